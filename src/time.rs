@@ -6,7 +6,9 @@ mod grid;
 mod typed;
 
 pub use grid::{Rate, Tick, TickGrid};
-pub(crate) use typed::{TRIM_MS, parse_duration, parse_time, parse_trim};
+pub(crate) use typed::{
+    TRIM_FRAMES, TRIM_MS, TrimChange, parse_duration, parse_time, parse_trim, parse_trim_change,
+};
 
 use std::fmt;
 use std::ops::{Add, AddAssign, Sub};

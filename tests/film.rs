@@ -147,11 +147,12 @@ fn the_seat_rests_while_the_film_stands_and_joins_it_where_it_goes_on() {
 
 #[test]
 fn a_film_that_ends_parks_the_seats_and_a_show_that_it_never_led_moves_none() {
-    let played = play(vec![film(0.5, 0.5, 1.0, FilmState::Locked), film(8.0, 8.0, 0.0, FilmState::Ended)]);
-    assert_eq!(
-        (played.ended.ending, played.frames.last().unwrap().request.positions[0].0),
-        (Ending::Completed, 0)
-    );
+    for (ends_s, ending) in [(8.0, Ending::Stopped), (29.0, Ending::Completed)] {
+        let played =
+            play(vec![film(0.5, 0.5, 1.0, FilmState::Locked), film(ends_s, ends_s, 0.0, FilmState::Ended)]);
+        let parked = played.frames.last().unwrap().request.positions[0].0;
+        assert_eq!((played.ended.ending, parked), (ending, 0), "it ends at {ends_s} s of {LENGTH}");
+    }
     let absent = Virtual { script: vec![(900, Event::Leave)], ..chasing() }.play();
     assert_eq!((absent.frames.len(), absent.ended.ending), (0, Ending::Stopped));
     let lost = play(vec![

@@ -174,8 +174,11 @@ fn serial_lines_are_the_only_devices_of_the_drop_in_for_drives_which_nobody_gets
 }
 
 #[test]
-fn alerts_are_what_prometheus_takes() {
+fn alerts_are_what_prometheus_takes_and_a_lost_film_raises_one_only_where_seats_wait_for_it() {
     if let Some(output) = tool("promtool", &["check", "rules", "systemd/prometheus/kinocue.rules.yml"]) {
+        assert!(output.status.success(), "{}", said(&output));
+    }
+    if let Some(output) = tool("promtool", &["test", "rules", "tests/data/prometheus/film.test.yml"]) {
         assert!(output.status.success(), "{}", said(&output));
     }
 }

@@ -98,7 +98,7 @@ fn a_day_is_a_table_with_a_line_for_all_together() {
         assert!(run.stdout.contains(part), "{part}: {}", run.stdout);
     }
     assert!(run.stdout.contains("ride: A2 was lost at 00:12.000"), "{}", run.stdout);
-    let film = "ride: followed the film by ltc:alsa:hw:2,0, artnet:10.0.0.20, at the most 1.25 ms from it, sources changed 1 times\n";
+    let film = "ride: followed the film by ltc:alsa:hw:2,0, artnet:10.0.0.20, at the most 1.25 ms from it, the source changed once\n";
     assert!(run.stdout.contains(film) && !run.stdout.contains("storm: followed"), "{}", run.stdout);
     let totals = "3 shows on 2026-11-21: 1 completed, 1 stopped, 1 interrupted; 00:10:30 in all; 8000 frames sent, 7998 \
                   acked, 0 refused, 2 lost";

@@ -7,18 +7,21 @@ use super::asker::{Asker, StatusReply};
 use super::input::{Json, Name, Nothing};
 use super::problem::bad_value;
 use crate::control::{Command, LevelsChange, Problem, Status};
+use crate::time::TRIM_FRAMES;
 
 type Reply = Result<StatusReply, Problem>;
 
 /// How far the motion may be moved against the film, s, either way.
 const MAX_TRIM_S: f64 = 0.5;
 
-/// How much later than the film the motion is.
+/// How much later than the film the motion is: one of both.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Trim {
     /// Seconds, -0.5 to 0.5, in whole milliseconds.
-    offset_s: f64,
+    offset_s: Option<f64>,
+    /// Later than it is by so many frames of the film, -12 to 12.
+    frames: Option<i32>,
 }
 
 /// Which seats are tested.
@@ -34,8 +37,16 @@ pub(super) struct Test {
 #[utoipa::path(
     put, path = "/api/v1/trim", tag = "settings", request_body = Trim, responses((status = 200, body = Status))
 )]
-pub(super) async fn trim(asker: Asker, Json(Trim { offset_s }): Json<Trim>) -> Reply {
-    asker.ask(Command::Trim(trim_ms(offset_s)?)).await
+pub(super) async fn trim(asker: Asker, Json(trim): Json<Trim>) -> Reply {
+    let ask = match (trim.offset_s, trim.frames) {
+        (Some(offset_s), None) => Command::Trim(trim_ms(offset_s)?),
+        (None, Some(frames)) if (-TRIM_FRAMES..=TRIM_FRAMES).contains(&frames) => Command::Nudge(frames),
+        _ => {
+            let detail = "a trim is offset_s, or frames by which it changes".to_owned();
+            return Err(bad_value(detail, "give one of both; frames of the film are -12 to 12"));
+        }
+    };
+    asker.ask(ask).await
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "500 at the most")]

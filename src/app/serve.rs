@@ -193,6 +193,7 @@ fn serve_halls(
     let service_log = ServiceLog::new(log.clone());
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let carryover = Carryover::of(kept);
+    let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut ports = SupervisorPorts {
         inbox,
         source,
@@ -204,8 +205,8 @@ fn serve_halls(
         settings_file,
         film: None,
         player: None,
+        osc: surfaces.osc_counts(),
     };
-    let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
     mark.leave()?;

@@ -3,6 +3,7 @@
 
 use std::io;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::thread::{Builder, JoinHandle};
 
 use tokio::runtime;
@@ -13,7 +14,7 @@ use crate::config::Config;
 use crate::control::Handle;
 use crate::library::Library;
 use crate::log::{Line, Log, Priority};
-use crate::osc::{self, Osc, OscError};
+use crate::osc::{self, Counts, Osc, OscError};
 use crate::playlist::Shelf;
 use crate::text_port::{self, Text, TextError};
 
@@ -49,6 +50,7 @@ pub(crate) enum SurfaceError {
 pub(crate) struct Surfaces {
     // The stop goes last.
     ports: Option<Ports>,
+    osc: Option<Arc<Counts>>,
     api: api::Running,
     stop: StopSocket,
 }
@@ -86,9 +88,10 @@ impl Surfaces {
         })?;
         let osc = config.osc.as_ref().map(|osc| osc::open(osc, handle.clone())).transpose()?;
         let text = config.text.as_ref().map(|text| text_port::open(text, handle.clone())).transpose()?;
+        let counts = osc.as_ref().map(Osc::counts);
         let ports =
             if osc.is_some() || text.is_some() { Some(Ports::start(osc, text, log.clone())?) } else { None };
-        Ok(Self { ports, api, stop })
+        Ok(Self { ports, osc: counts, api, stop })
     }
 
     /// Where the API listens over TCP.
@@ -97,9 +100,14 @@ impl Surfaces {
         self.api.addresses()
     }
 
+    /// What has come to the port for OSC, if there is one.
+    pub(crate) fn osc_counts(&self) -> Option<Arc<Counts>> {
+        self.osc.clone()
+    }
+
     /// Closes them in turn, the stop last.
     pub(crate) fn close(self) {
-        let Self { ports, api, stop } = self;
+        let Self { ports, api, stop, .. } = self;
         drop(ports);
         drop(api);
         drop(stop);

@@ -18,7 +18,6 @@ use crate::config::{Config, from_to_args, parse_level};
 use crate::control::model::Ending;
 use crate::drive::Manner;
 use crate::engine::Show;
-use crate::film::follower::PaceLimits;
 use crate::film::source::{ClockStart, FilmArgs, FilmSource};
 use crate::health::ACKS_OFF;
 use crate::sys::{signal, terminal};
@@ -130,7 +129,7 @@ fn film(args: &Args) -> Result<Option<FilmReader>, Failure> {
     if sources.is_empty() {
         return Ok(None);
     }
-    let rules = SourceRules { allows_coarse: args.allow_coarse, band: PaceLimits::default().band };
+    let rules = SourceRules { allows_coarse: args.allow_coarse, ..SourceRules::default() };
     FilmReader::start(&sources, rules).map(Some).or_exit(Exit::System)
 }
 

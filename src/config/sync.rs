@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::fault::Faults;
 use super::section::{Entry, Section};
-use crate::film::chase::Rejoin;
+use crate::film::chase::{JOIN_ABOVE, Rejoin};
 use crate::film::chooser::MOST_SOURCES;
 use crate::film::follower::PaceLimits;
 use crate::film::source::{FilmArgs, FilmSource, milliseconds};
@@ -15,6 +15,10 @@ use crate::time::ShowTime;
 /// How far from 1 a film's rate may be, and how much the seats may add to it: 25/24 is 4.2 %.
 const BAND_MOST: f64 = 0.05;
 const SLEW: std::ops::RangeInclusive<f64> = 0.005..=0.02;
+/// A tenth of it is 50 ms for a silent line, two timecode frames; with twice of it nobody notices within 4 s that a film stands.
+const FREEWHEEL: std::ops::RangeInclusive<f64> = 0.1..=2.0;
+/// Less is a source's own jitter, and more is seen in the picture.
+const JOIN_MS: std::ops::RangeInclusive<u128> = 10..=200;
 
 /// Kinds of sources; each has a table of its name.
 const KINDS: [&str; 8] = ["ltc", "mpv", "mtc", "artnet", "osc", "http", "clock", "sound"];
@@ -30,6 +34,10 @@ pub(crate) struct FilmSync {
     pub(crate) offset: ShowTime,
     /// The paces that shows are proved at.
     pub(crate) pace: PaceLimits,
+    /// Errors beyond it are joined, not slewed.
+    pub(crate) join_above: Duration,
+    /// For how long a source that falls silent is taken to run on, as a multiple of what its kind and the cause allow.
+    pub(crate) freewheel: f64,
     /// When seats that hold may join again.
     pub(crate) rejoin: Rejoin,
     /// True if those may lead as well that have not proved themselves.
@@ -43,6 +51,8 @@ impl Default for FilmSync {
             leads: false,
             offset: ShowTime::ZERO,
             pace: PaceLimits::default(),
+            join_above: JOIN_ABOVE,
+            freewheel: 1.0,
             rejoin: Rejoin::Auto,
             allows_coarse: false,
         }
@@ -79,6 +89,7 @@ pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync
     let sources = names.iter().filter_map(|name| source(*name, &mut section)).collect::<Vec<_>>();
     let [ltc, sound] =
         ["ltc", "sound"].map(|kind| section.get(kind).and_then(|entry| latency(entry, section.faults)));
+    let channel = section.get("ltc").and_then(|entry| channel(entry, section.faults)).unwrap_or(1);
     let films = section.get("mpv").map(|entry| films(entry, section.faults)).unwrap_or_default();
     let args = |(name, source): (Entry<'_>, FilmSource)| {
         let films = if matches!(source, FilmSource::Mpv(_)) { films.clone() } else { Vec::new() };
@@ -90,7 +101,7 @@ pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync
         let latency = latency.unwrap_or_default();
         let args = FilmArgs::new(source, fps.as_deref(), start.as_deref());
         let args = args.map_err(|error| name.fault(section.faults, &error.to_string())).ok()?;
-        Some(FilmArgs { latency, films, ..args })
+        Some(FilmArgs { latency, films, channel, ..args })
     };
     let sources = sources.into_iter().filter_map(args).collect();
     let default = PaceLimits::default();
@@ -98,13 +109,16 @@ pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync
         band: share(&mut section, "rate_band", 0.0..=BAND_MOST).unwrap_or(default.band),
         slew: share(&mut section, "slew", SLEW).unwrap_or(default.slew),
     };
+    let freewheel = share(&mut section, "freewheel", FREEWHEEL).unwrap_or(1.0);
+    let join_above = section.get("join_above").and_then(|entry| apart(entry, section.faults));
     let offset = section.get("offset").and_then(|entry| signed_ms(entry, section.faults)).unwrap_or_default();
     let rejoin =
         section.choice("rejoin", &[("auto", Rejoin::Auto), ("ask", Rejoin::Ask)]).unwrap_or(Rejoin::Auto);
     let allows_coarse = section.get("allow_coarse").and_then(|entry| entry.switch(section.faults));
     section.finish();
     let (leads, allows_coarse) = (start.is_some(), allows_coarse.unwrap_or(false));
-    Some(FilmSync { sources, leads, offset, pace, rejoin, allows_coarse })
+    let join_above = join_above.unwrap_or(JOIN_ABOVE);
+    Some(FilmSync { sources, leads, offset, pace, join_above, freewheel, rejoin, allows_coarse })
 }
 
 /// A source: by the name of its table, or whole, as `play --chase` takes it.
@@ -141,7 +155,8 @@ fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) 
     let beside = if more.is_empty() { None } else { table.text(more) };
     // How late it is, and which films count, are read for themselves.
     match kind {
-        "ltc" | "sound" => table.get("latency"),
+        "ltc" => table.get("latency").or(table.get("channel")),
+        "sound" => table.get("latency"),
         "mpv" => table.get("films"),
         _ => None,
     };
@@ -165,6 +180,26 @@ fn latency(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Duration> {
         entry.fault(faults, "is no latency of up to a second; write it as \"10.6ms\"");
     }
     late
+}
+
+/// The channel of a line that has the timecode.
+fn channel(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<u8> {
+    let value = entry.value.as_table()?.get("channel")?;
+    Entry::new("channel", value).whole_in(1..=64, faults)
+}
+
+/// `"40ms"`.
+fn apart(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Duration> {
+    let text = entry.text(faults)?;
+    let span = milliseconds(text).filter(|span| JOIN_MS.contains(&span.as_millis()));
+    if span.is_none() {
+        let (least, most) = (JOIN_MS.start(), JOIN_MS.end());
+        entry.fault(
+            faults,
+            &format!("{text:?} is no time within {least}ms to {most}ms; write it as \"40ms\""),
+        );
+    }
+    span
 }
 
 /// `"0.15%"`.
@@ -213,7 +248,8 @@ mod tests {
     fn sources_are_ranked_by_the_names_of_their_tables_or_whole() {
         let text = "[sync]\nsources = [\"ltc\", \"artnet\", \"mpv:/run/hall.sock\"]\nfilm_fps = \"25\"\nstart = \"01:00:00:00\"\n\
                     rate_band = \"0.2%\"\nslew = \"0.5 %\"\noffset = \"-40ms\"\nallow_coarse = true\n\
-                    [sync.ltc]\ninput = \"alsa:hw:2,0\"\nlatency = \"10.6ms\"\n\
+                    join_above = \"25ms\"\nfreewheel = \"50%\"\n\
+                    [sync.ltc]\ninput = \"alsa:hw:2,0\"\nchannel = 2\nlatency = \"10.6ms\"\n\
                     [sync.artnet]\nfrom = \"10.0.0.20\"\nbind = \"10.0.0.2:6454\"\n";
         let sync = hall_with(text).sync.unwrap();
         let names: Vec<_> = sync.sources.iter().map(|args| args.source.to_string()).collect();
@@ -222,6 +258,7 @@ mod tests {
         assert_eq!(late, [10_600, 0, 0]);
         assert!((sync.pace.band - 0.002).abs() < 1e-9 && (sync.pace.slew - 0.005).abs() < 1e-9);
         assert!(sync.leads && sync.allows_coarse && sync.offset.as_nanos() == -40_000_000);
+        assert_eq!((sync.join_above.as_millis(), sync.freewheel, sync.sources[0].channel), (25, 0.5, 2));
         let bare = hall_with("[sync]\nsources = [\"mpv:/run/hall.sock\"]").sync.unwrap();
         assert!(!bare.leads && !bare.allows_coarse, "nobody follows what begins nowhere");
     }
@@ -279,6 +316,9 @@ mod tests {
                 "sources = [\"ltc\"]\n[sync.ltc]\ninput = \"-\"\nlatency = \"2000ms\"",
                 "no latency of up to a second",
             ),
+            ("sources = [\"mpv:/s\"]\njoin_above = \"9ms\"", "is no time within 10ms to 200ms"),
+            ("sources = [\"mpv:/s\"]\nfreewheel = \"5%\"", "is no share within 10% to 200%"),
+            ("sources = [\"ltc\"]\n[sync.ltc]\ninput = \"-\"\nchannel = 0", "0 is outside 1..=64"),
             ("sources = [\"mpv:/s\"]\nrank = 1", "rank: unknown key in [sync]"),
         ];
         for (text, says) in wrong {

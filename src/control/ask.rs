@@ -56,6 +56,8 @@ pub enum Command {
     Clear,
     /// How much later than the film the motion is, ms, -500 to 500.
     Trim(i32),
+    /// Motion later than it is by so many frames of the film, -12 to 12.
+    Nudge(i32),
     /// Have the film followed by that source, or by the ranking.
     Source(Option<String>),
     /// Change levels and effects.
@@ -140,7 +142,7 @@ impl Command {
             Self::Stop => ("stop", View, LASTS, None),
             Self::Park => ("park", Operate, STALE, Some(GearWord::Park)),
             Self::Clear => ("clear", Engineer, STALE, None),
-            Self::Trim(_) => ("trim", Operate, LASTS, Some(GearWord::Trim)),
+            Self::Trim(_) | Self::Nudge(_) => ("trim", Operate, LASTS, Some(GearWord::Trim)),
             Self::Source(_) => ("source", Operate, LASTS, None),
             Self::Levels(_) => ("levels", Operate, LASTS, Some(GearWord::Levels)),
             Self::Preset(_) => ("preset", Operate, LASTS, None),
@@ -196,6 +198,7 @@ impl fmt::Display for Command {
             Self::Select { entry } => write!(f, " entry {}", entry.saturating_add(1)), // as people count
             Self::Seek(film) => write!(f, " {film}"),
             Self::Trim(ms) => write!(f, " {ms} ms"),
+            Self::Nudge(frames) => write!(f, " {frames:+} frames"),
             Self::Source(name) => write!(f, " {}", name.as_deref().unwrap_or("by the ranking")),
             Self::Levels(change) => change.fmt(f),
             Self::GoFrom(film) => write!(f, " from {film}"),

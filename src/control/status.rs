@@ -1,6 +1,8 @@
 //! The status of the hall. The supervisor publishes one ten times a second and after every change; every surface shows
 //! this and nothing else.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -48,6 +50,11 @@ pub struct Status {
     pub playlist: Option<PlaylistStatus>,
     /// The film that leads shows; null where each show is its own film.
     pub film: Option<FilmStatus>,
+    /// What came to the port for OSC since the program started, by what became of it: datagrams `received`, of these `foreign` (from
+    /// no source) and `malformed`; messages `refused`, `forbidden`, `early`, `repeated`, `done` and `not_done`; feedback `unsent`.
+    /// Left out where there is no such port.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub osc: Option<BTreeMap<String, u64>>,
     /// How much later than the film the motion is, ms.
     pub trim_ms: i32,
     /// Levels and effects as they are set.
@@ -175,6 +182,8 @@ pub struct FilmStatus {
     pub(crate) chosen: Option<String>,
     /// How often another source took over.
     pub(crate) switches: u64,
+    /// How often seats have joined it since the hall was opened.
+    pub(crate) joins: u64,
     /// All sources, in their ranking.
     pub(crate) sources: Vec<FilmSourceStatus>,
 }
@@ -211,6 +220,8 @@ pub(crate) struct FilmSourceStatus {
     pub(crate) may_lead: bool,
     /// How often nothing was heard of it.
     pub(crate) dropouts: u64,
+    /// For how long the film was taken to run on meanwhile, s.
+    pub(crate) freewheel_s: f64,
     /// Samples that were too far off to be used.
     pub(crate) rejected: u64,
     /// How often the film jumped by it.
@@ -219,6 +230,8 @@ pub(crate) struct FilmSourceStatus {
     pub(crate) level_dbfs: Option<f64>,
     /// What others sent in its place, and was not heard.
     pub(crate) foreign: u64,
+    /// What it sent that says nothing of a film.
+    pub(crate) garbage: u64,
 }
 
 /// A playlist, and where in it the hall is.

@@ -1,10 +1,7 @@
-//! Art-Net timecode (`ArtTimeCode` of the Art-Net 4 protocol): 19 bytes of UDP, of which anybody in the network can send some. So one
-//! sender is heard, and the others are counted.
+//! Art-Net timecode (`ArtTimeCode` of the Art-Net 4 protocol): 19 bytes of UDP.
 
 #[cfg(test)]
 mod tests;
-
-use std::net::IpAddr;
 
 use super::labels::LabelClock;
 use super::observation::{FilmWord, Observation};
@@ -58,25 +55,22 @@ impl ArtTimecode {
     }
 }
 
-/// Hears one sender of Art-Net timecode.
+/// Hears a sender of Art-Net timecode.
 #[derive(Debug, Clone)]
 pub(crate) struct ArtNetReader {
-    /// Who is heard: named, or whoever was first.
-    from: Option<IpAddr>,
     labels: LabelClock,
-    foreign: u64,
     garbage: u64,
 }
 
 impl ArtNetReader {
-    /// Hears that sender, or the first there is.
-    pub(crate) const fn new(from: Option<IpAddr>, rate: Option<FrameRate>, start: Label) -> Self {
-        Self { from, labels: LabelClock::new(rate, start, SIGMA_S), foreign: 0, garbage: 0 }
+    /// One whose frames last as `rate` says, or as is found; the label `start` is time 0 of the film.
+    pub(crate) const fn new(rate: Option<FrameRate>, start: Label) -> Self {
+        Self { labels: LabelClock::new(rate, start, SIGMA_S), garbage: 0 }
     }
 
-    /// Datagrams with timecode of others, and datagrams of the sender that are none.
-    pub(crate) const fn ignored(&self) -> (u64, u64) {
-        (self.foreign, self.garbage)
+    /// Datagrams that are no timecode.
+    pub(crate) const fn garbage(&self) -> u64 {
+        self.garbage
     }
 
     /// Its labels.
@@ -85,21 +79,11 @@ impl ArtNetReader {
     }
 
     /// Takes a datagram that came at an instant.
-    pub(crate) fn hear(
-        &mut self,
-        bytes: &[u8],
-        from: IpAddr,
-        at: MonoTime,
-        out: &mut impl FnMut(Observation),
-    ) {
+    pub(crate) fn hear(&mut self, bytes: &[u8], at: MonoTime, out: &mut impl FnMut(Observation)) {
         let Some(ArtTimecode { label, labels }) = ArtTimecode::parse(bytes) else {
             self.garbage += 1;
             return;
         };
-        if *self.from.get_or_insert(from) != from {
-            self.foreign += 1;
-            return;
-        }
         if let Some(media) = self.labels.media(at, label, 0, Some(labels)) {
             out(Observation::new(at, FilmWord::Position(media)));
         }

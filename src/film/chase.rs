@@ -15,7 +15,7 @@ pub(crate) const JOIN_ABOVE: Duration = FILM_FRAME;
 /// Seats that are parked join once the film has been followable for so long: a reader that flickers must not begin a show.
 const READY_FOR: Duration = Duration::from_millis(500);
 /// So long before the first sample of the cue seats join its first pose.
-const PRE_ROLL: ShowTime = ShowTime::from_millis(-10_000);
+pub(crate) const PRE_ROLL: ShowTime = ShowTime::from_millis(-10_000);
 /// A film that is outside the cue for longer has left it.
 const LEFT_AFTER: Duration = Duration::from_secs(2);
 /// Seats that have held for longer are parked, as in a pause.
@@ -23,6 +23,10 @@ const HELD_AFTER: Duration = Duration::from_mins(5);
 /// The next join waits for a person if so many came within [`UNSTABLE_WITHIN`].
 const UNSTABLE_JOINS: usize = 5;
 const UNSTABLE_WITHIN: Duration = Duration::from_mins(1);
+/// Of so many parts of a cue, so many have to be led for it to have been played: whoever joins within the first tenth, or leaves in
+/// the last, has seen it.
+const PARTS: i64 = 32;
+const PARTS_LED: u32 = 29;
 
 /// Where a show that chases a film stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -53,8 +57,10 @@ pub enum HoldCause {
 /// Why seats park.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ParkCause {
-    /// The film is over.
+    /// The film is over, and with it the cue.
     FilmEnded,
+    /// The film is over, and part of the cue was never led.
+    FilmCutShort,
     /// The film is outside the cue.
     CueLeft,
     /// Nobody knew for too long where the film is.
@@ -173,6 +179,8 @@ pub struct Chase {
     let_join: bool,
     ready_since: Option<MonoTime>,
     outside_since: Option<MonoTime>,
+    /// The parts of the cue in which seats have followed, a bit each.
+    led: u32,
     why: HoldCause,
     end: ParkCause,
 }
@@ -191,6 +199,7 @@ impl Chase {
             let_join: false,
             ready_since: None,
             outside_since: None,
+            led: 0,
             why: HoldCause::Film(FilmState::Absent),
             end: ParkCause::CueLeft,
         }
@@ -226,6 +235,7 @@ impl Chase {
                 } else {
                     self.join(&point, (now, end), input.trim_ms);
                 }
+                self.note_led();
             }
             (ChaseSign::Barred | ChaseSign::Brief | ChaseSign::Ready, _) => {}
         }
@@ -237,6 +247,12 @@ impl Chase {
         self.joined[self.joins as usize % UNSTABLE_JOINS] = now;
         self.joins = self.joins.wrapping_add(1);
         self.let_join = false;
+    }
+
+    /// Notes the part of the cue that seats follow in. Parts, not time: who is led through one half twice has not seen the other.
+    fn note_led(&mut self) {
+        let at = self.follower.playhead().as_nanos().checked_div(self.rules.cue_end.as_nanos() / PARTS);
+        self.led |= at.and_then(|part| 1_u32.checked_shl(part.try_into().ok()?)).unwrap_or_default();
     }
 
     const fn verdict(&self) -> ChaseVerdict {
@@ -288,7 +304,8 @@ impl Chase {
     /// The film cannot be followed.
     fn sign_of_nobody(&mut self, state: FilmState, now: MonoTime) -> ChaseSign {
         if state == FilmState::Ended {
-            return ChaseSign::Over(ParkCause::FilmEnded);
+            let is_led = self.led.count_ones() >= PARTS_LED;
+            return ChaseSign::Over(if is_led { ParkCause::FilmEnded } else { ParkCause::FilmCutShort });
         }
         self.outside_since = None;
         self.held(HoldCause::Film(state), now)

@@ -90,6 +90,8 @@ pub(crate) struct FilmArgs {
     pub(crate) start: Label,
     /// How long sound takes from the line to a block.
     pub(crate) latency: Duration,
+    /// The channel of a line that has the timecode, counted from 1.
+    pub(crate) channel: u8,
     /// The files that a player may lead with, by name or path; any where none is named.
     pub(crate) films: Vec<String>,
 }
@@ -124,7 +126,8 @@ impl FilmArgs {
 
     /// A source that tells the film's own time, from the cue's beginning on.
     pub(crate) fn of(source: FilmSource) -> Self {
-        Self { source, rate: None, start: Label::default(), latency: Duration::ZERO, films: Vec::new() }
+        let (start, latency) = (Label::default(), Duration::ZERO);
+        Self { source, rate: None, start, latency, channel: 1, films: Vec::new() }
     }
 
     /// What is written for them: a source, frames a second, and the timecode at which the cue begins.
@@ -141,13 +144,7 @@ impl FilmArgs {
         if let (Some(start), Some(rate)) = (start, rate) {
             Timecode::of(start, rate).map_err(|error| FilmArgError::of(&error))?;
         }
-        Ok(Self {
-            source,
-            rate,
-            start: start.unwrap_or_default(),
-            latency: Duration::ZERO,
-            films: Vec::new(),
-        })
+        Ok(Self { rate, start: start.unwrap_or_default(), ..Self::of(source) })
     }
 }
 

@@ -72,6 +72,8 @@ pub(crate) struct TrackerCounts {
     pub(crate) jumps: u64,
     /// How often samples were missing.
     pub(crate) dropouts: u64,
+    /// For how long the estimate has run on without them, in all.
+    pub(crate) freewheel: Duration,
 }
 
 /// The tracker of one source. Any thread; allocates nothing.
@@ -103,6 +105,9 @@ pub(crate) struct SourceTracker {
     held: HeldSince,
     /// For how long after the newest position the estimate may run on.
     patience: Duration,
+    /// And that as a multiple of it.
+    freewheel: f64,
+    polled: MonoTime,
     counts: TrackerCounts,
 }
 
@@ -152,6 +157,8 @@ impl SourceTracker {
             needed: traits.samples(),
             held: HeldSince::default(),
             patience: traits.silent_for,
+            freewheel: 1.0,
+            polled: now,
             counts: TrackerCounts::default(),
         }
     }

@@ -71,7 +71,7 @@ impl HoldCause {
     pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Film(state) => state.words(),
-            Self::Apart => "the film was more than 40 ms away from the seats",
+            Self::Apart => "the film was further away from the seats than they slew to it",
             Self::Unstable => "the seats had to join five times in a minute: see to its source, and resume",
             Self::Asks => "each join waits for a person: resume",
         }
@@ -84,6 +84,9 @@ impl ParkCause {
     pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::FilmEnded => "the film is over",
+            Self::FilmCutShort => {
+                "the film is over, and the seats have followed it through a part of the cue alone"
+            }
             Self::CueLeft => "the film has left the cue",
             Self::HeldTooLong => "the film could not be followed for five minutes",
         }

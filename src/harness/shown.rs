@@ -179,6 +179,12 @@ impl ShownFilm {
         self
     }
 
+    /// What comes of it for a while cannot be read.
+    pub fn unreadable(mut self, from: f64, to: f64) -> Self {
+        self.words.push((from, FilmWord::Dirt));
+        self.unheard(from, to)
+    }
+
     /// Somebody winds it, and says so, to so many seconds further on.
     pub fn sought(mut self, at: f64, seconds: f64) -> Self {
         self.truth = self.truth.step_at(at, seconds);

@@ -31,6 +31,7 @@ fn whole(film: &FilmStatus) -> Vec<Family> {
             apart,
         ),
         Family::counter("sync_switches", "How often another source took over", film.switches),
+        Family::counter("sync_joins", "How often seats have joined the film", film.joins),
     ]
 }
 
@@ -65,6 +66,12 @@ fn counts(all: &[FilmSourceStatus]) -> Vec<Family> {
         counters(all, "sync_rejected", "Samples too far off to be used", |one| one.rejected),
         counters(all, "sync_jumps", "How often the film jumped by the source", |one| one.jumps),
         counters(all, "sync_foreign", "What others sent in place of the source", |one| one.foreign),
+        counters(all, "sync_garbage", "What the source sent that says nothing of a film", |one| one.garbage),
+        Family {
+            name: "sync_freewheel_seconds",
+            help: "For how long the film was taken to run on while nothing was heard of the source",
+            values: Values::Seconds(all.iter().map(|one| (of(one), one.freewheel_s)).collect()),
+        },
     ]
 }
 

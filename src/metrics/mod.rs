@@ -62,6 +62,8 @@ enum Values {
     Gauges(Vec<(Labels, f64)>),
     /// What only grows while the program runs.
     Counters(Vec<(Labels, u64)>),
+    /// The same of seconds.
+    Seconds(Vec<(Labels, f64)>),
     /// What is said by labels alone.
     Info(Labels),
     /// Counts by size, s.
@@ -91,7 +93,7 @@ impl Family {
         let Self { name, help, values } = self;
         let kind = match values {
             Values::Gauges(_) => MetricType::Gauge,
-            Values::Counters(_) => MetricType::Counter,
+            Values::Counters(_) | Values::Seconds(_) => MetricType::Counter,
             Values::Info(_) => MetricType::Info,
             Values::Histogram { .. } => MetricType::Histogram,
         };
@@ -104,6 +106,9 @@ impl Family {
             Values::Counters(all) => all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
                 [] => metric.encode_counter(value, NO_EXEMPLAR),
                 _ => metric.encode_family(labels)?.encode_counter(value, NO_EXEMPLAR),
+            }),
+            Values::Seconds(all) => all.iter().try_for_each(|(labels, seconds)| {
+                metric.encode_family(labels)?.encode_counter(seconds, NO_EXEMPLAR)
             }),
             Values::Info(labels) => metric.encode_info(labels),
             Values::Histogram { sum, buckets } => {

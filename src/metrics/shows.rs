@@ -12,6 +12,13 @@ pub(super) fn families(status: &Status) -> Vec<Family> {
     all.extend(levels(status));
     all.extend(machine(status));
     all.push(warnings(status));
+    all.extend(status.osc.as_ref().map(|counts| Family {
+        name: "osc_messages",
+        help: "What came to the port for OSC, by what became of it",
+        values: Values::Counters(
+            counts.iter().map(|(word, count)| (label("result", word.as_str()), *count)).collect(),
+        ),
+    }));
     all
 }
 

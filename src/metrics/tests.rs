@@ -55,6 +55,7 @@ fn film() -> FilmStatus {
         source: "ltc:alsa:hw:2,0".to_owned(),
         state: "lost".to_owned(),
         dropouts: 3,
+        freewheel_s: 4.5,
         level_dbfs: Some(-60.0),
         ..FilmSourceStatus::default()
     };
@@ -73,6 +74,7 @@ fn film() -> FilmStatus {
         error_ms: Some(-0.5),
         disagrees: Some(FilmDisagreement { source: silent.source.clone(), ahead_s: 3.25 }),
         switches: 2,
+        joins: 4,
         sources: vec![silent, leading],
         ..FilmStatus::default()
     }
@@ -102,6 +104,7 @@ fn playing() -> Status {
         lapses_s: None,
         moving: true,
         film: Some(film()),
+        osc: Some([("received".to_owned(), 12), ("refused".to_owned(), 3)].into()),
         show: Some(ShowStatus {
             cue: "storm".to_owned(),
             title: None,
@@ -146,6 +149,7 @@ fn booting() -> Status {
         state: State::Boot.into(),
         moving: false,
         film: None,
+        osc: None,
         show: None,
         lateness: Times::default(),
         ack_latency: Times::default(),
@@ -217,6 +221,7 @@ fn figures_are_in_base_units() {
         ("kinocue_acks_total{controller=\"B1\",result=\"lost\"}", 8.0),
         ("kinocue_limit_interventions_total{controller=\"B1\"}", 3.0),
         ("kinocue_controller_ack_latency_seconds{controller=\"B1\",quantile=\"0.5\"}", 40e-6),
+        ("kinocue_osc_messages_total{result=\"refused\"}", 3.0),
     ] {
         assert_eq!(page.samples.get(series), Some(&value), "{series}");
     }
@@ -231,6 +236,8 @@ fn a_film_is_told_by_each_of_its_sources_and_not_at_all_where_none_is_followed()
         ("kinocue_sync_error_seconds", -0.000_5),
         ("kinocue_sync_disagreement_seconds", 3.25),
         ("kinocue_sync_switches_total", 2.0),
+        ("kinocue_sync_joins_total", 4.0),
+        ("kinocue_sync_freewheel_seconds_total{source=\"ltc:alsa:hw:2,0\"}", 4.5),
         ("kinocue_sync_leads{source=\"ltc:alsa:hw:2,0\"}", 0.0),
         ("kinocue_sync_leads{source=\"artnet:10.0.0.20\"}", 1.0),
         ("kinocue_sync_chosen{source=\"artnet:10.0.0.20\"}", 0.0),

@@ -1,5 +1,6 @@
 //! How many datagrams and messages came to what end.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What a count is of.
@@ -45,9 +46,14 @@ impl Counts {
         self.0[what as usize].fetch_add(1, Ordering::Relaxed);
     }
 
+    /// All of them by their words, for the status.
+    #[must_use]
+    pub(crate) fn by_word(&self) -> BTreeMap<String, u64> {
+        self.all().map(|(word, count)| (word.to_owned(), count)).into()
+    }
+
     /// All of them with their words.
     #[must_use]
-    #[cfg(test)]
     pub(crate) fn all(&self) -> [(&'static str, u64); WORDS.len()] {
         std::array::from_fn(|place| (WORDS[place], self.0[place].load(Ordering::Relaxed)))
     }

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //!  in   /kinocue/go   /kinocue/pause   /kinocue/resume   /kinocue/stop   /kinocue/park
-//!       /kinocue/seek f(s)   /kinocue/trim f(ms)   /kinocue/level/motion f   /kinocue/level/vibration f
+//!       /kinocue/seek f(s)   /kinocue/trim f(ms)   /kinocue/nudge i(frames)   /kinocue/level/motion f   /kinocue/level/vibration f
 //!       /kinocue/effect/NAME i   /kinocue/row/ROW/level f   /kinocue/seat/NAME/enable i
 //!       /kinocue/subscribe i(port) i(s)
 //!  out  /kinocue/state s   /kinocue/position f(s)   /kinocue/warning is   /kinocue/heartbeat i(s)
@@ -75,7 +75,6 @@ impl Osc {
 
     /// What has come so far, for whoever counts.
     #[must_use]
-    #[cfg(test)]
     pub(crate) fn counts(&self) -> Arc<Counts> {
         Arc::clone(&self.counts)
     }

@@ -4,7 +4,7 @@ use rosc::{OscMessage, OscType};
 
 use crate::config::GearWord;
 use crate::control::{Command, LevelsChange};
-use crate::time::ShowTime;
+use crate::time::{ShowTime, TRIM_FRAMES};
 
 /// The longest that a subscription lasts before it has to be renewed, s.
 const LONGEST_S: u16 = 3_600;
@@ -55,6 +55,7 @@ pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, F
         ["park"] => taken.button(Command::Park),
         ["seek"] => taken.allowed(GearWord::Seek)?.seek(),
         ["trim"] => taken.allowed(GearWord::Trim)?.trim(),
+        ["nudge"] => taken.allowed(GearWord::Trim)?.nudge(),
         ["subscribe"] => taken.subscribe(),
         ["level", "motion"] => taken.levels(|motion| LevelsChange { motion: Some(motion), ..<_>::default() }),
         ["level", "vibration"] => {
@@ -124,6 +125,14 @@ impl Taken<'_> {
         let ms = ms.ok_or_else(|| self.wants("milliseconds, -500 to 500"))?;
         #[expect(clippy::cast_possible_truncation, reason = "it is within -500 to 500")]
         Ok(Order::Command(Command::Trim(ms.round() as i32)))
+    }
+
+    fn nudge(self) -> Result<Order, Fault> {
+        let most = f64::from(TRIM_FRAMES);
+        let frames = self.number().filter(|frames| (-most..=most).contains(frames) && frames.fract() == 0.0);
+        let frames = frames.ok_or_else(|| self.wants("whole frames of the film, -12 to 12"))?;
+        #[expect(clippy::cast_possible_truncation, reason = "it is a whole number within -12 to 12")]
+        Ok(Order::Command(Command::Nudge(frames as i32)))
     }
 
     fn levels(self, change: impl FnOnce(f64) -> LevelsChange) -> Result<Order, Fault> {
@@ -212,6 +221,7 @@ mod tests {
             ("/kinocue/seek", vec![OscType::Float(12.5)], Command::Seek(ShowTime::from_millis(12_500))),
             ("/kinocue/seek", vec![OscType::Int(750)], Command::Seek(ShowTime::from_millis(750_000))),
             ("/kinocue/trim", vec![OscType::Float(-80.4)], Command::Trim(-80)),
+            ("/kinocue/nudge", vec![OscType::Int(-1)], Command::Nudge(-1)),
             (
                 "/kinocue/level/motion",
                 vec![OscType::Float(0.6)],
@@ -281,6 +291,8 @@ mod tests {
             ("/kinocue/seek", OscType::Float(-0.5)),
             ("/kinocue/seek", OscType::Double(f64::INFINITY)),
             ("/kinocue/trim", OscType::Int(501)),
+            ("/kinocue/nudge", OscType::Int(13)),
+            ("/kinocue/nudge", OscType::Float(0.5)),
             ("/kinocue/effect/water", OscType::String("on".to_owned())),
             ("/kinocue/seat/A1/enable", OscType::Int(2)),
         ] {

@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::film::{FilmLead, FilmStart};
 use super::mail::{Alarm, News};
 use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, PlayProgress, Rest};
+use crate::film::chase::ParkCause;
 use crate::state::{
     Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
 };
@@ -31,7 +32,7 @@ pub struct Conductor {
     ended: Option<MonoTime>,
     /// The film that leads the show; none where that is a film of its own.
     film: Option<FilmLead>,
-    /// Whether that is why the seats parked.
+    /// Whether it led them to its end, and that is why the seats parked.
     film_is_over: bool,
     /// How far ahead of the film the seats are that follow it.
     film_error_ns: Option<i64>,
@@ -162,7 +163,7 @@ impl Conductor {
         self.film_error_ns = film.error_ns(reached, tick.deadline, trim_ms).filter(|_| follows);
         if rides {
             self.machine.event(event, now);
-            self.film_is_over = matches!(event, Event::FilmOver(_));
+            self.film_is_over = matches!(event, Event::FilmOver(ParkCause::FilmEnded));
             self.steer(engine);
         }
         target.filter(|_| rides)
@@ -171,6 +172,11 @@ impl Conductor {
     /// How far ahead of the film that they follow the seats are, nanoseconds; none while they follow none.
     pub(super) const fn film_error_ns(&self) -> Option<i64> {
         self.film_error_ns
+    }
+
+    /// How often seats have joined the film.
+    pub(super) fn film_joins(&self) -> u64 {
+        self.film.as_ref().map_or(0, FilmLead::joins)
     }
 
     /// Where the hall stands, and why.

@@ -23,6 +23,8 @@ pub struct FilmLead {
     chase: Chase,
     begin: ShowTime,
     followed: Followed,
+    /// How often seats have joined it.
+    joins: u64,
     /// Where it was in this tick, from the cue's beginning on.
     point: Option<FilmPoint>,
 }
@@ -45,6 +47,7 @@ impl FilmLead {
             chase: Chase::new(rules, now),
             begin: ShowTime::ZERO,
             followed: Followed::Always,
+            joins: 0,
             point: None,
         }
     }
@@ -83,6 +86,11 @@ impl FilmLead {
         self.chase.state() == ChaseState::Following
     }
 
+    /// How often seats have joined it, in all shows.
+    pub(super) const fn joins(&self) -> u64 {
+        self.joins
+    }
+
     /// How far ahead of the film, less the trim, seats are that reach `pose` of the cue at `at`, nanoseconds.
     pub(super) fn error_ns(&self, pose: ShowTime, at: MonoTime, trim_ms: i32) -> Option<i64> {
         let film = self.point?.media_at(at).as_nanos();
@@ -101,7 +109,10 @@ impl FilmLead {
         let point = self.clock.at(tick).map(|point| FilmPoint { media: point.media.since(begin), ..point });
         self.point = point;
         let state = point.map_or(FilmState::Absent, |point| point.state);
-        match self.chase.tick(&ChaseInput { tick, frame, point, trim_ms, may_lead }) {
+        let led = self.leads();
+        let verdict = self.chase.tick(&ChaseInput { tick, frame, point, trim_ms, may_lead });
+        self.joins += u64::from(!led && self.leads());
+        match verdict {
             ChaseVerdict::Wait => (Event::FilmAwaited(HoldCause::Film(state)), None),
             ChaseVerdict::Hold(cause) => (Event::FilmAwaited(cause), None),
             ChaseVerdict::Follow { playhead, .. } => (Event::FilmLeads, Some(playhead)),

@@ -71,6 +71,7 @@ pub struct Live {
     film_error_ns: AtomicI64,
     /// The greatest amount of that since somebody asked, and 1; 0 if they followed none.
     film_error_most: AtomicU64,
+    film_joins: AtomicU64,
     ticks: AtomicU64,
     missed: AtomicU64,
     beats: AtomicU64,
@@ -198,6 +199,11 @@ impl Live {
         Some(Duration::from_nanos(ns).as_secs_f64())
     }
 
+    /// How often seats have joined the film.
+    pub(crate) fn film_joins(&self) -> u64 {
+        self.film_joins.load(Ordering::Relaxed)
+    }
+
     /// Ticks that sent so far.
     #[must_use]
     pub(crate) fn ticks(&self) -> u64 {
@@ -287,8 +293,9 @@ impl Live {
         self.hall.set(machine.state(), moving && !engine.waits(), machine.clears());
     }
 
-    /// Notes how far ahead of the film the seats are.
-    pub(super) fn on_film_error(&self, ns: Option<i64>) {
+    /// Notes how far ahead of the film the seats are, and how often they have joined it.
+    pub(super) fn on_film(&self, ns: Option<i64>, joins: u64) {
+        self.film_joins.store(joins, Ordering::Relaxed);
         self.film_error_ns.store(ns.map_or(0, |ns| ns << 1 | 1), Ordering::Relaxed);
         if let Some(ns) = ns {
             self.film_error_most.fetch_max(ns.unsigned_abs().saturating_add(1), Ordering::Relaxed);

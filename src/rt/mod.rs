@@ -260,7 +260,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
 
     fn hand_on(&mut self) {
         self.mail.look(self.conductor.machine(), &self.engine);
-        self.mail.live().on_film_error(self.conductor.film_error_ns());
+        self.mail.live().on_film(self.conductor.film_error_ns(), self.conductor.film_joins());
         tell_state(&mut self.conductor, &mut self.mail);
         if let Some(request) = self.engine.take_request() {
             self.mail.task(Task::Plan(request));

@@ -86,6 +86,11 @@ pub(crate) enum Whose {
 }
 
 impl Cause {
+    /// True for the end of a show that was played to its end: the cue's, or that of a film that led it through the cue.
+    pub(crate) const fn completes(self) -> bool {
+        matches!(self, Self::CueEnded | Self::FilmOver(ParkCause::FilmEnded))
+    }
+
     /// Which controller or group it speaks of; `None` if it is the whole hall.
     #[must_use]
     pub(crate) const fn whose(self) -> Option<Whose> {

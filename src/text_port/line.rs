@@ -2,7 +2,7 @@
 
 use crate::config::{GearWord, parse_level};
 use crate::control::{Code, Command, LevelsChange, Problem};
-use crate::time::{parse_time, parse_trim};
+use crate::time::{TrimChange, parse_time, parse_trim_change};
 
 /// The lines that there are, as a refusal lists them.
 const LINES: &str = "go, pause, resume, stop, park, status, film, seek 12:30, trim +80ms, level 60%, level motion 60%, effect \
@@ -48,7 +48,10 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
         ["resume"] => Command::Resume,
         ["park"] => Command::Park,
         ["seek", at] => Command::Seek(parse_time(at).map_err(|why| argument(at, &why))?),
-        ["trim", trim] => Command::Trim(parse_trim(trim).map_err(|why| argument(trim, &why))?),
+        ["trim", trim] => match parse_trim_change(trim).map_err(|why| argument(trim, &why))? {
+            TrimChange::To(ms) => Command::Trim(ms),
+            TrimChange::ByFrames(frames) => Command::Nudge(frames),
+        },
         ["level", all] => level(all, |all| (Some(all), Some(all)))?,
         ["level", "motion", motion] => level(motion, |motion| (Some(motion), None))?,
         ["level", "vibration", vibration] => level(vibration, |vibration| (None, Some(vibration)))?,
@@ -129,6 +132,8 @@ mod tests {
             ("seek 12:30", Command::Seek(ShowTime::from_millis(750_000))),
             ("trim +80ms", Command::Trim(80)),
             ("trim -80ms", Command::Trim(-80)),
+            ("trim +2f", Command::Nudge(2)),
+            ("trim -1f", Command::Nudge(-1)),
             ("level 60%", levels(Some(0.6), Some(0.6))),
             ("level motion 60%", levels(Some(0.6), None)),
             ("level  vibration\t60%", levels(None, Some(0.6))),
@@ -182,6 +187,8 @@ mod tests {
         for (line, says) in [
             ("seek soon", "write SS[.mmm], MM:SS"),
             ("trim 501", "\"501\": a trim is -500ms to 500ms"),
+            ("trim 13f", "up to 12 frames"),
+            ("trim xf", "write +2f or -1f"),
             ("level 101%", "write 0% to 100%"),
         ] {
             let Fault::Refused(problem) = ordered(line.as_bytes()).unwrap_err() else { panic!("{line}") };

@@ -7,6 +7,9 @@ use super::ShowTime;
 /// The furthest that motion may be moved against the film, either way, milliseconds.
 pub(crate) const TRIM_MS: i32 = 500;
 
+/// The most frames of a film by which a trim changes at once: half a second of the slowest film, which is all that there is.
+pub(crate) const TRIM_FRAMES: i32 = 12;
+
 const SECOND: u128 = 1_000_000_000;
 
 /// The frame rates of a time code in frames.
@@ -63,6 +66,31 @@ pub(crate) fn parse_trim(text: &str) -> Result<i32, String> {
     let digits = text.strip_suffix("ms").unwrap_or(text);
     let trim = digits.parse().ok().filter(|ms| (-TRIM_MS..=TRIM_MS).contains(ms));
     trim.ok_or_else(|| format!("a trim is -{TRIM_MS}ms to {TRIM_MS}ms, in whole milliseconds"))
+}
+
+/// What is asked of a trim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TrimChange {
+    /// To be that, milliseconds.
+    To(i32),
+    /// To be later by so many frames of the film, or earlier.
+    ByFrames(i32),
+}
+
+/// A trim as [`parse_trim`] reads it, or frames by which it changes: `+2f`, `-1f`.
+///
+/// # Errors
+/// What is wrong with the text, for a person.
+pub(crate) fn parse_trim_change(text: &str) -> Result<TrimChange, String> {
+    let frames = text.strip_suffix('f').map(|frames| frames.parse().ok());
+    let frames = frames.map(|frames| frames.filter(|frames| (-TRIM_FRAMES..=TRIM_FRAMES).contains(frames)));
+    match frames {
+        None => parse_trim(text)
+            .map(TrimChange::To)
+            .map_err(|why| format!("{why}; or frames by which it changes, as +2f")),
+        Some(Some(frames)) => Ok(TrimChange::ByFrames(frames)),
+        Some(None) => Err(format!("a trim changes by up to {TRIM_FRAMES} frames; write +2f or -1f")),
+    }
 }
 
 fn hours_minutes(h: &str, m: &str) -> Option<u128> {

@@ -41,6 +41,7 @@ fn every_change_reaches_the_hall_as_it_was_asked() {
         (plain("/api/v1/show/disarm"), Command::Disarm),
         (plain("/api/v1/show/clear"), Command::Clear),
         (put("/api/v1/trim", r#"{"offset_s":0.08}"#), Command::Trim(80)),
+        (put("/api/v1/trim", r#"{"frames":-2}"#), Command::Nudge(-2)),
         (put("/api/v1/sync/source", r#"{"source":"ltc"}"#), Command::Source(Some("ltc".to_owned()))),
         (put("/api/v1/sync/source", r#"{"source":null}"#), Command::Source(None)),
         (
@@ -113,6 +114,9 @@ fn what_is_not_as_it_may_be_is_refused_and_reaches_nobody() {
         ("POST", "/api/v1/show/seek", json, r#"{"position_s":1e999}"#, 400, "value"),
         ("POST", "/api/v1/show/seek", json, r#"{"position_s":"1"}"#, 400, "value"),
         ("PUT", "/api/v1/trim", json, r#"{"offset_s":0.6}"#, 400, "value"),
+        ("PUT", "/api/v1/trim", json, r#"{"frames":13}"#, 400, "value"),
+        ("PUT", "/api/v1/trim", json, r#"{"offset_s":0.1,"frames":1}"#, 400, "value"),
+        ("PUT", "/api/v1/trim", json, "{}", 400, "value"),
         ("PUT", "/api/v1/levels", json, r#"{"motion":1.1}"#, 400, "value"),
         ("PUT", "/api/v1/levels", json, r#"{"movement":1}"#, 400, "value"),
         ("PUT", "/api/v1/playlist", json, "{}", 400, "value"),

@@ -59,10 +59,14 @@ fn a_show_follows_the_film_of_its_hall_once_a_person_has_let_it_go_and_moves_nob
     drop(reel);
     let waits = hall.wait(|status| status["state"] == "waiting" && status["film"]["state"] == "lost");
     assert_eq!(waits["film"]["error_ms"], serde_json::Value::Null, "seats that wait follow nothing");
+    assert_eq!(waits["film"]["joins"], 1, "{}", waits["film"]);
     assert_eq!(waits["cause"], "nothing is heard of the film any more");
     assert!(waits["next"].as_str().is_some_and(|next| next.contains("see to the film")), "{}", waits["next"]);
     let reel = film(0, "01:00:30:00");
-    hall.wait(|status| status["state"] == "playing" && status["show"]["position_s"].as_f64() > Some(29.0));
+    let again = hall
+        .wait(|status| status["state"] == "playing" && status["show"]["position_s"].as_f64() > Some(29.0));
+    assert_eq!(again["film"]["joins"], 2, "{}", again["film"]);
+    assert!(again["film"]["sources"][0]["freewheel_s"].as_f64() > Some(1.0), "{}", again["film"]);
     drop(reel);
     let _trailer = film(0, "02:00:00:00");
     let parked = hall.wait(|status| status["state"] == "parked");
@@ -126,6 +130,32 @@ fn each_entry_of_a_playlist_waits_for_its_own_place_in_one_reel() {
     let second = hall.wait(|status| status["state"] == "waiting" && status["playlist"]["current"] == 1);
     assert!(second["film"]["position_s"].as_f64() < Some(0.0), "it has not begun: {}", second["film"]);
     hall.comes_to("playing");
+    hall.comes_to("parked");
+    hall.close();
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn a_film_that_comes_to_the_place_of_another_entry_has_that_loaded_and_nobody_armed() {
+    let mut hall = hall(3);
+    let entry = |start: &str| format!("[[entry]]\ncue = \"night\"\nfilm = \"{start}\"\n");
+    let entries = ["01:10:00:00", "01:20:00:00"].map(entry).concat();
+    hall.write("playlists/reel.toml", &format!("title = \"Reel\"\n{entries}"));
+    hall.done(&["playlist", "reel"]);
+    let _reel = film(3, "01:20:00:00");
+    let loaded = hall.wait(|status| status["playlist"]["current"] == 1);
+    assert_eq!(loaded["state"], "parked");
+    hall.lives_on(100);
+    assert_eq!((hall.relay(0).count(), hall.relay(1).count()), (0, 0), "the film moves nobody");
+    hall.done(&["preflight"]);
+    hall.done(&["arm"]);
+    hall.done(&["go"]);
+    let led = hall.comes_to("playing");
+    assert_eq!(led["playlist"]["current"], 1);
+    hall.done(&["trim", "+2f"]);
+    assert_eq!(hall.done(&["trim", "-1f"]).code, Some(0));
+    assert_eq!(hall.status()["trim_ms"], 40, "a frame of 25 a second is left");
+    hall.done(&["park"]);
     hall.comes_to("parked");
     hall.close();
     assert!(hall.end().rest_in_park());

@@ -157,12 +157,13 @@ fn a_playlist_of_two_films_runs_from_one_go_to_the_park_at_the_end() {
     }
     let mut hall = open("pause");
     let entry = |movie: &str, then: &str| {
-        format!("[[entry]]\ncue = \"eight\"\nmovie = \"{movie}\"\nthen = \"{then}\"\n")
+        format!("[[entry]]\ncue = \"six\"\nmovie = \"{movie}\"\nthen = \"{then}\"\n")
     };
     let text = format!("title = \"Day\"\n{}{}", entry("night.wav", "go"), entry("short.wav", "hold"));
-    hall.write("cues/eight.csv", &swell(8));
+    hall.write("cues/six.csv", &swell(6));
     hall.write("playlists/day.toml", &text);
     arm(&hall, "day");
+    assert_eq!(hall.status()["playlist"]["entries"][0]["movie"], "night.wav");
     hall.done(&["go"]);
     hall.wait(|status| status["playlist"]["current"] == 0 && together(status, 0.0));
     // Whatever the film before does meanwhile, they join the next one inside its cue.
@@ -170,6 +171,9 @@ fn a_playlist_of_two_films_runs_from_one_go_to_the_park_at_the_end() {
     hall.comes_to("parked");
     assert_eq!(hall.status()["playlist"]["current"], 1);
     hall.close();
+    let shows = hall.journal("show");
+    let results: Vec<_> = shows.iter().map(|show| &show["outcome"]["result"]).collect();
+    assert_eq!(results, ["completed"; 2], "{shows:?}");
     assert!(hall.end().rest_in_park());
 }
 
@@ -186,6 +190,7 @@ fn the_end_of_the_film_parks_and_that_it_is_shorter_than_its_cue_was_said_at_loa
     hall.comes_to("parked");
     let lines = hall.close();
     assert!(lines.iter().any(|line| line.contains("the film is over")), "{lines:?}");
+    assert_eq!(hall.journal("show").last().expect("it was played")["outcome"]["result"], "stopped");
     assert!(hall.end().rest_in_park());
 }
 

@@ -196,7 +196,7 @@ fn a_player_leads_the_seat_which_rests_while_it_is_paused_and_parks_when_its_fil
     player.tell(json!({ "event": "end-file", "reason": "eof" }));
     playing.wait_for("parked");
     let run = playing.finish();
-    assert_eq!(run.report_of(0)["result"], "completed");
+    assert_eq!((&run.report_of(0)["result"], run.code), (&"stopped".into(), Some(0)), "part of the cue");
     let seen = sim.end();
     assert!(seen.rest_in_park() && seen.rows.iter().any(|row| row.commanded[0] > pulses(0.001)));
 }
@@ -210,6 +210,30 @@ fn a_reel_that_ends_before_it_has_reached_the_cue_ends_the_play_and_moves_nobody
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert!(run.stderr.contains("no source can tell of another"), "{}", run.stderr);
     assert!(sim.end().rows.iter().all(|row| row.commanded[0] == 0));
+}
+
+#[test]
+fn a_relay_ends_with_its_lines() {
+    let folder = Folder::new();
+    let at = folder.write("none", String::new()).parent().expect("it lies in the folder").to_owned();
+    let run = kinocue(&["sync", "relay", "ltc:-", "--folder", at.to_str().expect("text")]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    assert!(run.stderr.contains("each line has ended"), "{run:?}");
+}
+
+#[test]
+fn a_recording_that_is_none_of_16_bits_is_refused_with_what_it_is_and_what_to_do() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let reel = reel(&folder, "01:00:00:00", "2");
+    let mut wav = std::fs::read(&reel).expect("it was made");
+    wav[34] = 24;
+    std::fs::write(&reel, wav).expect("it can be written");
+    let run = Playing::start(&rise(&folder, 4), &sim.to(), &["--chase", &format!("ltc:{reel}")]).finish();
+    assert_eq!(run.code, Some(71), "{run:?}");
+    for said in ["reel.wav cannot be read", "uncompressed sound of 24 bits", "-c:a pcm_s16le"] {
+        assert!(run.stderr.contains(said), "{said}: {run:?}");
+    }
+    assert_eq!(sim.end().rows.len(), 0, "nobody was moved");
 }
 
 #[test]

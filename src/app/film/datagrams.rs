@@ -27,8 +27,15 @@ pub(super) fn open(bind: SocketAddrV4) -> io::Result<Socket> {
     Ok(socket)
 }
 
-/// Hands each datagram to `hear`, with its sender and the instant at which the kernel had it, until nobody listens.
-pub(super) fn read(socket: &Socket, told: &WordSink, mut hear: impl FnMut(&[u8], Ipv4Addr, MonoTime)) {
+/// Hands each datagram of the one who is named to `hear`, with the instant at which the kernel had it, until nobody listens. Another
+/// who sends such as `is_one` says that they are is noted.
+pub(super) fn read(
+    socket: &Socket,
+    named: Ipv4Addr,
+    told: &WordSink,
+    is_one: impl Fn(&[u8]) -> bool,
+    mut hear: impl FnMut(&[u8], MonoTime),
+) {
     let mut batch = Batch::new();
     while !told.is_over() {
         let mut wanted = [PollFd::new(socket, PollFlags::IN)];
@@ -41,7 +48,10 @@ pub(super) fn read(socket: &Socket, told: &WordSink, mut hear: impl FnMut(&[u8],
         for datagram in batch.datagrams() {
             let age = datagram.stamp_ns.map_or(0, |stamp| wall_ns.saturating_sub(stamp));
             let age = Some(Duration::from_nanos(age)).filter(|age| *age < OLDEST).unwrap_or_default();
-            hear(datagram.bytes, *datagram.from.ip(), now.before(age));
+            let from = *datagram.from.ip();
+            if (from == named || is_one(datagram.bytes)) && told.hears(named, from.into()) {
+                hear(datagram.bytes, now.before(age));
+            }
         }
     }
 }

@@ -51,7 +51,8 @@ impl HallFilm {
 }
 
 fn open(sync: &FilmSync, player: Option<&Player>) -> io::Result<FilmReader> {
-    let rules = SourceRules { allows_coarse: sync.allows_coarse, band: sync.pace.band };
+    let rules =
+        SourceRules { allows_coarse: sync.allows_coarse, band: sync.pace.band, freewheel: sync.freewheel };
     let mut sources = sync.sources.clone();
     // A film that is shown from here leads before all others; while there is none it is heard of nowhere, and others may.
     sources.splice(..0, player.map(|player| FilmArgs::of(FilmSource::Mpv(player.socket().to_owned()))));

@@ -87,7 +87,7 @@ fn index_wav(film: &Path, name: &str) -> Result<Option<SoundIndex>, IndexingErro
         return Ok(None);
     }
     match index_stream(File::open(film)?, name) {
-        Err(IndexingError::Sound(RiffFault::Format)) => Ok(None),
+        Err(IndexingError::Sound(RiffFault::Format(_) | RiffFault::NoFormat)) => Ok(None),
         made => made.map(Some),
     }
 }

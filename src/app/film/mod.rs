@@ -39,12 +39,14 @@ pub(crate) use table::{FilmTable, SharedTable, SourceRow};
 
 use super::player::FilmGate;
 use crate::film::chooser::MOST_SOURCES;
+use crate::film::follower::PaceLimits;
 use crate::film::point::PublishedPoint;
 use crate::film::sound::IndexFault;
 use crate::film::source::{FilmArgs, FilmSource};
 use heard::Listening;
 use left::LeftRead;
 use relay::Listeners;
+use riff::RiffFault;
 use table::Ranking;
 use told::{Notes, WordSink};
 
@@ -62,6 +64,14 @@ pub(crate) enum FilmError {
         what: String,
         /// Why.
         source: io::Error,
+    },
+    /// A file is none that can be read as sound.
+    #[error("{what} cannot be read")]
+    Sound {
+        /// Which, as it was named.
+        what: String,
+        /// Why.
+        source: RiffFault,
     },
     /// A file is no index of a film's sound.
     #[error("{} cannot be used", path.display())]
@@ -118,6 +128,14 @@ pub(crate) struct SourceRules {
     pub(crate) allows_coarse: bool,
     /// How far from 1 a film's rate is followed.
     pub(crate) band: f64,
+    /// For how long a source that falls silent is taken to run on, as a multiple of what its kind and the cause allow.
+    pub(crate) freewheel: f64,
+}
+
+impl Default for SourceRules {
+    fn default() -> Self {
+        Self { allows_coarse: false, band: PaceLimits::default().band, freewheel: 1.0 }
+    }
 }
 
 /// The command that gives the sound of a source, if it has one.
@@ -159,7 +177,7 @@ impl FilmReader {
     /// # Errors
     /// [`FilmError`] where a socket cannot be served. A device that is not there is tried again.
     pub(crate) fn relay(sources: &[FilmArgs], folder: &Path) -> Result<Self, FilmError> {
-        let rules = SourceRules { allows_coarse: false, band: 0.0 };
+        let rules = SourceRules { band: 0.0, ..SourceRules::default() };
         Self::each(sources, rules, None, |args, told, child| {
             let listeners = Listeners::serve(&args.source, folder)?;
             let read = move |args: &FilmArgs, told, child| listeners.read(&args.source, told, child);

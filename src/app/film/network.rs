@@ -1,7 +1,7 @@
 //! Art-Net timecode, and positions by OSC and HTTP: what comes over the network from one sender who is named.
 
 use std::convert::Infallible;
-use std::net::IpAddr;
+use std::net::Ipv4Addr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 
 use super::{FilmError, WordSink, datagrams, start};
-use crate::film::artnet::ArtNetReader;
+use crate::film::artnet::{ArtNetReader, ArtTimecode};
 use crate::film::message::{FilmPosition, PositionReader};
 use crate::film::source::{FilmArgs, NamedSender};
 use crate::sys::clock::{Monotonic, wall_now_ns};
@@ -41,21 +41,18 @@ fn at_bind(sender: &NamedSender) -> impl FnOnce(std::io::Error) -> FilmError {
 /// Begins to hear Art-Net timecode.
 pub(super) fn hear_artnet(sender: &NamedSender, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
     let socket = datagrams::open(sender.bind).map_err(at_bind(sender))?;
-    let mut reader = ArtNetReader::new(Some(sender.from.into()), args.rate, args.start);
+    let (mut reader, named) = (ArtNetReader::new(args.rate, args.start), sender.from);
+    // Others may send whatever else Art-Net has.
+    let is_one = |bytes: &[u8]| ArtTimecode::parse(bytes).is_some();
     start("artnet", move || {
-        datagrams::read(&socket, &told, |bytes, from, at| {
-            let before = reader.ignored();
-            reader.hear(bytes, from.into(), at, &mut |what| {
+        datagrams::read(&socket, named, &told, is_one, |bytes, at| {
+            reader.hear(bytes, at, &mut |what| {
                 told.tell(what);
             });
-            if reader.ignored().0 > before.0 {
-                told.note_foreign(from);
-            } else {
-                told.note(|notes| {
-                    notes.garbage = reader.ignored().1;
-                    notes.label(reader.labels());
-                });
-            }
+            told.note(|notes| {
+                notes.garbage = reader.garbage();
+                notes.label(reader.labels());
+            });
         });
     })?;
     Ok(())
@@ -66,17 +63,18 @@ pub(super) fn hear_osc(sender: &NamedSender, args: &FilmArgs, told: WordSink) ->
     let socket = datagrams::open(sender.bind).map_err(at_bind(sender))?;
     let (mut reader, named) = (PositionReader::new(args.begin()), sender.from);
     start("osc", move || {
-        datagrams::read(&socket, &told, |bytes, from, at| {
-            if from != named {
-                return told.note_foreign(from);
-            }
-            match osc_position(bytes) {
+        datagrams::read(
+            &socket,
+            named,
+            &told,
+            |_| true,
+            |bytes, at| match osc_position(bytes) {
                 Some(position) => reader.hear(&position, at, &mut |what| {
                     told.tell(what);
                 }),
                 None => told.note(|notes| notes.garbage += 1),
-            }
-        });
+            },
+        );
     })?;
     Ok(())
 }
@@ -93,7 +91,7 @@ pub(super) fn hear_http(sender: &NamedSender, args: &FilmArgs, told: WordSink) -
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let listener = runtime.block_on(TcpListener::bind(sender.bind)).map_err(at_bind(sender))?;
     let door = Door { reader: Mutex::new(PositionReader::new(args.begin())), told };
-    let named = IpAddr::V4(sender.from);
+    let named = sender.from;
     start("http", move || runtime.block_on(serve(listener, named, Arc::new(door))))?;
     Ok(())
 }
@@ -104,7 +102,7 @@ struct Door {
     told: WordSink,
 }
 
-async fn serve(listener: TcpListener, named: IpAddr, door: Arc<Door>) {
+async fn serve(listener: TcpListener, named: Ipv4Addr, door: Arc<Door>) {
     let places = Arc::new(Semaphore::new(CONNECTIONS));
     while !door.told.is_over() {
         let Ok(accepted) = tokio::time::timeout(LOOK, listener.accept()).await else { continue };
@@ -112,13 +110,8 @@ async fn serve(listener: TcpListener, named: IpAddr, door: Arc<Door>) {
             tokio::time::sleep(LOOK).await; // out of descriptors: a moment later there may be some
             continue;
         };
-        match peer.ip() {
-            from if from == named => {}
-            IpAddr::V4(from) => {
-                door.told.note_foreign(from);
-                continue;
-            }
-            IpAddr::V6(_) => continue,
+        if !door.told.hears(named, peer.ip()) {
+            continue;
         }
         // One connection too many is closed: the sender has others.
         let Ok(place) = Arc::clone(&places).try_acquire_owned() else { continue };

@@ -63,7 +63,7 @@ impl Listeners {
         let listeners = self.clone();
         let line = ByteLine::new(told, move || listeners.begin());
         match source {
-            FilmSource::Ltc(input) => sound_line::start_line(input, line, &child),
+            FilmSource::Ltc(input) => sound_line::start_line(input, 1, line, &child),
             FilmSource::Mtc(input) => mtc::start_line(input, line),
             _ => Err(FilmError::NoLine(source.to_string())),
         }

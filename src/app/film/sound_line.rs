@@ -2,7 +2,7 @@
 //! the film.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read as _};
 use std::os::fd::AsFd as _;
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
@@ -14,7 +14,7 @@ use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::heard::{Listener, Listening};
 use super::line::{ByteLine, LineTaker};
-use super::riff::{Channels, SampleStream};
+use super::riff::{Channels, HEADER, SampleStream};
 use super::{ChildSlot, FilmError, WordSink, start};
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::source::{FilmArgs, LineKind, SoundLine};
@@ -30,12 +30,18 @@ pub(super) fn start_reading(
     child: &ChildSlot,
 ) -> Result<(), FilmError> {
     let (args, sink) = (args.clone(), told.clone());
-    let paced = matches!(input, SoundLine::File(_));
+    let (channels, most) = match listening {
+        Listening::Ltc => (Channels::One(args.channel), args.channel),
+        Listening::Sound(_) => (Channels::Mixed, 1),
+    };
+    let paced = if let SoundLine::File(path) = input {
+        check(path, channels)?;
+        true
+    } else {
+        false
+    };
     let open = move || SoundTaker {
-        samples: SampleStream::of(match listening {
-            Listening::Ltc => Channels::First,
-            Listening::Sound(_) => Channels::Mixed,
-        }),
+        samples: SampleStream::of(channels),
         listening: listening.clone(),
         args: args.clone(),
         told: sink.clone(),
@@ -43,15 +49,30 @@ pub(super) fn start_reading(
         listener: None,
         paced: paced.then(|| (Monotonic.now(), 0)),
     };
-    start_line(input, ByteLine::new(told, open), child)
+    start_line(input, most, ByteLine::new(told, open), child)
 }
 
-/// Begins to read an input.
-pub(super) fn start_line(input: &SoundLine, line: ByteLine, child: &ChildSlot) -> Result<(), FilmError> {
-    let failed = |path: &Path| {
-        let what = path.display().to_string();
-        move |source| FilmError::Open { what, source }
-    };
+/// Whether a recording can be read: said before anything waits for what it brings.
+fn check(path: &Path, channels: Channels) -> Result<(), FilmError> {
+    let mut begin = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(HEADER as u64).read_to_end(&mut begin));
+    read.map_err(failed(path))?;
+    let wrong = |source| FilmError::Sound { what: path.display().to_string(), source };
+    SampleStream::of(channels).check(&begin).map_err(wrong)
+}
+
+fn failed(path: &Path) -> impl FnOnce(io::Error) -> FilmError {
+    let what = path.display().to_string();
+    move |source| FilmError::Open { what, source }
+}
+
+/// Begins to read an input, of a sound card with so many channels.
+pub(super) fn start_line(
+    input: &SoundLine,
+    channels: u8,
+    line: ByteLine,
+    child: &ChildSlot,
+) -> Result<(), FilmError> {
     match input {
         SoundLine::File(path) => {
             let file = File::open(path).map_err(failed(path))?;
@@ -78,7 +99,10 @@ pub(super) fn start_line(input: &SoundLine, line: ByteLine, child: &ChildSlot) -
         }
         SoundLine::Alsa(device) => {
             let mut arecord = Command::new("arecord");
-            arecord.args(["-q", "-t", "raw", "-f", "S16_LE", "-c", "1", "-r", "48000", "-D", device]);
+            // What is raw has one channel; of more its header says how many there are.
+            let kind = if channels == 1 { "raw" } else { "wav" };
+            arecord.args(["-q", "-t", kind, "-f", "S16_LE", "-r", "48000", "-D", device]);
+            arecord.args(["-c", &channels.to_string()]);
             run(arecord, "arecord", line, child)?;
         }
     }
@@ -134,7 +158,8 @@ fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
 }
 
 /// Nothing more can come, whatever ended it: whoever wrote is gone for good, and the film over.
-fn end(line: &ByteLine, _read: io::Result<()>) {
+fn end(line: &ByteLine, read: io::Result<()>) {
+    line.told.note(|notes| notes.trouble = read.err().map(|error| error.to_string()));
     line.told.tell(Observation::new(Monotonic.now(), FilmWord::End));
 }
 

@@ -15,7 +15,7 @@ use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::film::source::FilmArgs;
 use crate::film::tracker::{SourceGrade, SourceTracker};
 use crate::sys::clock::Monotonic;
-use crate::time::{Clock as _, MonoTime};
+use crate::time::{Clock as _, MonoTime, ShowTime};
 
 /// How often where the film is is published, whatever is heard, and the table with it.
 const PUBLISH_EVERY: Duration = Duration::from_millis(50);
@@ -67,6 +67,8 @@ pub(crate) struct SourceRow {
     pub(crate) rejected: u64,
     pub(crate) jumps: u64,
     pub(crate) dropouts: u64,
+    /// For how long the estimate has run on while nothing was heard, in all, seconds.
+    pub(crate) freewheel_s: f64,
     #[serde(flatten)]
     pub(crate) notes: SourceNotes,
 }
@@ -101,6 +103,14 @@ impl SharedTable {
 
     fn chosen(&self) -> Option<usize> {
         self.chosen.load(Ordering::Relaxed).checked_sub(1)
+    }
+
+    /// One that says so.
+    #[cfg(test)]
+    pub(crate) fn of(table: FilmTable) -> Self {
+        let shared = Self::default();
+        shared.put(table);
+        shared
     }
 
     fn put(&self, table: FilmTable) {
@@ -143,6 +153,7 @@ impl TrackedSource {
             rejected: counts.rejected,
             jumps: counts.jumps,
             dropouts: counts.dropouts,
+            freewheel_s: counts.freewheel.as_secs_f64(),
             notes,
         }
     }
@@ -163,10 +174,10 @@ pub(super) struct Ranking {
 impl Ranking {
     /// Those sources, of which nothing was heard yet, with the notes of each.
     pub(super) fn new(args: &[FilmArgs], notes: &[Notes], rules: SourceRules) -> Self {
-        let (now, SourceRules { allows_coarse, band }) = (Monotonic.now(), rules);
+        let (now, SourceRules { allows_coarse, band, freewheel }) = (Monotonic.now(), rules);
         let of = |(args, notes): (&FilmArgs, &Notes)| TrackedSource {
             name: args.source.to_string(),
-            tracker: SourceTracker::new(args.source.kind(), band, now),
+            tracker: SourceTracker::new(args.source.kind(), band, now).freewheeling(freewheel),
             grade: SourceGrade::default(),
             notes: Arc::clone(notes),
         };
@@ -220,6 +231,12 @@ impl Ranking {
 }
 
 impl FilmTable {
+    /// Where the film is by the source that leads, if that is known and heard.
+    pub(crate) fn locked_at(&self) -> Option<ShowTime> {
+        let row = self.leads.and_then(|place| self.sources.get(place));
+        row.filter(|row| row.state == FilmState::Locked && row.may_lead)?.media_s.map(ShowTime::from_secs_f64)
+    }
+
     /// What a person should know beside where the film is: sentences that stay as they are for as long as they are true.
     pub(crate) fn warnings(&self) -> Vec<String> {
         let name = |place: usize| self.sources.get(place).map_or("", |row| row.source.as_str());
@@ -232,6 +249,27 @@ impl FilmTable {
 }
 
 impl SourceRow {
+    /// A source of which nothing is known but its name and state.
+    #[cfg(test)]
+    pub(crate) fn named(source: &str, state: FilmState) -> Self {
+        Self {
+            source: source.to_owned(),
+            state,
+            words: "",
+            media_s: None,
+            timecode: None,
+            rate_ppm: None,
+            sigma_ms: None,
+            may_lead: false,
+            used: 0,
+            rejected: 0,
+            jumps: 0,
+            dropouts: 0,
+            freewheel_s: 0.0,
+            notes: SourceNotes::default(),
+        }
+    }
+
     fn warnings(&self) -> Vec<String> {
         let Self { source, notes, .. } = self;
         let foreign = notes

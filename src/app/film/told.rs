@@ -1,7 +1,7 @@
 //! What readers tell: where the film is, in observations; and what a person should know beside that, in notes.
 
 use std::io;
-use std::net::Ipv4Addr;
+use std::net::{IpAddr, Ipv4Addr};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -99,12 +99,17 @@ impl WordSink {
         what(&mut noted(&self.notes));
     }
 
-    /// Somebody sent what this source alone is to send. The first is named: names may be made up at any pace.
-    pub(super) fn note_foreign(&self, from: Ipv4Addr) {
-        self.note(|notes| {
-            notes.foreign += 1;
-            notes.foreign_from.get_or_insert(from);
-        });
+    /// True if that is the one sender who is heard, as `named`. Of others the first is noted: names may be made up at any pace.
+    pub(super) fn hears(&self, named: Ipv4Addr, from: IpAddr) -> bool {
+        if let IpAddr::V4(other) = from
+            && other != named
+        {
+            self.note(|notes| {
+                notes.foreign += 1;
+                notes.foreign_from.get_or_insert(other);
+            });
+        }
+        from == named
     }
 
     pub(super) fn is_over(&self) -> bool {

@@ -14,7 +14,6 @@ use super::readiness::ReadinessCheck;
 use super::record::ShowRecords;
 use super::seat_testing::SeatTesting;
 use crate::control::Problem;
-use crate::state::Cause;
 use crate::time::ShowTime;
 
 /// All of them.
@@ -68,6 +67,7 @@ impl Features {
             }
             JobResult::Listed(listed) => self.onward.take_list(listed?, hall),
             JobResult::Entry(entry, cued) => self.onward.take_entry(entry, cued, hall),
+            JobResult::Reached(entry) => Ok(self.onward.enter(entry, hall)),
             JobResult::Again(again) => Ok(self.take_again(again, hall)),
             JobResult::Tested(made, only) => self.seats.take(made?, only, hall),
             JobResult::Preflighted(preflighted) => {
@@ -114,7 +114,7 @@ impl Features {
             return vec![Act::Stage(ShowChange::Again)];
         }
         if hall.aside.is_some() {
-            let how = if hall.ended == Cause::CueEnded { "completed" } else { "stopped" };
+            let how = if hall.ended.completes() { "completed" } else { "stopped" };
             return vec![Act::EndTest(how), Act::Stage(ShowChange::Rewind)];
         }
         hall.keep_place();

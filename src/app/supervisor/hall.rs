@@ -15,6 +15,7 @@ use crate::config::Config;
 use crate::control::{Code, Problem};
 use crate::engine::Unplanned;
 use crate::health::Groups;
+use crate::osc::Counts;
 use crate::rt::{Desk, Live, Loaded, Row, Times};
 use crate::state::{Cause, State, Whose};
 use crate::sys::realtime::RealTime;
@@ -47,6 +48,8 @@ pub(super) struct HallContext {
     pub(super) film: Option<SharedTable>,
     /// The way to the player, if the hall has one.
     pub(super) player: Option<PlayerLink>,
+    /// What has come to the port for OSC, if there is one.
+    pub(super) osc: Option<Arc<Counts>>,
     /// The slow work that is under way.
     pub(super) job: Option<&'static str>,
     pub(super) now: MonoTime,
@@ -114,6 +117,7 @@ impl HallContext {
             ended: Cause::Started,
             film: None,
             player: None,
+            osc: None,
             job: None,
             now,
         }
@@ -260,7 +264,7 @@ impl HallContext {
     pub(super) fn note_place(&mut self, from: State, to: State) {
         // A film that others show says by itself where a show goes on.
         let is_led = self.cued.as_ref().is_some_and(|cued| cued.film.is_some() && cued.movie.is_none());
-        if rides(from) && !rides(to) && !is_led && self.mirror.cause != Cause::CueEnded {
+        if rides(from) && !rides(to) && !is_led && !self.mirror.cause.completes() {
             self.left_at = Some(self.live.show());
         }
     }

@@ -55,6 +55,8 @@ pub(super) enum JobResult {
     Entry(usize, Result<Box<ProvedShow>, Problem>),
     /// What was loaded before was read and proved again.
     Again(Again),
+    /// No job of ours: the film has come to that entry of the playlist.
+    Reached(usize),
     /// A test of the seats of these rows is made, or why not.
     Tested(Result<(Box<SeatTest>, Box<ProvedShow>), Problem>, Option<BTreeSet<String>>),
     /// The controllers were asked for all that preflight judges.

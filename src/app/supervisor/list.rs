@@ -4,11 +4,13 @@ use std::time::Duration;
 
 use jiff::Zoned;
 
-use crate::config::Config;
+use crate::config::{Config, FilmSync};
 use crate::control::{Code, EntryStatus, PlaylistStatus, Problem};
+use crate::film::chase::PRE_ROLL;
 use crate::journal::{PlaylistPlace, stamp};
 use crate::library::{IdError, Library};
 use crate::playlist::{Entry, Playlist, PlaylistId, Schedule, Shelf, next_start};
+use crate::time::ShowTime;
 
 /// The playlist that is loaded.
 #[derive(Debug)]
@@ -80,6 +82,25 @@ impl List {
     /// The entry that is next, or plays.
     pub(super) fn entry(&self) -> &Entry {
         &self.playlist.entries[self.current]
+    }
+
+    /// The entry that names a timecode from which on its cue covers that place of the film; else the one before whose beginning it
+    /// is by no more than seats join ahead.
+    pub(super) fn entry_at(&self, sync: &FilmSync, media: ShowTime) -> Option<usize> {
+        let parts: Vec<_> = (0..)
+            .zip(self.playlist.entries.iter().zip(&self.cues))
+            .filter_map(|(entry, (of, (_, length_s)))| {
+                let begin = sync.begin(Some(of.film.begin?)).ok()??;
+                Some((entry, media.since(begin), ShowTime::from_secs_f64(*length_s)))
+            })
+            .collect();
+        let within = |from: ShowTime| {
+            let covers = |(entry, at, length): &(usize, ShowTime, ShowTime)| {
+                (from..*length).contains(at).then_some(*entry)
+            };
+            parts.iter().find_map(covers)
+        };
+        within(ShowTime::ZERO).or_else(|| within(PRE_ROLL))
     }
 
     /// As surfaces show it.

@@ -60,6 +60,7 @@ use crate::control::model::Ending;
 use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, StatusSource, Surface, Who};
 use crate::journal::Journal;
 use crate::library::Library;
+use crate::osc::Counts;
 use crate::rt::{News, Ticket};
 use crate::settings::{Settings, SettingsFile};
 use crate::state::State;
@@ -103,6 +104,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) film: Option<SharedTable>,
     /// The way to the player, where the hall has one.
     pub(crate) player: Option<PlayerLink>,
+    /// What has come to the port for OSC, where there is one.
+    pub(crate) osc: Option<Arc<Counts>>,
 }
 
 /// What is left once the hall has closed.
@@ -157,7 +160,7 @@ impl Supervisor {
         ports.source.lead(Arc::clone(&runtime.desk));
         examine(library.clone());
         let mut hall = HallContext::new(&runtime, settings, now);
-        (hall.film, hall.player) = (ports.film.clone(), ports.player.clone());
+        (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,

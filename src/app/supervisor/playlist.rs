@@ -14,7 +14,7 @@ use crate::control::{Code, Command, Problem, Surface};
 use crate::journal::PlaylistPlace;
 use crate::playlist::{PlaylistId, Then};
 use crate::rt::Command as TickCommand;
-use crate::state::{Cause, State, Transition};
+use crate::state::{State, Transition};
 
 /// What lets an entry start by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +38,8 @@ pub(super) struct Onward {
     follows: bool,
     /// It came while the seats moved once more: it is taken up when they rest.
     waits: Option<(usize, Box<ProvedShow>)>,
+    /// The entry in whose part of the reel the film was when that was heeded last: it is entered once.
+    reel: Option<usize>,
 }
 
 impl Onward {
@@ -147,9 +149,8 @@ impl Onward {
         let mut acts = vec![Act::Stage(ShowChange::Rewind)];
         let Some(list) = &self.list else { return acts };
         let (played, next) = (list.current, list.current + 1);
-        let completed = hall.ended == Cause::CueEnded;
         // A cue that a person loaded beside the playlist leads nowhere.
-        if !completed || !self.is_entry(played, hall) || next >= list.playlist.entries.len() {
+        if !hall.ended.completes() || !self.is_entry(played, hall) || next >= list.playlist.entries.len() {
             return acts;
         }
         let goes = list.entry().then == Then::Go && hall.mirror.state == State::Parked && !self.held;
@@ -157,6 +158,41 @@ impl Onward {
             acts.extend(self.fetch(next, goes.then_some(Start::GoOn)));
             self.follows = true;
         }
+        acts
+    }
+
+    /// Loads the entry into whose part of the reel the film has come, where all is parked: so one reel of timecode leads a day. A person
+    /// arms and lets go as ever, and whoever has loaded another cue, or selects an entry meanwhile, keeps that.
+    fn heed_reel(&mut self, hall: &HallContext) -> Vec<Act> {
+        let (Some(list), Some(sync), Some(table)) = (&self.list, &hall.config.sync, &hall.film) else {
+            return Vec::new();
+        };
+        let entered = table.read().locked_at().and_then(|media| list.entry_at(sync, media));
+        if entered.is_none() {
+            self.reel = None;
+        }
+        let entry = entered.filter(|entry| self.reel != Some(*entry) && self.may_enter(hall));
+        entry.map(|entry| Act::Take(JobResult::Reached(entry))).into_iter().collect()
+    }
+
+    /// True if a film may have another entry loaded: while all is parked, what is loaded is of the list, and nothing else is to come.
+    fn may_enter(&self, hall: &HallContext) -> bool {
+        let is_of_list = self.list.as_ref().is_some_and(|list| self.is_entry(list.current, hall));
+        let rests = hall.mirror.state == State::Parked && hall.is_free().is_ok();
+        rests && is_of_list && self.start.is_none() && self.waits.is_none()
+    }
+
+    /// Has the entry loaded to which the film has come, where that may still be once all before it is done: what goes on by itself
+    /// goes before.
+    pub(super) fn enter(&mut self, entry: usize, hall: &HallContext) -> Vec<Act> {
+        if self.reel == Some(entry) || !self.may_enter(hall) {
+            return Vec::new();
+        }
+        self.reel = Some(entry);
+        let Some(list) = self.list.as_ref().filter(|list| list.current != entry) else { return Vec::new() };
+        let name = format!("the film has come to entry {}, {}", entry + 1, list.playlist.entries[entry].cue);
+        let mut acts = vec![Act::Name(name)];
+        acts.extend(self.fetch(entry, None));
         acts
     }
 
@@ -199,7 +235,8 @@ impl Feature for Onward {
             }
             SupervisorEvent::Begun(_) => (self.start, self.held, self.waits) = (None, false, None),
             SupervisorEvent::Clock(wall) => out.extend(self.heed_schedule(wall, hall)),
-            SupervisorEvent::Done(_) | SupervisorEvent::Round(_) => {}
+            SupervisorEvent::Round(_) => out.extend(self.heed_reel(hall)),
+            SupervisorEvent::Done(_) => {}
         }
     }
 }

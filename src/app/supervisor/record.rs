@@ -10,7 +10,6 @@ use super::hall::{Counted, HallContext};
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 use crate::control::{Desired, JournalLine, Problem, Surface};
-use crate::film::chase::ParkCause;
 use crate::film::point::FilmState;
 use crate::journal::{Action, FilmProof, Folds, Journal, Outcome, ShowRecord, stamp};
 use crate::rt::Row;
@@ -215,11 +214,9 @@ impl ShowRecords {
             |table: &[Row]| table.iter().map(|row| FrameCounts::from(&row.counts)).sum::<FrameCounts>();
         let failed = |table: &[Row]| table.iter().map(|row| row.counts.send_failed).sum::<u64>();
         let after = hall.live.times();
-        // Who was never led has seen nothing of a film that is over.
-        let saw_it = film.as_ref().is_none_or(|(proof, _)| proof.greatest_error_ms.is_some());
         record.outcome = Some(Outcome {
             end,
-            result: if saw_it { ending(cause) } else { ending_unseen(cause) },
+            result: ending(cause),
             events,
             ticks,
             missed_ticks: missed,
@@ -250,17 +247,9 @@ impl Feature for ShowRecords {
 /// How a show ended for that cause.
 pub(super) const fn ending(cause: Cause) -> Ending {
     match cause {
-        Cause::CueEnded | Cause::FilmOver(ParkCause::FilmEnded) => Ending::Completed,
+        cause if cause.completes() => Ending::Completed,
         Cause::Trouble(_) | Cause::EmergencyStop(_) => Ending::Fault,
         _ => Ending::Stopped,
-    }
-}
-
-/// How a show ended whose seats had never followed its film.
-const fn ending_unseen(cause: Cause) -> Ending {
-    match cause {
-        Cause::FilmOver(_) => Ending::Stopped,
-        cause => ending(cause),
     }
 }
 
@@ -290,6 +279,7 @@ fn percentiles(mut now: Histogram, before: &Histogram) -> Percentiles {
 mod tests {
     use super::*;
     use crate::app::supervisor::testing::{hall, row, told};
+    use crate::film::chase::ParkCause;
     use crate::journal::Limits;
 
     #[test]
@@ -324,25 +314,6 @@ mod tests {
         }
     }
 
-    /// A source of which nothing is known but its name and state.
-    fn named((source, state): (&str, FilmState)) -> SourceRow {
-        SourceRow {
-            source: source.to_owned(),
-            state,
-            words: "",
-            media_s: None,
-            timecode: None,
-            rate_ppm: None,
-            sigma_ms: None,
-            may_lead: false,
-            used: 0,
-            rejected: 0,
-            jumps: 0,
-            dropouts: 0,
-            notes: Default::default(),
-        }
-    }
-
     #[test]
     fn proof_of_play_has_the_sources_that_were_followed_and_the_farthest_from_the_film() {
         let table = |leads, switches| FilmTable {
@@ -351,7 +322,7 @@ mod tests {
                 ("artnet", FilmState::Freewheeling),
                 ("mtc", FilmState::Absent),
             ]
-            .map(named)
+            .map(|(source, state)| SourceRow::named(source, state))
             .into(),
             leads,
             switches,
@@ -370,12 +341,12 @@ mod tests {
     }
 
     #[test]
-    fn a_show_that_ends_with_its_film_is_completed_if_seats_had_followed_it() {
-        let over = Cause::FilmOver(ParkCause::FilmEnded);
-        assert_eq!((ending(over), ending_unseen(over)), (Ending::Completed, Ending::Stopped));
-        for why in [ParkCause::CueLeft, ParkCause::HeldTooLong] {
-            assert_eq!(ending(Cause::FilmOver(why)), Ending::Stopped, "the film was not over");
+    fn a_show_that_ends_with_its_film_is_completed_if_that_led_it_through_its_cue() {
+        for over in [Cause::CueEnded, Cause::FilmOver(ParkCause::FilmEnded)] {
+            assert_eq!(ending(over), Ending::Completed, "{over}");
         }
-        assert_eq!(ending_unseen(Cause::CueEnded), Ending::Completed);
+        for why in [ParkCause::FilmCutShort, ParkCause::CueLeft, ParkCause::HeldTooLong] {
+            assert_eq!(ending(Cause::FilmOver(why)), Ending::Stopped, "{why:?}");
+        }
     }
 }

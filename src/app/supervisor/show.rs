@@ -172,7 +172,8 @@ fn film_of(config: &Config, of: &EntryFilm, end: ShowTime) -> Result<Option<Film
             named.map(|label| refused(format!("film = \"{label}\", and the configuration has no [sync]")));
         return why.map_or(Ok(None), Err);
     };
-    let rules = ChaseRules { pace: sync.pace, rejoin: sync.rejoin, ..ChaseRules::until(end) };
+    let (pace, join_above, rejoin) = (sync.pace, sync.join_above, sync.rejoin);
+    let rules = ChaseRules { pace, join_above, rejoin, ..ChaseRules::until(end) };
     let begin = if of.movie.is_some() && config.film.is_some() {
         Some(sync.offset)
     } else {

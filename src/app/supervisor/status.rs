@@ -70,6 +70,7 @@ impl StatusParts<'_> {
             show: hall.cued.as_ref().map(|cued| cued.status(position(cued))),
             playlist: features.onward.list.as_ref().map(|list| list.status(&Zoned::now())),
             film: hall.film.as_ref().map(|table| film::status(&table.read(), hall)),
+            osc: hall.osc.as_ref().map(|counts| counts.by_word()),
             trim_ms: hall.settings.trim_ms,
             levels: hall.settings.levels.clone(),
             presets: hall.config.presets.iter().map(|preset| preset.name.clone()).collect(),

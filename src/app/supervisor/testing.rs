@@ -416,6 +416,7 @@ fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, Supe
             settings_file,
             film: None,
             player: None,
+            osc: None,
         },
     )
 }

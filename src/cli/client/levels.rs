@@ -10,13 +10,15 @@ use super::server::{ServerArgs, in_path};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::parse_level;
 use crate::control::{LevelsChange, Status};
-use crate::time::parse_trim;
+use crate::time::{TrimChange, parse_trim_change};
 
 /// The commands that set what lasts.
 #[derive(Debug, clap::Subcommand)]
 pub(in crate::cli) enum Command {
     /// Offsets the motion against the film, later or earlier.
-    #[command(after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0")]
+    #[command(
+        after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0\n  kinocue trim +2f"
+    )]
     Trim(TrimArgs),
     /// Sets the level of motion and vibration.
     #[command(
@@ -63,9 +65,10 @@ enabled = false in the configuration.")]
 /// A trim.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct TrimArgs {
-    /// -500ms to 500ms: the motion comes so much later than the film, or earlier where it is negative.
-    #[arg(value_name = "TRIM", value_parser = parse_trim, allow_hyphen_values = true)]
-    trim: i32,
+    /// -500ms to 500ms: the motion comes so much later than the film, or earlier where it is negative. Or frames of the film, as +2f and
+    /// -1f, by which it comes later or earlier than it does.
+    #[arg(value_name = "TRIM", value_parser = parse_trim_change, allow_hyphen_values = true)]
+    trim: TrimChange,
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -125,7 +128,11 @@ pub(in crate::cli) struct DisableArgs {
 pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
     match command {
         Command::Trim(TrimArgs { trim, server }) => {
-            let status = server.put("/api/v1/trim", &json!({ "offset_s": f64::from(*trim) / 1e3 }))?;
+            let asked = match trim {
+                TrimChange::To(ms) => json!({ "offset_s": f64::from(*ms) / 1e3 }),
+                TrimChange::ByFrames(frames) => json!({ "frames": frames }),
+            };
+            let status = server.put("/api/v1/trim", &asked)?;
             Ok(told(server, &status))
         }
         Command::Level(args) => {

@@ -100,8 +100,11 @@ fn film(film: &FilmProof) -> String {
     match greatest_error_ms {
         None => "the seats never followed the film".to_owned(),
         Some(ms) => {
-            let often =
-                if *switches == 0 { String::new() } else { format!(", sources changed {switches} times") };
+            let often = match switches {
+                0 => String::new(),
+                1 => ", the source changed once".to_owned(),
+                often => format!(", the source changed {often} times"),
+            };
             format!("followed the film by {}, at the most {ms:.2} ms from it{often}", sources.join(", "))
         }
     }

@@ -5,7 +5,6 @@ use serde::Serialize;
 use super::LabelArgs;
 use crate::app::film::{FilmReader, FilmTable, SourceRow, SourceRules};
 use crate::cli::{Exit, Failure, OrExit as _, print};
-use crate::film::follower::PaceLimits;
 use crate::film::point::FilmState;
 use crate::film::source::{FilmArgs, FilmSource};
 use crate::sys::clock::Monotonic;
@@ -66,7 +65,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         _ => args.labels.of(source),
     };
     let sources = [of(&args.source)?, of(&args.against)?];
-    let rules = SourceRules { allows_coarse: true, band: PaceLimits::default().band };
+    let rules = SourceRules { allows_coarse: true, ..SourceRules::default() };
     let reader = FilmReader::start(&sources, rules).or_exit(Exit::System)?;
     wait_for_both(&reader)?;
     let table = reader.table();

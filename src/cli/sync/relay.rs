@@ -9,7 +9,8 @@ use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
 /// Reads timecode devices for services that have none: each line at a socket of its own, ltc.sock or mtc.sock, for up to eight halls on
-/// this machine, with ltc:relay:SOCKET or mtc:relay:SOCKET as their source.
+/// this machine, with ltc:relay:SOCKET or mtc:relay:SOCKET as their source. It ends once each line has, as a command does that ends well;
+/// a device that is gone is waited for.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Args {
     /// One line of LTC, one of MIDI timecode, or both, as `play --chase` takes them.
@@ -29,13 +30,18 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (table, mut said) = (reader.table(), BTreeMap::new());
     let mut at = Monotonic.now();
     loop {
-        for row in table.read().sources {
+        let now = table.read();
+        for row in now.sources {
             let words =
                 row.notes.trouble.map_or_else(|| "read".to_owned(), |trouble| format!("not read: {trouble}"));
             if said.get(&row.source) != Some(&words) {
                 print::tell(&format!("{}: {words}", row.source));
                 said.insert(row.source, words);
             }
+        }
+        if now.over {
+            print::tell("there is nothing more to relay: each line has ended");
+            return Ok(Exit::Done);
         }
         at = at + EVERY;
         Monotonic.sleep_until(at);

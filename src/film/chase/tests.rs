@@ -95,7 +95,7 @@ fn whatever_ends_the_lead_of_the_film_is_obeyed_in_the_tick_that_reads_it() {
         stand.state = state;
         let verdict = stand.tick();
         if state == FilmState::Ended {
-            assert_eq!(verdict, ChaseVerdict::Park(ParkCause::FilmEnded));
+            assert_eq!(verdict, ChaseVerdict::Park(ParkCause::FilmCutShort));
         } else {
             assert_eq!(verdict, ChaseVerdict::Hold(HoldCause::Film(state)));
             assert_eq!(stand.run(10.0), ChaseVerdict::Hold(HoldCause::Film(state)));
@@ -113,6 +113,33 @@ fn seats_that_hold_for_five_minutes_park_and_join_no_more_by_themselves() {
     assert_eq!(stand.run(2.0), ChaseVerdict::Park(ParkCause::HeldTooLong));
     stand.state = FilmState::Locked;
     assert_eq!(stand.run(10.0), ChaseVerdict::Park(ParkCause::HeldTooLong));
+}
+
+/// Seats that follow a film for so many seconds of a cue of 100 s, from one place in it on, and then from another; why they park at
+/// its end.
+fn parked_after(legs: [(f64, f64); 2]) -> ChaseVerdict {
+    let mut stand = Stand::new(ChaseRules::until(ShowTime::from_millis(100_000)));
+    for (from_s, seconds) in legs {
+        stand.ahead_s = from_s - stand.now_s();
+        stand.run(seconds);
+    }
+    stand.state = FilmState::Ended;
+    stand.tick()
+}
+
+#[test]
+fn a_film_that_is_over_has_led_its_cue_only_where_seats_followed_it_through_nine_tenths_of_it() {
+    for (legs, cause) in [
+        ([(0.0, 60.0), (60.0, 39.0)], ParkCause::FilmEnded),
+        ([(0.0, 50.0), (55.0, 44.0)], ParkCause::FilmEnded),
+        ([(5.0, 50.0), (55.0, 40.0)], ParkCause::FilmEnded),
+        ([(0.0, 50.0), (50.0, 30.0)], ParkCause::FilmCutShort),
+        ([(40.0, 10.0), (50.0, 49.0)], ParkCause::FilmCutShort),
+        ([(0.0, 60.0), (0.0, 60.0)], ParkCause::FilmCutShort),
+        ([(-9.0, 5.0), (-4.0, 3.0)], ParkCause::FilmCutShort),
+    ] {
+        assert_eq!(parked_after(legs), ChaseVerdict::Park(cause), "{legs:?}");
+    }
 }
 
 #[test]

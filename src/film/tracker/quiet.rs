@@ -6,18 +6,28 @@ use super::states::SourceSign;
 use super::{
     ACQUIRE_FOR, DOUBT, MISSING, MISSING_PERIODS, SURE_COARSE_S, SURE_S, SourceTracker, WINDOW_PERIODS,
 };
+use crate::film::point::FilmState;
 use crate::time::MonoTime;
 
 impl SourceTracker {
+    /// The same with an estimate that may run on for longer, or less long. What was told, as a stop is, counts at once all the same.
+    pub(crate) fn freewheeling(self, freewheel: f64) -> Self {
+        Self { freewheel, ..self }
+    }
+
     /// Notes that time has passed. To be told some times a second, whatever is heard.
     pub(crate) fn poll(&mut self, now: MonoTime) {
+        // From poll to poll, so that it never goes back: a sample that ends the gap is older than the poll before it.
+        let passed = now.since(std::mem::replace(&mut self.polled, now));
+        self.counts.freewheel += if self.state == FilmState::Freewheeling { passed } else { Duration::ZERO };
         let quiet = self.newest.map_or_else(|| now.since(self.since), |newest| now.since(newest.at));
         let period = self.newest.map_or(Duration::ZERO, |newest| newest.period);
         if quiet > MISSING.max(MISSING_PERIODS * period) {
             self.on_sign(SourceSign::Miss, now);
         }
+        let patience = self.patience.mul_f64(self.freewheel);
         let patience =
-            self.patience.max(if self.traits.coarse { WINDOW_PERIODS * period } else { Duration::ZERO });
+            patience.max(if self.traits.coarse { WINDOW_PERIODS * period } else { Duration::ZERO });
         if quiet > patience {
             self.on_sign(SourceSign::TimeOut, now);
         } else if self.state.may_lead() && now.since(self.fitted_at) > patience {

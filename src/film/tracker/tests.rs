@@ -125,6 +125,8 @@ fn an_outage_is_run_through_by_estimate_and_is_no_jump() {
             let run = Run::of(told.kind, &film, &all, 50.0);
             assert_eq!(run.tracker.epoch, 0, "{name}: {:?}", run.states);
             assert!(run.has_been(FilmState::Freewheeling), "{name}: {:?}", run.states);
+            let alone_s = run.tracker.counts().freewheel.as_secs_f64();
+            assert!((alone_s - lasts).abs() < 0.2, "{name}: {alone_s} s of {lasts} s were run through");
             let around = run.errors.iter().filter(|error| (gap.0..gap.1 + 1.0).contains(&error.0));
             let worst = around.map(|error| error.1.abs() * 1e3).fold(0.0, f64::max);
             println!("{name:<12} {lasts} s from {from} s on: {worst:.3} ms");
@@ -274,6 +276,23 @@ fn how_long_the_estimate_runs_on_hangs_on_the_cause() {
         let run = Run::of(SourceKind::Ltc, &film, &all, 20.0);
         let lost = run.states.iter().find(|seen| seen.1 == FilmState::Lost).expect("it is lost in the end").0;
         assert!((lost - 10.0 - seconds).abs() < 0.15, "{word:?}: {:?}", run.states);
+    }
+}
+
+#[test]
+fn an_estimate_runs_on_for_as_long_as_is_configured_and_a_told_stop_is_obeyed_at_once_all_the_same() {
+    for (freewheel, lasts_s) in [(0.25, 0.5), (1.0, 2.0), (2.0, 4.0)] {
+        let mut tracker = SourceTracker::new(SourceKind::Mpv, BAND, mono(0.0)).freewheeling(freewheel);
+        for told in player(&TrueFilm::new(0.0, 1.0), 5.0, &[]) {
+            tracker.hear(&told);
+        }
+        let mut stopped = tracker.clone();
+        stopped.hear(&Observation::new(mono(5.01), FilmWord::Stop));
+        assert_eq!(stopped.state(), FilmState::Stopped);
+        tracker.poll(mono(5.0 + lasts_s - 0.1));
+        assert_eq!(tracker.state(), FilmState::Freewheeling, "{freewheel}");
+        tracker.poll(mono(5.0 + lasts_s + 0.1));
+        assert_eq!(tracker.state(), FilmState::Lost, "{freewheel}");
     }
 }
 

@@ -3,8 +3,13 @@
 use std::path::Path;
 
 use super::*;
+use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::app::supervisor::testing::{Rig, hall, told};
+use crate::config::{Config, FilmSync};
 use crate::control::LevelsChange;
+use crate::film::chase::ParkCause;
+use crate::film::point::FilmState;
+use crate::film::source::{FilmArgs, FilmSource};
 use crate::playlist::{Playlist, Schedule};
 use crate::state::{Event, PlayMode};
 
@@ -61,12 +66,25 @@ fn ask_in_between(rig: &mut Rig, ask: Command) {
 }
 
 #[test]
-fn an_entry_goes_on_to_the_next_once_its_cue_came_to_its_end() {
-    let mut rig = playing();
-    rig.tell(Event::CueEnded);
-    rig.tell(Event::Parked);
-    rig.settle();
-    assert_eq!((rig.state(), cue(&rig)), (JOINING, Some("two")));
+fn an_entry_goes_on_to_the_next_once_its_cue_or_the_film_that_led_it_came_to_its_end() {
+    for end in [Event::CueEnded, Event::FilmOver(ParkCause::FilmEnded)] {
+        let mut rig = playing();
+        rig.tell(end);
+        rig.tell(Event::Parked);
+        rig.settle();
+        assert_eq!((rig.state(), cue(&rig)), (JOINING, Some("two")));
+    }
+}
+
+#[test]
+fn an_entry_whose_film_ended_or_left_in_the_midst_of_its_cue_goes_on_to_nothing() {
+    for why in [ParkCause::FilmCutShort, ParkCause::CueLeft, ParkCause::HeldTooLong] {
+        let mut rig = playing();
+        rig.tell(Event::FilmOver(why));
+        rig.tell(Event::Parked);
+        rig.settle();
+        assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("one")), "{why:?}");
+    }
 }
 
 #[test]
@@ -246,4 +264,91 @@ fn the_time_of_an_entry_starts_it_in_an_armed_hall_and_is_noted_in_any_other() {
         let [Act::Note(note)] = &acts[..] else { panic!("{acts:?}") };
         assert!(note.contains("nobody had armed the hall"), "{note}");
     }
+}
+
+/// What a hall in that state, in which `cue` is loaded of a reel of three parts, does for a film that is there, seconds after the hour.
+struct Reel {
+    onward: Onward,
+    hall: HallContext,
+}
+
+impl Reel {
+    fn new(state: State, cue: &str) -> Self {
+        let text = "title = \"Reel\"\n[[entry]]\ncue = \"one\"\nfilm = \"01:00:00:00\"\n\
+                    [[entry]]\ncue = \"two\"\nfilm = \"01:01:00:00\"\n[[entry]]\ncue = \"three\"\n";
+        let playlist = Playlist::parse(Path::new("reel.toml"), text).unwrap();
+        let list = List { playlist, cues: vec![(None, 60.0); 3], ..list() };
+        let mut hall = hall(state, cue);
+        let source = FilmSource::Mpv("/s".into());
+        let args = FilmArgs::new(source, Some("25"), Some("01:00:00:00")).unwrap();
+        let sync = FilmSync { sources: vec![args], leads: true, ..FilmSync::default() };
+        hall.config = std::sync::Arc::new(Config { sync: Some(sync), ..(*hall.config).clone() });
+        Self { onward: Onward { list: Some(list), ..Onward::default() }, hall }
+    }
+
+    /// Which entry is loaded for it, counted from 0.
+    fn at(&mut self, media_s: f64, state: FilmState) -> Option<usize> {
+        let row = SourceRow { media_s: Some(media_s), may_lead: true, ..SourceRow::named("ltc", state) };
+        let table = FilmTable { sources: vec![row], leads: Some(0), ..FilmTable::default() };
+        self.hall.film = Some(SharedTable::of(table));
+        let heeded = told(&mut self.onward, &SupervisorEvent::Round(&[]), &self.hall);
+        let [Act::Take(JobResult::Reached(entry))] = heeded[..] else {
+            assert!(heeded.is_empty(), "a film has something else done: {heeded:?}");
+            return None;
+        };
+        match &self.onward.enter(entry, &self.hall)[..] {
+            [] => None,
+            [Act::Name(_), Act::Start(Job::Entry(entry, ..))] => Some(*entry),
+            acts => panic!("a film has something else done: {acts:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_film_that_comes_to_the_part_of_another_entry_has_it_loaded_once_while_all_is_parked() {
+    let mut reel = Reel::new(State::Parked, "one");
+    assert_eq!(reel.at(10.0, FilmState::Locked), None, "it is loaded");
+    for state in FilmState::ALL.into_iter().filter(|state| *state != FilmState::Locked) {
+        assert_eq!(reel.at(70.0, state), None, "{state:?}");
+    }
+    assert_eq!(reel.at(59.9, FilmState::Locked), None, "a part goes before the way up to the next");
+    assert_eq!(reel.at(60.0, FilmState::Locked), Some(1));
+    assert_eq!(reel.at(61.0, FilmState::Locked), None, "once: a person may select another meanwhile");
+    reel.at(500.0, FilmState::Locked);
+    assert_eq!(reel.at(-9.0, FilmState::Locked), None, "it is loaded, and ten seconds ahead it is");
+    reel.at(-11.0, FilmState::Locked);
+    assert_eq!(reel.at(119.0, FilmState::Locked), Some(1), "it has come there anew");
+}
+
+#[test]
+fn frames_last_as_long_as_those_of_the_film_that_is_configured_or_heard() {
+    let mut hall = hall(State::Armed, "one");
+    let ms =
+        |hall: &HallContext| [-1, 1, 2].map(|frames| crate::app::supervisor::film::frames_ms(frames, hall));
+    assert_eq!(ms(&hall), [-42, 42, 83], "24 a second, where nobody knows");
+    let mut row = SourceRow { may_lead: true, ..SourceRow::named("ltc", FilmState::Locked) };
+    row.notes.fps = Some("30".to_owned());
+    hall.film =
+        Some(SharedTable::of(FilmTable { sources: vec![row], leads: Some(0), ..FilmTable::default() }));
+    assert_eq!(ms(&hall), [-33, 33, 67]);
+    assert_eq!(ms(&Reel::new(State::Armed, "one").hall), [-40, 40, 80], "25 are configured");
+}
+
+#[test]
+fn no_film_has_a_cue_loaded_that_is_armed_or_moves_or_where_a_person_has_loaded_another() {
+    let states = State::ALL.into_iter().filter(|state| *state != State::Parked);
+    for state in states {
+        let mut reel = Reel::new(state, "one");
+        assert_eq!(reel.at(70.0, FilmState::Locked), None, "{state}");
+        reel.hall.mirror.state = State::Parked;
+        assert_eq!(reel.at(71.0, FilmState::Locked), Some(1), "after {state}: the film is still there");
+    }
+    assert_eq!(Reel::new(State::Parked, "beside").at(70.0, FilmState::Locked), None);
+    let mut busy = Reel::new(State::Parked, "one");
+    busy.hall.job = Some("preflight");
+    assert_eq!(busy.at(70.0, FilmState::Locked), None);
+    let mut goes_on = Reel::new(State::Parked, "one");
+    goes_on.onward.fetch(1, Some(Start::GoOn));
+    assert!(goes_on.onward.enter(2, &goes_on.hall).is_empty());
+    assert_eq!((goes_on.at(70.0, FilmState::Locked), goes_on.onward.start), (None, Some(Start::GoOn)));
 }
