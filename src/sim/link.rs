@@ -1,6 +1,7 @@
 //! A network that loses and repeats on purpose, the same way for the same seed.
 
 use super::LinkFaults;
+use super::chance::Chance;
 
 /// What becomes of one datagram and its answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,15 +21,13 @@ pub(super) enum Fate {
 pub(super) struct Link {
     loss: f64,
     duplicate: f64,
-    state: u64,
+    chance: Chance,
 }
 
 impl Link {
     /// The link of the controller with this index.
     pub(super) fn new(faults: &LinkFaults, seed: u64, index: usize) -> Self {
-        // Each controller gets its own stream: a distance of one step in the seed is far apart after one mix.
-        let state = mix(seed ^ mix(index as u64));
-        Self { loss: faults.loss, duplicate: faults.duplicate, state }
+        Self { loss: faults.loss, duplicate: faults.duplicate, chance: Chance::new(seed, index) }
     }
 
     /// Changes the chance of a loss.
@@ -43,7 +42,7 @@ impl Link {
 
     /// The fate of the next datagram.
     pub(super) fn fate(&mut self) -> Fate {
-        let (lost, half, twice) = (self.chance(), self.chance(), self.chance());
+        let (lost, half, twice) = (self.chance.draw(), self.chance.draw(), self.chance.draw());
         if lost < self.loss {
             if half < 0.5 { Fate::LostOnTheWay } else { Fate::AnswerLost }
         } else if twice < self.duplicate {
@@ -52,20 +51,6 @@ impl Link {
             Fate::Answered
         }
     }
-
-    /// A number from 0 to below 1.
-    #[expect(clippy::cast_precision_loss, reason = "53 bits are what an f64 holds")]
-    fn chance(&mut self) -> f64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        (mix(self.state) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
-/// The mixing step of SplitMix64: every bit of the result hangs on every bit of the input.
-const fn mix(mut z: u64) -> u64 {
-    z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ z >> 31
 }
 
 #[cfg(test)]

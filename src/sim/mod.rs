@@ -12,6 +12,7 @@
 //! thread of normal priority; once it runs, a motion frame costs it no allocation. What the manuals leave open is
 //! [`Invented`], and can be played the other way.
 
+mod chance;
 mod command;
 mod controller;
 mod counts;
@@ -26,6 +27,8 @@ mod outcome;
 pub mod pa;
 mod player;
 mod registers;
+#[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "kinocue sim --tty comes next"))]
+pub(crate) mod serial;
 mod setup;
 mod sheet;
 mod station;

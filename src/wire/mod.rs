@@ -2,7 +2,8 @@
 //! thread; neither way allocates, writing cannot fail, and reading takes any bytes without a panic.
 //!
 //! Numbers are big-endian throughout; one message is one datagram. Sources are the SMC manual (2.2 and 2.3) and the
-//! IMAX manual (2.2 and 2.3); where they are silent or disagree, what public programs send.
+//! IMAX manual (2.2 and 2.3); where they are silent or disagree, what public programs send. What serial drives speak has a
+//! folder of its own each: [`silvermax`], [`sixpack2`].
 
 mod analogue;
 mod bytes;
@@ -18,6 +19,8 @@ mod register;
 mod reply;
 mod report;
 mod servo;
+#[expect(dead_code, unused_imports, reason = "the simulator and decode come next")]
+pub(crate) mod silvermax;
 #[expect(dead_code, reason = "spoken by the simulator and by the host once they are there")]
 pub(crate) mod sixpack2;
 mod status;

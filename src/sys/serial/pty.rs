@@ -43,6 +43,11 @@ impl Pty {
         &self.path
     }
 
+    /// The rate at which whoever opened the path last set it; the pseudo-terminal itself keeps to none.
+    pub(crate) fn baud(&self) -> Option<u32> {
+        tcgetattr(&self.line).ok().map(|modes| modes.output_speed())
+    }
+
     /// The near end. Whoever has the path open sees a port that vanished once this is dropped.
     pub(crate) fn line(&self) -> &OctetLine {
         &self.line
