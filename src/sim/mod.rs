@@ -31,6 +31,8 @@ mod registers;
 pub(crate) mod serial;
 mod setup;
 mod sheet;
+#[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "kinocue sim --tty comes next"))]
+pub(crate) mod sixpack2;
 mod station;
 
 pub use command::{Action, Command, CommandError};
