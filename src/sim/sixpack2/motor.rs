@@ -51,8 +51,8 @@ pub(super) enum Doing {
     Nothing,
     /// `$24`.
     Following(i32),
-    /// `$50`, and back to where `$2A` came: by a ramp to a place, at such a speed at the most.
-    Ramp(i32, u16),
+    /// `$50`, and back to where `$2A` came: by a ramp to a place, with such a part of speed and acceleration.
+    Ramp(i32, f64),
     /// `$25`.
     Turning(i16),
     /// `$22`.
@@ -189,7 +189,10 @@ impl SixpackMotor {
                     self.doing = Doing::Nothing;
                 }
             }
-            Doing::Ramp(target, most) => self.ramp(f64::from(target), f64::from(most), steps_a_unit),
+            Doing::Ramp(target, part) => {
+                let most = f64::from(self.written.ramp.vmax.clamp(1, 511));
+                self.ramp(f64::from(target), (part * most, part * self.amax()), steps_a_unit);
+            }
             Doing::Searching(search) => self.search_on(search, steps_a_unit),
         }
     }
@@ -204,18 +207,19 @@ impl SixpackMotor {
         self.speed += (wanted - self.speed).clamp(-self.amax(), self.amax());
     }
 
-    /// Towards a place, and stands once it is there.
-    fn ramp(&mut self, target: f64, most: f64, steps_a_unit: f64) {
+    /// Towards a place, by so much speed and acceleration at the most, and stands once it is there.
+    fn ramp(&mut self, target: f64, (most, amax): (f64, f64), steps_a_unit: f64) {
         let loops = (target - self.counter) / steps_a_unit;
-        if loops == 0.0 {
+        let (way, speed) = (loops.abs(), self.speed.abs());
+        if way == 0.0 {
             self.halt();
-        } else if loops.abs() <= self.amax() && self.speed.abs() <= 2.0 * self.amax() {
+        } else if way <= amax && speed <= 2.0 * amax {
             // With the last loop it is there; a unit makes single steps.
             self.speed = loops;
         } else {
-            let braking = (2.0 * self.amax() * loops.abs()).sqrt() - self.amax();
-            let most = most.clamp(1.0, f64::from(MOST_SPEED));
-            self.speed_up(braking.clamp(1.0, most).copysign(loops));
+            let braking = (2.0 * amax * way).sqrt() - amax;
+            let wanted = braking.clamp(amax.min(most), most).copysign(loops);
+            self.speed += (wanted - self.speed).clamp(-amax, amax);
         }
     }
 
@@ -239,7 +243,7 @@ impl SixpackMotor {
             SearchStep::Leave | SearchStep::BackOff => self.speed_up(-towards * slow),
             SearchStep::Seek | SearchStep::Mechanical => self.speed_up(towards * fast),
             SearchStep::Creep => self.speed_up(towards * slow),
-            SearchStep::Return => self.ramp(0.0, slow, steps_a_unit),
+            SearchStep::Return => self.ramp(0.0, (slow, self.amax()), steps_a_unit),
         }
     }
 

@@ -233,7 +233,7 @@ impl SixpackUnit {
                 self.collector.set_timeout(timeout);
             }
             SixpackCommand::StopSeveral(told) => self.each(told.mask, |motor| {
-                motor.doing = Doing::Ramp(motor.position(), motor.written.ramp.vmax);
+                motor.doing = Doing::Ramp(motor.position(), 1.0);
             }),
             SixpackCommand::JointStart(told) => self.start_jointly(told.mask),
             SixpackCommand::BaudSwitch(_) | SixpackCommand::Other { .. } => self.books.unknown += 1,
@@ -309,15 +309,13 @@ impl SixpackUnit {
     }
 
     /// All of them at once, each as fast as it has to be to arrive with the others; those that move are left alone.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a u16")]
     fn start_jointly(&mut self, mask: u8) {
         let way = |motor: &SixpackMotor| f64::from(motor.joint.abs_diff(motor.position()));
         let mut longest = 1.0_f64;
         self.each(mask, |motor| longest = longest.max(way(motor)));
         self.each(mask, |motor| {
             if motor.is_at_rest() {
-                let most = (f64::from(motor.written.ramp.vmax) * way(motor) / longest).ceil();
-                motor.doing = Doing::Ramp(motor.joint, most as u16);
+                motor.doing = Doing::Ramp(motor.joint, way(motor) / longest);
             }
         });
     }

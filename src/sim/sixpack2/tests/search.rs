@@ -4,7 +4,10 @@ use super::*;
 
 #[test]
 fn homing_finds_the_edge_of_the_switch_and_the_lower_end_of_the_stroke_reads_a_million() {
-    let mut host = Host::with(ShaftSetup::default());
+    let mut shafts = [ShaftSetup::default(); MOTORS];
+    shafts[1].start += 11.0;
+    shafts[2].start += 23.0;
+    let mut host = Host::of(SixpackSetup { shafts, ..setup() });
     for motor in 0..3 {
         host.settle(motor);
         host.order(search(motor));

@@ -38,6 +38,16 @@ fn an_answer_waits_for_the_delay_and_what_comes_while_it_holds_two_wires_is_lost
 }
 
 #[test]
+fn on_wires_of_its_own_for_each_way_it_hears_while_it_speaks() {
+    let mut host = Host::with(ShaftSetup::default());
+    let ask = SixpackOrder::AskUnit(UnitQuery { response: ANSWER });
+    host.order(ask);
+    assert_eq!(host.hear(MS(7)).len(), 9);
+    assert!(host.identity().is_some());
+    assert_eq!(host.unit().books.collisions, 0);
+}
+
+#[test]
 fn a_lost_octet_costs_the_next_frames_until_a_break_or_the_packet_timeout() {
     let mut host = Host::with(ShaftSetup::default());
     let short = |host: &mut Host| host.octets(&target(0, 5).frame(UNIT).octets()[1..]);
