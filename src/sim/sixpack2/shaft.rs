@@ -71,6 +71,7 @@ pub(crate) struct Shaft {
     /// Fell out of step, and stands until it is asked for no more than it can take at once.
     is_out_of_step: bool,
     is_blocked: bool,
+    is_switch_broken: bool,
     measure: Measure,
     executed: ExecutedMotion,
 }
@@ -94,6 +95,7 @@ impl Shaft {
             velocity: 0.0,
             is_out_of_step: false,
             is_blocked: false,
+            is_switch_broken: false,
             measure: Measure::new(Spacing::at_rate(LOOPS_A_SECOND)),
             executed,
         }
@@ -135,12 +137,23 @@ impl Shaft {
 
     /// The level of its switch; open without one.
     pub(super) fn level(&self) -> bool {
-        self.setup.switch.is_some_and(|switch| self.place <= switch) == self.setup.is_high
+        let is_closed = self.setup.switch.is_some_and(|switch| self.place <= switch);
+        (is_closed && !self.is_switch_broken) == self.setup.is_high
     }
 
     /// Something holds it, or lets go.
     pub(super) const fn block(&mut self, is_blocked: bool) {
         self.is_blocked = is_blocked;
+    }
+
+    /// Its switch does not close any more, or does.
+    pub(super) const fn break_switch(&mut self, is_broken: bool) {
+        self.is_switch_broken = is_broken;
+    }
+
+    /// It loses steps above another jump.
+    pub(super) const fn set_jump(&mut self, jump: f64) {
+        self.setup.jump = jump;
     }
 
     /// Where it really is.

@@ -39,7 +39,7 @@ pub(crate) struct SixpackSetup {
 }
 
 /// What can happen to a unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum SixpackFault {
     /// It forgets all it was told, and where it is.
     Reset,
@@ -54,6 +54,15 @@ pub(crate) enum SixpackFault {
         /// Holds it.
         is_blocked: bool,
     },
+    /// The switch of a motor gives the level of an open one for ever, or works again.
+    BreakSwitch {
+        /// Which motor; one that is not there is left alone.
+        motor: usize,
+        /// Does not close.
+        is_broken: bool,
+    },
+    /// All its motors lose steps where their speed changes by more than this at once, microsteps a second.
+    Jump(f64),
     /// It neither hears nor moves nor answers, or its power comes back, and it wakes.
     Dead(bool),
 }
@@ -142,6 +151,12 @@ impl SixpackUnit {
                     motor.shaft.block(is_blocked);
                 }
             }
+            SixpackFault::BreakSwitch { motor, is_broken } => {
+                if let Some(motor) = self.motors.get_mut(motor) {
+                    motor.shaft.break_switch(is_broken);
+                }
+            }
+            SixpackFault::Jump(jump) => self.motors.iter_mut().for_each(|motor| motor.shaft.set_jump(jump)),
             SixpackFault::Dead(true) => {
                 self.wake(now);
                 self.is_dead = true;

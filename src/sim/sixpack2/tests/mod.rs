@@ -1,6 +1,7 @@
 //! Units in virtual time, led as a host would, and by anything.
 
 mod chance;
+mod line;
 mod motion;
 mod search;
 mod unit;

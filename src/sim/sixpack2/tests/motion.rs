@@ -35,8 +35,8 @@ fn a_course_of_targets_is_executed_as_the_model_of_the_proof_says() {
 
 #[test]
 fn a_motor_that_is_asked_to_jump_by_more_than_it_can_loses_steps_and_its_unit_does_not_know() {
-    let shaft = ShaftSetup { start: 0.0, jump: 22.5 * MM, ..ShaftSetup::default() };
-    let mut host = Host::with(shaft);
+    let mut host = Host::with(ShaftSetup { start: 0.0, ..ShaftSetup::default() });
+    host.suffer(SixpackFault::Jump(22.5 * MM));
     host.settle(0);
     // 60 ms at 12 and 3: 1 mm begins with 25 mm a second.
     for step in 1..=10 {

@@ -51,10 +51,11 @@ fn a_reversed_axis_homes_to_its_lower_end_with_null_left_the_other_way_round() {
 
 #[test]
 fn a_search_without_a_switch_goes_on_for_ever_until_it_is_aborted() {
-    let mut host = Host::with(ShaftSetup { switch: None, ..ShaftSetup::default() });
+    let mut host = Host::with(ShaftSetup::default());
+    host.suffer(SixpackFault::BreakSwitch { motor: 0, is_broken: true });
     host.settle(0);
     host.order(search(0));
-    host.wait(Duration::from_secs(120));
+    host.wait(Duration::from_secs(60));
     let motor = host.motor(0);
     assert!(motor.shaft.executed().lost > 100_000.0 && motor.shaft.place() == -10.0 * MM, "{motor:?}");
     assert_eq!(host.position(0).action, action::SEARCH + 1);
