@@ -5,20 +5,25 @@ use std::io::Read as _;
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
+use control::{CarryOut, Control};
+
 use super::print::{self, tell};
 use super::{Exit, Failure, OrExit as _};
-use crate::sim::{Command, Farm, FarmError, LinkFaults, Options, Outcome, Setup};
+use crate::sim::{Farm, FarmError, LinkFaults, Options, Outcome, Setup};
 use crate::time::parse_duration;
 use crate::wire::Dialect;
 
 mod control;
 mod leeway;
 mod parse;
+mod silvermax;
+mod tty;
 
 /// Where a host is that says nothing else.
 const HOST_PORT: u16 = 8410;
@@ -38,6 +43,8 @@ Examples:
   kinocue sim --pa 06=0 --moves moves.csv            never hurries; logs how motors moved
   kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      an emergency stop comes and goes
   kinocue sim --count 8 --script \"5:3@err=12\"        the third has an alarm of the drive of axis 3
+  kinocue sim --dialect silvermax --tty ./stalls --units 16,17,18    three units on a serial line
+  kinocue sim --dialect silvermax --tty ./stalls --faults \"lost=0.001, 17@dead=1\" --script \"9:16@reset\"
 
 Commands of --script, each with TIME: before it (seconds from the start), and of --control:
   X1=1, X1=0     the switch at input X01 closes (active with PA04 = 1), or opens; X1 to X12
@@ -47,46 +54,60 @@ Commands of --script, each with TIME: before it (seconds from the start), and of
   mute=1         obeys, but says nothing; mute=0: speaks again
   pa95=3         somebody sets a parameter at its keys: register in hex, value decimal or 0x
   loss=0.1, duplicate=0.1, delay=50ms   what the network does from now on
-A number or name and @ before a command means that controller alone: 2@err=12, c2@err=12.")]
+A number or name and @ before a command means that controller alone: 2@err=12, c2@err=12.
+
+Commands of serial drives, in --faults too, without a time:
+  lost=0.1, doubled=0.1, flipped=0.1   what becomes of octets, by chance
+  late=0.1/30ms    octets come so much later, by chance
+  answer_lost=0.1, lose=2   answers are lost after what was asked has been done: by chance, or the next ones
+  held=16ms        the adapter holds back what has come; held=0ms: no more
+  echo=1           the adapter returns what is sent; echo=0: no more
+  unplug=1         the adapter is unplugged, and the link is gone; unplug=0: back under the same name
+and of a SilverMax, of all units or, with 17@ before it, of unit 17:
+  reset            the power goes and comes back
+  hot=1, blocked=1, dead=1   too hot; held by something; neither hears nor answers; 0: no more
+  X2=0, X2=1       an input is low, or high; X1 to X7, of which X1 is the switch of home
+  as=16, as=0      answers as another unit, or as itself
+  ppm=200          its crystal runs so much faster, millionths")]
 pub(super) struct Args {
     /// Where the first controller listens; with port 0 each gets a free one.
-    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7408")]
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7408", conflicts_with = "tty")]
     listen: SocketAddrV4,
 
     /// Number of controllers, at consecutive ports.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000), conflicts_with = "tty")]
     count: u16,
 
     /// Working axes of each (PA02), 1 to 12.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=12))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=12), conflicts_with = "tty")]
     axes: u16,
 
     /// A parameter: register in hex, value decimal or 0x; repeatable.
-    #[arg(long = "pa", value_name = "HEX=VALUE", value_parser = parse::parameter)]
+    #[arg(long = "pa", value_name = "HEX=VALUE", value_parser = parse::parameter, conflicts_with = "tty")]
     parameters: Vec<(u8, u16)>,
 
-    /// Which family they belong to: smc, or mbox for MBOX and IMAX.
+    /// Which family they belong to: smc, mbox for MBOX and IMAX, or serial drives, which need --tty.
     #[arg(long, value_enum, default_value_t = Family::Smc)]
     dialect: Family,
 
     /// Probability that a datagram goes unanswered, 0..1: half of those never arrive, of the others the answer is lost.
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance, conflicts_with = "tty")]
     loss: f64,
 
     /// Probability that an answer is sent twice, 0..1.
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance)]
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance, conflicts_with = "tty")]
     duplicate: f64,
 
     /// Delay of answers: 80ms, 1.5s.
-    #[arg(long, value_name = "SPAN", default_value = "0ms", value_parser = parse_duration)]
+    #[arg(long, value_name = "SPAN", default_value = "0ms", value_parser = parse_duration, conflicts_with = "tty")]
     delay: Duration,
 
     /// Obey, but never answer.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "tty")]
     mute: bool,
 
     /// An emergency stop is in effect from then on, counted from the start: SS[.mmm], MM:SS, HH:MM:SS.
-    #[arg(long, value_name = "TIME", value_parser = parse::time)]
+    #[arg(long, value_name = "TIME", value_parser = parse::time, conflicts_with = "tty")]
     estop_at: Option<Duration>,
 
     /// Seed of the random faults [default: a random one, which is printed]
@@ -94,28 +115,28 @@ pub(super) struct Args {
     seed: Option<u64>,
 
     /// The port that frames must come from (PA24); 0 takes any.
-    #[arg(long, value_name = "PORT", default_value_t = HOST_PORT)]
+    #[arg(long, value_name = "PORT", default_value_t = HOST_PORT, conflicts_with = "tty")]
     host_port: u16,
 
     /// Start with settings that are safe for people and pass preflight, reports go to this machine; --pa changes them.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "tty")]
     safe: bool,
 
     /// Timed commands, as "2.0:X1=1, 3.0:X1=0, 5:err=12, 8:reboot"; see below.
-    #[arg(long, value_name = "TIME:COMMAND, …", value_parser = script, default_value = "", hide_default_value = true)]
-    script: Script,
+    #[arg(long, value_name = "TIME:COMMAND, …", default_value = "", hide_default_value = true)]
+    script: String,
 
     /// Accept commands on a Unix socket, one per line, each answered with ok, or error and the reason.
     #[arg(long, value_name = "PATH")]
     control: Option<PathBuf>,
 
     /// Write a CSV row for each motion frame: what was commanded, and where the motors were.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "tty")]
     log: Option<PathBuf>,
 
     /// Write a CSV row for each move the motors ran: when it began, how long it took, from where to where, in pulses
     /// and without vibration; a move begins with its frame, or where the one before it ends.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "tty")]
     moves: Option<PathBuf>,
 
     /// At the end, one JSON object with all counts on the standard output.
@@ -123,68 +144,78 @@ pub(super) struct Args {
     json: bool,
 
     /// Listen on addresses that other machines reach, too.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "tty")]
     allow_lan: bool,
+
+    #[command(flatten)]
+    tty: tty::TtyArgs,
 
     #[command(flatten)]
     leeway: leeway::Leeway,
 }
 
-/// What happens when.
-type Script = std::sync::Arc<[(Duration, Command)]>;
-
-fn script(text: &str) -> anyhow::Result<Script> {
-    parse::script(text).map(Into::into)
-}
-
-/// A family of controllers.
+/// A family of controllers, or of serial drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Family {
     Smc,
     Mbox,
+    Silvermax,
 }
 
-impl From<Family> for Dialect {
-    fn from(family: Family) -> Self {
-        match family {
-            Family::Smc => Self::Smc,
-            Family::Mbox => Self::Mbox,
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let signals = Signals::catch().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
+    match (args.dialect, &args.tty.tty) {
+        (Family::Silvermax, Some(path)) => silvermax::run(args, path, signals),
+        (Family::Smc, None) => run_farm(args, Dialect::Smc, signals),
+        (Family::Mbox, None) => run_farm(args, Dialect::Mbox, signals),
+        (Family::Silvermax, None) => {
+            Err(anyhow!("serial drives need a line; give --tty and the link to it, as in --tty ./stalls"))
+                .or_exit(Exit::Usage)
+        }
+        (Family::Smc | Family::Mbox, Some(_)) => {
+            Err(anyhow!("--tty is for serial drives; give --dialect silvermax with it")).or_exit(Exit::Usage)
         }
     }
 }
 
-pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+fn run_farm(args: &Args, dialect: Dialect, signals: Signals) -> Result<Exit, Failure> {
     if !args.listen.ip().is_loopback() && !args.allow_lan {
         let address = args.listen;
         let refusal =
             anyhow!("{address} is not of this machine alone; give --allow-lan to listen there all the same");
         return Err(refusal).or_exit(Exit::Usage);
     }
-    let signals = Signals::catch().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
-    let farm = Farm::start(options(args)?).map_err(|error| {
+    let farm = Farm::start(options(args, dialect)?).map_err(|error| {
         let exit = if matches!(error, FarmError::Script(_)) { Exit::Usage } else { Exit::System };
         Failure { exit, error: error.into() }
     })?;
-    let control = args.control.as_deref().map(|path| {
-        let opened = control::Control::open(path, farm.remote());
-        opened.with_context(|| format!("cannot listen at {}", path.display())).or_exit(Exit::System)
-    });
-    let _control = control.transpose()?; // its file goes when this does
+    let remote = farm.remote();
+    // Its file goes when this does.
+    let _control = control(args, Arc::new(move |text| Ok(remote.tell(parse::command(text)?)?)))?;
     for address in farm.addresses() {
         tell(&format!("ready {address}"));
     }
-    signals.wait().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
+    signals.wait()?;
     let outcomes = farm.stop().context("cannot finish the log").or_exit(Exit::Io)?;
     report(&outcomes, args.json)?;
     Ok(Exit::Done)
 }
 
-fn options(args: &Args) -> Result<Options, Failure> {
+/// The control socket, if one is asked for.
+fn control(args: &Args, carry_out: CarryOut) -> Result<Option<Control>, Failure> {
+    let open = |path: &PathBuf| {
+        let opened = Control::open(path, carry_out);
+        opened.with_context(|| format!("cannot listen at {}", path.display())).or_exit(Exit::System)
+    };
+    args.control.as_ref().map(open).transpose()
+}
+
+fn options(args: &Args, dialect: Dialect) -> Result<Options, Failure> {
     let setup = Setup {
         axes: args.axes,
         parameters: args.parameters.clone(),
         host_port: args.host_port,
-        dialect: args.dialect.into(),
+        dialect,
         mute: args.mute,
         estop_at: args.estop_at,
         invented: args.leeway.invented(),
@@ -198,7 +229,7 @@ fn options(args: &Args) -> Result<Options, Failure> {
         seed: seed(args),
         log: log_file(args.log.as_deref())?,
         moves: log_file(args.moves.as_deref())?,
-        script: args.script.to_vec(),
+        script: parse::script(&args.script).context("--script").or_exit(Exit::Usage)?,
     })
 }
 
@@ -215,7 +246,7 @@ fn log_file(path: Option<&Path>) -> Result<Option<File>, Failure> {
 fn seed(args: &Args) -> u64 {
     args.seed.unwrap_or_else(|| {
         let seed = u64::from(std::process::id());
-        if args.loss > 0.0 || args.duplicate > 0.0 {
+        if args.loss > 0.0 || args.duplicate > 0.0 || args.tty.tty.is_some() {
             tell(&format!("seed {seed}"));
         }
         seed
@@ -249,7 +280,7 @@ impl Signals {
         Ok(Self(wait))
     }
 
-    fn wait(mut self) -> std::io::Result<()> {
-        self.0.read_exact(&mut [0])
+    fn wait(mut self) -> Result<(), Failure> {
+        self.0.read_exact(&mut [0]).context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)
     }
 }

@@ -27,11 +27,10 @@ mod outcome;
 pub mod pa;
 mod player;
 mod registers;
-#[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "kinocue sim --tty comes next"))]
 pub(crate) mod serial;
 mod setup;
 mod sheet;
-#[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "kinocue sim --tty comes next"))]
+pub(crate) mod silvermax;
 pub(crate) mod sixpack2;
 mod station;
 

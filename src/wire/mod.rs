@@ -19,7 +19,6 @@ mod register;
 mod reply;
 mod report;
 mod servo;
-#[expect(dead_code, unused_imports, reason = "the simulator and decode come next")]
 pub(crate) mod silvermax;
 #[expect(dead_code, reason = "spoken by the simulator and by the host once they are there")]
 pub(crate) mod sixpack2;

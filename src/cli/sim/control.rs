@@ -6,14 +6,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::parse;
-use crate::sim::Remote;
 use crate::sys::unix_socket::listen_in_place;
 
 /// Connections at a time.
 const CONNECTIONS: usize = 16;
 /// Bytes of a line.
 const LINE: u64 = 1_024;
+
+/// Carries out one command.
+pub(super) type CarryOut = Arc<dyn Fn(&str) -> anyhow::Result<()> + Send + Sync>;
 
 /// A control socket; its file goes with it.
 #[derive(Debug)]
@@ -26,12 +27,12 @@ impl Control {
     ///
     /// # Errors
     /// A path that is taken or cannot be made, or a thread that cannot be had.
-    pub(super) fn open(path: &Path, remote: Remote) -> io::Result<Self> {
+    pub(super) fn open(path: &Path, carry_out: CarryOut) -> io::Result<Self> {
         let listener = listen_in_place(path)?;
         let control = Self { path: path.to_owned() };
         std::thread::Builder::new()
             .name("sim-control".to_owned())
-            .spawn(move || accept(&listener, &remote))?;
+            .spawn(move || accept(&listener, &carry_out))?;
         Ok(control)
     }
 }
@@ -43,7 +44,7 @@ impl Drop for Control {
 }
 
 /// Serves each connection on a thread of its own, until the program ends.
-fn accept(listener: &UnixListener, remote: &Remote) {
+fn accept(listener: &UnixListener, carry_out: &CarryOut) {
     let open = Arc::new(AtomicUsize::new(0));
     for stream in listener.incoming() {
         let Ok(stream) = stream else { continue };
@@ -52,10 +53,10 @@ fn accept(listener: &UnixListener, remote: &Remote) {
             let _ = (&stream).write_all(b"error too many connections\n");
             continue;
         };
-        let remote = remote.clone();
+        let carry_out = Arc::clone(carry_out);
         // Without a thread the connection closes, which says enough.
         let _ = std::thread::Builder::new().name("sim-control".to_owned()).spawn(move || {
-            let _ = serve(&stream, &remote); // whoever was connected is gone
+            let _ = serve(&stream, &carry_out); // whoever was connected is gone
             drop(place);
         });
     }
@@ -78,7 +79,7 @@ impl Drop for Place {
 }
 
 /// Answers line by line; a line that is too long ends the connection.
-fn serve(stream: &UnixStream, remote: &Remote) -> io::Result<()> {
+fn serve(stream: &UnixStream, carry_out: &CarryOut) -> io::Result<()> {
     let mut lines = BufReader::new(stream);
     let mut line = Vec::new();
     loop {
@@ -90,15 +91,11 @@ fn serve(stream: &UnixStream, remote: &Remote) -> io::Result<()> {
         if line.last() != Some(&b'\n') && line.len() as u64 == LINE {
             return writeln!(&*stream, "error a line has at most {LINE} bytes");
         }
-        let answer = match carry_out(&line, remote) {
+        let done = std::str::from_utf8(&line).map_err(Into::into).and_then(|text| carry_out(text.trim()));
+        let answer = match done {
             Ok(()) => "ok".to_owned(),
             Err(error) => format!("error {error:#}"),
         };
         writeln!(&*stream, "{answer}")?;
     }
-}
-
-fn carry_out(line: &[u8], remote: &Remote) -> anyhow::Result<()> {
-    let command = parse::command(std::str::from_utf8(line)?.trim())?;
-    Ok(remote.tell(command)?)
 }

@@ -48,13 +48,24 @@ pub(super) fn version(text: &str) -> anyhow::Result<[u16; 2]> {
 
 /// `TIME:COMMAND, …`: what happens when.
 pub(super) fn script(text: &str) -> anyhow::Result<Vec<(Duration, Command)>> {
-    let items = text.split(',').map(str::trim).filter(|item| !item.is_empty());
-    items.map(|item| timed_command(item).with_context(|| format!("{item:?}"))).collect()
+    timed(text, command)
 }
 
-fn timed_command(text: &str) -> anyhow::Result<(Duration, Command)> {
-    let (at, rest) = text.split_once(':').context("no TIME: before it, as in 2.5:X1=1")?;
-    Ok((time(at.trim())?, command(rest.trim())?))
+/// `TIME:COMMAND, …` of commands of any kind.
+pub(super) fn timed<T>(
+    text: &str,
+    command: impl Fn(&str) -> anyhow::Result<T>,
+) -> anyhow::Result<Vec<(Duration, T)>> {
+    list(text, |item| {
+        let (at, rest) = item.split_once(':').context("no TIME: before it, as in 2.5:X1=1")?;
+        Ok((time(at.trim())?, command(rest.trim())?))
+    })
+}
+
+/// `COMMAND, …`, each refused by what it says.
+pub(super) fn list<T>(text: &str, item: impl Fn(&str) -> anyhow::Result<T>) -> anyhow::Result<Vec<T>> {
+    let items = text.split(',').map(str::trim).filter(|item| !item.is_empty());
+    items.map(|text| item(text).with_context(|| format!("{text:?}"))).collect()
 }
 
 /// `[NAME@]ACTION`: what happens to one controller, or to all.
@@ -102,7 +113,8 @@ fn action(text: &str) -> anyhow::Result<Action> {
 const COMMANDS: &str =
     "commands are X1=1, err=12, estop=1, mute=1, loss=0.1, duplicate=0.1, delay=50ms, pa95=3 and reboot";
 
-fn switch(text: &str) -> anyhow::Result<bool> {
+/// 0 or 1.
+pub(super) fn switch(text: &str) -> anyhow::Result<bool> {
     match text {
         "0" => Ok(false),
         "1" => Ok(true),

@@ -16,7 +16,7 @@ mod tests;
 
 pub(crate) use faults::LineFaults;
 pub(crate) use line::SerialLine;
-pub(crate) use pty::{Deed, PtyError, PtyLoop, Remote};
+pub(crate) use pty::{Deed, PtyError, PtyLoop};
 
 use crate::time::MonoTime;
 

@@ -102,7 +102,7 @@ pub(crate) enum Request {
     SubtractAccumulator,
     /// KMC, page 57: what ends motion and drops the driver.
     KillConditions {
-        /// Which bits are looked at, as in the word of RIO.
+        /// Which bits of the internal status word are looked at.
         enable: u16,
         /// What kills, for each.
         state: u16,

@@ -1,0 +1,135 @@
+//! `kinocue sim --tty`: drives of any dialect on a serial line.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::{Context as _, anyhow, bail};
+use serde_json::Value;
+
+use super::{Args, Signals, control, parse, seed};
+use crate::cli::print::{self, tell};
+use crate::cli::{Exit, Failure, OrExit as _};
+use crate::sim::serial::{Bus, Deed, LineFaults, PtyError, PtyLoop, SerialLine};
+use crate::time::parse_duration;
+
+/// Serial drives on a pseudo-terminal.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Serial drives")]
+pub(super) struct TtyArgs {
+    /// Simulate drives on a serial line, a pseudo-terminal with this link to it.
+    #[arg(long, value_name = "LINK")]
+    pub(super) tty: Option<PathBuf>,
+
+    /// The numbers of the units on the line.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "16", requires = "tty")]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..=254))]
+    pub(super) units: Vec<u8>,
+
+    /// Bits a second of the line, which a pseudo-terminal does not keep to by itself.
+    #[arg(long, value_name = "BAUD", default_value_t = 57_600, requires = "tty")]
+    #[arg(value_parser = clap::value_parser!(u32).range(300..=1_000_000))]
+    pub(super) baud: u32,
+
+    /// What is wrong from the start, as "lost=0.001, 17@dead=1"; see below.
+    #[arg(long, value_name = "COMMAND, …", default_value = "", hide_default_value = true, requires = "tty")]
+    faults: String,
+}
+
+/// Drives that can be run on a line: what happens to them in words, and what became of them.
+pub(super) trait Drives: Bus + Send + Sized + 'static {
+    /// Bits of an octet with start and stop.
+    const BITS: u32;
+
+    /// Something that happens to a unit, or to all; refused in words.
+    fn deed(unit: Option<u8>, name: &str, value: Option<&str>) -> anyhow::Result<Deed<Self>>;
+
+    /// What became of the units: for programs, and a line each for a person.
+    fn report(&self) -> (Value, Vec<String>);
+}
+
+/// Runs drives on the line until a signal comes.
+pub(super) fn run<B: Drives>(bus: B, args: &Args, path: &Path, signals: Signals) -> Result<Exit, Failure> {
+    let deed = {
+        let units = args.tty.units.clone();
+        move |text: &str| deed::<B>(text, &units)
+    };
+    let faults = parse::list(&args.tty.faults, &deed).context("--faults").or_exit(Exit::Usage)?;
+    let mut script: Vec<_> = faults.into_iter().map(|deed| (Duration::ZERO, deed)).collect();
+    script.extend(parse::timed(&args.script, &deed).context("--script").or_exit(Exit::Usage)?);
+    let line = SerialLine::new(bus, B::BITS, LineFaults::default(), seed(args));
+    let running = PtyLoop::start(line, path, script).map_err(|error| Failure {
+        exit: if matches!(error, PtyError::Taken(_)) { Exit::Usage } else { Exit::System },
+        error: error.into(),
+    })?;
+    let remote = running.remote();
+    let carry_out = move |text: &str| {
+        let is_done = remote.tell(deed(text)?);
+        if is_done { Ok(()) } else { Err(anyhow!("the virtual drives have ended")) }
+    };
+    let _control = control(args, Arc::new(carry_out))?; // its file goes when this does
+    tell(&format!("ready {}", path.display()));
+    signals.wait()?;
+    let (object, lines) = running.stop().map(|line| line.bus().report()).unwrap_or_default();
+    if args.json {
+        print::json(&object)?;
+    } else {
+        lines.iter().for_each(|line| tell(line));
+    }
+    Ok(Exit::Done)
+}
+
+/// `[UNIT@]NAME[=VALUE]`: what happens to the line, to one unit or to all.
+fn deed<B: Drives>(text: &str, units: &[u8]) -> anyhow::Result<Deed<B>> {
+    let (unit, rest) = match text.split_once('@') {
+        Some((unit, rest)) => (Some(named(unit.trim(), units)?), rest),
+        None => (None, text),
+    };
+    let (name, value) = match rest.split_once('=') {
+        Some((name, value)) => (name.trim(), Some(value.trim())),
+        None => (rest.trim(), None),
+    };
+    if let (None, Some(value)) = (unit, value)
+        && let Some(change) = fault(name, value)?
+    {
+        return Ok(Box::new(move |line, _| change(&mut line.faults)));
+    }
+    B::deed(unit, name, value)
+}
+
+fn named(unit: &str, units: &[u8]) -> anyhow::Result<u8> {
+    let number = unit.parse().ok().filter(|number| units.contains(number));
+    number.with_context(|| format!("there is no unit {unit}; the line has {units:?}"))
+}
+
+/// A change of what a line does to octets.
+type Change = Box<dyn FnOnce(&mut LineFaults) + Send>;
+
+/// What a word does to a line; nothing where it is a word of its drives.
+fn fault(name: &str, value: &str) -> anyhow::Result<Option<Change>> {
+    let chance = || parse::chance(value);
+    let span = |text: &str| parse_duration(text).map_err(|why| anyhow!(why));
+    Ok(Some(match name {
+        "lost" => set(chance()?, |faults, lost| faults.lost = lost),
+        "doubled" => set(chance()?, |faults, doubled| faults.doubled = doubled),
+        "flipped" => set(chance()?, |faults, flipped| faults.flipped = flipped),
+        "answer_lost" => set(chance()?, |faults, lost| faults.answer_lost = lost),
+        "late" => {
+            let Some((chance, by)) = value.split_once('/') else { bail!("not CHANCE/SPAN, as in 0.1/30ms") };
+            let late = (parse::chance(chance.trim())?, span(by.trim())?);
+            set(late, |faults, late| (faults.late, faults.late_by) = late)
+        }
+        "lose" => {
+            let count = value.parse().context("not a number of answers")?;
+            set(count, |faults, count| faults.lose_answers = count)
+        }
+        "held" => set(span(value)?, |faults, held| faults.held = held),
+        "echo" => set(parse::switch(value)?, |faults, echo| faults.echo = echo),
+        "unplug" => set(parse::switch(value)?, |faults, unplugged| faults.unplugged = unplugged),
+        _ => return Ok(None),
+    }))
+}
+
+fn set<T: Send + 'static>(value: T, change: fn(&mut LineFaults, T)) -> Change {
+    Box::new(move |faults| change(faults, value))
+}
