@@ -29,14 +29,22 @@ impl SixpackBus {
         Self { units: setups.into_iter().map(|setup| SixpackUnit::waking(setup, now)).collect() }
     }
 
+    /// Something happens to one of them, or to all.
+    pub(crate) fn suffer(&mut self, number: Option<u8>, fault: SixpackFault, now: MonoTime) {
+        let is_meant = |unit: &&mut SixpackUnit| number.is_none_or(|number| number == unit.number());
+        self.units.iter_mut().filter(is_meant).for_each(|unit| unit.suffer(fault, now));
+    }
+
     /// One of them by its number.
     pub(crate) fn unit(&self, number: u8) -> Option<&SixpackUnit> {
         self.units.iter().find(|unit| unit.number() == number)
     }
 
-    /// The same, to be told what happens to it.
-    pub(crate) fn unit_mut(&mut self, number: u8) -> Option<&mut SixpackUnit> {
-        self.units.iter_mut().find(|unit| unit.number() == number)
+    /// What its axes execute is judged from here on, as after homing.
+    #[cfg_attr(not(test), expect(dead_code, reason = "asked by tests of hosts"))]
+    pub(crate) fn forget(&mut self) {
+        let motors = self.units.iter_mut().flat_map(|unit| &mut unit.motors);
+        motors.for_each(|motor| motor.shaft.forget());
     }
 
     /// All of them.

@@ -135,6 +135,11 @@ impl SixpackUnit {
         self.setup.unit
     }
 
+    /// Octets that never became a frame.
+    pub(crate) const fn strays(&self) -> u64 {
+        self.collector.strays()
+    }
+
     /// At which it listens and speaks.
     pub(crate) fn baud(&self) -> u32 {
         baud_of(self.divisor).unwrap_or(1)

@@ -93,7 +93,7 @@ impl Host {
 
     fn suffer(&mut self, fault: SixpackFault) {
         let now = self.now;
-        self.bus.unit_mut(UNIT).unwrap().suffer(fault, now);
+        self.bus.suffer(Some(UNIT), fault, now);
     }
 
     /// All that a home writes for a motor, its zero to the left.

@@ -45,7 +45,7 @@ fn a_motor_that_is_asked_to_jump_by_more_than_it_can_loses_steps_and_its_unit_do
     }
     let gentle = host.motor(0).shaft.executed();
     assert!(gentle.lost == 0.0 && gentle.jump < 22.5 * MM, "{gentle:?}");
-    host.bus.unit_mut(UNIT).unwrap().motors[0].shaft.forget();
+    host.bus.forget();
     assert_eq!(host.motor(0).shaft.executed().jump, 0.0);
     host.order(target(0, 9_600));
     host.wait(Duration::from_secs(2));
