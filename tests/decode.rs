@@ -237,3 +237,71 @@ fn an_error_of_an_mbox_is_not_read_from_the_slot_of_the_channel() {
     assert!(decode(&[refused], b"").out.contains("Err10"));
     assert!(decode(&[refused, "--dialect", "mbox"], b"").out.contains("channel    10"));
 }
+
+fn serial(stdin: &[u8], args: &[&str]) -> Ran {
+    decode(&[&["--dialect", "silvermax"], args].concat(), stdin)
+}
+
+#[test]
+fn every_golden_message_of_a_silvermax_is_read_from_a_log_with_its_names() {
+    let golden: Value = serde_json::from_str(include_str!("data/vectors-drives.json")).unwrap();
+    let ours = |vector: &&Value| vector["family"] == "silvermax";
+    let vectors: Vec<&Value> = golden["vectors"].as_array().unwrap().iter().filter(ours).collect();
+    let mut log = String::new();
+    for vector in &vectors {
+        log += &format!("1.5 > {}\n", vector["hex"].as_str().unwrap());
+        if let Some(hex) = vector["reply"]["hex"].as_str() {
+            log += &format!("1.6 < {hex}\n");
+        }
+    }
+    let ran = serial(log.as_bytes(), &["--json"]);
+    assert_eq!(ran.code, 0, "{}", ran.out);
+    let lines = ran.json();
+    let (total, mut lines) = (lines.last().unwrap().clone(), lines.iter());
+    assert_eq!(total["strays"], 0);
+    for vector in vectors {
+        let (said, fields) = (lines.next().unwrap(), &vector["fields"]);
+        assert_eq!((&said["direction"], &said["at_s"]), (&json!("to_drive"), &json!(1.5)));
+        assert_eq!(said["unit"], fields["unit"], "{vector}");
+        if let Some(mnemonic) = fields.get("mnemonic") {
+            assert_eq!(&said["mnemonic"], mnemonic);
+            assert_eq!(said["parameters"], fields["parameters"], "{vector}");
+        }
+        if !vector["reply"].is_null() {
+            let (said, fields) = (lines.next().unwrap(), &vector["reply"]["fields"]);
+            assert_eq!(said["direction"], "from_drive");
+            for name in ["kind", "words", "value", "reason"] {
+                let expected = fields.get(name);
+                assert!(expected.is_none_or(|expected| said[name] == *expected), "{vector}: {said}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_serial_line_is_told_in_words_and_what_is_no_message_is_shown() {
+    let ran = serial(b"x\r@16 12 1\r# 10 000C FFFF FF9C\r! 10 0019 0006\r@16 25 2 21", &[]);
+    assert_eq!(ran.code, 65);
+    for words in [
+        "  ?  78 0d: no line",
+        " 16  RRG register=1 (position)",
+        " 16  RRG register 1 (position) = -100 (FFFF FF9C)",
+        " 16  IMW refused: queue full (6)",
+        "it ends in the middle of a line",
+        "3 messages, 2 times octets that are none",
+    ] {
+        assert!(ran.out.contains(words), "{words}: {}", ran.out);
+    }
+    let ran = serial(b"0.25 < 23 20 31 30 20 30 30 31 34 20 30 31 30 30 0D\n0.3 < zz\n", &[]);
+    assert!(ran.out.contains("    0.250000  <  16  RIS 0100: moving error, hot"), "{}", ran.out);
+    assert!(ran.code == 65 && ran.out.contains("not hex"), "{}", ran.out);
+}
+
+#[test]
+fn octets_that_two_forms_explain_are_not_taken_for_one_of_them() {
+    // A poll of unit 33 in nine bits; an opening of a refusal as well.
+    let ran = serial(b"0.1 > 21 00 df\n0.2 > 20 00 e0\n", &[]);
+    assert!(ran.out.contains("cannot be told") && ran.out.contains(" 32  POL  (nine bits)"), "{}", ran.out);
+    assert_eq!(decode(&["--dialect", "silvermax", "40", "31 36", "0d"], b"").out, " 16  POL\n");
+    assert_eq!(serial(b"", &["--port", "7"]).code, 64);
+}

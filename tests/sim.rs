@@ -332,6 +332,93 @@ fn the_program_follows_its_script() {
     }
 }
 
+/// What a line answers to octets, up to a carriage return.
+fn exchange(line: &std::fs::File, octets: &[u8]) -> Vec<u8> {
+    (&*line).write_all(octets).expect("it takes octets");
+    let mut answer = Vec::new();
+    let patience = rustix::time::Timespec { tv_sec: 10, tv_nsec: 0 };
+    while !answer.ends_with(b"\r") {
+        let mut polled = [rustix::event::PollFd::new(line, rustix::event::PollFlags::IN)];
+        assert_eq!(rustix::event::poll(&mut polled, Some(&patience)), Ok(1), "an answer in time: {answer:?}");
+        let mut some = [0; 64];
+        let count = (&*line).read(&mut some).expect("octets");
+        answer.extend(&some[..count]);
+    }
+    answer
+}
+
+#[test]
+fn the_program_runs_units_on_a_serial_line_with_a_link_and_says_what_became_of_them() {
+    use std::os::unix::fs::OpenOptionsExt as _;
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, socket) = (folder.path().join("stalls"), folder.path().join("sim.sock"));
+    let (tty, control) = (path.to_str().expect("text"), socket.to_str().expect("text"));
+    let mut sim = Program::start(&[
+        "--dialect",
+        "silvermax",
+        "--tty",
+        tty,
+        "--units",
+        "16,26",
+        "--seed",
+        "1",
+        "--control",
+        control,
+        "--faults",
+        "26@X2=0",
+        "--json",
+    ]);
+    let lines = BufReader::new(sim.0.stderr.as_mut().expect("piped")).lines().next();
+    assert_eq!(lines.expect("a line").expect("text"), format!("ready {tty}"));
+    let line = std::fs::File::options().read(true).write(true).custom_flags(libc::O_NOCTTY).open(&path);
+    let line = line.expect("the link leads to it");
+    assert_eq!(exchange(&line, b"@16 12 1\r"), b"# 10 000C 0000 0000\r");
+    assert_eq!(
+        exchange(&line, b"@26 21\r"),
+        b"# 1A 0015 F0D0\r",
+        "input 2 is low, and 1 high on the switch alone"
+    );
+    let control = UnixStream::connect(&socket).expect("it listens");
+    let mut answers = BufReader::new(&control).lines();
+    let mut command = |text: &str| {
+        writeln!(&control, "{text}").expect("it takes lines");
+        answers.next().expect("an answer").expect("text")
+    };
+    assert_eq!(command("26@as=16"), "ok");
+    assert_eq!(command("27@reset"), "error there is no unit 27; the line has [16, 26]");
+    assert_eq!(exchange(&line, b"@26 1 0\r"), b"* 10\r");
+    let (code, text) = sim.end(rustix::process::Signal::TERM);
+    assert_eq!(code, Some(0));
+    let report: serde_json::Value = serde_json::from_str(&text).expect("one JSON object");
+    assert_eq!((&report["units"][0]["requests"], &report["units"][1]["requests"]), (&1.into(), &2.into()));
+    assert_eq!(report["units"][0]["executed"]["jumps"], 0);
+    assert!(!path.is_symlink() && !socket.exists());
+}
+
+#[test]
+fn the_program_refuses_what_means_nothing_on_a_serial_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("kept");
+    std::fs::write(&file, "kept").expect("a file");
+    let kept = file.to_str().expect("text");
+    for wrong in [
+        &["--dialect", "silvermax"][..],
+        &["--tty", "./never"],
+        &["--units", "16"],
+        &["--dialect", "silvermax", "--tty", "./never", "--listen", "127.0.0.1:0"],
+        &["--dialect", "silvermax", "--tty", "./never", "--queue-depth", "3"],
+        &["--dialect", "silvermax", "--tty", "./never", "--pa", "95=3"],
+        &["--dialect", "silvermax", "--tty", "./never", "--faults", "lost=2"],
+        &["--dialect", "silvermax", "--tty", "./never", "--script", "1:17@reset"],
+        &["--dialect", "silvermax", "--tty", "./never", "--units", "255"],
+        &["--dialect", "silvermax", "--tty", kept],
+    ] {
+        let code = Program::start(wrong).0.wait();
+        assert_eq!(code.expect("it ends").code(), Some(64), "{wrong:?}");
+    }
+    assert_eq!(std::fs::read_to_string(&file).expect("it is there"), "kept");
+}
+
 /// Bytes that open as a request does and go on by chance.
 fn request() -> impl Strategy<Value = Vec<u8>> {
     let family = prop::sample::select(&[0x11_u8, 0x12, 0x13, 0x14, 0x18, 0x19, 0x21, 0x22][..]);

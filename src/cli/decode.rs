@@ -13,12 +13,15 @@ mod input;
 mod message;
 mod names;
 mod printer;
+mod serial;
 mod sheet;
+mod silvermax;
 mod tally;
 
 use input::{Input, Stream};
 use message::Reading;
 use printer::{Halt, Manner, Printer};
+use silvermax::SilverDecoder;
 
 /// Where controllers (PA14) and hosts (PA24) listen.
 const PORTS: [u16; 2] = [7408, 8410];
@@ -33,6 +36,9 @@ Examples:
   kinocue decode show.pcapng --port 7402 --json
   tcpdump -i eth0 -w - udp port 7408 | kinocue decode
   xxd -p -c 256 frame.bin | kinocue decode -
+  kinocue decode --dialect silvermax 40 31 36 20 31 32 20 31 0d
+  printf '@16 0\\r# 10 0000 2000\\r' | kinocue decode --dialect silvermax
+  printf '0.5 > 40 31 36 20 30 0d\\n0.6 < 2a 20 31 30 0d\\n' | kinocue decode --dialect silvermax -
 
 Exit codes: 0 all of it was read, 64 the hex is none, 65 something is malformed, cut short or
 no capture, 66 no such file")]
@@ -46,7 +52,8 @@ pub(super) struct Args {
     input: Vec<OsString>,
 
     /// Which family's manual messages are read by: imax is the layout as its manual prints it, which no known program
-    /// sends.
+    /// sends. Of serial drives a file, or the standard input, is their octets, lines of hex, or a log of lines
+    /// "seconds > hex" to the drive and "seconds < hex" from it.
     #[arg(long, value_enum, default_value_t = Reading::Smc)]
     dialect: Reading,
 
@@ -72,6 +79,15 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    if args.dialect == Reading::Silvermax {
+        if args.all || args.verbose || !args.port.is_empty() {
+            return Err(anyhow!(
+                "--port, --all and --verbose are for datagrams; leave them out with a serial line"
+            ))
+            .or_exit(Exit::Usage);
+        }
+        return serial::run(args, SilverDecoder::default());
+    }
     let port = args.vibration_port_octets;
     let manner = Manner { reading: args.dialect, port, json: args.json, full: args.verbose };
     match Input::of(&args.input)? {

@@ -13,13 +13,15 @@ pub(super) enum Reading {
     Smc,
     Mbox,
     Imax,
+    Silvermax,
 }
 
 impl Reading {
     const fn dialect(self) -> Dialect {
         match self {
-            Self::Smc => Dialect::Smc,
             Self::Mbox | Self::Imax => Dialect::Mbox,
+            // Serial drives have a decoder of their own.
+            Self::Smc | Self::Silvermax => Dialect::Smc,
         }
     }
 }

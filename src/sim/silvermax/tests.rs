@@ -5,8 +5,10 @@
 use std::time::Duration;
 
 use super::*;
-use crate::sim::serial::{Bus as _, LineFaults, SerialLine};
-use crate::time::MonoTime;
+use crate::sim::serial::{Bus as _, LineFaults, PtyLoop, SerialLine};
+use crate::sys::clock::Monotonic;
+use crate::sys::serial::{SerialPort, SerialSettings, StopBits};
+use crate::time::{Clock as _, MonoTime};
 use crate::wire::silvermax::{Internal, Io, MAX_LINE, NakReason, Poll, Reply, Request, StopOn, register};
 
 mod queue;
@@ -239,4 +241,26 @@ fn the_delay_of_answers_is_as_it_was_set_and_the_rate_is_changed_before_the_answ
     let mut host = Host::of(16);
     assert_eq!(host.send(b"@16 174 2304\r"), b"* 10\r");
     assert_eq!(host.line.bus().baud(), 230_400);
+}
+
+#[test]
+fn units_answer_whoever_opens_their_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stalls");
+    let bus = SilverBus::new(&[UnitSetup::new(16)], 57_600, Monotonic.now());
+    let line = SerialLine::new(bus, 11, LineFaults::default(), 3);
+    let running = PtyLoop::start(line, &path, Vec::new()).unwrap();
+    let settings = SerialSettings { baud: 57_600, stop_bits: StopBits::Two, is_rs485: false };
+    let port = SerialPort::open(&path, settings).unwrap();
+    let deadline = Monotonic.now() + Duration::from_secs(10);
+    port.line().write(Request::Revision.emit(16, &mut [0; MAX_LINE]), deadline).unwrap();
+    let (mut collector, mut octet) = (LineCollector::of_replies(), [0]);
+    let reply = loop {
+        assert_eq!(port.line().read(&mut octet, deadline), Ok(1), "an answer in time");
+        if let Some(Collected::Line(line)) = collector.push(octet[0]) {
+            break Reply::parse(line).unwrap();
+        }
+    };
+    assert_eq!((reply.unit(), reply.command()), (16, Some(5)));
+    assert_eq!(running.stop().unwrap().bus().units()[0].tally().requests, 1);
 }

@@ -37,6 +37,11 @@ impl LineCollector {
         Self::new(b"*#!")
     }
 
+    /// Collects both, where nobody knows which is which.
+    pub(crate) const fn of_both() -> Self {
+        Self::new(b"@*#!")
+    }
+
     const fn new(openings: &'static [u8]) -> Self {
         Self { openings, octets: [0; MAX_LINE], len: 0, next: None }
     }
@@ -61,6 +66,11 @@ impl LineCollector {
     pub(crate) fn rest(&mut self) -> &[u8] {
         self.begin_next();
         self.take()
+    }
+
+    /// True if nothing has come since the last line.
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.len == 0 && self.next.is_none()
     }
 
     fn is_open(&self) -> bool {
