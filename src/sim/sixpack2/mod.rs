@@ -10,9 +10,9 @@ mod shaft;
 mod tests;
 mod unit;
 
-pub(crate) use motor::{LOOP as SIXPACK_LOOP, MotorWritten, SixpackMotor};
-pub(crate) use shaft::{ExecutedMotion, ShaftSetup};
-pub(crate) use unit::{MOTORS, SixpackFault, SixpackSetup, SixpackUnit, UnitBooks};
+pub(crate) use motor::SixpackMotor;
+pub(crate) use shaft::ShaftSetup;
+pub(crate) use unit::{MOTORS, SixpackFault, SixpackSetup, SixpackUnit};
 
 use super::serial::Bus;
 use crate::time::MonoTime;
@@ -33,11 +33,6 @@ impl SixpackBus {
     pub(crate) fn suffer(&mut self, number: Option<u8>, fault: SixpackFault, now: MonoTime) {
         let is_meant = |unit: &&mut SixpackUnit| number.is_none_or(|number| number == unit.number());
         self.units.iter_mut().filter(is_meant).for_each(|unit| unit.suffer(fault, now));
-    }
-
-    /// One of them by its number.
-    pub(crate) fn unit(&self, number: u8) -> Option<&SixpackUnit> {
-        self.units.iter().find(|unit| unit.number() == number)
     }
 
     /// What its axes execute is judged from here on, as after homing.

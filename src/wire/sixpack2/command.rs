@@ -196,20 +196,14 @@ messages! {
     }
 }
 
-/// Flags of `P5` of `$15`.
+/// Flags of `P5` of `$15` that matter here.
 pub(crate) mod p5 {
-    /// Follows targets by a PI controller, else by ramps.
-    pub(crate) const PI_MODE: u8 = 1 << 0;
-    /// Turns round and round.
-    pub(crate) const ROTARY: u8 = 1 << 1;
     /// Begin to search zero, now.
     pub(crate) const AUTONULL_CMD: u8 = 1 << 2;
     /// Stop, and maybe search, if it stands at zero and its switch is not closed.
     pub(crate) const TEST_NULL: u8 = 1 << 3;
     /// Zero is at the lower end.
     pub(crate) const NULL_LEFT: u8 = 1 << 4;
-    /// Zero is in the middle of where the switch is closed.
-    pub(crate) const NULL_CENTER: u8 = 1 << 5;
     /// Stop, and maybe search, if the switch closes away from zero.
     pub(crate) const STOP_NULL: u8 = 1 << 6;
     /// The switch is de-bounced.
@@ -218,22 +212,16 @@ pub(crate) mod p5 {
     pub(crate) const SEARCHES: u8 = AUTONULL_CMD | TEST_NULL | STOP_NULL;
 }
 
-/// Flags of `P6` of `$15`.
+/// Flags of `P6` of `$15` that matter here.
 pub(crate) mod p6 {
-    /// The shorter way round of a rotary axis.
-    pub(crate) const SHORTER_WAY: u8 = 1 << 0;
     /// Search at the greatest velocity.
     pub(crate) const FAST_REF: u8 = 1 << 1;
     /// Zero is a mechanical stop, into which it is driven.
     pub(crate) const MECH_REF: u8 = 1 << 2;
-    /// Look at the switch only once it has stood for T0.
-    pub(crate) const DELAY_TEST_NULL: u8 = 1 << 3;
     /// Stop by the ramp.
     pub(crate) const STOP_SOFT: u8 = 1 << 4;
     /// Never search because of what made it stop.
     pub(crate) const STOP_NO_REF: u8 = 1 << 5;
     /// The switch is active high.
     pub(crate) const NULL_POSITIVE: u8 = 1 << 6;
-    /// Ramps end on full steps.
-    pub(crate) const STOP_AT_FULL_STEPS: u8 = 1 << 7;
 }

@@ -26,7 +26,7 @@ pub(crate) use command::{
     AbortSearch, ActionsQuery, BaudSwitch, ClockDivider, CurrentSettings, InputQuery, JointStart,
     JointTarget, MotorSettings, PacketTimeout, PeakCurrent, PiSettings, PiTarget, PositionPreset,
     PositionQuery, RampSettings, ReferenceSearch, ReferenceSettings, Rotation, SixpackCommand, StartSettings,
-    StopSeveral, UnitQuery, VelocityQuery, ZeroSettings, p5, p6,
+    UnitQuery, VelocityQuery, ZeroSettings, p5, p6,
 };
 pub(crate) use frame::{FRAME_LEN, SixpackFrame};
 pub(crate) use order::SixpackOrder;

@@ -12,7 +12,7 @@ fn line(faults: LineFaults) -> (SerialLine<SixpackBus>, MonoTime) {
 }
 
 fn books(line: &SerialLine<SixpackBus>) -> UnitBooks {
-    line.bus().unit(UNIT).unwrap().books
+    line.bus().units()[0].books
 }
 
 #[test]

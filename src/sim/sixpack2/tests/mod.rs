@@ -8,6 +8,8 @@ mod unit;
 
 use std::time::Duration;
 
+use super::motor::{LOOP, MotorWritten};
+use super::unit::UnitBooks;
 use super::*;
 use crate::wire::sixpack2::*;
 
@@ -84,7 +86,7 @@ impl Host {
     }
 
     fn unit(&self) -> &SixpackUnit {
-        self.bus.unit(UNIT).unwrap()
+        &self.bus.units()[0]
     }
 
     fn motor(&self, motor: usize) -> &SixpackMotor {

@@ -115,7 +115,7 @@ fn a_bus_at_rest_wants_nothing_and_one_that_moves_the_next_loop() {
     assert_eq!(host.bus.next(), None);
     host.order(target(0, 64_000));
     let next = host.bus.next().unwrap();
-    assert!(next > host.now && next.since(host.now) <= SIXPACK_LOOP);
+    assert!(next > host.now && next.since(host.now) <= LOOP);
 }
 
 #[test]
