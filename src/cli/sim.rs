@@ -65,6 +65,7 @@ Commands of serial drives, in --faults too, without a time:
   held=16ms        the adapter holds back what has come; held=0ms: no more
   echo=1           the adapter returns what is sent; echo=0: no more
   unplug=1         the adapter is unplugged, and the link is gone; unplug=0: back under the same name
+  break            the host sends a break, which a pseudo-terminal does not carry
 and of a SilverMax, of all units or, with 17@ before it, of unit 17:
   reset            the power goes and comes back
   hot=1, blocked=1, dead=1   too hot; held by something; neither hears nor answers; 0: no more

@@ -38,7 +38,6 @@ pub use command::{Action, Command, CommandError};
 pub use controller::Controller;
 pub(crate) use controller::MotionSeen;
 pub(crate) use counts::Counts;
-pub(crate) use farm::Remote;
 pub use farm::{Farm, FarmError};
 pub(crate) use invented::{Commands, Invented};
 pub(crate) use outcome::Outcome;

@@ -85,7 +85,7 @@ fn unit(unit: &crate::sim::silvermax::Unit) -> Value {
 }
 
 const COMMANDS: &str = "commands of a unit are reset, hot=1, blocked=1, dead=1, X2=0, as=16 and ppm=200, those of the line \
-                        lost, doubled, flipped, late, answer_lost, lose, held, echo and unplug";
+                        lost, doubled, flipped, late, answer_lost, lose, held, echo, unplug and break";
 
 fn action(name: &str, value: Option<&str>) -> anyhow::Result<Action> {
     let Some(value) = value else {

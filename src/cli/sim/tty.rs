@@ -103,6 +103,9 @@ fn deed<B: Drives>(text: &str, units: &[u8]) -> anyhow::Result<Deed<B>> {
     {
         return Ok(Box::new(move |line, _| change(&mut line.faults)));
     }
+    if (unit, name, value) == (None, "break", None) {
+        return Ok(Box::new(SerialLine::send_break));
+    }
     B::deed(unit, name, value)
 }
 

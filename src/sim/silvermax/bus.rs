@@ -38,6 +38,7 @@ impl SilverBus {
     }
 
     /// The same, to be changed.
+    #[cfg(test)]
     pub(crate) fn units_mut(&mut self) -> &mut [Unit] {
         &mut self.units
     }

@@ -9,7 +9,9 @@ use crate::sim::serial::{Bus as _, LineFaults, PtyLoop, SerialLine};
 use crate::sys::clock::Monotonic;
 use crate::sys::serial::{SerialPort, SerialSettings, StopBits};
 use crate::time::{Clock as _, MonoTime};
-use crate::wire::silvermax::{Internal, Io, MAX_LINE, NakReason, Poll, Reply, Request, StopOn, register};
+use crate::wire::silvermax::{
+    Collected, Internal, Io, LineCollector, MAX_LINE, NakReason, Poll, Reply, Request, StopOn, register,
+};
 
 mod queue;
 mod safety;
@@ -61,7 +63,7 @@ impl Host {
 
     /// What a unit answers, if it does.
     fn ask(&mut self, unit: u8, request: Request) -> Option<Reply> {
-        let octets = self.send(&request.emit(unit, &mut [0; MAX_LINE]).to_vec());
+        let octets = self.send(request.emit(unit, &mut [0; MAX_LINE]));
         let (last, line) = octets.split_last()?;
         assert_eq!(*last, b'\r');
         Some(Reply::parse(line).unwrap())

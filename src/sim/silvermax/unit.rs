@@ -149,6 +149,7 @@ impl Unit {
     }
 
     /// Forgets where its axis was until now.
+    #[cfg(test)]
     pub(crate) fn forget_executed(&mut self) {
         self.axis.executed = Executed::at(self.axis.counts());
     }
@@ -174,6 +175,7 @@ impl Unit {
     }
 
     /// Segments that wait.
+    #[cfg(test)]
     pub(crate) fn queued(&self) -> usize {
         self.queue.len()
     }

@@ -41,9 +41,6 @@ pub(crate) const ERROR_LIMITS: u8 = 208;
 /// What killed: the bits in the upper word, their state in the lower one.
 pub(crate) const KILL_CAUSE: u8 = 211;
 
-/// Registers that can be written and read at any time.
-pub(crate) const WRITABLE: std::ops::RangeInclusive<u8> = 10..=40;
-
 /// What is in a register, in words; nothing where the number is free for any use.
 pub(crate) const fn name(register: u8) -> Option<&'static str> {
     Some(match register {

@@ -135,11 +135,6 @@ impl Io {
             _ => 0,
         }
     }
-
-    /// True if an input, 1 to 7, is high.
-    pub(crate) const fn is_high(self, input: u8) -> bool {
-        self.0 & Self::input_bit(input) != 0
-    }
 }
 
 impl StatusWord for Io {

@@ -204,6 +204,22 @@ fn every_golden_message_in_nine_bits_is_read() {
 }
 
 #[test]
+fn what_has_no_golden_message_is_written_as_its_page_has_it() {
+    let index = Request::MoveRelative { distance: 8, acceleration: 5, velocity: 9, stop: StopOn::Index };
+    let stalled =
+        Request::MoveRelative { distance: 8, acceleration: 5, velocity: 9, stop: StopOn::MovingError };
+    for (request, line) in [
+        (Request::ReadSupply, &b"@16 193 7 10\r"[..]),
+        (Request::SoftLimitsOff, b"@16 221 0\r"),
+        (index, b"@16 135 8 5 9 -9 1\r"),
+        (stalled, b"@16 135 8 5 9 -11 1\r"),
+        (Request::TorqueLimits { hold: 12_000, moving: 20_000 }, b"@16 149 12000 20000 12000 20000\r"),
+    ] {
+        assert_eq!(request.emit(16, &mut [0xa5; MAX_LINE]), line);
+    }
+}
+
+#[test]
 fn commands_stand_in_the_order_of_their_numbers() {
     for (number, mnemonic) in [(0, "POL"), (25, "IMW"), (135, "MRV"), (253, "IMS"), (254, "IMQ")] {
         assert_eq!(command(number).map(|command| command.mnemonic), Some(mnemonic));
@@ -280,7 +296,7 @@ fn octets_that_are_no_line_are_shown_and_cost_no_line_after_them() {
 fn the_inputs_are_where_the_manual_has_them() {
     // The printed answer F0F0: inputs 4 to 7 and 1 to 3 high, not hot (page 20).
     let io = Io(0xf0f0);
-    assert!((1..=7).all(|input| io.is_high(input)));
+    assert!((1..=7).all(|input| io.has(Io::input_bit(input))));
     assert_eq!(Io::input_bit(0) | Io::input_bit(8), 0);
     assert_eq!(
         (1..=7).map(Io::input_bit).collect::<Vec<_>>(),
