@@ -126,6 +126,22 @@ fn the_worked_example_of_the_manual_is_only_sent_with_its_searches_off() {
 }
 
 #[test]
+fn settings_are_sent_as_their_golden_messages() {
+    let vectors = golden("serial");
+    let currents = CurrentSettings { motor: 0, power_down: 8, stand: 2, run: 1, ramp: 0, t0: 500 };
+    for (name, order) in [
+        ("peak_current", SixpackOrder::Peak(PeakCurrent { motor: 0, value: 238 })),
+        ("current_control", SixpackOrder::Currents(currents)),
+        ("start_velocity", SixpackOrder::Start(StartSettings { motor: 0, vmin: 0, vstart: 16, div: 2 })),
+        ("clock_divider_3", SixpackOrder::Clock(ClockDivider { divider: 3 })),
+        ("zero_offset_and_range", SixpackOrder::Zero(ZeroSettings { motor: 0, offset: -160, range: 64 })),
+    ] {
+        let golden = vectors.iter().find(|vector| vector.name == name).expect(name);
+        assert_eq!(order.frame(1).octets(), octets(&golden.hex), "{name}");
+    }
+}
+
+#[test]
 fn a_stop_is_the_golden_one_and_all_actions_are_never_asked_for_later() {
     let stop = SixpackOrder::RampedStop { motor: 0 }.frame(1);
     assert_eq!(stop.octets(), octets("01 25 00 00 00 00 00 00 00"));
