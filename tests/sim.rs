@@ -375,8 +375,8 @@ fn the_program_runs_units_on_a_serial_line_with_a_link_and_says_what_became_of_t
     assert_eq!(exchange(&line, b"@16 12 1\r"), b"# 10 000C 0000 0000\r");
     assert_eq!(
         exchange(&line, b"@26 21\r"),
-        b"# 1A 0015 F0D0\r",
-        "input 2 is low, and 1 high on the switch alone"
+        b"# 1A 0015 F0C0\r",
+        "input 2 is low, and 1 away from the switch"
     );
     let control = UnixStream::connect(&socket).expect("it listens");
     let mut answers = BufReader::new(&control).lines();

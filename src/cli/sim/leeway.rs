@@ -11,7 +11,6 @@ use crate::wire::VibrationPort;
 /// What the manuals leave open.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "What the manuals leave open")]
-#[group(id = "leeway", multiple = true, conflicts_with = "tty")]
 pub(super) struct Leeway {
     /// Commands that can be queued; one more is Err21.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..))]

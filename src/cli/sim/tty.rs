@@ -18,7 +18,7 @@ use crate::time::parse_duration;
 #[command(next_help_heading = "Serial drives")]
 pub(super) struct TtyArgs {
     /// Simulate drives on a serial line, a pseudo-terminal with this link to it.
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", conflicts_with = "Leeway")]
     pub(super) tty: Option<PathBuf>,
 
     /// The numbers of the units on the line [default: 16 for a SilverMax, 1 for a SIXpack 2].
