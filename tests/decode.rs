@@ -305,3 +305,62 @@ fn octets_that_two_forms_explain_are_not_taken_for_one_of_them() {
     assert_eq!(decode(&["--dialect", "silvermax", "40", "31 36", "0d"], b"").out, " 16  POL\n");
     assert_eq!(serial(b"", &["--port", "7"]).code, 64);
 }
+
+fn sixpack2(stdin: &[u8], args: &[&str]) -> Ran {
+    decode(&[&["--dialect", "sixpack2"], args].concat(), stdin)
+}
+
+/// The golden messages of a SIXpack 2 on a serial line, each with its answer: the objects, and their octets in hex.
+fn golden_frames() -> Vec<(Value, &'static str)> {
+    let golden: Value = serde_json::from_str(include_str!("data/vectors-drives.json")).unwrap();
+    let all = golden["vectors"].as_array().unwrap().iter();
+    let ours = all.filter(|vector| vector["family"] == "sixpack2" && vector["protocol"] == "serial");
+    let both = ours.flat_map(|vector| [(vector, ">"), (&vector["reply"], "<")]);
+    both.filter(|(message, _)| !message.is_null()).map(|(message, way)| (message.clone(), way)).collect()
+}
+
+#[test]
+fn every_golden_message_of_a_sixpack_2_is_read_from_a_log_and_from_bare_octets_with_its_names() {
+    let golden = golden_frames();
+    let hex = |message: &Value| message["hex"].as_str().unwrap().to_owned();
+    let log: String = golden.iter().map(|(message, way)| format!("1.5 {way} {}\n", hex(message))).collect();
+    let bare: String = golden.iter().map(|(message, _)| hex(message) + "\n").collect();
+    for input in [log, bare] {
+        let ran = sixpack2(input.as_bytes(), &["--json"]);
+        assert_eq!(ran.code, 0, "{}", ran.out);
+        let lines = ran.json();
+        assert_eq!(lines.len(), golden.len() + 1);
+        for ((message, way), said) in golden.iter().zip(&lines) {
+            assert_eq!(said["kind"], if *way == ">" { "request" } else { "answer" });
+            for (name, value) in message["fields"].as_object().unwrap() {
+                let told = said.get(name).unwrap_or(&said["parameters"][name]);
+                assert_eq!(told, value, "{name}: {message} {said}");
+            }
+        }
+    }
+}
+
+#[test]
+fn frames_are_told_in_words_and_octets_without_a_frame_are_shown() {
+    let log = b"0.1 > 01 15 00 90 01 00 00 C8 5A\n\
+                0.2 > 01 20 00\n\
+                0.3 > 01 20 00 02 00 00 00 00 00\n\
+                0.31 < 02 20 00 40\n\
+                0.32 < 1F 00 00 0A 00\n\
+                0.4 > 01 CC 00 00 00 00 00 00 00\n\
+                0.5 > 01 24 00 40 1F 00 00 00 07\n\
+                0.6 < 02\n";
+    let ran = sixpack2(log, &[]);
+    assert_eq!(ran.code, 65);
+    for words in [
+        ">   1  motor parameters motor=0 poslimit=400 p5=200 (TestNull, StopNull, FilterSwitch) p6=90 (FastRef, ",
+        ">   ?  01 20 00: a piece of a frame",
+        "<   2  position motor=0 position=8000 action=10 (PI) stop=0",
+        ">   1  $CC? parameter=0",
+        ">   1  PI target motor=0 target=8000  (octets that it does not use are not 0)",
+        "<   ?  02: it ends in the middle of a frame",
+        "5 messages, 2 times octets that are none",
+    ] {
+        assert!(ran.out.contains(words), "{words}: {}", ran.out);
+    }
+}

@@ -16,12 +16,14 @@ mod printer;
 mod serial;
 mod sheet;
 mod silvermax;
+mod sixpack2;
 mod tally;
 
 use input::{Input, Stream};
 use message::Reading;
 use printer::{Halt, Manner, Printer};
 use silvermax::SilverDecoder;
+use sixpack2::SixpackDecoder;
 
 /// Where controllers (PA14) and hosts (PA24) listen.
 const PORTS: [u16; 2] = [7408, 8410];
@@ -39,6 +41,7 @@ Examples:
   kinocue decode --dialect silvermax 40 31 36 20 31 32 20 31 0d
   printf '@16 0\\r# 10 0000 2000\\r' | kinocue decode --dialect silvermax
   printf '0.5 > 40 31 36 20 30 0d\\n0.6 < 2a 20 31 30 0d\\n' | kinocue decode --dialect silvermax -
+  kinocue decode --dialect sixpack2 01 24 00 40 1f 00 00 00 00
 
 Exit codes: 0 all of it was read, 64 the hex is none, 65 something is malformed, cut short or
 no capture, 66 no such file")]
@@ -79,15 +82,21 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    if args.dialect == Reading::Silvermax {
-        if args.all || args.verbose || !args.port.is_empty() {
-            return Err(anyhow!(
-                "--port, --all and --verbose are for datagrams; leave them out with a serial line"
-            ))
-            .or_exit(Exit::Usage);
-        }
-        return serial::run(args, SilverDecoder::default());
+    let is_serial = matches!(args.dialect, Reading::Silvermax | Reading::Sixpack2);
+    if is_serial && (args.all || args.verbose || !args.port.is_empty()) {
+        return Err(anyhow!(
+            "--port, --all and --verbose are for datagrams; leave them out with a serial line"
+        ))
+        .or_exit(Exit::Usage);
     }
+    match args.dialect {
+        Reading::Silvermax => serial::run(args, SilverDecoder::default()),
+        Reading::Sixpack2 => serial::run(args, SixpackDecoder::default()),
+        _ => datagrams(args),
+    }
+}
+
+fn datagrams(args: &Args) -> Result<Exit, Failure> {
     let port = args.vibration_port_octets;
     let manner = Manner { reading: args.dialect, port, json: args.json, full: args.verbose };
     match Input::of(&args.input)? {

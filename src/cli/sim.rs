@@ -23,6 +23,7 @@ mod control;
 mod leeway;
 mod parse;
 mod silvermax;
+mod sixpack2;
 mod tty;
 
 /// Where a host is that says nothing else.
@@ -45,6 +46,7 @@ Examples:
   kinocue sim --count 8 --script \"5:3@err=12\"        the third has an alarm of the drive of axis 3
   kinocue sim --dialect silvermax --tty ./stalls --units 16,17,18    three units on a serial line
   kinocue sim --dialect silvermax --tty ./stalls --faults \"lost=0.001, 17@dead=1\" --script \"9:16@reset\"
+  kinocue sim --dialect sixpack2 --tty ./stalls --faults \"jump=14400\"    six motors that lose steps above 22.5 mm/s at once
 
 Commands of --script, each with TIME: before it (seconds from the start), and of --control:
   X1=1, X1=0     the switch at input X01 closes (active with PA04 = 1), or opens; X1 to X12
@@ -69,7 +71,12 @@ and of a SilverMax, of all units or, with 17@ before it, of unit 17:
   hot=1, blocked=1, dead=1   too hot; held by something; neither hears nor answers; 0: no more
   X2=0, X2=1       an input is low, or high; X1 to X7, of which X1 is the switch of home
   as=16, as=0      answers as another unit, or as itself
-  ppm=200          its crystal runs so much faster, millionths")]
+  ppm=200          its crystal runs so much faster, millionths
+and of a SIXpack 2, which wakes at 19200 baud and is switched by its host, with 1@ before it of unit 1 alone:
+  reset, dead=1    as above; dead=0: its power comes back
+  celsius=80, volts=51   its temperature and its supply
+  jump=14400       its motors lose steps where their speed changes by more at once, microsteps a second
+  blocked2=1, broken2=1   motor 2, of 0 to 5, is held by something; its switch does not close any more; 0: no more")]
 pub(super) struct Args {
     /// Where the first controller listens; with port 0 each gets a free one.
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7408", conflicts_with = "tty")]
@@ -161,20 +168,23 @@ enum Family {
     Smc,
     Mbox,
     Silvermax,
+    Sixpack2,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let signals = Signals::catch().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
     match (args.dialect, &args.tty.tty) {
         (Family::Silvermax, Some(path)) => silvermax::run(args, path, signals),
+        (Family::Sixpack2, Some(path)) => sixpack2::run(args, path, signals),
         (Family::Smc, None) => run_farm(args, Dialect::Smc, signals),
         (Family::Mbox, None) => run_farm(args, Dialect::Mbox, signals),
-        (Family::Silvermax, None) => {
+        (Family::Silvermax | Family::Sixpack2, None) => {
             Err(anyhow!("serial drives need a line; give --tty and the link to it, as in --tty ./stalls"))
                 .or_exit(Exit::Usage)
         }
         (Family::Smc | Family::Mbox, Some(_)) => {
-            Err(anyhow!("--tty is for serial drives; give --dialect silvermax with it")).or_exit(Exit::Usage)
+            Err(anyhow!("--tty is for serial drives; give --dialect silvermax or sixpack2 with it"))
+                .or_exit(Exit::Usage)
         }
     }
 }

@@ -6,12 +6,11 @@ use std::path::PathBuf;
 use super::drive::DriveFamily;
 use super::fault::Faults;
 use super::section::{Entry, Section};
+use crate::wire::sixpack2::BAUD_CLOCK;
 
 /// Bits a second that a SilverMax knows (BRT 174, command reference page 35).
 const SILVERMAX_BAUDS: [u32; 12] =
     [300, 1_200, 2_400, 4_800, 9_600, 19_200, 28_800, 38_400, 57_600, 100_000, 115_200, 230_400];
-/// A SIXpack 2 divides this by a whole number (its manual, CMD $40).
-const SIXPACK2_CLOCK: u32 = 1_250_000;
 /// The rates between which a SIXpack 2 is switched.
 const SIXPACK2_BAUDS: std::ops::RangeInclusive<u32> = 9_600..=250_000;
 /// How far from the rate that was asked for a SIXpack 2 may be: another program asks for 57,600, and it makes 56,818.
@@ -187,8 +186,8 @@ fn silvermax_baud(asked: u32) -> Result<u32, String> {
 /// The rate next to the one asked for: 1,250,000 divided by a whole number.
 fn sixpack2_baud(asked: u32) -> Result<u32, String> {
     let (least, most) = (SIXPACK2_BAUDS.start(), SIXPACK2_BAUDS.end());
-    let near = ((SIXPACK2_CLOCK + asked / 2) / asked.max(1)).max(1);
-    let made = (SIXPACK2_CLOCK + near / 2) / near;
+    let near = ((BAUD_CLOCK + asked / 2) / asked.max(1)).max(1);
+    let made = (BAUD_CLOCK + near / 2) / near;
     if f64::from(made.abs_diff(asked)) > TOLERANCE * f64::from(asked) {
         return Err(format!(
             "{asked} cannot be made: a SIXpack 2 divides 1,250,000 by a whole number, and the nearest is {made}"

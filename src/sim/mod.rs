@@ -31,6 +31,7 @@ pub(crate) mod serial;
 mod setup;
 mod sheet;
 pub(crate) mod silvermax;
+pub(crate) mod sixpack2;
 mod station;
 
 pub use command::{Action, Command, CommandError};

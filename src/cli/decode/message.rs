@@ -14,6 +14,7 @@ pub(super) enum Reading {
     Mbox,
     Imax,
     Silvermax,
+    Sixpack2,
 }
 
 impl Reading {
@@ -21,7 +22,7 @@ impl Reading {
         match self {
             Self::Mbox | Self::Imax => Dialect::Mbox,
             // Serial drives have a decoder of their own.
-            Self::Smc | Self::Silvermax => Dialect::Smc,
+            Self::Smc | Self::Silvermax | Self::Sixpack2 => Dialect::Smc,
         }
     }
 }

@@ -33,6 +33,18 @@ pub(super) struct Said {
     pub(super) is_message: bool,
 }
 
+impl Said {
+    /// Octets that are no message, and why.
+    pub(super) fn stray(direction: Option<Direction>, octets: &[u8], why: &str) -> Self {
+        let hex: Vec<String> = octets.iter().map(|octet| format!("{octet:02x}")).collect();
+        let hex = hex.join(" ");
+        let text = format!("  ?  {hex}: {why}");
+        let named = [("kind", json!("stray")), ("octets", json!(hex)), ("why", json!(why))];
+        let fields = named.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        Self { direction, text, fields, is_message: false }
+    }
+}
+
 /// Makes messages of the octets of one dialect.
 pub(super) trait Decoder {
     /// Octets that came together; what is complete with them.

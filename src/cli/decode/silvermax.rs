@@ -47,9 +47,9 @@ impl SilverDecoder {
             (Ok(request), _) => self.request(request),
             (_, Ok(reply)) => self.reply(&reply),
             (Err(why), Err(_)) if line.first() == Some(&b'@') => {
-                return stray(direction, line, &why.to_string());
+                return Said::stray(direction, line, &why.to_string());
             }
-            (_, Err(why)) => return stray(direction, line, &why.to_string()),
+            (_, Err(why)) => return Said::stray(direction, line, &why.to_string()),
         };
         Said { direction, text, fields, is_message: true }
     }
@@ -145,7 +145,7 @@ impl SilverDecoder {
         };
         let read = read.ok()?;
         if OPENINGS.contains(octets.first()?) {
-            return Some(stray(
+            return Some(Said::stray(
                 Some(direction),
                 octets,
                 "it may be in nine bits or a piece of a line; which of them cannot be told",
@@ -182,7 +182,11 @@ impl Decoder for SilverDecoder {
                 Some(Collected::Line(line)) => (true, line.to_vec()),
                 Some(Collected::Stray(stray)) => (false, stray.to_vec()),
             };
-            said.push(if is_line { self.line(direction, &kept) } else { stray(direction, &kept, "no line") });
+            said.push(if is_line {
+                self.line(direction, &kept)
+            } else {
+                Said::stray(direction, &kept, "no line")
+            });
         }
         said
     }
@@ -193,7 +197,7 @@ impl Decoder for SilverDecoder {
         for direction in directions {
             let rest = self.collector(direction).rest();
             if !rest.is_empty() {
-                said.push(stray(direction, rest, "it ends in the middle of a line"));
+                said.push(Said::stray(direction, rest, "it ends in the middle of a line"));
             }
         }
         said
@@ -208,13 +212,6 @@ fn bits(command: u16, word: u16) -> Option<Vec<&'static str>> {
         21 => Io(word).names().collect(),
         _ => return None,
     })
-}
-
-fn stray(direction: Option<Direction>, octets: &[u8], why: &str) -> Said {
-    let hex: Vec<String> = octets.iter().map(|octet| format!("{octet:02x}")).collect();
-    let hex = hex.join(" ");
-    let fields = object(json!({ "kind": "stray", "octets": hex, "why": why }));
-    Said { direction, text: format!("  ?  {hex}: {why}"), fields, is_message: false }
 }
 
 fn object(fields: Value) -> Map<String, Value> {

@@ -13,15 +13,20 @@ use crate::sim::silvermax::{Action, SilverBus, UnitSetup};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
+/// Bits a second unless others are named (command reference, page 67).
+const WAKING_BAUD: u32 = 57_600;
+
 /// Runs units until a signal comes.
 pub(super) fn run(args: &Args, path: &Path, signals: Signals) -> Result<Exit, Failure> {
-    let setups: Vec<UnitSetup> = args.tty.units.iter().map(|unit| UnitSetup::new(*unit)).collect();
-    let bus = SilverBus::new(&setups, args.tty.baud, Monotonic.now());
+    let units = args.tty.units::<SilverBus>();
+    let setups: Vec<UnitSetup> = units.into_iter().map(UnitSetup::new).collect();
+    let bus = SilverBus::new(&setups, args.tty.baud.unwrap_or(WAKING_BAUD), Monotonic.now());
     tty::run(bus, args, path, signals)
 }
 
 impl Drives for SilverBus {
     const BITS: u32 = 11;
+    const ALONE: u8 = 16;
 
     fn deed(unit: Option<u8>, name: &str, value: Option<&str>) -> anyhow::Result<Deed<Self>> {
         let action = action(name, value)?;

@@ -21,25 +21,34 @@ pub(super) struct TtyArgs {
     #[arg(long, value_name = "LINK", conflicts_with = "Leeway")]
     pub(super) tty: Option<PathBuf>,
 
-    /// The numbers of the units on the line.
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "16", requires = "tty")]
+    /// The numbers of the units on the line [default: 16 for a SilverMax, 1 for a SIXpack 2].
+    #[arg(long, value_name = "N,…", value_delimiter = ',', requires = "tty")]
     #[arg(value_parser = clap::value_parser!(u8).range(1..=254))]
-    pub(super) units: Vec<u8>,
+    units: Vec<u8>,
 
-    /// Bits a second of the line, which a pseudo-terminal does not keep to by itself.
-    #[arg(long, value_name = "BAUD", default_value_t = 57_600, requires = "tty")]
+    /// Bits a second of a SilverMax's line, which a pseudo-terminal does not keep to by itself [default: 57600].
+    #[arg(long, value_name = "BAUD", requires = "tty")]
     #[arg(value_parser = clap::value_parser!(u32).range(300..=1_000_000))]
-    pub(super) baud: u32,
+    pub(super) baud: Option<u32>,
 
     /// What is wrong from the start, as "lost=0.001, 17@dead=1"; see below.
     #[arg(long, value_name = "COMMAND, …", default_value = "", hide_default_value = true, requires = "tty")]
     faults: String,
 }
 
+impl TtyArgs {
+    /// The units on the line: one where none is named.
+    pub(super) fn units<B: Drives>(&self) -> Vec<u8> {
+        if self.units.is_empty() { vec![B::ALONE] } else { self.units.clone() }
+    }
+}
+
 /// Drives that can be run on a line: what happens to them in words, and what became of them.
 pub(super) trait Drives: Bus + Send + Sized + 'static {
     /// Bits of an octet with start and stop.
     const BITS: u32;
+    /// The number of a unit that nobody gave one.
+    const ALONE: u8;
 
     /// Something that happens to a unit, or to all; refused in words.
     fn deed(unit: Option<u8>, name: &str, value: Option<&str>) -> anyhow::Result<Deed<Self>>;
@@ -51,7 +60,7 @@ pub(super) trait Drives: Bus + Send + Sized + 'static {
 /// Runs drives on the line until a signal comes.
 pub(super) fn run<B: Drives>(bus: B, args: &Args, path: &Path, signals: Signals) -> Result<Exit, Failure> {
     let deed = {
-        let units = args.tty.units.clone();
+        let units = args.tty.units::<B>();
         move |text: &str| deed::<B>(text, &units)
     };
     let faults = parse::list(&args.tty.faults, &deed).context("--faults").or_exit(Exit::Usage)?;
