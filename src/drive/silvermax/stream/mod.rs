@@ -224,8 +224,8 @@ impl<P: LinkPort> Stream<P> {
     /// The first pose of a lane that stands.
     fn begin(&mut self, index: usize, pose: LinkPose, now: MonoTime) {
         if let Some((axis, by_mm)) = self.lanes[index].off(&pose, NEAR_MM) {
-            // Told once, not at each tick.
-            if self.figures.poses_skipped == 0 || !self.lanes[index].moves {
+            // Told once while it stands, not at each tick.
+            if !self.lanes[index].moves {
                 self.lanes[index].moves = true;
                 self.tell(StreamEvent::Elsewhere { lane: number(index), axis: axis_number(axis), by_mm });
             }
