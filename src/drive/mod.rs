@@ -15,6 +15,8 @@ mod rounds;
     expect(dead_code, reason = "the clocks of drives, and their settings, come with their links")
 )]
 mod segments;
+#[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "the thread of a link comes next"))]
+pub(crate) mod silvermax;
 
 pub use lane::Lane;
 pub(crate) use lane::Stamped;

@@ -53,6 +53,13 @@ impl SegmentFit {
         self.knots.set_clock(clock);
     }
 
+    /// What was put in beside the segments made here lasted so many ticks, and the drive is on `course` behind all of them.
+    pub(crate) fn put_in(&mut self, ticks: u32, course: DriveCourse) {
+        self.knots.put_in(ticks);
+        self.late += f64::from(ticks) / self.knots.slice();
+        self.course = course;
+    }
+
     /// Takes the middle of the next slice, in counts, and gives the segment of the one two before it, which is none before
     /// the third. One that is no number is as the one before.
     pub(crate) fn push(&mut self, middle: f64) -> Option<Segment> {

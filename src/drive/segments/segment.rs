@@ -55,6 +55,12 @@ impl Segment {
         Self::to_rest(ticks, position, LEAST_ACCELERATION, 0)
     }
 
+    /// True if it ends at rest.
+    #[must_use]
+    pub(crate) const fn is_at_rest(&self) -> bool {
+        matches!(self.end(), End::AtRest(_))
+    }
+
     /// How it ends.
     #[must_use]
     pub(crate) const fn end(&self) -> End {

@@ -24,9 +24,7 @@ pub(crate) use command::{Class, command};
 pub(crate) use line::{Collected, LineCollector, LineError, MAX_LINE};
 pub(crate) use nine_bit::NineBit;
 pub(crate) use reply::{NakReason, Reply, Words};
-pub(crate) use request::AnyRequest;
-#[cfg_attr(not(test), expect(unused_imports, reason = "links of drives send in the next step"))]
-pub(crate) use request::{Request, StopOn};
+pub(crate) use request::{AnyRequest, Request, StopOn};
 pub(crate) use status::{Internal, Io, Poll, StatusWord};
 
 /// All units at once; like a group they obey and never answer (command reference, IDT, page 54).

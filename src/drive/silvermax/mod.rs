@@ -1,0 +1,36 @@
+//! The host's end of a line of SilverMax units: what is asked of them, how a seat on them finds its zero, and how poses become motion.
+//! Straight-line blocking procedures over a [`LinkPort`], which knows the time, so that whole homings and shows run in
+//! virtual time. The thread of the link; nothing here is called by the tick thread.
+//!
+//! ```text
+//!  look, home --Request--> Talk --octets--> LinkPort        one exchange at a time
+//!  poses --ring--> Stream --segments--> Talk                the same, by what is due next
+//!                     '--events--> ring
+//! ```
+
+mod delays;
+mod home;
+mod look;
+mod port;
+mod scale;
+mod set_up;
+mod stream;
+mod talk;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use home::{Homing, Step, home};
+pub(crate) use look::look;
+pub(crate) use port::{LinkFault, LinkPort};
+pub(crate) use set_up::{HomeError, SeatUnits};
+pub(crate) use stream::{
+    AxisFigures, BrakeReason, LaneUnits, LinkPose, Stream, StreamEvent, StreamTerms, lead,
+};
+pub(crate) use talk::{Talk, TalkTerms};
+
+#[expect(unused_imports, reason = "for the thread of a link, and preflight")]
+pub(crate) use {
+    look::UnitFacts,
+    stream::{Account, LinkFigures},
+    talk::{TalkCounts, TalkFault},
+};

@@ -1,0 +1,32 @@
+//! The seam between procedures and a line: a real one, or one in virtual time.
+
+use crate::time::MonoTime;
+
+/// The host's end of a serial line.
+pub(crate) trait LinkPort {
+    /// The present instant.
+    fn now(&self) -> MonoTime;
+
+    /// Sends all of it; the line is busy for its octets.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault>;
+
+    /// What arrives up to then, at least one octet; none at the deadline.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault>;
+
+    /// Drops what came unasked, says how much.
+    fn flush(&mut self) -> usize;
+
+    /// Returns then; at once where that is past.
+    fn sleep_until(&mut self, at: MonoTime);
+}
+
+/// The port is gone: neither what was sent nor what is answered goes over it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the port has vanished; look at the plug and the power of the adapter")]
+pub(crate) struct LinkFault;

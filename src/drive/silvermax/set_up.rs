@@ -1,0 +1,347 @@
+//! The settings of the units of a seat: written where a person is, at rest, and read back (command reference, pages 47 to 75).
+
+use super::port::LinkPort;
+use super::scale::DriveScale;
+use super::talk::{Answer, Talk, TalkFault};
+use crate::config::drive::{SeatDrive, SilverMaxDrive};
+use crate::drive::TICK_NS;
+use crate::motion::{AxisGeometry, SeatType};
+use crate::wire::silvermax::register::{
+    self, CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, QUEUE_SOURCE, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW,
+    TORQUE_CLOSED, TORQUE_OPEN,
+};
+use crate::wire::silvermax::{Io, NakReason, Poll, Request, StatusWord, command};
+
+/// A seat, and the units that move it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SeatUnits<'a> {
+    /// What it is.
+    pub(crate) seat: &'a SeatType,
+    /// How drives move it.
+    pub(crate) drive: &'a SeatDrive,
+    /// What its units are set to.
+    pub(crate) silvermax: &'a SilverMaxDrive,
+    /// The unit of each axis.
+    pub(crate) units: &'a [u8],
+}
+
+/// Why a seat is not home, and what to do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum HomeError {
+    /// The line, or a unit.
+    #[error(transparent)]
+    Talk(#[from] TalkFault),
+    /// A unit refused something.
+    #[error("unit {unit} refused {what}: {reason}; look at its own program and its firmware")]
+    Refused {
+        /// Who.
+        unit: u8,
+        /// The command, by its three letters.
+        what: &'static str,
+        /// Why.
+        reason: NakReason,
+    },
+    /// Not known whether a move or a shift was taken.
+    #[error("it is not known whether unit {unit} took {what}; it was braked, home it again")]
+    InDoubt {
+        /// Who.
+        unit: u8,
+        /// The command, by its three letters.
+        what: &'static str,
+    },
+    /// A setting reads back as another.
+    #[error(
+        "unit {unit}: register {number} ({name}) reads {found} where {wanted} was written; does another program change it? \
+         Then home again"
+    )]
+    ReadBack {
+        /// Who.
+        unit: u8,
+        /// The register.
+        number: u8,
+        /// What it is.
+        name: &'static str,
+        /// As read.
+        found: i32,
+        /// As written.
+        wanted: i32,
+    },
+    /// The seat type counts as no such drive does.
+    #[error(
+        "axis {axis}: {counts} counts a turn are none of a SilverMax; set pulses_per_rev = 4000, 8000 or 16000"
+    )]
+    Counts {
+        /// The axis, from 1.
+        axis: usize,
+        /// What the seat says.
+        counts: f64,
+    },
+    /// A limit that a unit cannot keep.
+    #[error("axis {axis}: an error of {mm} mm is {counts:.0} counts, over 32767; lower max_error_mm")]
+    ErrorLimit {
+        /// The axis, from 1.
+        axis: usize,
+        /// What the seat says.
+        mm: f64,
+        /// The same in counts.
+        counts: f64,
+    },
+    /// Too hot.
+    #[error("unit {unit} is too hot; let it cool, look at what loads it, then home")]
+    Hot {
+        /// Who.
+        unit: u8,
+    },
+    /// The drive let go of its motor.
+    #[error("unit {unit} was killed by {cause} (register 211); look for what blocks or heats it, then home")]
+    Killed {
+        /// Who.
+        unit: u8,
+        /// The conditions by name.
+        cause: String,
+    },
+    /// The switch stays on.
+    #[error(
+        "unit {unit}: input {input} is still on {travel_mm} mm away from it; check the switch and its wiring, and `active`"
+    )]
+    SwitchStaysOn {
+        /// Who.
+        unit: u8,
+        /// The input.
+        input: u8,
+        /// How far it went.
+        travel_mm: f64,
+    },
+    /// What was looked for is not there.
+    #[error("unit {unit}: {what} not found within {travel_mm} mm; check it, its wiring, and `toward`")]
+    NotFound {
+        /// Who.
+        unit: u8,
+        /// What.
+        what: String,
+        /// How far it went.
+        travel_mm: f64,
+    },
+    /// It moves on and on.
+    #[error("unit {unit} still moves after {seconds:.0} s; it was braked, look for what slows it, then home")]
+    TooLong {
+        /// Who.
+        unit: u8,
+        /// The limit.
+        seconds: f64,
+    },
+    /// It is elsewhere than it was sent.
+    #[error(
+        "unit {unit} stands at {found_mm:.2} mm where it was sent to {wanted_mm:.2}; look for what blocks it, then home"
+    )]
+    Elsewhere {
+        /// Who.
+        unit: u8,
+        /// Where it is.
+        found_mm: f64,
+        /// Where it should be.
+        wanted_mm: f64,
+    },
+    /// A person stopped it.
+    #[error("homing was stopped; the seat is not home")]
+    Aborted,
+    /// 0 cannot be told from a restart.
+    #[error("the canary is 0, which is what a unit has after a restart; take another")]
+    Canary,
+}
+
+/// An axis with its unit.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct UnitAxis<'a> {
+    pub(super) unit: u8,
+    pub(super) axis: &'a AxisGeometry,
+    pub(super) scale: DriveScale,
+    pub(super) of: SeatUnits<'a>,
+}
+
+impl<'a> SeatUnits<'a> {
+    /// Its axes.
+    pub(super) fn axes(&self) -> Result<Vec<UnitAxis<'a>>, HomeError> {
+        let pairs = self.seat.own().iter().zip(self.units).enumerate();
+        let axis = |(index, (axis, unit)): (usize, (&'a AxisGeometry, &u8))| {
+            let counts = HomeError::Counts { axis: index + 1, counts: axis.pulses_per_rev };
+            let scale = DriveScale::of(axis, self.drive.reverse[index]).ok_or(counts)?;
+            let (mm, most) = (self.silvermax.max_error_mm, f64::from(i16::MAX));
+            let counts = scale.counts(mm).abs();
+            if counts > most {
+                return Err(HomeError::ErrorLimit { axis: index + 1, mm, counts });
+            }
+            Ok(UnitAxis { unit: *unit, axis, scale, of: *self })
+        };
+        pairs.map(axis).collect()
+    }
+}
+
+/// Asks for what has to be taken, and may be done twice.
+pub(super) fn write<P: LinkPort>(talk: &mut Talk<P>, unit: u8, request: Request) -> Result<(), HomeError> {
+    let answer = talk.insist(unit, request)?;
+    taken(unit, request, answer)
+}
+
+/// The same for what must not be done twice.
+pub(super) fn write_once<P: LinkPort>(
+    talk: &mut Talk<P>,
+    unit: u8,
+    request: Request,
+) -> Result<(), HomeError> {
+    let answer = match talk.exchange(unit, request) {
+        Err(TalkFault::Link(fault)) => return Err(TalkFault::Link(fault).into()),
+        Err(_) => talk.fence(unit, request)?,
+        Ok(answer) => Some(answer),
+    };
+    let doubt = HomeError::InDoubt { unit, what: mnemonic(request) };
+    taken(unit, request, answer.ok_or(doubt)?)
+}
+
+fn taken(unit: u8, request: Request, answer: Answer) -> Result<(), HomeError> {
+    match answer {
+        Answer::Nak(reason) => Err(HomeError::Refused { unit, what: mnemonic(request), reason }),
+        Answer::Ack | Answer::Data(_) => Ok(()),
+    }
+}
+
+fn mnemonic(request: Request) -> &'static str {
+    command(request.number()).map_or("a command", |command| command.mnemonic)
+}
+
+impl UnitAxis<'_> {
+    /// Before anything moves: what is wrong, then disarmed and held by its driver where it stands.
+    pub(super) fn disarm<P: LinkPort>(&self, talk: &mut Talk<P>) -> Result<(), HomeError> {
+        let unit = self.unit;
+        write(talk, unit, Request::StopAtOnce)?;
+        if talk.internal(unit)?.is_hot() {
+            return Err(HomeError::Hot { unit });
+        }
+        let offset = i16::try_from(self.of.silvermax.gravity).unwrap_or_default();
+        let requests = [
+            Request::ClearInternalStatus,
+            Request::EnableMultiTasking,
+            // On heat alone: an error is what a hard stop is found by, and an input the switch.
+            Request::KillConditions { enable: Io::COOL, state: 0 },
+            // They lie before the switch: a second homing would end at them.
+            Request::SoftLimitsOff,
+            // What is given up half-way is not home.
+            Request::WriteRegister { register: CANARY, value: 0 },
+            self.torque(self.of.drive.homing.torque),
+            self.error_limits(),
+            Request::GravityOffset { offset },
+            // Never the driver first: it jumps to where the target is (page 57).
+            Request::TargetToPosition,
+            Request::EnableDriver,
+        ];
+        requests.into_iter().try_for_each(|request| write(talk, unit, request))
+    }
+
+    /// The limits of a show, and the kill conditions.
+    pub(super) fn arm<P: LinkPort>(&self, talk: &mut Talk<P>) -> Result<(), HomeError> {
+        let errors = Io::MOVING_ERROR | Io::HOLDING_ERROR;
+        let requests = [
+            self.torque(None),
+            self.error_limits(),
+            Request::ClearInternalStatus,
+            Request::KillConditions { enable: errors | Io::COOL, state: errors },
+        ];
+        requests.into_iter().try_for_each(|request| write(talk, self.unit, request))
+    }
+
+    /// Inside the stroke: what holds it there, read back; the canary last.
+    pub(super) fn seal<P: LinkPort>(&self, talk: &mut Talk<P>, canary: i32) -> Result<(), HomeError> {
+        let [low, high] = self.soft_limits();
+        let written = [
+            (SOFT_LIMIT_LOW, low),
+            (SOFT_LIMIT_HIGH, high),
+            (DRY_BRAKE, self.brake().cast_signed()),
+            (QUEUE_SOURCE, 0),
+        ];
+        for (register, value) in written {
+            write(talk, self.unit, Request::WriteRegister { register, value })?;
+        }
+        write(talk, self.unit, Request::SoftLimitsOn)?;
+        let torque = self.torque_words(None);
+        let settings = [(TORQUE_CLOSED, torque), (TORQUE_OPEN, torque), (ERROR_LIMITS, self.error_words())];
+        let held = settings.into_iter().chain(written.into_iter().take(3));
+        held.into_iter().try_for_each(|(number, wanted)| self.read_back(talk, number, wanted))?;
+        write(talk, self.unit, Request::WriteRegister { register: CANARY, value: canary })?;
+        self.read_back(talk, CANARY, canary)
+    }
+
+    fn read_back<P: LinkPort>(&self, talk: &mut Talk<P>, number: u8, wanted: i32) -> Result<(), HomeError> {
+        let found = talk.register(self.unit, number)?;
+        let name = register::name(number).unwrap_or("a register");
+        let differs = HomeError::ReadBack { unit: self.unit, number, name, found, wanted };
+        if found == wanted { Ok(()) } else { Err(differs) }
+    }
+
+    /// What happened since it was asked last; what killed is a fault.
+    pub(super) fn happened<P: LinkPort>(&self, talk: &mut Talk<P>) -> Result<Poll, HomeError> {
+        let poll = Poll(talk.word(self.unit, Request::Poll)?);
+        if poll.has(Poll::KILLED) {
+            let cause = kill_names(talk.register(self.unit, KILL_CAUSE)?);
+            return Err(HomeError::Killed { unit: self.unit, cause });
+        }
+        Ok(poll)
+    }
+
+    /// Deceleration of a stop, and of a dry queue.
+    pub(super) fn brake(&self) -> u32 {
+        self.scale.acceleration(self.axis.max_acceleration)
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "a stroke fits i32; saturating")]
+    fn soft_limits(&self) -> [i32; 2] {
+        let (low, high) = self.scale.reach(self.of.drive.margin_mm);
+        [low.floor() as i32, high.ceil() as i32]
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "shares of at most 32767")]
+    fn torque_limits(&self, share: Option<f64>) -> [u16; 2] {
+        let torque = &self.of.silvermax.torque;
+        let of = |share: f64| (share * f64::from(torque.full)).round().clamp(0.0, f64::from(i16::MAX)) as u16;
+        [share.unwrap_or(torque.hold), share.unwrap_or(torque.moving)].map(of)
+    }
+
+    fn torque(&self, share: Option<f64>) -> Request {
+        let [hold, moving] = self.torque_limits(share);
+        Request::TorqueLimits { hold, moving }
+    }
+
+    fn torque_words(&self, share: Option<f64>) -> i32 {
+        let [hold, moving] = self.torque_limits(share);
+        two_words(hold, moving)
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "judged in axes()")]
+    fn error_counts(&self) -> [u16; 2] {
+        let SilverMaxDrive { max_error_mm, hold_error_mm, .. } = self.of.silvermax;
+        [*max_error_mm, *hold_error_mm].map(|mm| self.scale.counts(mm).abs().round() as u16)
+    }
+
+    fn error_limits(&self) -> Request {
+        let [moving, holding] = self.error_counts();
+        let ticks = u64::from(self.of.silvermax.settle_ms) * 1_000_000 / u64::from(TICK_NS);
+        let delay_ticks = u16::try_from(ticks).unwrap_or(u16::MAX);
+        Request::ErrorLimits { moving, holding, delay_ticks }
+    }
+
+    fn error_words(&self) -> i32 {
+        let [moving, holding] = self.error_counts();
+        two_words(moving, holding)
+    }
+}
+
+/// The conditions of register 211 by name: the bits that killed stand in its upper word.
+pub(super) fn kill_names(register: i32) -> String {
+    let bits = u16::try_from(register.cast_unsigned() >> 16).unwrap_or_default();
+    let names: Vec<_> = Io(bits).names().map(|name| if name == "not hot" { "heat" } else { name }).collect();
+    if names.is_empty() { "what it does not say".to_owned() } else { names.join(", ") }
+}
+
+fn two_words(high: u16, low: u16) -> i32 {
+    (u32::from(high) << 16 | u32::from(low)).cast_signed()
+}

@@ -1,0 +1,355 @@
+//! One exchange at a time: a request, and the answer of the unit that was asked.
+//!
+//! No line carries a sum, and an ack does not say what it is for. So an answer counts only from the unit asked, while it is
+//! waited for; where it does not come, what was asked is in doubt, and nothing else is asked of the unit before
+//! [`Talk::fence`]: a unit answers in turn, so what comes before the answer to a read belongs to what was asked before.
+
+use std::time::Duration;
+
+use super::delays::Delays;
+use super::port::{LinkFault, LinkPort};
+use crate::time::MonoTime;
+use crate::wire::silvermax::{
+    ALL_UNITS, Collected, Internal, LineCollector, MAX_LINE, NakReason, Reply, Request, Words,
+};
+
+/// What the unit makes of a request, beyond its octets and its delay.
+const SLACK: Duration = Duration::from_millis(4);
+/// Octets of the longest answer, that to a read of the revision apart.
+const ANSWER: u32 = 24;
+/// Octets of a refusal, the longest answer to a segment: what is in doubt has to be found out soon.
+const REFUSAL: u32 = 15;
+/// How often what does no harm twice is asked.
+const TRIES: u32 = 4;
+
+/// The register of the internal status word.
+pub(super) const INTERNAL: u8 = 3;
+
+/// What stands in that register, above the state of the drive.
+pub(super) fn internal_word(register: i32) -> Internal {
+    Internal(u16::try_from(register.cast_unsigned() >> 16).unwrap_or_default())
+}
+
+/// What a line is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct TalkTerms {
+    /// Bits a second.
+    pub(crate) baud: u32,
+    /// Bits of an octet with start and stop.
+    pub(crate) octet_bits: u32,
+    /// The adapter returns what is sent.
+    pub(crate) has_echo: bool,
+}
+
+/// What a unit answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// Taken.
+    Ack,
+    /// What was asked for.
+    Data(Words),
+    /// Not taken.
+    Nak(NakReason),
+}
+
+/// Why there is no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum TalkFault {
+    /// The port.
+    #[error(transparent)]
+    Link(#[from] LinkFault),
+    /// Nothing that can be read came in time: whether it was taken is not known.
+    #[error(
+        "unit {unit} does not answer; check its number (decimal here, hexadecimal in its answers), baud and wiring"
+    )]
+    Silent {
+        /// Who was asked.
+        unit: u8,
+    },
+    /// Somebody else answered: which of the two has taken it is not known.
+    #[error("unit {by} answered what unit {unit} was asked; look for a bad line, or two units of one number")]
+    Foreign {
+        /// Who was asked.
+        unit: u8,
+        /// Who answered.
+        by: u8,
+    },
+}
+
+/// What came over a line, counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct TalkCounts {
+    /// Requests that wait for an answer.
+    pub(crate) asked: u64,
+    /// Those that got one in time.
+    pub(crate) answered: u64,
+    /// Answers that came after their time.
+    pub(crate) late: u64,
+    /// Answers where none was waited for any more.
+    pub(crate) doubled: u64,
+    /// Lines that are no answer, and octets that are no line.
+    pub(crate) malformed: u64,
+    /// Answers of a unit, or to a command, that was not asked.
+    pub(crate) foreign: u64,
+    /// The echo was not what was sent.
+    pub(crate) echo_differs: u64,
+}
+
+/// When an exchange happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Moment {
+    /// The last octet of the request had left.
+    pub(crate) sent: MonoTime,
+    /// The first octet of the answer began to arrive.
+    pub(crate) answered: MonoTime,
+}
+
+impl Moment {
+    /// How long the answer took to begin.
+    pub(crate) const fn delay(&self) -> Duration {
+        self.answered.since(self.sent)
+    }
+}
+
+/// A conversation with the units of a line.
+#[derive(Debug)]
+pub(crate) struct Talk<P> {
+    port: P,
+    terms: TalkTerms,
+    delays: Delays,
+    counts: TalkCounts,
+    moment: Moment,
+}
+
+impl<P: LinkPort> Talk<P> {
+    /// Over a port that is open.
+    pub(crate) fn new(port: P, terms: TalkTerms) -> Self {
+        let counts = TalkCounts::default();
+        Self { port, terms, delays: Delays::new(), counts, moment: Moment::default() }
+    }
+
+    /// The present instant.
+    pub(crate) fn now(&self) -> MonoTime {
+        self.port.now()
+    }
+
+    /// The port.
+    pub(crate) fn port(&mut self) -> &mut P {
+        &mut self.port
+    }
+
+    /// What came so far.
+    pub(crate) const fn counts(&self) -> TalkCounts {
+        self.counts
+    }
+
+    /// What 99 of 100 answers take to begin.
+    pub(crate) fn delay_p99(&self) -> Duration {
+        self.delays.p99()
+    }
+
+    /// When the last exchange was.
+    pub(crate) const fn moment(&self) -> Moment {
+        self.moment
+    }
+
+    /// How long so many octets take.
+    pub(crate) fn octets(&self, count: u32) -> Duration {
+        Duration::from_nanos(
+            u64::from(count * self.terms.octet_bits) * 1_000_000_000 / u64::from(self.terms.baud.max(1)),
+        )
+    }
+
+    /// Tells all units something; none answers.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    pub(crate) fn tell_all(&mut self, request: Request) -> Result<(), LinkFault> {
+        let octets = self.send(ALL_UNITS, request)?;
+        let sent = self.now() + octets;
+        self.port.sleep_until(sent);
+        if self.terms.has_echo {
+            self.port.flush();
+        }
+        Ok(())
+    }
+
+    /// Asks a unit, once.
+    ///
+    /// # Errors
+    /// A [`TalkFault`]; [`Talk::fence`] has to follow where that is not the port.
+    pub(crate) fn exchange(&mut self, unit: u8, request: Request) -> Result<Answer, TalkFault> {
+        let stale = self.port.flush();
+        self.counts.doubled += u64::from(stale > 0);
+        let sending = self.send(unit, request)?;
+        self.counts.asked += 1;
+        let sent = self.now() + sending;
+        let octets = if matches!(request, Request::ImmediateSegment { .. }) { REFUSAL } else { ANSWER };
+        let deadline = sent + self.octets(octets) + 2 * self.delays.p99() + SLACK;
+        let command = u16::from(request.number());
+        let fits = |reply: &Reply| reply.command().is_none_or(|told| told == command);
+        match self.answer(sent, deadline)? {
+            Some(reply) if reply.unit() == unit && fits(&reply) => {
+                self.counts.answered += 1;
+                Ok(Answer::of(reply))
+            }
+            Some(reply) => {
+                self.counts.foreign += 1;
+                // Of the right unit, and to another command: late, and no answer to this.
+                Err(match reply.unit() {
+                    by if by == unit => TalkFault::Silent { unit },
+                    by => TalkFault::Foreign { unit, by },
+                })
+            }
+            None => Err(TalkFault::Silent { unit }),
+        }
+    }
+
+    /// Waits for what may still come of a request in doubt, by reading the revision behind it. Gives the answer to the request
+    /// if that came late.
+    ///
+    /// Of all that is answered by data this is the read that nothing else asks for, and that an octet which is lost makes no
+    /// other command of: of RIS and RIO, 20 and 21, it makes a HLT, 2, which drops what the motor holds.
+    ///
+    /// # Errors
+    /// A [`TalkFault`] where no read is answered.
+    pub(crate) fn fence(&mut self, unit: u8, doubtful: Request) -> Result<Option<Answer>, TalkFault> {
+        let (number, fence) = (u16::from(doubtful.number()), u16::from(Request::Revision.number()));
+        let (mut late, mut waited) = (None, 0);
+        for open in 1..=2 {
+            let sending = self.send(unit, Request::Revision)?;
+            self.counts.asked += 1;
+            let sent = self.now() + sending;
+            let deadline = sent + self.octets(2 * ANSWER) + 2 * self.delays.p99() + SLACK;
+            // The answers to all reads that were sent, so that none is left over.
+            while waited < open
+                && let Some(reply) = self.answer(sent, deadline)?
+            {
+                if reply.unit() != unit {
+                    self.counts.foreign += 1;
+                } else if reply.command() == Some(fence) {
+                    waited += 1;
+                } else {
+                    self.counts.late += 1;
+                    let is_of_it = reply.command().is_none_or(|command| command == number);
+                    late = late.or(is_of_it.then(|| Answer::of(reply)));
+                }
+            }
+            if waited > 0 {
+                self.counts.answered += 1;
+                return Ok(late);
+            }
+        }
+        Err(TalkFault::Silent { unit })
+    }
+
+    /// Asks for what does no harm if it is done twice, a few times if need be.
+    ///
+    /// # Errors
+    /// The last [`TalkFault`].
+    pub(crate) fn insist(&mut self, unit: u8, request: Request) -> Result<Answer, TalkFault> {
+        let mut last = self.exchange(unit, request);
+        for _ in 1..TRIES {
+            match last {
+                Ok(_) | Err(TalkFault::Link(_)) => break,
+                Err(_) => {}
+            }
+            last = match self.fence(unit, request)? {
+                Some(answer) => Ok(answer),
+                None => self.exchange(unit, request),
+            };
+        }
+        last
+    }
+
+    /// A register.
+    ///
+    /// # Errors
+    /// A [`TalkFault`]; an answer that is no value counts as none.
+    pub(crate) fn register(&mut self, unit: u8, register: u8) -> Result<i32, TalkFault> {
+        match self.insist(unit, Request::ReadRegister { register })? {
+            Answer::Data(words) => words.value().ok_or(TalkFault::Silent { unit }),
+            _ => Err(TalkFault::Silent { unit }),
+        }
+    }
+
+    /// The internal status word, by the register that holds it (3): RIS is what an octet that is lost makes a HLT of.
+    ///
+    /// # Errors
+    /// A [`TalkFault`].
+    pub(crate) fn internal(&mut self, unit: u8) -> Result<Internal, TalkFault> {
+        self.register(unit, INTERNAL).map(internal_word)
+    }
+
+    /// A word, 0 where a unit has nothing to tell.
+    ///
+    /// # Errors
+    /// A [`TalkFault`]; an answer that is no word counts as none.
+    pub(crate) fn word(&mut self, unit: u8, request: Request) -> Result<u16, TalkFault> {
+        match self.insist(unit, request)? {
+            Answer::Data(words) => words.word().ok_or(TalkFault::Silent { unit }),
+            Answer::Ack => Ok(0),
+            Answer::Nak(_) => Err(TalkFault::Silent { unit }),
+        }
+    }
+
+    /// Sends, takes the echo back, and says how long the octets take from now on.
+    fn send(&mut self, unit: u8, request: Request) -> Result<Duration, LinkFault> {
+        let mut buf = [0; MAX_LINE];
+        let line = request.emit(unit, &mut buf);
+        let takes = self.octets(u32::try_from(line.len()).unwrap_or(u32::MAX));
+        self.port.send(line)?;
+        if !self.terms.has_echo {
+            return Ok(takes);
+        }
+        let (deadline, mut echo, mut at) = (self.now() + takes + SLACK, [0; MAX_LINE], 0);
+        while at < line.len() {
+            match self.port.receive(&mut echo[at..line.len()], deadline)? {
+                0 => break,
+                count => at += count,
+            }
+        }
+        self.counts.echo_differs += u64::from(echo[..at] != *line);
+        Ok(Duration::ZERO)
+    }
+
+    /// The next line that is an answer, none at the deadline.
+    fn answer(&mut self, sent: MonoTime, deadline: MonoTime) -> Result<Option<Reply>, LinkFault> {
+        let mut collector = LineCollector::of_replies();
+        let mut octet = [0];
+        let mut begun = None;
+        while self.port.receive(&mut octet, deadline)? > 0 {
+            begun.get_or_insert(self.now());
+            let malformed = match collector.push(octet[0]) {
+                Some(Collected::Line(line)) => match Reply::parse(line) {
+                    Ok(reply) => {
+                        // An octet is there when its last bit is.
+                        let first = begun.unwrap_or(sent).before(self.octets(1));
+                        self.moment = Moment { sent, answered: first.max(sent) };
+                        self.delays.push(first.since(sent));
+                        return Ok(Some(reply));
+                    }
+                    Err(_) => true,
+                },
+                Some(Collected::Stray(_)) => true,
+                None => false,
+            };
+            if malformed {
+                self.counts.malformed += 1;
+                begun = None;
+            }
+        }
+        self.counts.malformed += u64::from(!collector.rest().is_empty());
+        Ok(None)
+    }
+}
+
+impl Answer {
+    fn of(reply: Reply) -> Self {
+        match reply {
+            Reply::Ack { .. } => Self::Ack,
+            Reply::Data { words, .. } => Self::Data(words),
+            Reply::Nak { reason, .. } => Self::Nak(reason),
+        }
+    }
+}

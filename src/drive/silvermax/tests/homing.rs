@@ -1,0 +1,153 @@
+//! How seats find their zero.
+
+use super::bench::*;
+use crate::config::drive::homing::HomeWay;
+use crate::drive::silvermax::*;
+use crate::sim::silvermax::{Action, UnitSetup};
+
+fn three() -> Vec<UnitSetup> {
+    [(16, 63_200), (17, 400), (18, 120_000)]
+        .map(|(unit, place)| UnitSetup { place, ..UnitSetup::new(unit) })
+        .into()
+}
+
+fn act(talk: &mut Talk<VirtualPort>, action: Action) {
+    let now = talk.now();
+    talk.port().line.bus_mut().act(None, action, now);
+}
+
+#[test]
+fn a_seat_is_homed_by_the_edge_of_its_switch_to_a_count_and_stands_at_park() {
+    let mut talk = talk_to(&three());
+    let (homed, steps) = home_as(&mut talk, &drive(SWITCH), &[16, 17, 18]);
+    assert_eq!(homed, Ok(()));
+    assert!(steps.contains(&Step::OffSwitch(1)) && !steps.contains(&Step::OffSwitch(0)), "{steps:?}");
+    for index in 0..3 {
+        let (place, position) = (unit(&mut talk, index).place(), unit(&mut talk, index).position());
+        // The edge is at 1,600 counts from the stop and -2 mm: 0 mm are at 3,200.
+        assert!((place - ZERO).abs() <= 1.0 && position == 0, "{index}: {place} {position}");
+        let (executed, tally) = (unit(&mut talk, index).executed().clone(), unit(&mut talk, index).tally());
+        assert_eq!((executed.jumps, tally.forbidden, tally.kills), (0, 0, 0));
+        let facts = look(&mut talk, 16 + index as u8).unwrap();
+        assert_eq!((facts.canary, facts.position, facts.soft_limits), (CANARY, 0, [-800, 120_800]));
+        assert_eq!((facts.torque, facts.dry_brake), ([12_000 << 16 | 20_000; 2], 2_319_282));
+    }
+}
+
+#[test]
+fn a_seat_is_homed_again_from_anywhere_although_its_soft_limits_lie_before_the_switch() {
+    let mut talk = talk_to(&three());
+    assert_eq!(home_as(&mut talk, &drive(SWITCH), &[16, 17, 18]).0, Ok(()));
+    let again = home_as(&mut talk, &drive(SWITCH), &[16, 17, 18]).0;
+    assert_eq!(again, Ok(()));
+    assert!((unit(&mut talk, 2).place() - ZERO).abs() <= 1.0);
+}
+
+#[test]
+fn a_reversed_axis_finds_the_same_edge() {
+    let mut drive = drive(SWITCH);
+    drive.reverse[0] = true;
+    // The virtual axis has its switch where its counts are low: up, for a reversed one.
+    drive.homing.toward = crate::config::drive::homing::Side::Up;
+    drive.homing.zero_mm = 152.0;
+    let mut talk = talk_to(&[UnitSetup::new(16)]);
+    assert_eq!(home_as(&mut talk, &drive, &[16]).0, Ok(()));
+    // 152 mm at the edge, and 0 mm as far above it.
+    let place = unit(&mut talk, 0).place();
+    assert!((place - (1_600.0 + 152.0 * MM)).abs() <= 1.0, "{place}");
+}
+
+#[test]
+fn a_switch_that_is_not_there_is_told_in_words_and_the_seat_is_not_home() {
+    let mut talk = talk_to(&[UnitSetup { switch: None, ..UnitSetup::new(16) }]);
+    act(&mut talk, Action::Input { input: 1, is_high: false });
+    let mut drive = drive(SWITCH);
+    drive.homing.travel_mm = 60.0;
+    let (homed, _) = home_as(&mut talk, &drive, &[16]);
+    let words = homed.unwrap_err().to_string();
+    assert_eq!(
+        words,
+        "unit 16: the switch on input 1 not found within 60 mm; check it, its wiring, and `toward`"
+    );
+    assert_eq!(look(&mut talk, 16).unwrap().canary, 0);
+    let lowest = unit(&mut talk, 0).executed().lowest;
+    assert!((63_200.0 - lowest - 60.0 * MM).abs() <= 1.0, "never farther than the travel: {lowest}");
+}
+
+#[test]
+fn a_switch_that_stays_on_is_told() {
+    let mut talk = talk_to(&[UnitSetup { switch: None, ..UnitSetup::new(16) }]);
+    let words = home_as(&mut talk, &drive(SWITCH), &[16]).0.unwrap_err().to_string();
+    assert!(words.starts_with("unit 16: input 1 is still on 10 mm away from it"), "{words}");
+}
+
+#[test]
+fn a_hard_stop_is_found_by_the_error_and_a_person_says_here() {
+    let mut stop = drive(HomeWay::HardStop);
+    stop.homing.zero_mm = -4.0;
+    let mut talk = talk_to(&[UnitSetup { switch: None, ..UnitSetup::new(16) }]);
+    assert_eq!(home_as(&mut talk, &stop, &[16]).0, Ok(()));
+    assert!((unit(&mut talk, 0).place() - ZERO).abs() <= 2.0, "{}", unit(&mut talk, 0).place());
+    let mut here = drive(HomeWay::Here);
+    here.homing.zero_mm = 75.0;
+    let mut talk = talk_to(&[UnitSetup { switch: None, ..UnitSetup::new(16) }]);
+    assert_eq!(home_as(&mut talk, &here, &[16]).0, Ok(()));
+    assert!((unit(&mut talk, 0).place() - (63_200.0 - 75.0 * MM)).abs() <= 1.0);
+}
+
+#[test]
+fn the_index_is_looked_for_behind_the_edge() {
+    let mut drive = drive(HomeWay::Index { input: Some(1), active_high: true });
+    drive.homing.zero_mm = -0.5;
+    let mut talk = talk_to(&[UnitSetup::new(16)]);
+    assert_eq!(home_as(&mut talk, &drive, &[16]).0, Ok(()));
+    // The virtual index is where it counts whole turns from where it was switched on: 63,200 - 15 x 4,000.
+    let index = unit(&mut talk, 0).place() - 0.5 * MM;
+    assert!((index - 3_200.0).abs() <= 1.0, "{index}");
+}
+
+#[test]
+fn a_homing_is_stopped_between_two_looks() {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    let mut talk = talk_to(&[UnitSetup::new(16)]);
+    let (seat, drive) = (crate::motion::SeatType { axes: 1, ..seat() }, drive(SWITCH));
+    let silvermax = drive.silvermax.clone().unwrap();
+    let of = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16] };
+    let abort = AtomicBool::new(false);
+    let mut told = |step| abort.store(matches!(step, Step::Searching(_)), Ordering::Relaxed);
+    let homed = home(&mut talk, of, Homing { canary: CANARY, abort: &abort, told: &mut told });
+    assert_eq!(homed, Err(HomeError::Aborted));
+    let last = talk.port().sent.last().unwrap().1.clone();
+    assert_eq!(last, "@16 3 2319282\r");
+    assert!(unit(&mut talk, 0).place() > 63_000.0, "it had hardly begun to move");
+}
+
+#[test]
+fn a_unit_that_is_not_there_too_hot_or_of_another_count_is_told_with_its_remedy() {
+    let mut talk = talk_to(&[UnitSetup::new(16)]);
+    let words = home_as(&mut talk, &drive(SWITCH), &[33]).0.unwrap_err().to_string();
+    assert!(words.starts_with("unit 33 does not answer; check its number"), "{words}");
+    act(&mut talk, Action::Hot(true));
+    let words = home_as(&mut talk, &drive(SWITCH), &[16]).0.unwrap_err().to_string();
+    assert!(words.starts_with("unit 16 is too hot"), "{words}");
+}
+
+#[test]
+fn a_homing_over_a_bad_line_ends_at_the_edge_or_says_what_is_wrong() {
+    use crate::sim::serial::LineFaults;
+    let mut homes = 0;
+    for seed in 0..12_u64 {
+        let mut talk = talk_to(&[UnitSetup { place: 20_000 + 700 * seed as i32, ..UnitSetup::new(16) }]);
+        talk.port().line.faults = LineFaults { lost: 0.002, answer_lost: 0.02, ..LineFaults::default() };
+        let (homed, _) = home_as(&mut talk, &drive(SWITCH), &[16]);
+        talk.port().line.faults = LineFaults::default();
+        match homed {
+            Ok(()) => {
+                homes += 1;
+                assert!((unit(&mut talk, 0).place() - ZERO).abs() <= 1.0, "{seed}");
+            }
+            Err(fault) => assert!(look(&mut talk, 16).unwrap().canary == 0, "{seed}: {fault}"),
+        }
+    }
+    assert!(homes >= 6, "{homes}");
+}

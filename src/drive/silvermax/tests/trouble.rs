@@ -1,0 +1,164 @@
+//! Plays over bad lines, and to units in trouble.
+
+use std::time::Duration;
+
+use super::bench::*;
+use crate::drive::silvermax::*;
+use crate::sim::serial::LineFaults;
+use crate::sim::silvermax::Action;
+
+/// The reasons for which a lane braked or went out, as words.
+fn told(play: &Play) -> Vec<String> {
+    let rare = |event: &&(_, StreamEvent)| {
+        !matches!(
+            event.1,
+            StreamEvent::Confirmed { .. } | StreamEvent::Moves { .. } | StreamEvent::Rests { .. }
+        )
+    };
+    play.told.iter().filter(rare).map(|(_, event)| format!("{event:?}")).collect()
+}
+
+fn has(play: &Play, word: &str) -> bool {
+    told(play).iter().any(|event| event.contains(word))
+}
+
+/// Rides for a while over a line with faults; whatever happens to the lane, no axis leaves its course.
+fn ride_over(faults: LineFaults, seconds: f64) -> Play {
+    let mut play = Play::with_ppm([100, -100, 0]);
+    play.judged = false;
+    play.line().faults = faults;
+    play.begin(ride);
+    play.play(seconds, 0);
+    play
+}
+
+#[test]
+fn segments_in_doubt_are_found_out_and_none_is_executed_twice() {
+    for (lost, least) in [(0.001, 1_790), (0.003, 1_790)] {
+        let mut play = ride_over(LineFaults { answer_lost: lost, ..LineFaults::default() }, 60.0);
+        let figures = play.figures();
+        play.assert_gentle();
+        let doubts: u64 = figures.iter().map(|axis| axis.account.in_doubt).sum();
+        assert!(doubts > 3, "{lost}: {figures:?}");
+        let off = figures.iter().map(|axis| axis.off_course_mm).fold(0.0, f64::max);
+        assert!(off < 0.3 && !has(&play, "OffCourse"), "{lost}: {off} {:?}", told(&play));
+        assert!(figures.iter().all(|axis| axis.account.acked > least), "{figures:?} {:?}", told(&play));
+    }
+}
+
+#[test]
+fn octets_that_are_lost_doubled_or_late_do_no_harm() {
+    for (index, faults) in [
+        LineFaults { lost: 0.000_2, ..LineFaults::default() },
+        LineFaults { doubled: 0.000_2, ..LineFaults::default() },
+        LineFaults { late: 0.000_5, late_by: Duration::from_millis(25), ..LineFaults::default() },
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mut play = ride_over(faults, 40.0);
+        for axis in 0..3 {
+            let executed = play.unit(axis).executed();
+            let (low, high) = ((executed.lowest - ZERO) / MM, (executed.highest - ZERO) / MM);
+            assert!(low >= -1.01 && high <= 151.01, "{index}: {low} {high}");
+        }
+    }
+}
+
+#[test]
+fn flipped_bits_never_lead_beyond_the_soft_limits() {
+    let mut play = ride_over(LineFaults { flipped: 0.000_3, ..LineFaults::default() }, 40.0);
+    for axis in 0..3 {
+        let executed = play.unit(axis).executed();
+        let (low, high) = ((executed.lowest - ZERO) / MM, (executed.highest - ZERO) / MM);
+        assert!(low >= -1.01 && high <= 151.01, "{low} {high}");
+    }
+}
+
+#[test]
+fn a_stop_is_on_the_line_after_one_exchange_and_each_unit_has_acked_it() {
+    let mut play = Play::with_ppm([0; 3]);
+    play.begin(ride);
+    play.play(10.0, 0);
+    let before = play.stream.talk().port().sent.len();
+    let _ = play.stream.round();
+    play.stream.stop(None).unwrap();
+    play.judged = false;
+    play.wait(0.03);
+    let sent: Vec<_> =
+        play.stream.talk().port().sent[before..].iter().map(|(_, line)| line.clone()).collect();
+    let at = sent.iter().position(|line| line == "@255 3 2319282\r").unwrap();
+    assert!(at <= 1, "{sent:?}");
+    assert_eq!(sent[at + 1..at + 4], ["@16 3 2319282\r", "@17 3 2319282\r", "@18 3 2319282\r"]);
+    play.wait(1.0);
+    assert!((0..3).all(|axis| !play.unit(axis).is_moving() || play.unit(axis).queued() == 0));
+    assert!(play.stream.is_ready(0) && has(&play, "Stopped"), "{:?}", told(&play));
+    play.assert_gentle();
+}
+
+#[test]
+fn unplugged_in_mid_course_it_is_at_rest_within_the_lead_and_comes_back_where_it_stands() {
+    let mut play = Play::with_ppm([0; 3]);
+    play.judged = false;
+    play.begin(ride);
+    play.play(10.0, 0);
+    play.line().faults.unplugged = true;
+    let brake = 0.1;
+    play.play(lead(play.terms).as_secs_f64() + brake, 0);
+    let rest = [0, 1, 2].map(|axis| play.place(axis));
+    play.play(1.0, 0);
+    assert_eq!([0, 1, 2].map(|axis| play.place(axis)), rest);
+    assert!(has(&play, "Lost"), "{:?}", told(&play));
+    play.line().faults.unplugged = false;
+    play.wait(2.0);
+    assert!(has(&play, "Back") && play.stream.is_ready(0), "{:?}", told(&play));
+    assert_eq!([0, 1, 2].map(|axis| play.place(axis)), rest);
+    play.assert_gentle();
+}
+
+#[test]
+fn a_port_that_is_gone_is_an_error_and_all_lanes_are_lost() {
+    let mut play = Play::with_ppm([0; 3]);
+    play.stream.talk().port().is_gone = true;
+    let rounds: Vec<_> = (0..300).map(|_| play.stream.round()).collect();
+    play.wait(0.0);
+    assert!(rounds.contains(&Err(LinkFault)), "{:?}", told(&play));
+    assert!(
+        play.events.pop().is_ok_and(|event| matches!(event, StreamEvent::Lost { lane: 0, .. }))
+            || has(&play, "Lost")
+    );
+}
+
+#[test]
+fn a_unit_that_was_restarted_is_told_and_its_seat_stays_out_until_it_is_homed() {
+    let mut play = Play::with_ppm([0; 3]);
+    play.judged = false;
+    play.begin(ride);
+    play.play(10.0, 0);
+    let now = play.now();
+    play.line().bus_mut().act(Some(17), Action::Reset, now);
+    play.play(3.0, 0);
+    assert!(has(&play, "Restarted { lane: 0, axis: 1 }"), "{:?}", told(&play));
+    let rest = [0, 2].map(|axis| play.place(axis));
+    play.play(2.0, 0);
+    assert_eq!([0, 2].map(|axis| play.place(axis)), rest);
+    assert!(!play.stream.is_ready(0));
+    let homed = home_as(play.stream.talk(), &drive(SWITCH), &[16, 17, 18]).0;
+    assert_eq!(homed, Ok(()));
+    play.stream.rejoin(0, CANARY);
+    play.wait(1.0);
+    assert!(play.stream.is_ready(0));
+}
+
+#[test]
+fn a_blocked_axis_is_killed_and_told_by_what() {
+    let mut play = Play::with_ppm([0; 3]);
+    play.judged = false;
+    play.begin(ride);
+    play.play(10.0, 0);
+    let now = play.now();
+    play.line().bus_mut().act(Some(18), Action::Blocked(true), now);
+    play.play(2.0, 0);
+    assert!(has(&play, "Killed { lane: 0, axis: 2, cause: "), "{:?}", told(&play));
+    assert!((0..2).all(|axis| !play.unit(axis).is_moving()));
+}
