@@ -8,11 +8,15 @@ use serde::Serialize;
 
 use super::ask::{agreed, somebody};
 use super::client;
-use super::targets::{TargetArgs, Targets, Troubles, state};
+use super::targets::{Driven, TargetArgs, Targets, Troubles, state};
 use super::{Exit, Failure, print};
-use crate::config::{Controller, Station};
+use crate::config::Controller;
 use crate::device::home::{HomeError, PA0E, Progress, hindrance, home};
 use crate::device::{Outcome, Patience, Request, Talk, table};
+
+mod drives;
+
+use drives::Homed;
 
 /// Homes empty seats.
 ///
@@ -21,7 +25,8 @@ use crate::device::{Outcome, Patience, Request, Talk, table};
 /// Without --to and --config the daemon homes all seats of its hall; see `kinocue watch` for how far they are.
 ///
 /// The seats move by themselves, over their whole stroke, at a speed that the controllers set. Ctrl-C ends the command,
-/// not the movement: to stop that is the emergency stop's, which is hard-wired.
+/// not the movement: to stop that is the emergency stop's, which is hard-wired. Seats with serial drives are led by this command, at the
+/// speed of [seat.NAME.drive] and within its travel; there Ctrl-C has the axes brake.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -42,7 +47,7 @@ pub(super) struct Args {
     /// Confirm that nobody sits on the seats and nothing lies on or under them; do not ask.
     #[arg(long)]
     seats_empty: bool,
-    /// Timeout for each controller in seconds, 1 to 3600; the daemon has its own.
+    /// Timeout for each controller in seconds, 1 to 3600; the daemon has its own, and serial drives go by their travel.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
     timeout: u64,
     #[command(flatten)]
@@ -69,35 +74,45 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         args.targets.refuse_choice(&args.names)?;
         return client::home(&args.server, args.seats_empty);
     }
-    let targets = args.targets.resolve(&args.names)?;
+    let (targets, driven) = args.targets.resolve_all(&args.names)?;
     if !args.seats_empty {
         somebody("Are the seats empty?", "--seats-empty")?;
     }
-    let mut talk = targets.open()?;
     let mut troubles = Troubles::default();
-    let mut results = explain(&mut talk, &targets, &mut troubles);
+    let mut talk = if targets.controllers.is_empty() { None } else { Some(targets.open()?) };
+    let mut results = talk.as_mut().map_or_else(Vec::new, |talk| explain(talk, &targets, &mut troubles));
+    let mut on_links = drives::explain(&driven, &mut troubles);
     let ready: Vec<usize> = (0..results.len()).filter(|lane| results[*lane].is_ok()).collect();
-    if !ready.is_empty() {
-        if !agreed(&question(&targets, &ready), args.seats_empty, "--seats-empty")? {
+    let names: Vec<&str> = ready_names(&targets.controllers, &results)
+        .chain(ready_names(&driven.controllers, &on_links))
+        .collect();
+    if !names.is_empty() {
+        if !agreed(&question(&names), args.seats_empty, "--seats-empty")? {
             print::tell("nothing was moved");
             return Ok(Exit::Done);
         }
         let timeout = Duration::from_secs(args.timeout);
-        for (lane, result) in ready.iter().zip(move_home(&mut talk, &targets, &ready, timeout)) {
+        let moved = talk.as_mut().map(|talk| move_home(talk, &targets, &ready, timeout));
+        for (lane, result) in ready.iter().zip(moved.into_iter().flatten()) {
             if let Err(error) = &result {
                 tell(error, targets.name(*lane), &mut troubles);
             }
             results[*lane] = result.map_err(|error| error.to_string());
         }
+        drives::home_all(&driven, &mut on_links, &mut troubles)?;
     }
     if args.server.json {
-        print::json(&Report::new(&targets, &results))?;
+        print::json(&Report::new((&targets, &results), (&driven, &on_links)))?;
     }
     Ok(troubles.exit())
 }
 
-fn question(targets: &Targets, lanes: &[usize]) -> String {
-    let names: Vec<_> = lanes.iter().map(|lane| targets.name(*lane)).collect();
+/// The names of those that can be homed.
+fn ready_names<'c, C>(controllers: &'c [Controller<C>], results: &[Homed]) -> impl Iterator<Item = &'c str> {
+    controllers.iter().zip(results).filter(|(_, result)| result.is_ok()).map(|(one, _)| one.name.as_str())
+}
+
+fn question(names: &[&str]) -> String {
     format!(
         "{} will move over the whole stroke. Are these seats empty, and is nobody near them?",
         names.join(", ")
@@ -105,7 +120,7 @@ fn question(targets: &Targets, lanes: &[usize]) -> String {
 }
 
 /// Asks each controller what its reset does, and says so; an error for each that cannot home, of which it has told.
-fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<Result<Duration, String>> {
+fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<Homed> {
     let one = |outcome: Outcome| {
         let (lane, name) = (outcome.lane, targets.name(outcome.lane));
         let (_, answer) = troubles.sort(targets, outcome)?;
@@ -145,16 +160,20 @@ fn move_home(
 }
 
 impl<'a> Report<'a> {
-    fn new(targets: &'a Targets, results: &[Result<Duration, String>]) -> Self {
-        let one =
-            |(controller, result): (&'a Controller<Station>, &Result<Duration, String>)| ControllerReport {
-                name: &controller.name,
-                address: controller.connection.address.to_string(),
-                home: result.is_ok(),
-                seconds: result.as_ref().ok().map(Duration::as_secs_f64),
-                fault: result.as_ref().err().cloned(),
-            };
-        Self { controllers: targets.controllers.iter().zip(results).map(one).collect() }
+    fn new((targets, results): (&'a Targets, &[Homed]), (driven, on_links): (&'a Driven, &[Homed])) -> Self {
+        let one = |(name, address, result): (&'a str, String, &Homed)| ControllerReport {
+            name,
+            address,
+            home: result.is_ok(),
+            seconds: result.as_ref().ok().map(Duration::as_secs_f64),
+            fault: result.as_ref().err().cloned(),
+        };
+        let stations = targets.controllers.iter().zip(results);
+        let stations =
+            stations.map(|(it, result)| (it.name.as_str(), it.connection.address.to_string(), result));
+        let seats = driven.controllers.iter().zip(on_links);
+        let seats = seats.map(|(it, result)| (it.name.as_str(), it.address(), result));
+        Self { controllers: stations.chain(seats).map(one).collect() }
     }
 }
 

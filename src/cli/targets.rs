@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, anyhow};
 
 use super::{Exit, Failure, OrExit as _, load, print};
-use crate::config::{Config, Controller, Show, Station, from_to_args};
+use crate::config::{Config, Controller, Link, Show, Station, from_to_args};
 use crate::device::{Answer, Fault, Outcome, Request, Talk, refusal};
 use crate::motion::MAX_AXES;
 use crate::net::NetError;
@@ -39,6 +39,21 @@ pub(super) struct Targets {
     pub(super) show: Show,
 }
 
+/// The controllers on links that are meant.
+#[derive(Debug)]
+pub(super) struct Driven {
+    pub(super) controllers: Vec<Controller>,
+    /// All links of the hall.
+    pub(super) links: Vec<Link>,
+}
+
+struct Meant {
+    on_network: Targets,
+    on_links: Vec<Controller>,
+    /// The hall without its controllers.
+    config: Config,
+}
+
 impl TargetArgs {
     /// The controllers that the arguments and `names` mean.
     pub(super) fn resolve(&self, names: &[String]) -> Result<Targets, Failure> {
@@ -48,27 +63,36 @@ impl TargetArgs {
 
     /// The same, for a cue of `cue_axes` axes.
     pub(super) fn resolve_for(&self, names: &[String], cue_axes: usize) -> Result<Targets, Failure> {
-        let config = match &self.config {
+        let meant = self.meant(names, cue_axes)?;
+        Config { controllers: meant.on_links, ..meant.config }.playable().or_exit(Exit::Config)?;
+        Ok(meant.on_network)
+    }
+
+    /// The same, those on links apart.
+    pub(super) fn resolve_all(&self, names: &[String]) -> Result<(Targets, Driven), Failure> {
+        let Meant { on_network, on_links, config } = self.meant(names, MAX_AXES)?;
+        Ok((on_network, Driven { controllers: on_links, links: config.links }))
+    }
+
+    fn meant(&self, names: &[String], cue_axes: usize) -> Result<Meant, Failure> {
+        let mut config = match &self.config {
             Some(path) => load::config(path)?,
             None => from_to_args(&self.to, &[], cue_axes).or_exit(Exit::Usage)?,
         };
-        let is_meant = |one: &Controller| {
-            let is_in_row = one.row.as_ref().is_some_and(|row| self.row.contains(row));
-            names.contains(&one.name) || is_in_row || (names.is_empty() && self.row.is_empty())
-        };
-        if config.named().any(|one| one.drives().is_some() && is_meant(one)) {
-            config.playable().or_exit(Exit::Config)?;
-        }
-        let Config { mut show, controllers, absent, .. } = config;
+        let (controllers, absent) =
+            (std::mem::take(&mut config.controllers), std::mem::take(&mut config.absent));
+        let mut show = config.show.clone();
         show.bind = self.bind.unwrap_or(show.bind);
         // What is out for good is meant only where it is named: whoever repairs it has to reach it.
-        let (meant, left): (Vec<Controller>, Vec<_>) =
+        let (named, left): (Vec<Controller>, Vec<_>) =
             absent.into_iter().map(|one| one.controller).partition(|one| names.contains(&one.name));
         if names.is_empty() && self.row.is_empty() {
             left.iter().for_each(tell_absent);
         }
-        let stations = controllers.iter().chain(&meant).filter_map(Controller::on_network).collect();
-        Ok(Targets { controllers: self.choose(stations, names)?, show })
+        let chosen = self.choose(controllers.into_iter().chain(named).collect(), names)?;
+        let stations = chosen.iter().filter_map(Controller::on_network).collect();
+        let on_links = chosen.into_iter().filter(|one| one.drives().is_some()).collect();
+        Ok(Meant { on_network: Targets { controllers: stations, show }, on_links, config })
     }
 
     /// True if anybody is meant: without, `home` and `preflight` ask the daemon for its own.
@@ -92,11 +116,7 @@ impl TargetArgs {
     }
 
     /// Those of the rows and of the names, in the order of the configuration; all where neither chooses.
-    fn choose(
-        &self,
-        all: Vec<Controller<Station>>,
-        names: &[String],
-    ) -> Result<Vec<Controller<Station>>, Failure> {
+    fn choose(&self, all: Vec<Controller>, names: &[String]) -> Result<Vec<Controller>, Failure> {
         if self.row.is_empty() && names.is_empty() {
             return Ok(all);
         }
@@ -112,7 +132,7 @@ impl TargetArgs {
                 return Err(anyhow!("no controller stands in row {row}")).or_exit(Exit::Usage);
             }
         }
-        let chosen = |one: &Controller<Station>| {
+        let chosen = |one: &Controller| {
             names.contains(&one.name) || one.row.as_ref().is_some_and(|row| self.row.contains(row))
         };
         Ok(all.into_iter().filter(chosen).collect())

@@ -6,7 +6,7 @@
 
 mod lane;
 mod lanes;
-mod link;
+pub(crate) mod link;
 mod mbox;
 pub(crate) mod rates;
 mod rounds;

@@ -3,6 +3,10 @@
 //! A lane on a link writes a record of this program's own in place of a datagram, so that everything before the sink stays the same for all
 //! families; the thread of the link makes of poses what its drives are sent.
 
+mod line;
+
+pub(crate) use line::LinkLine;
+
 use crate::channel::ChannelId;
 use crate::cue::Vibration;
 use crate::engine::{Beat, Mix};

@@ -19,6 +19,8 @@ use crate::wire::silvermax::{Internal, Io, Poll, Request, StatusWord, StopOn};
 const OFF_SWITCH_MM: f64 = 10.0;
 /// From standing to the speed of a search, seconds: gentle.
 const RAMP: f64 = 0.2;
+/// How far it may run past its switch, mm: there is little room to the stop of the mechanics.
+const OVERRUN_MM: f64 = 0.5;
 /// How far beside park an axis may come to stand, mm: what the motor holds, and no more.
 const PARKED_MM: f64 = 0.1;
 /// How much longer than it has to a move may take.
@@ -280,7 +282,8 @@ impl UnitAxis<'_> {
     fn pace(&self) -> [u32; 2] {
         let speed = self.of.drive.homing.speed_mm_s;
         let velocity = self.scale.velocity(speed);
-        let acceleration = self.scale.acceleration(speed / RAMP);
+        let brakes = (speed / RAMP).max(speed * speed / (2.0 * OVERRUN_MM));
+        let acceleration = self.scale.acceleration(brakes.min(self.axis.max_acceleration));
         [acceleration.min(velocity / 2), velocity]
     }
 

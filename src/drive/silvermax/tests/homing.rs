@@ -44,6 +44,19 @@ fn a_seat_is_homed_again_from_anywhere_although_its_soft_limits_lie_before_the_s
 }
 
 #[test]
+fn a_search_runs_past_its_switch_by_no_more_than_there_is_room_for_however_fast_it_is() {
+    let mut drive = drive(SWITCH);
+    for speed_mm_s in [10.0, 40.0] {
+        drive.homing.speed_mm_s = speed_mm_s;
+        let mut talk = talk_to(&three()[..1]);
+        assert_eq!(home_as(&mut talk, &drive, &[16]).0, Ok(()));
+        let lowest = unit(&mut talk, 0).executed().lowest;
+        // The edge is at 1,600 counts, and half a tick and more goes by until the unit has seen it.
+        assert!(lowest >= 1_600.0 - 0.6 * MM, "{speed_mm_s} mm/s: {lowest}");
+    }
+}
+
+#[test]
 fn a_reversed_axis_finds_the_same_edge() {
     let mut drive = drive(SWITCH);
     drive.reverse[0] = true;

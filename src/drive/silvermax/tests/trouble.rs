@@ -34,7 +34,7 @@ fn ride_over(faults: LineFaults, seconds: f64) -> Play {
 
 #[test]
 fn segments_in_doubt_are_found_out_and_none_is_executed_twice() {
-    for (lost, least) in [(0.001, 1_790), (0.003, 1_790)] {
+    for lost in [0.001, 0.003] {
         let mut play = ride_over(LineFaults { answer_lost: lost, ..LineFaults::default() }, 60.0);
         let figures = play.figures();
         play.assert_gentle();
@@ -42,7 +42,9 @@ fn segments_in_doubt_are_found_out_and_none_is_executed_twice() {
         assert!(doubts > 3, "{lost}: {figures:?}");
         let off = figures.iter().map(|axis| axis.off_course_mm).fold(0.0, f64::max);
         assert!(off < 0.3 && !has(&play, "OffCourse"), "{lost}: {off} {:?}", told(&play));
-        assert!(figures.iter().all(|axis| axis.account.acked > least), "{figures:?} {:?}", told(&play));
+        // Answers that are lost one after the other may cost more time than is queued: then the seat brakes, and says so.
+        let is_through = figures.iter().all(|axis| axis.account.acked > 1_790);
+        assert!(is_through || (lost > 0.001 && has(&play, "Braked")), "{figures:?} {:?}", told(&play));
     }
 }
 

@@ -1,0 +1,119 @@
+//! Seats with serial drives: `kinocue home`, over pseudo-terminals to simulated units.
+
+#[expect(dead_code, reason = "shared with tests that need more of it")]
+#[path = "common/process.rs"]
+mod process;
+
+use std::fs;
+use std::io::BufRead as _;
+use std::path::Path;
+
+use process::{Guarded, kinocue};
+use rustix::process::Signal;
+
+/// A hall with one seat of three SilverMax units, on the line at `port`.
+fn hall(folder: &Path, port: &Path, dialect: &str) -> String {
+    let units = if dialect == "silvermax" { "units = [16, 17, 18]" } else { "unit = 1\nmotors = [0, 1, 2]" };
+    let text = format!(
+        r#"
+[link.stalls]
+port = "{}"
+baud = {}
+
+[seat.lift]
+axes = 3
+stroke_mm = 150.0
+lead_mm = 5.0
+pulses_per_rev = 4000
+max_velocity_mm_s = 160.0
+max_acceleration_mm_s2 = 3000.0
+max_jerk_mm_s3 = 60000.0
+
+[seat.lift.drive]
+home = {{ way = "switch", {} toward = "down", speed_mm_s = 40, travel_mm = 165, zero_mm = -2.0 }}
+torque = {{ hold = "60%", move = "100%", full = 20000 }}
+current = {{ peak = 238 }}
+clock_divider = 3
+
+[[controller]]
+name = "A1"
+seat = "lift"
+address = "link:stalls"
+dialect = "{dialect}"
+{units}
+"#,
+        port.display(),
+        if dialect == "silvermax" { 57_600 } else { 56_818 },
+        if dialect == "silvermax" { "input = 1, active = \"high\"," } else { "" },
+    );
+    let path = folder.join("hall.toml");
+    fs::write(&path, text).expect("a file");
+    path.to_str().expect("text").to_owned()
+}
+
+/// What `kinocue home` says as JSON, what else it says, and how it ends.
+fn home(hall: &str) -> (serde_json::Value, String, Option<i32>) {
+    let run = kinocue(&["home", "--config", hall, "--seats-empty", "--json"]);
+    (serde_json::from_str(&run.stdout).expect("JSON"), run.stderr, run.code)
+}
+
+#[test]
+fn a_seat_on_silvermax_units_is_homed_and_homed_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let tty = port.to_str().expect("text");
+    let mut sim = Guarded::start(&[
+        "sim",
+        "--dialect",
+        "silvermax",
+        "--tty",
+        tty,
+        "--units",
+        "16,17,18",
+        "--seed",
+        "1",
+        "--json",
+    ]);
+    let mut stderr = sim.stderr();
+    let mut ready = String::new();
+    stderr.read_line(&mut ready).expect("text");
+    assert_eq!(ready, format!("ready {tty}\n"));
+    let hall = hall(folder.path(), &port, "silvermax");
+    for time in ["from anywhere", "from park"] {
+        let (told, said, exit) = home(&hall);
+        assert_eq!(exit, Some(0), "{time}: {said}");
+        let seat = &told["controllers"][0];
+        assert_eq!(
+            (&seat["name"], &seat["address"], &seat["home"]),
+            (&"A1".into(), &"link:stalls".into(), &true.into())
+        );
+        assert!(
+            said.contains("A1: units 16, 17, 18 on link stalls look for their switch, down, at 40 mm/s"),
+            "{said}"
+        );
+        assert!(said.contains("A1: axis 3 has found its zero") && said.contains("A1: home after"), "{said}");
+    }
+    sim.signal(Signal::TERM);
+    let counts = sim.finish().report_of(0);
+    for unit in counts["units"].as_array().expect("a list") {
+        assert_eq!((&unit["kills"], &unit["position"]), (&0.into(), &0.into()), "{counts}");
+    }
+}
+
+#[test]
+fn a_port_that_is_not_there_is_told_with_what_to_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hall = hall(folder.path(), &folder.path().join("none"), "silvermax");
+    let (told, said, exit) = home(&hall);
+    assert_eq!((exit, &told["controllers"][0]["home"]), (Some(69), &false.into()), "{said}");
+    assert!(said.contains("there is no such port; plug the adapter in"), "{said}");
+}
+
+#[test]
+fn a_sixpack_is_refused_by_name_before_anything_moves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hall = hall(folder.path(), &folder.path().join("none"), "sixpack2");
+    let (_, said, exit) = home(&hall);
+    assert_eq!(exit, Some(76), "{said}");
+    assert!(said.contains("A1: SIXpack 2 units are not homed yet"), "{said}");
+}
