@@ -57,27 +57,22 @@ fn home(hall: &str) -> (serde_json::Value, String, Option<i32>) {
     (serde_json::from_str(&run.stdout).expect("JSON"), run.stderr, run.code)
 }
 
+/// Three virtual units, at the end of that line.
+fn units(port: &Path) -> Guarded {
+    let tty = port.to_str().expect("text");
+    let silvermax = ["sim", "--dialect", "silvermax", "--tty", tty, "--units", "16,17,18"];
+    let mut sim = Guarded::start(&[&silvermax[..], &["--seed", "1", "--json"]].concat());
+    let mut ready = String::new();
+    sim.stderr().read_line(&mut ready).expect("text");
+    assert_eq!(ready, format!("ready {tty}\n"));
+    sim
+}
+
 #[test]
 fn a_seat_on_silvermax_units_is_homed_and_homed_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let port = folder.path().join("stalls");
-    let tty = port.to_str().expect("text");
-    let mut sim = Guarded::start(&[
-        "sim",
-        "--dialect",
-        "silvermax",
-        "--tty",
-        tty,
-        "--units",
-        "16,17,18",
-        "--seed",
-        "1",
-        "--json",
-    ]);
-    let mut stderr = sim.stderr();
-    let mut ready = String::new();
-    stderr.read_line(&mut ready).expect("text");
-    assert_eq!(ready, format!("ready {tty}\n"));
+    let sim = units(&port);
     let hall = hall(folder.path(), &port, "silvermax");
     for time in ["from anywhere", "from park"] {
         let (told, said, exit) = home(&hall);
@@ -98,6 +93,23 @@ fn a_seat_on_silvermax_units_is_homed_and_homed_again() {
     for unit in counts["units"].as_array().expect("a list") {
         assert_eq!((&unit["kills"], &unit["position"]), (&0.into(), &0.into()), "{counts}");
     }
+}
+
+#[test]
+fn ctrl_c_brakes_the_axis_that_searches_and_the_seat_is_not_home() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let sim = units(&port);
+    let hall = hall(folder.path(), &port, "silvermax");
+    let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
+    let mut said = homing.stderr().lines().map(|line| line.expect("text"));
+    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    homing.signal(Signal::INT);
+    assert!(said.any(|line| line.ends_with("homing was stopped; the seat is not home")));
+    assert_eq!(homing.finish().code, Some(130));
+    sim.signal(Signal::TERM);
+    let axis = sim.finish().report_of(0)["units"][0].clone();
+    assert!(axis["executed"]["lowest"].as_f64() > Some(3_200.0), "it was braked before its switch: {axis}");
 }
 
 #[test]

@@ -86,6 +86,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let names: Vec<&str> = ready_names(&targets.controllers, &results)
         .chain(ready_names(&driven.controllers, &on_links))
         .collect();
+    let mut is_ended = false;
     if !names.is_empty() {
         if !agreed(&question(&names), args.seats_empty, "--seats-empty")? {
             print::tell("nothing was moved");
@@ -99,12 +100,12 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             }
             results[*lane] = result.map_err(|error| error.to_string());
         }
-        drives::home_all(&driven, &mut on_links, &mut troubles)?;
+        is_ended = drives::home_all(&driven, &mut on_links, &mut troubles)?;
     }
     if args.server.json {
         print::json(&Report::new((&targets, &results), (&driven, &on_links)))?;
     }
-    Ok(troubles.exit())
+    Ok(if is_ended { Exit::Interrupted } else { troubles.exit() })
 }
 
 /// The names of those that can be homed.

@@ -70,12 +70,12 @@ fn way(homing: &DriveHoming) -> String {
     format!("{by}, {toward}, at {speed} mm/s and {travel} mm at the most, and go to park")
 }
 
-/// Homes those of the seats that can be; the results take the place of theirs.
+/// Homes those of the seats that can be; the results take the place of theirs. Says whether somebody ended it.
 pub(super) fn home_all(
     driven: &Driven,
     results: &mut [Homed],
     troubles: &mut Troubles,
-) -> Result<(), Failure> {
+) -> Result<bool, Failure> {
     let abort = Arc::new(AtomicBool::new(false));
     leave_on_signals(&abort).or_exit(Exit::System)?;
     let ready: Vec<usize> = (0..results.len()).filter(|index| results[*index].is_ok()).collect();
@@ -95,7 +95,7 @@ pub(super) fn home_all(
         drop(tell);
         show(driven, &told, results, troubles);
     });
-    Ok(())
+    Ok(abort.load(Ordering::Relaxed))
 }
 
 fn show(driven: &Driven, told: &Receiver<Told>, results: &mut [Homed], troubles: &mut Troubles) {
