@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::load::cue_exit;
 use super::{Exit, Failure, OrExit as _, print};
-use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, FaultClass, Problem, Source, limits};
+use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
 
 /// Converts a cue from one format to another.
 #[derive(Debug, clap::Args)]
@@ -72,7 +73,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         }
         Err(faults) => {
             print::tell(&format!("{faults}"));
-            return Ok(exit_of(&faults));
+            return Ok(cue_exit(&faults));
         }
     };
     if let Some(title) = &args.title {
@@ -139,14 +140,6 @@ fn tell_lost(cue: &Cue, lost: Option<&Problem>) {
             "{} is {what}; {rows} rows up to {last} are saved, the rest is lost",
             cue.path().display()
         ));
-    }
-}
-
-fn exit_of(faults: &CueFaults) -> Exit {
-    match faults.class() {
-        FaultClass::NoInput => Exit::NoInput,
-        FaultClass::Io => Exit::Io,
-        FaultClass::BadCue => Exit::BadCue,
     }
 }
 

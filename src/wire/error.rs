@@ -71,6 +71,18 @@ pub enum WireError {
 }
 
 impl WireError {
+    /// That a message is shorter or longer than the `need` bytes it takes.
+    pub(super) const fn unless_exactly(need: usize, bytes: &[u8]) -> Result<(), Self> {
+        let len = bytes.len();
+        if len < need {
+            return Err(Self::Length { len, need });
+        }
+        if len > need {
+            return Err(Self::Surplus { len, need });
+        }
+        Ok(())
+    }
+
     /// The byte at which the fault shows, counted from 0.
     #[must_use]
     pub const fn offset(self) -> usize {

@@ -54,13 +54,7 @@ impl ImaxMotion {
             return Err(header.foreign());
         }
         let axes = axes(header.slot, bytes.len())?;
-        let (len, need) = (bytes.len(), Self::len(axes));
-        if len < need {
-            return Err(WireError::Length { len, need });
-        }
-        if len > need {
-            return Err(WireError::Surplus { len, need });
-        }
+        WireError::unless_exactly(Self::len(axes), bytes)?;
         let port = field::POSITIONS + 4 * axes;
         Ok(Self {
             timing,
@@ -122,12 +116,8 @@ impl<'a> ImaxRegisters<'a> {
         };
         let code = header.reply_code().ok_or(header.foreign())?;
         let (start, num) = words::ask(bytes)?;
-        let (len, need) = (bytes.len(), words::HEAD_LEN + 4 * usize::from(num));
-        if code == ReplyCode::Running && len < need {
-            return Err(WireError::Length { len, need });
-        }
-        if code == ReplyCode::Running && len > need {
-            return Err(WireError::Surplus { len, need });
+        if code == ReplyCode::Running {
+            WireError::unless_exactly(words::HEAD_LEN + 4 * usize::from(num), bytes)?;
         }
         let data = &bytes[words::HEAD_LEN..];
         Ok(Self { access, code, channel: header.slot, start, num, data })

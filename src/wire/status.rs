@@ -79,13 +79,7 @@ impl Status {
         if axes == 0 || axes > MAX_AXES {
             return Err(WireError::Axes { at: field::AXES, found: counted });
         }
-        let (len, need) = (bytes.len(), Self::len(axes));
-        if len < need {
-            return Err(WireError::Length { len, need });
-        }
-        if len > need {
-            return Err(WireError::Surplus { len, need });
-        }
+        WireError::unless_exactly(Self::len(axes), bytes)?;
         let (forces, errors, tail) = places(axes);
         Ok(Self {
             station: Code(u16_at(bytes, field::ID)),

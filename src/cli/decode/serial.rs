@@ -20,6 +20,27 @@ pub(super) enum Direction {
     FromDrive,
 }
 
+/// Something of each direction of a line, and of octets whose direction nobody knows.
+pub(super) struct EachWay<T> {
+    pub(super) to_drive: T,
+    pub(super) from_drive: T,
+    pub(super) either: T,
+}
+
+impl<T> EachWay<T> {
+    /// Every way that octets can have gone.
+    pub(super) const WAYS: [Option<Direction>; 3] =
+        [Some(Direction::ToDrive), Some(Direction::FromDrive), None];
+
+    pub(super) const fn of(&mut self, direction: Option<Direction>) -> &mut T {
+        match direction {
+            Some(Direction::ToDrive) => &mut self.to_drive,
+            Some(Direction::FromDrive) => &mut self.from_drive,
+            None => &mut self.either,
+        }
+    }
+}
+
 /// One message, or octets that are none.
 #[derive(Debug)]
 pub(super) struct Said {

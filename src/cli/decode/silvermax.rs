@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::serial::{Decoder, Direction, Said};
+use super::serial::{Decoder, Direction, EachWay, Said};
 use crate::wire::silvermax::{
     AnyRequest, Collected, Internal, Io, LineCollector, NineBit, Poll, Reply, StatusWord as _, Words,
     command, register,
@@ -13,34 +13,23 @@ const OPENINGS: [u8; 4] = *b"!#*@";
 
 /// Reads both directions of a line, each by itself where they are known.
 pub(super) struct SilverDecoder {
-    to_drive: LineCollector,
-    from_drive: LineCollector,
-    /// Where nobody knows the direction.
-    either: LineCollector,
+    collectors: EachWay<LineCollector>,
     /// What was asked last, which tells what an answer is about.
     asked: Option<AnyRequest>,
 }
 
 impl Default for SilverDecoder {
     fn default() -> Self {
-        Self {
+        let collectors = EachWay {
             to_drive: LineCollector::of_requests(),
             from_drive: LineCollector::of_replies(),
             either: LineCollector::of_both(),
-            asked: None,
-        }
+        };
+        Self { collectors, asked: None }
     }
 }
 
 impl SilverDecoder {
-    fn collector(&mut self, direction: Option<Direction>) -> &mut LineCollector {
-        match direction {
-            Some(Direction::ToDrive) => &mut self.to_drive,
-            Some(Direction::FromDrive) => &mut self.from_drive,
-            None => &mut self.either,
-        }
-    }
-
     fn line(&mut self, direction: Option<Direction>, line: &[u8]) -> Said {
         let request = AnyRequest::parse(line);
         let (text, fields) = match (request, Reply::parse(line)) {
@@ -167,7 +156,7 @@ impl SilverDecoder {
 
 impl Decoder for SilverDecoder {
     fn take(&mut self, direction: Option<Direction>, octets: &[u8]) -> Vec<Said> {
-        let is_between = self.collector(direction).is_empty();
+        let is_between = self.collectors.of(direction).is_empty();
         let opens = octets.first().is_some_and(|first| OPENINGS.contains(first));
         let may_be_a_line = opens && octets.last() == Some(&b'\r');
         if let (Some(direction), true, false) = (direction, is_between, may_be_a_line)
@@ -177,7 +166,7 @@ impl Decoder for SilverDecoder {
         }
         let mut said = Vec::new();
         for octet in octets {
-            let (is_line, kept) = match self.collector(direction).push(*octet) {
+            let (is_line, kept) = match self.collectors.of(direction).push(*octet) {
                 None => continue,
                 Some(Collected::Line(line)) => (true, line.to_vec()),
                 Some(Collected::Stray(stray)) => (false, stray.to_vec()),
@@ -192,10 +181,9 @@ impl Decoder for SilverDecoder {
     }
 
     fn rest(&mut self) -> Vec<Said> {
-        let directions = [Some(Direction::ToDrive), Some(Direction::FromDrive), None];
         let mut said = Vec::new();
-        for direction in directions {
-            let rest = self.collector(direction).rest();
+        for direction in EachWay::<LineCollector>::WAYS {
+            let rest = self.collectors.of(direction).rest();
             if !rest.is_empty() {
                 said.push(Said::stray(direction, rest, "it ends in the middle of a line"));
             }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use super::serial::{Decoder, Direction, Said};
+use super::serial::{Decoder, Direction, EachWay, Said};
 use crate::wire::sixpack2::{FrameCollector, SixpackCommand, SixpackFrame, SixpackReply, action};
 
 /// The flags of P5 and P6 of `$15` (motor parameters, page 38).
@@ -23,10 +23,7 @@ const P6: [&str; 8] = [
 
 /// Reads both directions of a line, each by itself where they are known.
 pub(super) struct SixpackDecoder {
-    to_drive: FrameCollector,
-    from_drive: FrameCollector,
-    /// Where nobody knows the direction.
-    either: FrameCollector,
+    collectors: EachWay<FrameCollector>,
     /// What was asked last, and not answered yet.
     asked: Option<SixpackCommand>,
 }
@@ -34,22 +31,15 @@ pub(super) struct SixpackDecoder {
 impl Default for SixpackDecoder {
     fn default() -> Self {
         let collector = FrameCollector::new(None);
-        Self { to_drive: collector, from_drive: collector, either: collector, asked: None }
+        let collectors = EachWay { to_drive: collector, from_drive: collector, either: collector };
+        Self { collectors, asked: None }
     }
 }
 
 impl SixpackDecoder {
-    fn collector(&mut self, direction: Option<Direction>) -> &mut FrameCollector {
-        match direction {
-            Some(Direction::ToDrive) => &mut self.to_drive,
-            Some(Direction::FromDrive) => &mut self.from_drive,
-            None => &mut self.either,
-        }
-    }
-
     /// Octets that no frame will ever have: the next begins anew.
     fn give_up(&mut self, direction: Option<Direction>, why: &str) -> Option<Said> {
-        let collector = self.collector(direction);
+        let collector = self.collectors.of(direction);
         let said = (!collector.begun().is_empty()).then(|| Said::stray(direction, collector.begun(), why));
         collector.clear();
         said
@@ -90,7 +80,7 @@ impl Decoder for SixpackDecoder {
             said.extend(self.give_up(direction, "a piece of a frame"));
         }
         for octet in octets {
-            let Some(frame) = self.collector(direction).push(*octet, Duration::ZERO) else { continue };
+            let Some(frame) = self.collectors.of(direction).push(*octet, Duration::ZERO) else { continue };
             if direction == Some(Direction::ToDrive) && is_query(SixpackCommand::of(frame)) {
                 // Whoever asks again waits for no answer any more.
                 said.extend(self.give_up(Some(Direction::FromDrive), "a piece of an answer"));
@@ -101,8 +91,8 @@ impl Decoder for SixpackDecoder {
     }
 
     fn rest(&mut self) -> Vec<Said> {
-        let directions = [Some(Direction::ToDrive), Some(Direction::FromDrive), None];
-        let rest = directions.map(|direction| self.give_up(direction, "it ends in the middle of a frame"));
+        let ways = EachWay::<FrameCollector>::WAYS;
+        let rest = ways.map(|direction| self.give_up(direction, "it ends in the middle of a frame"));
         rest.into_iter().flatten().collect()
     }
 }

@@ -111,7 +111,7 @@ impl<B: Bus> SerialLine<B> {
                 let octet = self.heard(octet);
                 self.bus.on_octet(octet, at);
             }
-            let is_stuck = !self.take_answers(at) && arrival != Some(at) && self.bus.next() == Some(at);
+            let is_stuck = self.take_answers(at) == 0 && arrival != Some(at) && self.bus.next() == Some(at);
             debug_assert!(!is_stuck, "a bus that asked for {at:?} and did nothing then");
             if is_stuck {
                 break;
@@ -146,11 +146,11 @@ impl<B: Bus> SerialLine<B> {
         }
     }
 
-    /// Takes from the bus what it sends by now; says whether it sent anything.
-    fn take_answers(&mut self, now: MonoTime) -> bool {
-        let mut any = false;
+    /// Takes from the bus what it sends by now: how many octets.
+    fn take_answers(&mut self, now: MonoTime) -> usize {
+        let mut taken = 0;
         while let Some(octet) = self.bus.take_octet(now) {
-            any = true;
+            taken += 1;
             if self.back.free < now {
                 self.is_losing = self.loses_answer();
             }
@@ -165,7 +165,7 @@ impl<B: Bus> SerialLine<B> {
                 self.back.put(octet, now + late, takes);
             }
         }
-        any
+        taken
     }
 
     fn loses_answer(&mut self) -> bool {

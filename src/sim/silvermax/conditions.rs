@@ -2,7 +2,7 @@
 
 use super::mover::{Mode, StopWords};
 use super::unit::Unit;
-use crate::wire::silvermax::{Internal, Io, Poll};
+use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
 
 impl Unit {
     /// True if what ends a move is there. Negative codes are inputs and conditions, others masks of the word of RIO.
@@ -63,7 +63,7 @@ impl Unit {
     /// The internal status word (RIS).
     pub(super) fn internal(&self) -> u16 {
         const INPUTS: u16 = 0x70;
-        self.status.latched | self.io() & (INPUTS | Internal::COOL) | self.error_bits()
+        self.status.latched | self.io() & (INPUTS | Io::COOL) | self.error_bits()
     }
 
     /// The word of RIO.

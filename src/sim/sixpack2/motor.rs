@@ -6,8 +6,8 @@ use super::search::{Search, SearchStep};
 use super::shaft::Shaft;
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{
-    CurrentSettings, MOST_SPEED, MotorSettings, PeakCurrent, PiSettings, RampSettings, ReferenceSettings,
-    SixpackCommand, StartSettings, ZeroSettings, action, p5, p6, steps_of_a_unit,
+    CurrentSettings, MOST_SPEED, MotorSettings, PeakCurrent, PiSettings, PositionTold, RampSettings,
+    ReferenceSettings, SixpackCommand, StartSettings, ZeroSettings, action, p5, p6, steps_of_a_unit,
 };
 
 /// How often it chooses a speed (manual, page 25).
@@ -136,9 +136,10 @@ impl SixpackMotor {
         self.counter = f64::from(position);
     }
 
-    /// Whether it was stopped since it was asked last.
-    pub(super) const fn take_stop(&mut self) -> bool {
-        std::mem::replace(&mut self.was_stopped, false)
+    /// The answer to whoever asks where it is, which tells once that it was stopped.
+    pub(super) fn tell_position(&mut self, motor: u8) -> PositionTold {
+        let stop = u8::from(std::mem::take(&mut self.was_stopped));
+        PositionTold { motor, position: self.position(), action: self.action(), stop }
     }
 
     /// Begins to search zero.

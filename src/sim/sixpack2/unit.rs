@@ -7,8 +7,8 @@ use super::motor::{Doing, LOOP, SixpackMotor};
 use super::shaft::{Shaft, ShaftSetup};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{
-    ActionsTold, FrameCollector, GREATEST_DIVIDER, InputTold, PositionTold, SixpackCommand, SixpackFrame,
-    SixpackReply, UnitTold, VelocityTold, WAKING_DIVISOR, baud_of,
+    ActionsTold, FrameCollector, GREATEST_DIVIDER, InputTold, SixpackCommand, SixpackFrame, SixpackReply,
+    UnitTold, VelocityTold, WAKING_DIVISOR, baud_of,
 };
 
 /// Motors of a unit.
@@ -269,9 +269,7 @@ impl SixpackUnit {
         Some(match query {
             SixpackCommand::PositionQuery(query) => {
                 let motor = self.motors.get_mut(usize::from(query.motor))?;
-                let (position, action) = (motor.position(), motor.action());
-                let stop = u8::from(motor.take_stop());
-                (query.response, PositionTold { motor: query.motor, position, action, stop }.into())
+                (query.response, motor.tell_position(query.motor).into())
             }
             SixpackCommand::VelocityQuery(query) => {
                 let motor = self.motors.get(usize::from(query.motor))?;
