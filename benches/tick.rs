@@ -139,7 +139,7 @@ fn round(links: &[Link], chases: bool) -> Round {
             // The first frame of a chased show joins, for which there is no planner here.
             let target = film.as_mut().and_then(|film| film.target(&due)).filter(|_| tick > 1);
             places.look(&mut engine, &mail, at, true);
-            let Step::Send(_) = engine.tick(0, target) else { unreachable!("the ride is longer") };
+            let Step::Send = engine.tick(0, target) else { unreachable!("the ride is longer") };
             for (index, lane) in lanes.iter_mut().enumerate() {
                 let beat = places.admit(index, &mut engine, at).expect("every lane takes part");
                 let pose = engine.lane(index).pose();

@@ -46,11 +46,10 @@ impl Beat {
 }
 
 /// What a tick does.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "it is made and used up on one stack, every tick")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// Frames go out.
-    Send(Beat),
+    /// Frames go out ([`super::Engine::beat_of`]).
+    Send,
     /// None does: the lanes rest, and have been told so.
     Quiet,
     /// The play has ended.

@@ -213,7 +213,7 @@ impl Engine {
         let (timing, stamp_ms) = self.stamps.next(time_ms);
         let still = Beat::still(timing, stamp_ms).lasting(time_ms);
         self.cues.iter_mut().for_each(|cue| cue.fill(&still, &self.timeline, says));
-        Step::Send(self.cues.first().map_or(still, |cue| cue.beat))
+        Step::Send
     }
 
     /// The beat of this tick as a lane has it: the cue's channels and effects are those of so much later as it is led ahead.

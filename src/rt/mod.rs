@@ -140,12 +140,12 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
         match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
-            Step::Send(_) if self.conductor.machine().may_send_motion() => {
+            Step::Send if self.conductor.machine().may_send_motion() => {
                 ticked.missed += tick.missed;
                 ticked.ticks += 1;
                 self.send(tick);
             }
-            Step::Send(_) | Step::Quiet | Step::Over => {}
+            Step::Send | Step::Quiet | Step::Over => {}
         }
         self.conductor.watch(&mut self.engine, now);
         self.hand_on();
