@@ -90,8 +90,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 /// From the generator of the kernel, which is ready long before a shell is.
-fn chance() -> io::Result<[u8; BYTES]> {
-    let mut bytes = [0; BYTES];
+pub(super) fn chance<const N: usize>() -> io::Result<[u8; N]> {
+    let mut bytes = [0; N];
     File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     Ok(bytes)
 }
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn no_two_are_alike() {
-        assert_ne!(chance().unwrap(), chance().unwrap());
+        assert_ne!(chance::<BYTES>().unwrap(), chance().unwrap());
     }
 
     #[test]

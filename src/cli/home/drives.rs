@@ -1,8 +1,6 @@
 //! Seats on serial links find their zero: the drives know no search of their own, so this program leads them, a seat after the other
 //! on each link, all links at once. Ctrl-C has their axes braked.
 
-use std::fs::File;
-use std::io::Read as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -11,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use super::super::play::leave_on_signals;
 use super::super::targets::{Driven, Troubles};
+use super::super::token::chance;
 use super::super::{Exit, Failure, OrExit as _, print};
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
@@ -184,8 +183,9 @@ fn home_seat(
 
 /// A number that stands in no register by itself.
 fn canary() -> std::io::Result<i32> {
-    let mut bytes = [0; 4];
-    File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     // 0 is what a unit has after a reset.
-    Ok(i32::from_le_bytes(bytes).max(1))
+    Ok(match i32::from_le_bytes(chance()?) {
+        0 => 1,
+        number => number,
+    })
 }
