@@ -35,7 +35,7 @@ impl Watch {
 }
 
 impl FrameSink for Watch {
-    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
+    fn send(&mut self, lane: usize, datagram: &[u8], _at: MonoTime) -> Delivery {
         let delivery = self.sender.send(lane, datagram);
         let at = Monotonic.now();
         let frame = MotionRequest::parse(datagram).expect("only frames are sent");

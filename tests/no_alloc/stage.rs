@@ -106,7 +106,7 @@ struct Counted<'a> {
 }
 
 impl FrameSink for Counted<'_> {
-    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
+    fn send(&mut self, lane: usize, datagram: &[u8], _at: MonoTime) -> Delivery {
         self.pace.sent.fetch_add(1, Ordering::AcqRel);
         self.sender.send(lane, datagram)
     }

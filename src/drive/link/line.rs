@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use super::{LinkFault, LinkPort};
 use crate::config::Link;
 use crate::config::link::LinkWiring;
-use crate::drive::silvermax::{LinkFault, LinkPort, TalkTerms};
+use crate::drive::silvermax::TalkTerms;
 use crate::sys::clock::Monotonic;
 use crate::sys::serial::{SerialError, SerialPort, SerialSettings, StopBits};
 use crate::time::{Clock as _, MonoTime};

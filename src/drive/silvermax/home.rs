@@ -7,10 +7,10 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use super::port::LinkPort;
 use super::set_up::{HomeError, SeatUnits, UnitAxis, write, write_once};
 use super::talk::Talk;
 use crate::config::drive::homing::{HomeWay, Side};
+use crate::drive::link::LinkPort;
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{ACCUMULATOR, INPUT_POSITION, POSITION};
 use crate::wire::silvermax::{Internal, Io, Poll, Request, StatusWord, StopOn};

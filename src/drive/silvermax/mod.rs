@@ -11,7 +11,6 @@
 mod delays;
 mod home;
 mod look;
-mod port;
 mod scale;
 mod set_up;
 mod stream;
@@ -21,11 +20,8 @@ mod tests;
 
 pub(crate) use home::{Homing, Step, home};
 pub(crate) use look::look;
-pub(crate) use port::{LinkFault, LinkPort};
 pub(crate) use set_up::{HomeError, SeatUnits};
-pub(crate) use stream::{
-    AxisFigures, BrakeReason, LaneUnits, LinkPose, Stream, StreamEvent, StreamTerms, lead,
-};
+pub(crate) use stream::{AxisFigures, BrakeReason, LaneUnits, Stream, StreamEvent, StreamTerms, lead};
 pub(crate) use talk::{Talk, TalkTerms};
 
 #[expect(unused_imports, reason = "for the thread of a link, and preflight")]

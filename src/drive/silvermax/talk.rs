@@ -7,7 +7,7 @@
 use std::time::Duration;
 
 use super::delays::Delays;
-use super::port::{LinkFault, LinkPort};
+use crate::drive::link::{LinkFault, LinkPort};
 use crate::time::MonoTime;
 use crate::wire::silvermax::{
     ALL_UNITS, Collected, Internal, LineCollector, MAX_LINE, NakReason, Reply, Request, Words,

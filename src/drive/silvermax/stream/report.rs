@@ -11,12 +11,32 @@ use crate::wire::silvermax::NakReason;
 /// What happened to a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StreamEvent {
-    /// All axes have taken the segments up to that frame.
+    /// All axes have taken the segments of these frames, or stand where they lead.
     Confirmed {
         /// The lane.
         lane: u16,
-        /// The last frame that is covered.
-        frame: FrameNo,
+        /// The first that was not told before.
+        first: FrameNo,
+        /// The last that is covered.
+        last: FrameNo,
+    },
+    /// An axis of a seat that is home was read.
+    Read {
+        /// The lane.
+        lane: u16,
+        /// The axis, from 0.
+        axis: u8,
+        /// Where it is, in strokes.
+        position: f64,
+        /// When.
+        at: MonoTime,
+    },
+    /// All units were asked whether they are home, and have been since.
+    Homed {
+        /// The lane.
+        lane: u16,
+        /// They are.
+        homed: bool,
     },
     /// It is at rest, or will be then.
     Rests {

@@ -26,7 +26,7 @@ fn frames_are_confirmed_once_all_axes_have_them_before_they_are_executed() {
     let origin = play.origin;
     let mut last = None;
     for (at, event) in &play.told {
-        if let StreamEvent::Confirmed { frame, .. } = event {
+        if let StreamEvent::Confirmed { last: frame, .. } = event {
             assert!(last < Some(frame.0), "{last:?} {frame:?}");
             last = Some(frame.0);
             let executed = origin + TICK * frame.0;
