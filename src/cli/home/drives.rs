@@ -15,7 +15,7 @@ use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Drives, Link};
 use crate::drive::link::LinkLine;
-use crate::drive::silvermax::{HomeError, Homing, SeatUnits, Step, Talk, TalkFault, home};
+use crate::drive::silvermax::{HomeError, Homing, SeatUnits, Step, Talk, TalkFault, TalkTerms, home};
 
 /// How the homing of a seat went: how long it took, or why it is not home.
 pub(super) type Homed = Result<Duration, String>;
@@ -146,8 +146,7 @@ fn home_link(link: &Link, driven: &Driven, seats: &[usize], abort: &AtomicBool, 
             return;
         }
     };
-    let terms = line.terms(link);
-    let mut talk = Talk::new(line, terms);
+    let mut talk = Talk::new(line, TalkTerms::of(link));
     for &index in seats {
         let step = &mut |step| drop(tell.send(Told::Step(index, step)));
         over(index, home_seat(&mut talk, &driven.controllers[index], abort, step));

@@ -5,7 +5,6 @@ use std::time::Duration;
 use super::{LinkFault, LinkPort};
 use crate::config::Link;
 use crate::config::link::LinkWiring;
-use crate::drive::silvermax::TalkTerms;
 use crate::sys::clock::Monotonic;
 use crate::sys::serial::{SerialError, SerialPort, SerialSettings, StopBits};
 use crate::time::{Clock as _, MonoTime};
@@ -27,12 +26,6 @@ impl LinkLine {
         let is_rs485 = link.wiring == LinkWiring::Rs485;
         let settings = SerialSettings { baud: link.baud, stop_bits, is_rs485 };
         SerialPort::open(&link.port, settings).map(Self)
-    }
-
-    /// What is to be known of it to tell how long an exchange takes.
-    pub(crate) fn terms(&self, link: &Link) -> TalkTerms {
-        let octet_bits = 9 + u32::from(link.stop_bits);
-        TalkTerms { baud: self.0.baud(), octet_bits, has_echo: link.has_echo }
     }
 }
 

@@ -4,10 +4,16 @@
 //! families; the thread of the link makes of poses what its drives are sent.
 
 mod line;
+mod peer;
 mod port;
+pub(crate) mod streaming;
+mod terms;
 
 pub(crate) use line::LinkLine;
+pub(crate) use peer::{LaneWants, LinkPeer};
 pub(crate) use port::{LinkFault, LinkPort};
+pub(crate) use streaming::{Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent};
+pub(crate) use terms::StreamTerms;
 
 use crate::channel::ChannelId;
 use crate::cue::Vibration;
@@ -73,7 +79,6 @@ impl LinkPose {
 
     /// Reads what [`Self::emit`] wrote.
     #[must_use]
-    #[cfg_attr(not(test), expect(dead_code, reason = "the threads of links come with the drives' masters"))]
     pub(crate) fn parse(record: &[u8; RECORD_LEN]) -> Self {
         let (words, _) = record[..8].as_chunks::<4>();
         let (cells, _) = record[8..].as_chunks::<8>();

@@ -21,12 +21,8 @@ mod tests;
 pub(crate) use home::{Homing, Step, home};
 pub(crate) use look::look;
 pub(crate) use set_up::{HomeError, SeatUnits};
-pub(crate) use stream::{AxisFigures, BrakeReason, LaneUnits, Stream, StreamEvent, StreamTerms, lead};
-pub(crate) use talk::{Talk, TalkTerms};
+pub(crate) use stream::{LaneUnits, Stream, lead};
+pub(crate) use talk::{Talk, TalkCounts, TalkTerms};
 
-#[expect(unused_imports, reason = "for the thread of a link, and preflight")]
-pub(crate) use {
-    look::UnitFacts,
-    stream::{Account, LinkFigures},
-    talk::{TalkCounts, TalkFault},
-};
+#[cfg_attr(not(test), expect(unused_imports, reason = "for preflight"))]
+pub(crate) use {look::UnitFacts, talk::TalkFault};

@@ -7,6 +7,7 @@
 use std::time::Duration;
 
 use super::delays::Delays;
+use crate::config::Link;
 use crate::drive::link::{LinkFault, LinkPort};
 use crate::time::MonoTime;
 use crate::wire::silvermax::{
@@ -39,6 +40,13 @@ pub(crate) struct TalkTerms {
     pub(crate) octet_bits: u32,
     /// The adapter returns what is sent.
     pub(crate) has_echo: bool,
+}
+
+impl TalkTerms {
+    /// Those of a link.
+    pub(crate) fn of(link: &Link) -> Self {
+        Self { baud: link.baud, octet_bits: 9 + u32::from(link.stop_bits), has_echo: link.has_echo }
+    }
 }
 
 /// What a unit answered.
@@ -134,7 +142,7 @@ impl<P: LinkPort> Talk<P> {
     }
 
     /// The port.
-    pub(crate) fn port(&mut self) -> &mut P {
+    pub(crate) const fn port(&mut self) -> &mut P {
         &mut self.port
     }
 

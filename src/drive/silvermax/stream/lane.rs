@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use super::axis::{Axis, Kind};
 use super::clock::{after, seconds};
-use super::report::StreamEvent;
 use crate::drive::Segment;
+use crate::drive::link::StreamEvent;
 use crate::drive::link::{LedPose, LinkPose};
 use crate::motion::{MAX_AXES, Pose};
 use crate::time::MonoTime;

@@ -14,10 +14,7 @@ mod lane;
 mod polls;
 mod queue;
 mod ready;
-mod report;
 mod watch;
-
-pub(crate) use report::{Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent};
 
 use std::time::Duration;
 
@@ -28,7 +25,9 @@ use self::lane::{Lane, Stage};
 use self::polls::Question;
 use super::set_up::{HomeError, SeatUnits};
 use super::talk::{Talk, TalkFault};
-use crate::drive::link::{LedPose, LinkFault, LinkPort};
+use crate::drive::link::{
+    AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms,
+};
 use crate::time::MonoTime;
 use crate::wire::silvermax::Request;
 
@@ -42,15 +41,6 @@ const IDLE: Duration = Duration::from_millis(1);
 const LOST: Duration = Duration::from_millis(250);
 /// How often a unit that is lost is asked.
 const PROBES: Duration = Duration::from_millis(250);
-
-/// How a link plays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct StreamTerms {
-    /// From one segment of an axis to the next.
-    pub(crate) period: Duration,
-    /// From one pose to the next.
-    pub(crate) tick: Duration,
-}
 
 /// A lane: a seat that is home.
 #[derive(Debug, Clone, Copy)]
@@ -211,7 +201,13 @@ impl<P: LinkPort> Stream<P> {
         LinkFigures { talk: self.talk.counts(), delay_p99: self.talk.delay_p99(), ..self.figures }
     }
 
+    /// The port.
+    pub(crate) const fn port(&mut self) -> &mut P {
+        self.talk.port()
+    }
+
     /// The conversation, for other procedures while no lane runs.
+    #[cfg(test)]
     pub(crate) const fn talk(&mut self) -> &mut Talk<P> {
         &mut self.talk
     }

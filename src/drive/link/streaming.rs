@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::super::talk::TalkCounts;
+use crate::drive::silvermax::TalkCounts;
 use crate::motion::Pose;
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
@@ -114,6 +114,27 @@ pub(crate) enum StreamEvent {
         /// The axis, from 0.
         axis: u8,
     },
+}
+
+impl StreamEvent {
+    /// The lane that it is about.
+    pub(crate) const fn lane(&self) -> u16 {
+        match *self {
+            Self::Confirmed { lane, .. }
+            | Self::Read { lane, .. }
+            | Self::Homed { lane, .. }
+            | Self::Rests { lane, .. }
+            | Self::Moves { lane, .. }
+            | Self::Braked { lane, .. }
+            | Self::Lost { lane, .. }
+            | Self::Back { lane }
+            | Self::Restarted { lane, .. }
+            | Self::Killed { lane, .. }
+            | Self::Elsewhere { lane, .. }
+            | Self::OffCourse { lane, .. }
+            | Self::Doubt { lane, .. } => lane,
+        }
+    }
 }
 
 /// Why a lane brakes.
