@@ -3,9 +3,18 @@
 //! A lane on a link writes a record of this program's own in place of a datagram, so that everything before the sink stays the same for all
 //! families; the thread of the link makes of poses what its drives are sent.
 
+mod delays;
+mod exchange;
+mod homing;
 mod line;
+mod port;
+pub(crate) mod streaming;
 
+pub(crate) use delays::Delays;
+pub(crate) use exchange::{Moment, TalkCounts, TalkTerms};
+pub(crate) use homing::Step;
 pub(crate) use line::LinkLine;
+pub(crate) use port::{LinkFault, LinkPort};
 
 use crate::channel::ChannelId;
 use crate::cue::Vibration;

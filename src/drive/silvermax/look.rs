@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use super::port::LinkPort;
 use super::talk::{Answer, INTERNAL, Talk, TalkFault, internal_word};
+use crate::drive::link::LinkPort;
 use crate::wire::silvermax::register::{
     CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, POSITION, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW, TARGET,
     TORQUE_CLOSED, TORQUE_OPEN,

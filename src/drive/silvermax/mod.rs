@@ -8,10 +8,8 @@
 //!                     '--events--> ring
 //! ```
 
-mod delays;
 mod home;
 mod look;
-mod port;
 mod scale;
 mod set_up;
 mod stream;
@@ -19,18 +17,14 @@ mod talk;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use home::{Homing, Step, home};
+pub(crate) use home::{Homing, home};
 pub(crate) use look::look;
-pub(crate) use port::{LinkFault, LinkPort};
 pub(crate) use set_up::{HomeError, SeatUnits};
-pub(crate) use stream::{
-    AxisFigures, BrakeReason, LaneUnits, LinkPose, Stream, StreamEvent, StreamTerms, lead,
-};
-pub(crate) use talk::{Talk, TalkTerms};
+pub(crate) use stream::{LaneUnits, Stream, lead};
+pub(crate) use talk::Talk;
+
+pub(crate) use super::link::streaming::{AxisFigures, BrakeReason, LinkPose, StreamEvent, StreamTerms};
+pub(crate) use super::link::{LinkFault, LinkPort, Step, TalkTerms};
 
 #[expect(unused_imports, reason = "for the thread of a link, and preflight")]
-pub(crate) use {
-    look::UnitFacts,
-    stream::{Account, LinkFigures},
-    talk::{TalkCounts, TalkFault},
-};
+pub(crate) use {look::UnitFacts, talk::TalkFault};

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::super::scale::DriveScale;
 use super::clock::{UnitClock, seconds};
 use super::polls::Polls;
-use super::report::{Account, AxisFigures};
+use crate::drive::link::streaming::{Account, AxisFigures};
 use crate::drive::{DriveCourse, Knots, Middles, Segment, SegmentFit, Shaker, TICK_NS};
 use crate::time::MonoTime;
 use crate::wire::silvermax::Request;

@@ -2,11 +2,10 @@
 
 use std::time::Duration;
 
-use super::LinkPose;
 use super::axis::{Axis, Kind};
 use super::clock::{after, seconds};
-use super::report::StreamEvent;
 use crate::drive::Segment;
+use crate::drive::link::streaming::{LinkPose, StreamEvent};
 use crate::motion::{MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;

@@ -14,10 +14,7 @@ mod lane;
 mod polls;
 mod queue;
 mod ready;
-mod report;
 mod watch;
-
-pub(crate) use report::{Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent};
 
 use std::time::Duration;
 
@@ -26,12 +23,13 @@ use rtrb::{Consumer, Producer};
 use self::axis::{Axis, AxisTerms, Doubt};
 use self::lane::{Lane, Stage};
 use self::polls::Question;
-use super::port::{LinkFault, LinkPort};
 use super::set_up::{HomeError, SeatUnits};
 use super::talk::{Talk, TalkFault};
-use crate::motion::{MAX_AXES, Pose};
+use crate::drive::link::streaming::{
+    AxisFigures, BrakeReason, LinkFigures, LinkPose, StreamEvent, StreamTerms,
+};
+use crate::drive::link::{LinkFault, LinkPort};
 use crate::time::MonoTime;
-use crate::wire::FrameNo;
 use crate::wire::silvermax::Request;
 
 /// How far a first pose may be from where the seat stands, mm.
@@ -44,32 +42,6 @@ const IDLE: Duration = Duration::from_millis(1);
 const LOST: Duration = Duration::from_millis(250);
 /// How often a unit that is lost is asked.
 const PROBES: Duration = Duration::from_millis(250);
-
-/// A pose of a lane, as it comes tick by tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LinkPose {
-    /// The lane, from 0.
-    pub(crate) lane: u16,
-    /// The frame that it is.
-    pub(crate) frame: FrameNo,
-    /// When the seat is to be there: [`lead`] after the tick.
-    pub(crate) at: MonoTime,
-    /// Until the next, ms.
-    pub(crate) lasts_ms: u32,
-    /// In strokes.
-    pub(crate) axes: Pose,
-    /// Hz, and amplitude in strokes.
-    pub(crate) vibration: [(f64, f64); MAX_AXES],
-}
-
-/// How a link plays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct StreamTerms {
-    /// From one segment of an axis to the next.
-    pub(crate) period: Duration,
-    /// From one pose to the next.
-    pub(crate) tick: Duration,
-}
 
 /// A lane: a seat that is home.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@ use super::axis::Doubt;
 use super::lane::Stage;
 use super::polls::Question;
 use super::{BrakeReason, LOST, PROBES, Stream, StreamEvent, axis_number, number};
-use crate::drive::silvermax::port::LinkPort;
+use crate::drive::link::LinkPort;
 use crate::drive::silvermax::talk::{Answer, TalkFault, internal_word};
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{CANARY, KILL_CAUSE};

@@ -66,6 +66,17 @@ impl LinkPort for VirtualPort {
         std::iter::from_fn(|| self.line.receive(self.now)).count()
     }
 
+    fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
+        self.line.send_break(self.now);
+        self.sleep_until(self.now + span);
+        Ok(())
+    }
+
+    fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
+        self.line.set_host_baud(Some(baud));
+        Ok(())
+    }
+
     fn sleep_until(&mut self, at: MonoTime) {
         self.now = self.now.max(at);
         self.line.advance(self.now);
@@ -78,7 +89,7 @@ pub(super) fn talk_to(setups: &[UnitSetup]) -> Talk<VirtualPort> {
     let bus = SilverBus::new(setups, BAUD, now);
     let line = SerialLine::new(bus, 11, LineFaults::default(), 7);
     let port = VirtualPort { line, now, is_gone: false, sent: Vec::new() };
-    Talk::new(port, TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false })
+    Talk::new(port, TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false, is_two_wires: false })
 }
 
 /// A seat type of three axes as the drives of the bench have it.

@@ -1,12 +1,39 @@
-//! What a play on a link tells: events for whoever keeps health and belief, and figures that can be copied.
+//! What a play on a link is given, and what it tells: poses tick by tick; events for whoever keeps health and belief, and figures that can
+//! be copied. The same for all families.
 
 use std::time::Duration;
 
-use super::super::talk::TalkCounts;
-use crate::motion::Pose;
+use super::TalkCounts;
+use crate::motion::{MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 use crate::wire::silvermax::NakReason;
+
+/// A pose of a lane, as it comes tick by tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LinkPose {
+    /// The lane, from 0.
+    pub(crate) lane: u16,
+    /// The frame that it is.
+    pub(crate) frame: FrameNo,
+    /// When the seat is to be there: [`lead`] after the tick.
+    pub(crate) at: MonoTime,
+    /// Until the next, ms.
+    pub(crate) lasts_ms: u32,
+    /// In strokes.
+    pub(crate) axes: Pose,
+    /// Hz, and amplitude in strokes.
+    pub(crate) vibration: [(f64, f64); MAX_AXES],
+}
+
+/// How a link plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct StreamTerms {
+    /// From one segment of an axis to the next.
+    pub(crate) period: Duration,
+    /// From one pose to the next.
+    pub(crate) tick: Duration,
+}
 
 /// What happened to a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
