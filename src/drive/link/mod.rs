@@ -9,12 +9,16 @@ mod homing;
 mod line;
 mod port;
 pub(crate) mod streaming;
+#[cfg(test)]
+mod virtual_port;
 
 pub(crate) use delays::Delays;
 pub(crate) use exchange::{Moment, TalkCounts, TalkTerms};
 pub(crate) use homing::Step;
 pub(crate) use line::LinkLine;
 pub(crate) use port::{LinkFault, LinkPort};
+#[cfg(test)]
+pub(crate) use virtual_port::VirtualPort;
 
 use crate::channel::ChannelId;
 use crate::cue::Vibration;

@@ -16,7 +16,7 @@ pub(crate) struct LinkPose {
     pub(crate) lane: u16,
     /// The frame that it is.
     pub(crate) frame: FrameNo,
-    /// When the seat is to be there: [`lead`] after the tick.
+    /// When the seat is to be there: the lead of its family after the tick.
     pub(crate) at: MonoTime,
     /// Until the next, ms.
     pub(crate) lasts_ms: u32,
