@@ -3,12 +3,14 @@
 use std::io;
 use std::net::SocketAddrV4;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
 
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::config::{Config, Controller, Link, Show, Station, from_to_args};
 use crate::device::{Answer, Fault, Outcome, Request, Talk, refusal};
+use crate::drive::rates::LinkLoad;
 use crate::motion::MAX_AXES;
 use crate::net::NetError;
 use crate::wire::ReplyCode;
@@ -45,6 +47,8 @@ pub(super) struct Driven {
     pub(super) controllers: Vec<Controller>,
     /// All links of the hall.
     pub(super) links: Vec<Link>,
+    /// From one target of an axis to the next on each of them, by all that is on it.
+    pub(super) periods: Vec<Duration>,
 }
 
 struct Meant {
@@ -52,6 +56,7 @@ struct Meant {
     on_links: Vec<Controller>,
     /// The hall without its controllers.
     config: Config,
+    periods: Vec<Duration>,
 }
 
 impl TargetArgs {
@@ -70,8 +75,8 @@ impl TargetArgs {
 
     /// The same, those on links apart.
     pub(super) fn resolve_all(&self, names: &[String]) -> Result<(Targets, Driven), Failure> {
-        let Meant { on_network, on_links, config } = self.meant(names, MAX_AXES)?;
-        Ok((on_network, Driven { controllers: on_links, links: config.links }))
+        let Meant { on_network, on_links, config, periods } = self.meant(names, MAX_AXES)?;
+        Ok((on_network, Driven { controllers: on_links, links: config.links, periods }))
     }
 
     fn meant(&self, names: &[String], cue_axes: usize) -> Result<Meant, Failure> {
@@ -79,6 +84,7 @@ impl TargetArgs {
             Some(path) => load::config(path)?,
             None => from_to_args(&self.to, &[], cue_axes).or_exit(Exit::Usage)?,
         };
+        let periods = config.links.iter().map(|link| period(link, &config)).collect();
         let (controllers, absent) =
             (std::mem::take(&mut config.controllers), std::mem::take(&mut config.absent));
         let mut show = config.show.clone();
@@ -92,7 +98,7 @@ impl TargetArgs {
         let chosen = self.choose(controllers.into_iter().chain(named).collect(), names)?;
         let stations = chosen.iter().filter_map(Controller::on_network).collect();
         let on_links = chosen.into_iter().filter(|one| one.drives().is_some()).collect();
-        Ok(Meant { on_network: Targets { controllers: stations, show }, on_links, config })
+        Ok(Meant { on_network: Targets { controllers: stations, show }, on_links, config, periods })
     }
 
     /// True if anybody is meant: without, `home` and `preflight` ask the daemon for its own.
@@ -137,6 +143,12 @@ impl TargetArgs {
         };
         Ok(all.into_iter().filter(chosen).collect())
     }
+}
+
+/// What `check` says that a link plays at; at the most that fits where more is asked for.
+fn period(link: &Link, config: &Config) -> Duration {
+    let load = LinkLoad::of(link, config);
+    load.map_or(Duration::MAX, |load| load.period_for(link.rate_hz).unwrap_or_else(|_| load.period()))
 }
 
 impl Targets {

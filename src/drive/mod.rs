@@ -10,13 +10,11 @@ pub(crate) mod link;
 mod mbox;
 pub(crate) mod rates;
 mod rounds;
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "the clocks of drives, and their settings, come with their links")
-)]
 mod segments;
 #[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "the thread of a link comes next"))]
 pub(crate) mod silvermax;
+#[cfg_attr(not(test), expect(dead_code, reason = "a look is for preflight"))]
+pub(crate) mod sixpack2;
 
 pub use lane::Lane;
 pub(crate) use lane::Stamped;

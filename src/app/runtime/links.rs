@@ -8,8 +8,8 @@ use super::RuntimeError;
 use crate::config::drive_controller::Motors;
 use crate::config::{Config, Controller, Drives, Link};
 use crate::drive::Lane;
-use crate::drive::link::{LedPose, LinkLine, StreamTerms};
-use crate::drive::silvermax::{LaneUnits, SeatUnits, Stream, Talk, TalkTerms};
+use crate::drive::link::{LedPose, LinkLine, StreamTerms, TalkTerms};
+use crate::drive::silvermax::{LaneUnits, SeatUnits, Stream, Talk};
 use crate::rt::{LinkLane, LinkLoop, LinkNews, Live, Port, Watch};
 
 /// Poses of a lane that wait for the thread of its link: a tenth of a second at 1 kHz.

@@ -3,17 +3,27 @@
 //! A lane on a link writes a record of this program's own in place of a datagram, so that everything before the sink stays the same for all
 //! families; the thread of the link makes of poses what its drives are sent.
 
+mod delays;
+mod exchange;
+mod homing;
 mod line;
 mod peer;
 mod port;
 pub(crate) mod streaming;
 mod terms;
+#[cfg(test)]
+mod virtual_port;
 
+pub(crate) use delays::Delays;
+pub(crate) use exchange::{Moment, TalkCounts, TalkTerms};
+pub(crate) use homing::Step;
 pub(crate) use line::LinkLine;
 pub(crate) use peer::{LaneWants, LinkPeer};
 pub(crate) use port::{LinkFault, LinkPort};
 pub(crate) use streaming::{Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent};
 pub(crate) use terms::StreamTerms;
+#[cfg(test)]
+pub(crate) use virtual_port::VirtualPort;
 
 use crate::channel::ChannelId;
 use crate::cue::Vibration;

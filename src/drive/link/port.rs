@@ -1,5 +1,7 @@
 //! The seam between procedures and a line: a real one, or one in virtual time.
 
+use std::time::Duration;
+
 use crate::time::MonoTime;
 
 /// The host's end of a serial line.
@@ -22,11 +24,32 @@ pub(crate) trait LinkPort {
     /// Drops what came unasked, says how much.
     fn flush(&mut self) -> usize;
 
+    /// Holds the line at 0 for so long, by which whoever listens forgets what it has of a message. All that was sent has to have left
+    /// by then.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    fn send_break(&mut self, span: Duration) -> Result<(), LinkFault>;
+
+    /// Sends and listens at so many bits a second from now on.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone, or cannot make that rate.
+    fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault>;
+
     /// Returns then; at once where that is past.
     fn sleep_until(&mut self, at: MonoTime);
 }
 
 impl<P: LinkPort + ?Sized> LinkPort for Box<P> {
+    fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
+        (**self).send_break(span)
+    }
+
+    fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
+        (**self).set_baud(baud)
+    }
+
     fn now(&self) -> MonoTime {
         (**self).now()
     }

@@ -1,8 +1,9 @@
-//! What a play on a link tells: events for whoever keeps health and belief, and figures that can be copied.
+//! What a play on a link is given, and what it tells: poses tick by tick; events for whoever keeps health and belief, and figures that can
+//! be copied. The same for all families.
 
 use std::time::Duration;
 
-use crate::drive::silvermax::TalkCounts;
+use super::TalkCounts;
 use crate::motion::Pose;
 use crate::time::MonoTime;
 use crate::wire::FrameNo;

@@ -8,7 +8,6 @@
 //!                     '--events--> ring
 //! ```
 
-mod delays;
 mod home;
 mod look;
 mod scale;
@@ -18,11 +17,12 @@ mod talk;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use home::{Homing, Step, home};
+pub(crate) use home::{Homing, home};
 pub(crate) use look::look;
 pub(crate) use set_up::{HomeError, SeatUnits};
 pub(crate) use stream::{LaneUnits, Stream, lead};
-pub(crate) use talk::{Talk, TalkCounts, TalkTerms};
+pub(crate) use talk::Talk;
 
-#[cfg_attr(not(test), expect(unused_imports, reason = "for preflight"))]
-pub(crate) use {look::UnitFacts, talk::TalkFault};
+#[expect(unused_imports, reason = "for preflight")]
+pub(crate) use look::UnitFacts;
+pub(crate) use talk::TalkFault;

@@ -1,7 +1,7 @@
 //! Plays over a good line.
 
 use super::bench::*;
-use crate::drive::silvermax::*;
+use crate::drive::link::*;
 
 #[test]
 fn a_ride_over_three_units_is_executed_within_a_tenth_of_a_millimetre_whatever_their_crystals() {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::bench::*;
-use crate::drive::link::LinkFault;
+use crate::drive::link::*;
 use crate::drive::silvermax::*;
 use crate::sim::serial::LineFaults;
 use crate::sim::silvermax::Action;
@@ -94,8 +94,10 @@ fn a_stop_is_on_the_line_after_one_exchange_and_each_unit_has_acked_it() {
     play.stream.stop(None).unwrap();
     play.judged = false;
     play.wait(0.03);
-    let sent: Vec<_> =
-        play.stream.talk().port().sent[before..].iter().map(|(_, line)| line.clone()).collect();
+    let sent: Vec<_> = play.stream.talk().port().sent[before..]
+        .iter()
+        .map(|(_, line)| String::from_utf8_lossy(line).into_owned())
+        .collect();
     let at = sent.iter().position(|line| line == "@255 3 2319282\r").unwrap();
     assert!(at <= 1, "{sent:?}");
     assert_eq!(sent[at + 1..at + 4], ["@16 3 2319282\r", "@17 3 2319282\r", "@18 3 2319282\r"]);
