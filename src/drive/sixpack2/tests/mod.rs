@@ -1,9 +1,6 @@
 //! Homings in virtual time, against virtual units; judged by where their axes really were.
 
-#![expect(
-    clippy::cast_precision_loss,
-    reason = "numbers of axes and seeds"
-)]
+#![expect(clippy::cast_precision_loss, reason = "numbers of axes and seeds")]
 
 mod bench;
 mod finding;

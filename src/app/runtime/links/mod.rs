@@ -107,3 +107,6 @@ fn unit_of<'c>(controller: &'c Controller, drives: &'c Drives) -> Result<LaneUni
     let seat = SeatUnits { seat: &controller.seat, drive: &drives.drive, silvermax, units };
     Ok(LaneUnits { seat, canary: None })
 }
+
+#[cfg(test)]
+mod tests;
