@@ -45,6 +45,13 @@ pub(crate) enum StreamEvent {
         /// The last frame that is covered.
         frame: FrameNo,
     },
+    /// What leads it up to that frame was sent to drives that confirm nothing.
+    Sent {
+        /// The lane.
+        lane: u16,
+        /// The last frame that is covered.
+        frame: FrameNo,
+    },
     /// It is at rest, or will be then.
     Rests {
         /// The lane.

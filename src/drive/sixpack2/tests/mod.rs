@@ -1,4 +1,4 @@
-//! Homings in virtual time, against virtual units; judged by where their axes really were.
+//! Homings and plays in virtual time, against virtual units; judged by where their axes really were.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -10,3 +10,6 @@
 mod bench;
 mod finding;
 mod homing;
+mod play;
+mod playing;
+mod trouble;
