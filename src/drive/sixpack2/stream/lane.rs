@@ -74,13 +74,8 @@ impl Lane {
     }
 
     /// True if its motors are told where to be.
-    pub(super) fn is_led(&self, now: MonoTime) -> bool {
-        match self.stage {
-            Stage::Ready | Stage::Runs | Stage::Ends => true,
-            // Answers may be all that is lost.
-            Stage::Lost => !self.track.has_ended(now),
-            Stage::Readying | Stage::Out => false,
-        }
+    pub(super) const fn is_led(&self) -> bool {
+        matches!(self.stage, Stage::Ready | Stage::Runs | Stage::Ends)
     }
 
     /// The first axis that is farther from a pose than so many mm, and how far.

@@ -23,7 +23,7 @@ use self::lane::{Lane, Stage};
 use self::track::Track;
 use super::find::waking_baud;
 use super::set_up::{HomeError, SeatMotors};
-use super::talk::{Talk, TalkFault};
+use super::talk::Talk;
 use crate::drive::link::streaming::{
     AxisFigures, BrakeReason, LinkFigures, LinkPose, StreamEvent, StreamTerms,
 };
@@ -109,7 +109,7 @@ impl<P: LinkPort> Stream<P> {
         (0..self.lanes.len()).for_each(|lane| self.mind(lane, now));
         let done = if now >= self.next_slice {
             self.send_targets()
-        } else if self.has_time(now) && self.ask_next(now)? {
+        } else if self.has_time() && self.ask_next(now)? {
             Ok(())
         } else {
             let until = self.next_slice.min(now + IDLE);
@@ -131,7 +131,6 @@ impl<P: LinkPort> Stream<P> {
             Some(lane) => usize::from(lane)..self.lanes.len().min(usize::from(lane) + 1),
             None => 0..self.lanes.len(),
         };
-        self.next_slice = self.talk.now();
         for index in lanes {
             if matches!(self.lanes[index].stage, Stage::Lost | Stage::Out) {
                 self.stop_motors(index)?;
@@ -226,7 +225,7 @@ impl<P: LinkPort> Stream<P> {
         if self.next_slice <= now {
             self.next_slice = now + self.terms.period;
         }
-        let led: usize = self.lanes.iter().filter(|lane| lane.is_led(now)).map(|lane| lane.axes.len()).sum();
+        let led: usize = self.lanes.iter().filter(|lane| lane.is_led()).map(|lane| lane.axes.len()).sum();
         let (mut at, frame_time) = self.talk.arrival();
         self.targets += u32::try_from(led).unwrap_or(u32::MAX);
         // A target is followed until the next, which comes later where a question comes before it.
@@ -234,7 +233,7 @@ impl<P: LinkPort> Stream<P> {
         let sent = at + frame_time * u32::try_from(led).unwrap_or(u32::MAX);
         let half = self.next_slice.max(sent + asked).since(now) / 2;
         let mut frames: Vec<SixpackFrame> = Vec::with_capacity(led);
-        for lane in self.lanes.iter_mut().filter(|lane| lane.is_led(now)) {
+        for lane in self.lanes.iter_mut().filter(|lane| lane.is_led()) {
             for (index, axis) in lane.axes.iter_mut().enumerate() {
                 let target = axis.aim(lane.track.at(index, at + half), at);
                 let order = SixpackOrder::Target(PiTarget { motor: axis.motor, target });

@@ -29,8 +29,8 @@ const LOST_ZERO_MM: f64 = 10.0;
 
 impl<P: LinkPort> Stream<P> {
     /// True if a question does not make the next slice later than it has to.
-    pub(super) fn has_time(&self, now: MonoTime) -> bool {
-        !self.lanes.iter().any(|lane| lane.is_led(now)) || self.targets >= TARGETS
+    pub(super) fn has_time(&self) -> bool {
+        !self.lanes.iter().any(|lane| lane.is_led()) || self.targets >= TARGETS
     }
 
     /// Asks what is due; false where nothing is.
@@ -200,14 +200,13 @@ impl<P: LinkPort> Stream<P> {
         }
     }
 
-    /// A lane's unit does not answer any more. What it hears all the same brakes it.
+    /// A lane's unit does not answer any more. Its motors go where the last target led them, and rest there.
     pub(super) fn lose(&mut self, index: usize) {
         let now = self.talk.now();
         let lane = &mut self.lanes[index];
         if matches!(lane.stage, Stage::Lost | Stage::Out) {
             return;
         }
-        lane.brake(now);
         (lane.stage, lane.not_before) = (Stage::Lost, now + PROBES);
         self.tell(StreamEvent::Lost { lane: number(index), axis: 0 });
     }

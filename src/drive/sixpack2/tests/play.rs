@@ -226,6 +226,17 @@ impl Play {
             }
         }
     }
+
+    /// That besides no motor was made to jump by more than a seat's acceleration makes in a slice, and the whole units of speed add.
+    pub(super) fn assert_gentle(&mut self) {
+        self.assert_inside();
+        for unit in self.bus().units() {
+            for (index, motor) in unit.motors[..3].iter().enumerate() {
+                let jump = motor.shaft.executed().jump / MM;
+                assert!(jump <= 32.0, "{index}: {jump} mm/s at once");
+            }
+        }
+    }
 }
 
 /// Swings of up to some 190 mm/s and 1,900 mm/s² that begin gently, in mm.

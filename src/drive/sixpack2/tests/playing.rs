@@ -17,7 +17,7 @@ fn a_ride_is_executed_within_a_fifth_of_a_millimetre_by_axes_that_do_not_wait_fo
             "{figures:?}"
         );
         assert!(play.rare().is_empty(), "{:?}", play.rare());
-        play.assert_inside();
+        play.assert_gentle();
     }
 }
 
@@ -81,7 +81,7 @@ fn poses_that_end_in_motion_or_stay_away_brake_it_within_the_limits() {
     };
     assert!(play.told.iter().any(|(_, event)| braked(event)), "{:?}", play.rare());
     assert!(play.stream.is_ready(0));
-    play.assert_inside();
+    play.assert_gentle();
 }
 
 #[test]
@@ -118,5 +118,5 @@ fn two_units_on_two_wires_ride_together() {
         play.bus().units().iter().map(|unit| (unit.books.collisions, unit.books.unknown)).collect();
     assert_eq!(books, [(0, 0), (0, 0)]);
     assert!(play.rare().is_empty(), "{:?}", play.rare());
-    play.assert_inside();
+    play.assert_gentle();
 }

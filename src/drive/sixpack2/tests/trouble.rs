@@ -3,7 +3,6 @@
 use super::bench::*;
 use super::play::*;
 use crate::drive::link::LinkFault;
-use crate::drive::sixpack2::*;
 use crate::sim::serial::LineFaults;
 use crate::sim::sixpack2::SixpackFault;
 
@@ -21,14 +20,14 @@ fn a_stop_is_in_the_very_next_slice_and_ends_at_rest_within_the_limits() {
     let sent = play.stream.talk().port().sent.len();
     play.stream.stop(None).unwrap();
     let speed = play.speed();
-    play.wait(0.05);
+    play.wait(0.03);
     let next = play.stream.talk().port().sent[sent].1.clone();
     assert_eq!((next.len(), next[1]), (27, 0x24));
     play.wait(0.1);
     assert!(speed > 20.0 && play.speed() < speed, "{speed} {}", play.speed());
     play.wait(1.0);
     assert!(play.speed() == 0.0 && play.stream.is_ready(0) && play.has("Stopped"), "{:?}", play.rare());
-    play.assert_inside();
+    play.assert_gentle();
 }
 
 #[test]
@@ -44,16 +43,16 @@ fn unplugged_in_mid_course_it_is_at_rest_inside_its_stroke_and_comes_back_where_
     play.wait(1.5);
     assert!(play.has("Back") && play.stream.is_ready(0), "{:?}", play.rare());
     assert_eq!(play.places(), rest);
-    play.assert_inside();
+    play.assert_gentle();
 }
 
 #[test]
-fn where_only_its_answers_are_lost_a_seat_is_braked_all_the_same() {
+fn where_only_its_answers_are_lost_a_seat_comes_to_rest_all_the_same() {
     let mut play = riding(10.0);
     play.line().faults.answer_lost = 1.0;
     play.play(2.0, 0);
     assert!(play.has("Lost") && play.speed() == 0.0, "{:?}", play.rare());
-    play.assert_inside();
+    play.assert_gentle();
 }
 
 #[test]
@@ -99,7 +98,7 @@ fn a_motor_that_searches_by_a_damaged_question_is_ended_and_out() {
         });
     play.line().send_break(now);
     play.line().send(&search.frame(1).octets(), now);
-    play.play(1.0, 0);
+    play.play(0.2, 0);
     let action = play.bus().units()[0].motors[1].action();
     assert!(play.has("OffCourse { lane: 0, axis: 1") && action == 0, "{action} {:?}", play.rare());
 }
