@@ -70,15 +70,14 @@ fn it_ends_at_rest_where_the_poses_ended_and_begins_again_from_there() {
 }
 
 #[test]
-fn poses_that_end_in_motion_or_stay_away_brake_it_within_the_limits() {
+fn poses_that_end_in_motion_brake_it_within_the_limits() {
     let mut play = Play::over(&[wired(1, false)], BAUD);
     play.begin(ride);
     play.play(8.0, 0);
     play.judged = false;
     play.wait(1.5);
-    let braked = |event: &StreamEvent| {
-        matches!(event, StreamEvent::Braked { why: BrakeReason::PosesEnded | BrakeReason::Behind, .. })
-    };
+    let braked =
+        |event: &StreamEvent| matches!(event, StreamEvent::Braked { why: BrakeReason::PosesEnded, .. });
     assert!(play.told.iter().any(|(_, event)| braked(event)), "{:?}", play.rare());
     assert!(play.stream.is_ready(0));
     play.assert_gentle();
