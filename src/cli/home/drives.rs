@@ -16,7 +16,7 @@ use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
 use crate::config::link::LinkWiring;
 use crate::config::{Controller, Drives, Link};
-use crate::drive::link::{LinkLine, Step};
+use crate::drive::link::{LinkLine, Step, TalkTerms};
 use crate::drive::{silvermax, sixpack2};
 
 /// How the homing of a seat went: how long it took, or why it is not home.
@@ -174,7 +174,7 @@ enum LinkTalk {
 
 impl LinkTalk {
     fn over(line: LinkLine, link: &Link, period: Duration) -> Self {
-        let terms = line.terms(link);
+        let terms = TalkTerms::of(link);
         match link.family {
             Some(DriveFamily::Sixpack2) => Self::Sixpack2(sixpack2::Talk::new(line, terms), period),
             _ => Self::SilverMax(silvermax::Talk::new(line, terms)),

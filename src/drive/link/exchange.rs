@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::config::Link;
+use crate::config::link::LinkWiring;
 use crate::time::MonoTime;
 
 /// What a line is.
@@ -15,6 +17,14 @@ pub(crate) struct TalkTerms {
     pub(crate) has_echo: bool,
     /// All share two wires: only one may speak at a time.
     pub(crate) is_two_wires: bool,
+}
+
+impl TalkTerms {
+    /// Those of a link.
+    pub(crate) fn of(link: &Link) -> Self {
+        let (octet_bits, is_two_wires) = (9 + u32::from(link.stop_bits), link.wiring == LinkWiring::Rs485);
+        Self { baud: link.baud, octet_bits, has_echo: link.has_echo, is_two_wires }
+    }
 }
 
 /// What came over a line, counted.

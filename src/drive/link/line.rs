@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::{LinkFault, LinkPort, TalkTerms};
+use super::{LinkFault, LinkPort};
 use crate::config::Link;
 use crate::config::link::LinkWiring;
 use crate::sys::clock::Monotonic;
@@ -32,17 +32,6 @@ impl LinkLine {
         let settings = SerialSettings { baud: link.baud, stop_bits, is_rs485 };
         let port = SerialPort::open(&link.port, settings)?;
         Ok(Self { port, path: link.port.clone(), settings })
-    }
-
-    /// What is to be known of it to tell how long an exchange takes.
-    pub(crate) fn terms(&self, link: &Link) -> TalkTerms {
-        let octet_bits = 9 + u32::from(link.stop_bits);
-        TalkTerms {
-            baud: self.port.baud(),
-            octet_bits,
-            has_echo: link.has_echo,
-            is_two_wires: link.wiring == LinkWiring::Rs485,
-        }
     }
 }
 

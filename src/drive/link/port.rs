@@ -41,6 +41,36 @@ pub(crate) trait LinkPort {
     fn sleep_until(&mut self, at: MonoTime);
 }
 
+impl<P: LinkPort + ?Sized> LinkPort for Box<P> {
+    fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
+        (**self).send_break(span)
+    }
+
+    fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
+        (**self).set_baud(baud)
+    }
+
+    fn now(&self) -> MonoTime {
+        (**self).now()
+    }
+
+    fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
+        (**self).send(octets)
+    }
+
+    fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault> {
+        (**self).receive(buf, deadline)
+    }
+
+    fn flush(&mut self) -> usize {
+        (**self).flush()
+    }
+
+    fn sleep_until(&mut self, at: MonoTime) {
+        (**self).sleep_until(at);
+    }
+}
+
 /// The port is gone: neither what was sent nor what is answered goes over it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the port has vanished; look at the plug and the power of the adapter")]

@@ -4,46 +4,40 @@
 use std::time::Duration;
 
 use super::TalkCounts;
-use crate::motion::{MAX_AXES, Pose};
+use crate::motion::Pose;
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 use crate::wire::silvermax::NakReason;
 
-/// A pose of a lane, as it comes tick by tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LinkPose {
-    /// The lane, from 0.
-    pub(crate) lane: u16,
-    /// The frame that it is.
-    pub(crate) frame: FrameNo,
-    /// When the seat is to be there: the lead of its family after the tick.
-    pub(crate) at: MonoTime,
-    /// Until the next, ms.
-    pub(crate) lasts_ms: u32,
-    /// In strokes.
-    pub(crate) axes: Pose,
-    /// Hz, and amplitude in strokes.
-    pub(crate) vibration: [(f64, f64); MAX_AXES],
-}
-
-/// How a link plays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct StreamTerms {
-    /// From one segment of an axis to the next.
-    pub(crate) period: Duration,
-    /// From one pose to the next.
-    pub(crate) tick: Duration,
-}
-
 /// What happened to a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StreamEvent {
-    /// All axes have taken the segments up to that frame.
+    /// All axes have taken the segments of these frames, or stand where they lead.
     Confirmed {
         /// The lane.
         lane: u16,
-        /// The last frame that is covered.
-        frame: FrameNo,
+        /// The first that was not told before.
+        first: FrameNo,
+        /// The last that is covered.
+        last: FrameNo,
+    },
+    /// An axis of a seat that is home was read.
+    Read {
+        /// The lane.
+        lane: u16,
+        /// The axis, from 0.
+        axis: u8,
+        /// Where it is, in strokes.
+        position: f64,
+        /// When.
+        at: MonoTime,
+    },
+    /// All units were asked whether they are home, and have been since.
+    Homed {
+        /// The lane.
+        lane: u16,
+        /// They are.
+        homed: bool,
     },
     /// What leads it up to that frame was sent to drives that confirm nothing.
     Sent {
@@ -128,6 +122,27 @@ pub(crate) enum StreamEvent {
         /// The axis, from 0.
         axis: u8,
     },
+}
+
+impl StreamEvent {
+    /// The lane that it is about.
+    pub(crate) const fn lane(&self) -> u16 {
+        match *self {
+            Self::Confirmed { lane, .. }
+            | Self::Read { lane, .. }
+            | Self::Homed { lane, .. }
+            | Self::Rests { lane, .. }
+            | Self::Moves { lane, .. }
+            | Self::Braked { lane, .. }
+            | Self::Lost { lane, .. }
+            | Self::Back { lane }
+            | Self::Restarted { lane, .. }
+            | Self::Killed { lane, .. }
+            | Self::Elsewhere { lane, .. }
+            | Self::OffCourse { lane, .. }
+            | Self::Doubt { lane, .. } => lane,
+        }
+    }
 }
 
 /// Why a lane brakes.

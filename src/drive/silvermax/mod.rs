@@ -23,8 +23,6 @@ pub(crate) use set_up::{HomeError, SeatUnits};
 pub(crate) use stream::{LaneUnits, Stream, lead};
 pub(crate) use talk::Talk;
 
-pub(crate) use super::link::streaming::{AxisFigures, BrakeReason, LinkPose, StreamEvent, StreamTerms};
-pub(crate) use super::link::{LinkFault, Step, TalkTerms};
-
-#[expect(unused_imports, reason = "for the thread of a link, and preflight")]
-pub(crate) use {look::UnitFacts, talk::TalkFault};
+#[expect(unused_imports, reason = "for preflight")]
+pub(crate) use look::UnitFacts;
+pub(crate) use talk::TalkFault;

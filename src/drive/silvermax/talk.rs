@@ -87,7 +87,7 @@ impl<P: LinkPort> Talk<P> {
     }
 
     /// The port.
-    pub(crate) fn port(&mut self) -> &mut P {
+    pub(crate) const fn port(&mut self) -> &mut P {
         &mut self.port
     }
 

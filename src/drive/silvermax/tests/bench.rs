@@ -8,6 +8,8 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::super::*;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive::{SeatDrive, SilverMaxDrive, Torque};
+use crate::cue::Vibration;
+use crate::drive::link::*;
 use crate::motion::{AxisGeometry, MAX_AXES, SeatType};
 use crate::sim::serial::{LineFaults, SerialLine};
 use crate::sim::silvermax::{SilverBus, Unit, UnitSetup};
@@ -90,7 +92,7 @@ pub(super) fn unit(talk: &mut Talk<VirtualPort>, index: usize) -> &Unit {
 /// A seat that is home, and a play to it.
 pub(super) struct Play {
     pub(super) stream: Stream<VirtualPort>,
-    poses: Producer<LinkPose>,
+    poses: Producer<LedPose>,
     pub(super) events: Consumer<StreamEvent>,
     pub(super) terms: StreamTerms,
     /// Ticks so far, and when the first was.
@@ -127,7 +129,7 @@ impl Play {
         let terms = StreamTerms { period: PERIOD, tick: TICK };
         let (seat, silvermax) = (seat(), drive.silvermax.clone().unwrap());
         let seat = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16, 17, 18] };
-        let lanes = [LaneUnits { seat, canary: CANARY }];
+        let lanes = [LaneUnits { seat, canary: Some(CANARY) }];
         let stream = Stream::new(talk, terms, &lanes, from_tick, to_health).unwrap();
         let mut play = Self {
             stream,
@@ -197,15 +199,9 @@ impl Play {
             for (index, place) in axes.iter_mut().take(3).enumerate() {
                 *place = (self.course)(stream, index) / 150.0;
             }
-            let pose = LinkPose {
-                lane: 0,
-                frame: FrameNo(self.ticks),
-                at: due + lead(self.terms),
-                lasts_ms: 10,
-                axes,
-                vibration: [(0.0, 0.0); MAX_AXES],
-            };
-            let _ = self.poses.push(pose);
+            let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
+            let pose = LinkPose { frame: FrameNo(self.ticks), lasts_ms: 10, axes, vibration };
+            let _ = self.poses.push(LedPose { lane: 0, at: due + lead(self.terms), pose });
             self.ticks += 1;
         }
     }
