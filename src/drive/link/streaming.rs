@@ -39,6 +39,13 @@ pub(crate) enum StreamEvent {
         /// They are.
         homed: bool,
     },
+    /// What leads it up to that frame was sent to drives that confirm nothing.
+    Sent {
+        /// The lane.
+        lane: u16,
+        /// The last frame that is covered.
+        frame: FrameNo,
+    },
     /// It is at rest, or will be then.
     Rests {
         /// The lane.

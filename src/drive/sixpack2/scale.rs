@@ -41,6 +41,28 @@ impl MotorScale {
         (mm * self.per_mm).abs().ceil() as u32
     }
 
+    /// The counter at a fraction of the stroke.
+    pub(crate) fn at(&self, fraction: f64) -> f64 {
+        BASE + self.way_of(fraction)
+    }
+
+    /// Microsteps of a part of the stroke.
+    pub(crate) fn way_of(&self, fraction: f64) -> f64 {
+        fraction * self.stroke_mm * self.per_mm
+    }
+
+    /// The fraction of the stroke at the counter.
+    pub(crate) fn fraction(&self, steps: f64) -> f64 {
+        (steps - BASE) / (self.stroke_mm * self.per_mm)
+    }
+
+    /// The ends of the stroke, and so far beyond, by the counter, the lower number first.
+    pub(crate) fn reach(&self, margin_mm: f64) -> (f64, f64) {
+        let down = self.steps(self.low_mm - margin_mm);
+        let up = self.steps(self.low_mm + self.stroke_mm + margin_mm);
+        (down.min(up), down.max(up))
+    }
+
     /// The place of the counter.
     pub(crate) fn mm(&self, steps: f64) -> f64 {
         self.low_mm + self.mm_of(steps - BASE)
@@ -85,6 +107,10 @@ mod tests {
         assert_eq!([plain.whole(10.0), plain.whole(160.0)], [1_000_000, 1_096_000]);
         assert_eq!([reversed.whole(10.0), reversed.whole(160.0)], [1_000_000, 904_000]);
         assert!((reversed.mm(reversed.steps(33.0)) - 33.0).abs() < 1e-9);
+        assert_eq!(reversed.reach(1.0), (903_360.0, 1_000_640.0));
+        assert!(
+            (reversed.at(0.5) - 952_000.0).abs() < 1e-6 && (reversed.fraction(952_000.0) - 0.5).abs() < 1e-12
+        );
         assert_eq!((plain.way(165.0), reversed.way(165.0)), (105_600, 105_600));
     }
 

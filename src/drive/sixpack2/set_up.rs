@@ -77,6 +77,15 @@ pub(crate) enum HomeError {
         /// What is allowed.
         jump: f64,
     },
+    /// A unit that restarts would go on being understood.
+    #[error(
+        "{baud} baud is what a unit that was restarted talks at: it would follow targets without knowing its place; set another \
+         baud for a link that plays, 57600 for one"
+    )]
+    WakingRate {
+        /// The rate of the link.
+        baud: u32,
+    },
     /// It does not stand still.
     #[error(
         "motor {motor} of unit {unit} does not come to rest within {seconds:.0} s; it was told to stop, switch its power off and home it again"

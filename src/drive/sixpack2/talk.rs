@@ -82,10 +82,33 @@ impl<P: LinkPort> Talk<P> {
         self.counts
     }
 
+    /// What 99 of 100 answers take to begin.
+    pub(crate) fn delay_p99(&self) -> Duration {
+        self.delays.p99()
+    }
+
+    /// When the last question was asked and answered.
+    pub(crate) const fn moment(&self) -> Moment {
+        self.moment
+    }
+
+    /// When a frame that is sent now has wholly arrived, and how long one takes.
+    pub(crate) fn arrival(&self) -> (MonoTime, Duration) {
+        let frame = self.octets(NINE);
+        (self.now().max(self.busy) + self.octets(BREAK) + frame, frame)
+    }
+
     /// How long so many octets take.
     pub(crate) fn octets(&self, count: u32) -> Duration {
         let bits = u64::from(count * self.terms.octet_bits);
         Duration::from_nanos(bits * 1_000_000_000 / u64::from(self.terms.baud.max(1)))
+    }
+
+    /// How long a question holds up what is said next.
+    pub(crate) fn question(&self) -> Duration {
+        let delay = self.delays.p99();
+        let hold = if self.terms.is_two_wires { delay.min(LONGEST_HOLD) } else { Duration::ZERO };
+        self.octets(BREAK + 2 * NINE) + delay + hold
     }
 
     /// Does nothing for so long.

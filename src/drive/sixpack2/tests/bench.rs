@@ -87,10 +87,20 @@ pub(super) fn home_as(
     drive: &SeatDrive,
     motors: &[u8],
 ) -> (Result<(), HomeError>, Vec<Step>) {
+    home_on(talk, drive, 1, motors)
+}
+
+/// Homes a seat on motors of a unit; with what was told.
+pub(super) fn home_on(
+    talk: &mut Talk<VirtualPort>,
+    drive: &SeatDrive,
+    unit: u8,
+    motors: &[u8],
+) -> (Result<(), HomeError>, Vec<Step>) {
     let mut steps = Vec::new();
     let seat = SeatType { axes: motors.len(), ..seat() };
     let sixpack2 = drive.sixpack2.clone().unwrap();
-    let of = SeatMotors { seat: &seat, drive, sixpack2: &sixpack2, unit: 1, motors, period: PERIOD };
+    let of = SeatMotors { seat: &seat, drive, sixpack2: &sixpack2, unit, motors, period: PERIOD };
     let mut told = |step| steps.push(step);
     let homed = home(talk, of, Homing { abort: &AtomicBool::new(false), told: &mut told });
     (homed, steps)

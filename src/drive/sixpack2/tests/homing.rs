@@ -126,14 +126,17 @@ fn a_switch_that_is_not_found_ends_the_search_and_is_told_in_words() {
 
 #[test]
 fn a_unit_that_restarts_while_it_homes_is_not_home() {
-    for (after, baud) in [(500, BAUD), (500, 19_231), (3_000, 19_231), (9_300, 19_231), (9_800, 19_231)] {
+    for (after, baud) in
+        [(500, BAUD), (500, 19_231), (3_000, 19_231), (7_000, 19_231), (9_300, 19_231), (9_800, 19_231)]
+    {
         let mut talk = talk_at(&[unit_with(1, shaft())], baud);
         let at = talk.now() + Duration::from_millis(after);
         talk.port().script = Some((at, |line, now| line.bus_mut().suffer(None, SixpackFault::Reset, now)));
-        let homed = home_as(&mut talk, &drive(SWITCH), &[0, 1]).0;
+        let (homed, steps) = home_as(&mut talk, &drive(SWITCH), &[0, 1]);
         assert!(talk.port().script.is_none(), "it was over after {:?}", talk.now());
         assert!(homed.is_err(), "{after} ms: a unit that lost its place is taken for home");
         let restarted = Err(HomeError::Restarted { unit: 1 });
+        assert!(after > 9_000 || !steps.contains(&Step::Parking), "{after} ms: {steps:?}");
         assert!(baud == BAUD || after > 9_000 || homed == restarted, "{after} ms: {homed:?}");
         talk.pause(Duration::from_secs(1));
         assert_eq!(motor(&mut talk, 0).speed(), 0);
