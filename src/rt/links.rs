@@ -69,7 +69,11 @@ impl FrameSink for Outlets {
         let failed = Delivery::Failed(SendFault::of(libc::EAGAIN));
         let Some(LinkLane { link, lane, lead }) = self.led.get(led).copied() else { return failed };
         let record: Option<&[u8; RECORD_LEN]> = datagram.try_into().ok();
-        let pose = record.map(|record| LedPose { lane, at: at + lead, pose: LinkPose::parse(record) });
+        let pose = record.map(|record| {
+            let pose = LinkPose::parse(record);
+            // As any frame, it is reached after its Time.
+            LedPose { lane, at: at + Duration::from_millis(pose.lasts_ms.into()) + lead, pose }
+        });
         let is_taken = pose.is_some_and(|pose| self.poses[link].push(pose).is_ok());
         if is_taken { Delivery::Sent } else { failed }
     }

@@ -9,7 +9,7 @@ mod homing;
 mod line;
 mod peer;
 mod port;
-pub(crate) mod streaming;
+mod streaming;
 mod terms;
 #[cfg(test)]
 mod virtual_port;

@@ -129,6 +129,7 @@ impl StreamEvent {
     pub(crate) const fn lane(&self) -> u16 {
         match *self {
             Self::Confirmed { lane, .. }
+            | Self::Sent { lane, .. }
             | Self::Read { lane, .. }
             | Self::Homed { lane, .. }
             | Self::Rests { lane, .. }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::super::scale::MotorScale;
 use super::super::set_up::MotorAxis;
-use crate::drive::link::streaming::AxisFigures;
+use crate::drive::link::AxisFigures;
 use crate::drive::{LOOP, Lag, Middle, Motor, Shaker, TargetMaker};
 use crate::motion::Limits;
 use crate::time::MonoTime;

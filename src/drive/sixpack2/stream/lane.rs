@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::track::Track;
-use crate::drive::link::streaming::{LinkPose, StreamTerms};
+use crate::drive::link::{LedPose, LinkPose, StreamTerms};
 use crate::motion::{Limits, MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
@@ -87,13 +87,13 @@ impl Lane {
     }
 
     /// Takes the next pose.
-    pub(super) fn push(&mut self, pose: &LinkPose, now: MonoTime) {
-        let mut places = pose.axes;
-        for ((place, axis), (hz, amplitude)) in places.iter_mut().zip(&mut self.axes).zip(pose.vibration) {
-            *place += axis.shaker.after(self.terms.tick, hz, amplitude);
+    pub(super) fn push(&mut self, led: &LedPose, now: MonoTime) {
+        let mut places = led.pose.axes;
+        for ((place, axis), swing) in places.iter_mut().zip(&mut self.axes).zip(led.pose.vibration) {
+            *place += axis.shaker.after(self.terms.tick, swing.hz, swing.amplitude);
         }
-        self.track.push(pose, places);
-        (self.heard, self.lasts_ms) = (now, pose.lasts_ms);
+        self.track.push(led, places);
+        (self.heard, self.lasts_ms) = (now, led.pose.lasts_ms);
     }
 
     /// True if no pose came for so long that none will.

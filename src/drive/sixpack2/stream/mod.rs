@@ -24,10 +24,9 @@ use self::track::Track;
 use super::find::waking_baud;
 use super::set_up::{HomeError, SeatMotors};
 use super::talk::Talk;
-use crate::drive::link::streaming::{
-    AxisFigures, BrakeReason, LinkFigures, LinkPose, StreamEvent, StreamTerms,
+use crate::drive::link::{
+    AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms,
 };
-use crate::drive::link::{LinkFault, LinkPort};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{PiTarget, SixpackFrame, SixpackOrder};
 
@@ -53,7 +52,7 @@ pub(crate) struct Stream<P> {
     talk: Talk<P>,
     terms: StreamTerms,
     lanes: Vec<Lane>,
-    poses: Consumer<LinkPose>,
+    poses: Consumer<LedPose>,
     events: Producer<StreamEvent>,
     figures: LinkFigures,
     next_slice: MonoTime,
@@ -72,7 +71,7 @@ impl<P: LinkPort> Stream<P> {
         talk: Talk<P>,
         terms: StreamTerms,
         lanes: &[SeatMotors<'_>],
-        poses: Consumer<LinkPose>,
+        poses: Consumer<LedPose>,
         events: Producer<StreamEvent>,
     ) -> Result<Self, HomeError> {
         let (baud, waking) = (talk.baud(), waking_baud());
@@ -184,8 +183,8 @@ impl<P: LinkPort> Stream<P> {
     }
 
     /// The first pose of a lane that stands.
-    fn begin(&mut self, index: usize, pose: &LinkPose, now: MonoTime) {
-        if let Some((axis, by_mm)) = self.lanes[index].off(pose, NEAR_MM) {
+    fn begin(&mut self, index: usize, pose: &LedPose, now: MonoTime) {
+        if let Some((axis, by_mm)) = self.lanes[index].off(&pose.pose, NEAR_MM) {
             // Told once while it stands, not at each tick.
             if !std::mem::replace(&mut self.lanes[index].is_elsewhere, true) {
                 self.tell(StreamEvent::Elsewhere { lane: number(index), axis: axis_number(axis), by_mm });

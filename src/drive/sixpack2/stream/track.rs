@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::drive::Middle;
-use crate::drive::link::streaming::LinkPose;
+use crate::drive::link::LedPose;
 use crate::motion::{AxisState, Halt, Limits, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
@@ -56,14 +56,14 @@ impl Track {
 
     /// Takes the next pose, with what vibrates on it. Poses go on in stream time, one tick after the other: where ticks were missed, and
     /// `at` leaps, what was ahead shrinks by that, and the grid is stretched by up to 1 % until it is regained.
-    pub(super) fn push(&mut self, pose: &LinkPose, places: Pose) {
+    pub(super) fn push(&mut self, led: &LedPose, places: Pose) {
         let tick = self.tick.as_secs_f64();
         let stream = f64::from(self.poses) * tick;
-        let wanted = seconds(pose.at, self.origin) - stream;
+        let wanted = seconds(led.at, self.origin) - stream;
         self.shift += (wanted - self.shift).clamp(-STRETCH * tick, STRETCH * tick);
         self.poses += 1;
         let at = self.origin + Duration::from_secs_f64((stream + self.shift).max(0.0));
-        self.knots.push_back(Knot { at, places, frame: Some(pose.frame) });
+        self.knots.push_back(Knot { at, places, frame: Some(led.pose.frame) });
     }
 
     /// What lies behind is forgotten.
@@ -162,20 +162,17 @@ pub(super) fn seconds(later: MonoTime, earlier: MonoTime) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cue::Vibration;
+    use crate::drive::link::LinkPose;
     use crate::motion::MAX_AXES;
 
     const TICK: Duration = Duration::from_millis(10);
     const LIMITS: Limits = Limits { velocity: 1.6, acceleration: 20.0, jerk: 400.0 };
 
-    fn pose(index: u32, origin: MonoTime, missed: u32) -> LinkPose {
-        LinkPose {
-            lane: 0,
-            frame: FrameNo(index),
-            at: origin + TICK * (index + missed),
-            lasts_ms: 10,
-            axes: [0.0; MAX_AXES],
-            vibration: [(0.0, 0.0); MAX_AXES],
-        }
+    fn pose(index: u32, origin: MonoTime, missed: u32) -> LedPose {
+        let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
+        let pose = LinkPose { frame: FrameNo(index), lasts_ms: 10, axes: [0.0; MAX_AXES], vibration };
+        LedPose { lane: 0, at: origin + TICK * (index + missed), pose }
     }
 
     fn track(count: u32, place: impl Fn(f64) -> f64) -> (Track, MonoTime) {

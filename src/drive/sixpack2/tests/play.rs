@@ -5,7 +5,8 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::bench::*;
-use crate::drive::link::streaming::{LinkPose, StreamEvent, StreamTerms};
+use crate::cue::Vibration;
+use crate::drive::link::{LedPose, LinkPose, StreamEvent, StreamTerms};
 use crate::drive::sixpack2::*;
 use crate::motion::MAX_AXES;
 use crate::sim::serial::SerialLine;
@@ -22,7 +23,7 @@ pub(super) fn wired(unit: u8, is_two_wires: bool) -> SixpackSetup {
 /// A play of one seat on the first three motors of each unit, all led alike.
 pub(super) struct Play {
     pub(super) stream: Stream<VirtualPort>,
-    poses: Producer<LinkPose>,
+    poses: Producer<LedPose>,
     events: Consumer<StreamEvent>,
     terms: StreamTerms,
     seats: u16,
@@ -38,7 +39,7 @@ pub(super) struct Play {
     pub(super) judged: bool,
 }
 
-type Opened = (Stream<VirtualPort>, Producer<LinkPose>, Consumer<StreamEvent>, StreamTerms);
+type Opened = (Stream<VirtualPort>, Producer<LedPose>, Consumer<StreamEvent>, StreamTerms);
 
 impl Play {
     /// A stream to a seat on each of so many units.
@@ -145,15 +146,9 @@ impl Play {
                 *place = (self.course)(stream, index) / 150.0;
             }
             for lane in 0..self.seats {
-                let pose = LinkPose {
-                    lane,
-                    frame: FrameNo(self.ticks),
-                    at: due + lead(self.terms),
-                    lasts_ms: 10,
-                    axes,
-                    vibration: [(0.0, 0.0); MAX_AXES],
-                };
-                let _ = self.poses.push(pose);
+                let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
+                let pose = LinkPose { frame: FrameNo(self.ticks), lasts_ms: 10, axes, vibration };
+                let _ = self.poses.push(LedPose { lane, at: due + lead(self.terms), pose });
             }
             self.ticks += 1;
         }

@@ -2,7 +2,7 @@
 
 use super::bench::*;
 use super::play::*;
-use crate::drive::link::streaming::{BrakeReason, StreamEvent};
+use crate::drive::link::{BrakeReason, StreamEvent};
 
 #[test]
 fn a_ride_is_executed_within_a_fifth_of_a_millimetre_by_axes_that_do_not_wait_for_each_other() {
