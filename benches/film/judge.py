@@ -185,6 +185,7 @@ class Between:
 
     def __init__(self, folder, player, lost=0.0):
         self.socket, self.lost, self.ahead_s, self.chance = folder / "between.sock", lost, 0.0, random.Random(5)
+        self.first = None  # when a position was passed on first
         self.socket.unlink(missing_ok=True)
         self.door = socket.socket(socket.AF_UNIX)
         self.door.bind(str(self.socket))
@@ -197,7 +198,10 @@ class Between:
         kept = {ours: b"", theirs: b""}
         while True:
             for one in select.select([ours, theirs], [], [])[0]:
-                got = one.recv(65_536)
+                try:
+                    got = one.recv(65_536)
+                except ConnectionError:
+                    return
                 if not got:
                     return
                 *lines, kept[one] = (kept[one] + got).split(b"\n")
@@ -209,6 +213,7 @@ class Between:
         if is_told and told.get("request_id") and isinstance(told.get("data"), float):
             if self.chance.random() < self.lost:
                 return
+            self.first = self.first or time.monotonic()
             line = json.dumps(told | {"data": told["data"] + self.ahead_s}).encode()
         to.sendall(line + b"\n")
 
@@ -243,7 +248,6 @@ def until(true, seconds=30.0):
 def film(folder, seconds):
     """A film of a small picture and a tone."""
     path = pathlib.Path(folder) / "film.mkv"
-    picture, tone = "testsrc=size=64x48:rate=24", "sine=frequency=440:sample_rate=48000"
-    made = ["-f", "lavfi", "-i", picture, "-f", "lavfi", "-i", tone, "-t", str(seconds), "-c:v", "mpeg4", "-c:a", "pcm_s16le"]
-    subprocess.run(["ffmpeg", "-v", "error", "-y", *made, str(path)], check=True)
+    made = f"av://lavfi:testsrc=size=64x48:rate=24:duration={seconds}[out0];sine=frequency=440:sample_rate=48000:duration={seconds}[out1]"
+    subprocess.run(["mpv", "--no-config", "--no-terminal", made, f"--o={path}", "--ovc=mpeg4", "--oac=pcm_s16le"], check=True)
     return path
