@@ -75,8 +75,9 @@ def follow(args, folder, player=(), lost=0.0):
         holds = show.holds()
     errors = [error for _, error in show.errors(frames, show.began + SETTLED_S, show.began + SETTLED_S + args.seconds)]
     bias, gap = statistics.median(errors), max(b[0] - a[0] for a, b in zip(frames, frames[1:]))
+    told = "; ".join(" ".join(line.split()) for line in show.play.lines if line.startswith(("ticks", "lateness")))
     film = f"film {1e6 * (show.film_rate - 1):+.0f} ppm, its answers within {1e3 * show.film_left:.2f} ms of a line"
-    return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, longest gap between frames {1e3 * gap:.0f} ms; {film}"
+    return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, longest gap between frames {1e3 * gap:.0f} ms; {told}; {film}"
 
 
 def loaded(args, folder):

@@ -237,15 +237,20 @@ fn first_heard_s(
 ) -> Vec<f64> {
     let (_, _, index) = the_film();
     let mut dice = Dice(0x50_1d);
+    let (mut places, mut off) = (0, 0);
     let mut found: Vec<f64> = (0..all)
         .map(|_| {
             let at = (dice.next() * ((FILM_S - seconds) * RATE) as f32) as usize;
             let heard = listen(index, &damage(&mut dice, at..at + seconds * RATE));
-            let (first_s, worst_ms) = judge(&heard, at as f64 / RATE as f64, 1.0);
-            assert!(worst_ms < 10.0, "from {at}: {worst_ms} ms");
-            first_s
+            let begin_s = at as f64 / RATE as f64;
+            let is_off = |place: &&HeardPlace| (place.media_s - begin_s - place.line_s).abs() > 0.002;
+            places += heard.places.len();
+            off += heard.places.iter().filter(is_off).count();
+            judge(&heard, begin_s, 1.0).0
         })
         .collect();
+    println!("{off} of {places} places are off by more than 2 ms");
+    assert!(50 * off <= places, "a tracker leaves out what does not fit");
     found.sort_by(f64::total_cmp);
     found
 }
