@@ -5,7 +5,7 @@ the film is, mpv is asked on a connection of the judge's own. Prints the table o
 
     cargo build --release && benches/film/run.py [--seconds 120] [--only "idle"] [--rate 100]
 
-Loopback only, in a folder of its own. Needs mpv and ffmpeg; for "jack" also jackd. Python 3.10 or later, nothing besides.
+Loopback only, in a folder of its own. Needs mpv; for "jack" also jackd. Python 3.10 or later, nothing besides.
 """
 
 import argparse
@@ -33,18 +33,19 @@ def spread(values):
 class Show:
     """One play of one film."""
 
-    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0):
+    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0, until="playing: "):
         self.ramp = Ramp(seconds)
         self.seat = Seat(args.program, folder)
         self.player = Player(folder, args.film, player)
         self.between = Between(folder, self.player, lost) if lost or between else None
+        self.until = until
         socket = (self.between or self.player).socket
         cue = self.ramp.write(folder / "ramp.csv")
         self.play = Play(args.program, cue, self.seat.to, f"mpv:{socket}", args.rate)
 
     def __enter__(self):
         try:
-            self.play.says("playing: ")
+            self.play.says(self.until)
         except BaseException:
             self.__exit__()
             raise
@@ -73,8 +74,10 @@ def follow(args, folder, player=(), lost=0.0):
         frames = show.seat.frames()
         holds = show.holds()
     errors = [error for _, error in show.errors(frames, show.began + SETTLED_S, show.began + SETTLED_S + args.seconds)]
-    bias = statistics.median(errors)
-    return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, film {1e6 * (show.film_rate - 1):+.0f} ppm"
+    bias, gap = statistics.median(errors), max(b[0] - a[0] for a, b in zip(frames, frames[1:]))
+    told = "; ".join(" ".join(line.split()) for line in show.play.lines if line.startswith(("ticks", "lateness")))
+    film = f"film {1e6 * (show.film_rate - 1):+.0f} ppm, its answers within {1e3 * show.film_left:.2f} ms of a line"
+    return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, longest gap between frames {1e3 * gap:.0f} ms; {told}; {film}"
 
 
 def loaded(args, folder):
@@ -103,6 +106,19 @@ def jack(args, folder):
     finally:
         server.terminate()
         server.wait()
+
+
+def lock(args, folder):
+    took = []
+    for _ in range(args.times):
+        with Show(args, folder, ["--pause"], between=True, until="waiting: ") as show:
+            time.sleep(1.0)
+            show.between.first = None
+            show.player.tell("set_property", "pause", False)
+            show.play.says("playing: ")
+            time.sleep(0.3)
+            took.append(1e3 * (show.seat.frames()[0][0] - show.between.first))
+    return f"first position to first frame {spread(took)}, of which 500 ms are waited whether it stays so"
 
 
 def step(args, folder):
@@ -167,6 +183,7 @@ def seek(args, folder):
 
 
 CASES = {
+    "lock": lock,
     "idle": follow,
     "busy": loaded,
     "jack": jack,

@@ -27,6 +27,9 @@ const UNSTABLE_WITHIN: Duration = Duration::from_mins(1);
 /// the last, has seen it.
 const PARTS: i64 = 32;
 const PARTS_LED: u32 = 29;
+/// Nor has anybody missed what is before the first join, if that came as soon as it could: a player that begins is known a second
+/// later, and on a loaded machine two. Of a short film that is more than a tenth.
+const JOINS_WITHIN: ShowTime = ShowTime::from_millis(3_000);
 
 /// Where a show that chases a film stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -235,7 +238,7 @@ impl Chase {
                 } else {
                     self.join(&point, (now, end), input.trim_ms);
                 }
-                self.note_led();
+                self.led |= self.part();
             }
             (ChaseSign::Barred | ChaseSign::Brief | ChaseSign::Ready, _) => {}
         }
@@ -247,12 +250,16 @@ impl Chase {
         self.joined[self.joins as usize % UNSTABLE_JOINS] = now;
         self.joins = self.joins.wrapping_add(1);
         self.let_join = false;
+        let at = self.follower.playhead();
+        if at <= JOINS_WITHIN && at.as_nanos() <= self.rules.cue_end.as_nanos() / 2 {
+            self.led |= self.part().saturating_sub(1);
+        }
     }
 
-    /// Notes the part of the cue that seats follow in. Parts, not time: who is led through one half twice has not seen the other.
-    fn note_led(&mut self) {
+    /// The part of the cue that seats follow in, as its bit. Parts, not time: who is led through one half twice has not seen the other.
+    fn part(&self) -> u32 {
         let at = self.follower.playhead().as_nanos().checked_div(self.rules.cue_end.as_nanos() / PARTS);
-        self.led |= at.and_then(|part| 1_u32.checked_shl(part.try_into().ok()?)).unwrap_or_default();
+        at.and_then(|part| 1_u32.checked_shl(part.try_into().ok()?)).unwrap_or_default()
     }
 
     const fn verdict(&self) -> ChaseVerdict {

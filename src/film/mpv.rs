@@ -12,10 +12,15 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::observation::{FilmWord, Observation};
+use super::timecode::FrameRate;
 use crate::time::{MonoTime, ShowTime};
 
 /// From one question to the next: more of them make the estimate no better.
 const ASK_EVERY: Duration = Duration::from_millis(50);
+/// The same while little is known: for so long after it began to run, or was wound.
+const ASK_SOON: Duration = Duration::from_millis(10);
+/// Measured: after a seek the sound has no clock for up to 0.3 s, while the picture runs as much as a frame beside it.
+const SETTLES: Duration = Duration::from_millis(500);
 /// An answer that takes longer says nothing; the next question goes out.
 const MUTE_AFTER: Duration = Duration::from_millis(250);
 /// The longest line that is read. mpv's are shorter than a kilobyte, but for lists that nobody asked for.
@@ -40,6 +45,17 @@ struct MpvMessage<'a> {
     data: Option<Value>,
 }
 
+/// What is known of the sound of the film that is open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MpvSound {
+    /// It is the clock.
+    Heard,
+    /// Whether there is any is not known: it was just opened or wound, or stands where it was wound to.
+    Away,
+    /// There is none.
+    Absent,
+}
+
 /// A question that is under way.
 #[derive(Debug, Clone, Copy)]
 struct MpvQuestion {
@@ -56,7 +72,9 @@ pub(crate) struct MpvClient {
     question: Option<MpvQuestion>,
     questions: u64,
     next_at: MonoTime,
-    has_sound: bool,
+    sound: MpvSound,
+    /// When it began to run last, or was wound.
+    began: MonoTime,
     paused: bool,
     idle: bool,
     winding: bool,
@@ -77,7 +95,8 @@ impl MpvClient {
             question: None,
             questions: 0,
             next_at: now,
-            has_sound: true,
+            sound: MpvSound::Away,
+            began: now,
             paused: false,
             idle: false,
             winding: false,
@@ -102,6 +121,12 @@ impl MpvClient {
         self.path.as_deref()
     }
 
+    /// The film's frames a second, where they are of a rate that films have.
+    pub(crate) fn rate(&self) -> Option<FrameRate> {
+        let is_it = |rate: &FrameRate| (rate.frames_per_second() * self.frame_s - 1.0).abs() < 1e-4;
+        FrameRate::ALL.into_iter().find(is_it)
+    }
+
     /// How far picture and sound are apart by its own account, seconds.
     pub(crate) const fn avsync_s(&self) -> Option<f64> {
         self.avsync_s
@@ -114,29 +139,36 @@ impl MpvClient {
 
     /// When [`Self::poll`] has something to ask next.
     #[cfg(test)]
-    pub(crate) const fn next_at(&self) -> MonoTime {
-        self.next_at
+    pub(crate) fn next_at(&self) -> MonoTime {
+        self.due()
+    }
+
+    fn due(&self) -> MonoTime {
+        self.question.map_or(self.next_at, |question| question.sent + MUTE_AFTER)
     }
 
     /// The question that is due, as a line to be sent now.
     pub(crate) fn poll(&mut self, now: MonoTime) -> Option<String> {
-        if now < self.next_at {
+        if now < self.due() {
             return None;
-        }
-        if let Some(question) = self.question {
-            let mute_at = question.sent + MUTE_AFTER;
-            if now < mute_at {
-                self.next_at = mute_at;
-                return None;
-            }
         }
         self.questions += 1;
         self.question = Some(MpvQuestion { id: self.questions, sent: now });
-        self.next_at = now + ASK_EVERY;
+        self.next_at = now + if self.settles(now) { ASK_SOON } else { ASK_EVERY };
         Some(
             json!({ "command": ["get_property", "audio-pts"], "request_id": self.questions }).to_string()
                 + "\n",
         )
+    }
+
+    /// True shortly after it began to run, or was wound.
+    fn settles(&self, now: MonoTime) -> bool {
+        now.since(self.began) < SETTLES
+    }
+
+    /// It runs from here on; what was asked before is answered by where it was.
+    fn begin(&mut self, at: MonoTime) {
+        (self.began, self.next_at, self.question) = (at, at, None);
     }
 
     /// Takes bytes that came at an instant.
@@ -181,12 +213,17 @@ impl MpvClient {
             return;
         };
         self.question = None;
-        self.next_at = self.next_at.max(question.sent + ASK_EVERY);
         let trip = at.since(question.sent);
         let position = message.data.as_ref().and_then(Value::as_f64);
-        self.has_sound = message.error.as_deref() == Some("success") && position.is_some();
+        self.sound = match (message.error.as_deref(), position, self.sound) {
+            (Some("success"), Some(_), _) => MpvSound::Heard,
+            (.., MpvSound::Absent) => MpvSound::Absent,
+            _ if self.paused || self.winding || self.settles(at) => MpvSound::Away,
+            _ => MpvSound::Absent,
+        };
+        let is_heard = self.sound == MpvSound::Heard;
         // Neither way is known to be the slower one: half way, and off by half the trip at the most.
-        let Some(position) = position.filter(|_| self.has_sound && trip <= MUTE_AFTER) else { return };
+        let Some(position) = position.filter(|_| is_heard && trip <= MUTE_AFTER) else { return };
         let word = FilmWord::Position(ShowTime::from_secs_f64(position));
         out(Observation { at: question.sent + trip / 2, bound: trip / 2, word });
     }
@@ -214,7 +251,12 @@ impl MpvClient {
                     number.filter(|fps| (1.0..=1_000.0).contains(fps)).map_or(FRAME_S, |fps| 1.0 / fps);
             }
             Some("time-pos") => {
-                let shown = number.filter(|_| !self.has_sound);
+                let is_clock = match self.sound {
+                    MpvSound::Heard => false,
+                    MpvSound::Away => self.paused,
+                    MpvSound::Absent => true,
+                };
+                let shown = number.filter(|_| is_clock);
                 let word =
                     shown.map(|queued| FilmWord::Position(ShowTime::from_secs_f64(queued - self.frame_s)));
                 word.into_iter().for_each(|word| out(Observation::new(at, word)));
@@ -229,6 +271,9 @@ impl MpvClient {
         let runs = !self.paused && (!self.idle || self.winding);
         if self.runs != Some(runs) {
             self.runs = Some(runs);
+            if runs {
+                self.begin(at);
+            }
             out(Observation::new(at, if runs { FilmWord::Play } else { FilmWord::Stop }));
         }
     }
@@ -244,10 +289,14 @@ impl MpvClient {
         match event {
             "seek" | "start-file" => {
                 self.winding = true;
+                if event == "start-file" {
+                    self.sound = MpvSound::Away;
+                }
                 say(FilmWord::Seek);
             }
             "playback-restart" => {
                 self.winding = false;
+                self.begin(at);
                 say(FilmWord::Landed);
                 // After the end of a film it was said to stand, and nothing has said that it does not any more.
                 if self.runs == Some(false) && !self.paused {

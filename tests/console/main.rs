@@ -259,6 +259,13 @@ fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_pr
     let reel = film("01:00:02:00");
     browser.reads("follow-word", "locked");
     browser.reads("follow-badge", "film locked");
+    browser.press("[data-nudge='1']");
+    browser.reads("levels-reply", "trim a frame later: done");
+    browser.reads("trim", "+40 ms"); // of 25 a second
+    browser.press("[data-trim='-10']");
+    browser.reads("trim", "+30 ms");
+    browser.press("[data-trim='0']");
+    browser.reads("levels-reply", "trim 0 ms: done");
     arm(&browser);
     browser.wait("/^01:00:\\d\\d:\\d\\d$/.test(document.getElementById('timecode').textContent)");
     go(&browser);

@@ -48,7 +48,7 @@ use left::LeftRead;
 use relay::Listeners;
 use riff::RiffFault;
 use table::Ranking;
-use told::{Notes, WordSink};
+use told::{Notes, SourceNotes, WordSink};
 
 /// Observations that wait at the most: seconds of a source that tells a hundred a second.
 const WAITING: usize = 512;
@@ -195,7 +195,7 @@ impl FilmReader {
             return Err(FilmError::Many(sources.len()));
         }
         let (to, heard) = sync_channel(WAITING);
-        let notes: Vec<Notes> = sources.iter().map(|_| Notes::default()).collect();
+        let notes: Vec<Notes> = sources.iter().map(SourceNotes::shared).collect();
         let ranking = Ranking::new(sources, &notes, rules);
         let (point, table) = (Arc::clone(&ranking.point), ranking.table.clone());
         let mut reader = Self { point, table, children: Vec::new(), over: Arc::default() };

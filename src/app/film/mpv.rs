@@ -81,6 +81,7 @@ impl MpvPlayer {
             if notes.film.as_deref() != client.path() {
                 notes.film = client.path().map(str::to_owned);
             }
+            notes.fps = self.args.rate.or_else(|| client.rate()).map(|rate| rate.to_string());
             notes.avsync_ms = client.avsync_s().map(|seconds| seconds * 1e3);
             notes.garbage = client.garbage();
             let other = client.path().filter(|open| !self.args.counts(Some(open)));

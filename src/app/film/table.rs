@@ -13,6 +13,7 @@ use crate::film::chooser::{Chooser, SourceView};
 use crate::film::observation::Observation;
 use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::film::source::FilmArgs;
+use crate::film::timecode::FrameRate;
 use crate::film::tracker::{SourceGrade, SourceTracker};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime, ShowTime};
@@ -235,6 +236,16 @@ impl FilmTable {
     pub(crate) fn locked_at(&self) -> Option<ShowTime> {
         let row = self.leads.and_then(|place| self.sources.get(place));
         row.filter(|row| row.state == FilmState::Locked && row.may_lead)?.media_s.map(ShowTime::from_secs_f64)
+    }
+
+    /// How long so many frames of the film last, as the source that leads has it, else the first; of 24 a second where none knows.
+    pub(crate) fn frames_ms(&self, frames: i32) -> i32 {
+        let rate =
+            self.sources.get(self.leads.unwrap_or(0)).and_then(|row| row.notes.fps.as_ref()?.parse().ok());
+        let ms = f64::from(frames) * 1e3 / rate.unwrap_or(FrameRate::F24).frames_per_second();
+        #[expect(clippy::cast_possible_truncation, reason = "a dozen frames are half a second")]
+        let ms = ms.round() as i32;
+        ms
     }
 
     /// What a person should know beside where the film is: sentences that stay as they are for as long as they are true.

@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::app::player::FilmGate;
 use crate::film::labels::LabelClock;
 use crate::film::observation::{FilmWord, Observation};
+use crate::film::source::FilmArgs;
 use crate::film::timecode::Timecode;
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
@@ -49,6 +50,12 @@ pub(crate) struct SourceNotes {
 }
 
 impl SourceNotes {
+    /// Those of a source of which nothing was heard.
+    pub(super) fn shared(args: &FilmArgs) -> Notes {
+        let fps = args.rate.map(|rate| rate.to_string());
+        Arc::new(Mutex::new(Self { fps, ..Self::default() }))
+    }
+
     pub(super) fn label(&mut self, labels: &LabelClock) {
         self.refused = labels.refused().map(ToString::to_string);
         self.fps = labels.rate().map(|rate| rate.to_string());

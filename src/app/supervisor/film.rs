@@ -2,10 +2,9 @@
 
 use super::act::Act;
 use super::hall::HallContext;
-use crate::app::film::{FilmTable, SourceRow};
+use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::control::{Code, FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
 use crate::film::point::FilmState;
-use crate::film::timecode::FrameRate;
 
 /// The film by the source that leads, or by the first while none does.
 pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
@@ -46,20 +45,9 @@ pub(super) fn choose(name: Option<&str>, hall: &HallContext) -> Result<Vec<Act>,
     Err(Problem::new(Code::Unknown, detail, format!("choose one of {}, or none", names.join(", "))))
 }
 
-/// A film of which nobody knows how many frames a second it has.
-const USUAL: FrameRate = FrameRate::F24;
-
-/// How long so many frames of the film last, as it is configured, else as the leading source says it, ms.
+/// How long so many frames of the film last, ms.
 pub(super) fn frames_ms(frames: i32, hall: &HallContext) -> i32 {
-    let configured = hall.config.sync.as_ref().and_then(|sync| sync.sources.first()?.rate);
-    let rate = configured.or_else(|| {
-        let table = hall.film.as_ref()?.read();
-        table.leads.and_then(|place| table.sources.get(place))?.notes.fps.as_ref()?.parse().ok()
-    });
-    let ms = f64::from(frames) * 1e3 / rate.unwrap_or(USUAL).frames_per_second();
-    #[expect(clippy::cast_possible_truncation, reason = "a dozen frames are half a second")]
-    let ms = ms.round() as i32;
-    ms
+    hall.film.as_ref().map(SharedTable::read).unwrap_or_default().frames_ms(frames)
 }
 
 fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {

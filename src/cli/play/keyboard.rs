@@ -12,6 +12,7 @@ use rtrb::Producer;
 
 use super::keys::{Action, Decoder, HELP};
 use crate::app::Control;
+use crate::app::film::SharedTable;
 use crate::engine::Mix;
 use crate::rt::Command;
 use crate::state::{State, Transition};
@@ -29,6 +30,8 @@ pub(super) struct Leader {
     control: Control,
     /// Length of the cue.
     length: ShowTime,
+    /// What is heard of the film.
+    film: SharedTable,
     /// What was set for the lanes when the play began.
     begun: Vec<Mix>,
     /// The greatest level of a lane, percent.
@@ -40,11 +43,11 @@ pub(super) struct Leader {
 }
 
 impl Leader {
-    /// One of a play that has not begun, with its cue's length.
-    pub(super) fn new(control: Control, length: ShowTime) -> Self {
+    /// One of a play that has not begun, with its cue's length and what is heard of its film.
+    pub(super) fn new(control: Control, length: ShowTime, film: SharedTable) -> Self {
         let begun: Vec<Mix> = (0..control.desk.lanes()).map(|lane| control.desk.mix(lane)).collect();
         let percent = percent(&begun);
-        Self { control, length, begun, percent, commands: None, jumped: None }
+        Self { control, length, film, begun, percent, commands: None, jumped: None }
     }
 
     /// Does it; returns what there is to say at once.
@@ -60,6 +63,7 @@ impl Leader {
             Action::Stop => self.stop(),
             Action::Level(step) => self.level(step),
             Action::Trim(step) => self.trim(step),
+            Action::Nudge(frames) => self.trim(self.film.read().frames_ms(frames)),
             Action::Leave => {
                 self.control.leave.store(true, Ordering::Relaxed);
                 None
@@ -165,6 +169,8 @@ pub(super) fn start(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::film::{FilmTable, SourceRow};
+    use crate::film::point::FilmState;
     use crate::rt::Desk;
     use crate::state::PlayMode;
     use rtrb::{Consumer, RingBuffer};
@@ -178,9 +184,16 @@ mod tests {
         let show = ShowTime::from_millis(30_000);
         control.live.on_show(show);
         let (commands, asked) = RingBuffer::new(4);
-        let mut leader = Leader::new(control, ShowTime::from_millis(60_000));
+        let mut leader = Leader::new(control, ShowTime::from_millis(60_000), film());
         leader.commands = Some(commands);
         (leader, asked)
+    }
+
+    /// A film of 25 frames a second.
+    fn film() -> SharedTable {
+        let mut row = SourceRow::named("mpv", FilmState::Locked);
+        row.notes.fps = Some("25".to_owned());
+        SharedTable::of(FilmTable { sources: vec![row], ..FilmTable::default() })
     }
 
     fn at(ms: u64) -> MonoTime {
@@ -246,6 +259,11 @@ mod tests {
         assert_eq!(leader.control.desk.trim_ms(), -10);
         (0..60).for_each(|_| assert_eq!(leader.act(Action::Trim(10), at(0)), None));
         assert_eq!(leader.control.desk.trim_ms(), TRIM_MS);
+        leader.act(Action::Nudge(-2), at(0));
+        assert_eq!(leader.control.desk.trim_ms(), TRIM_MS - 80, "two frames of 25 a second");
+        leader.film = SharedTable::default();
+        leader.act(Action::Nudge(-1), at(0));
+        assert_eq!(leader.control.desk.trim_ms(), TRIM_MS - 122, "one more of 24");
     }
 
     #[test]

@@ -17,6 +17,8 @@ pub(super) enum Action {
     Level(i32),
     /// Motion later by so many milliseconds, or earlier.
     Trim(i32),
+    /// The same by frames of the film.
+    Nudge(i32),
     /// Park as far as the hall may move, and leave.
     Leave,
     /// Say what the keys do.
@@ -25,7 +27,7 @@ pub(super) enum Action {
 
 /// All keys in one line.
 pub(super) const IN_SHORT: &str =
-    "space pause  ←→ 5s  s stop  c clear  p park  +- level  ,. trim  q leave  ? help";
+    "space pause  ←→ 5s  s stop  c clear  p park  +- level  ,.<> trim  q end  ? help";
 
 /// What the keys do.
 pub(super) const HELP: &str = "\
@@ -36,6 +38,7 @@ c        clear, after a stop or a fault
 p        park the seats, and end
 + -      motion and vibration of all seats 5 % up or down, never above the level at the start
 , .      motion 10 ms earlier or later than the film
+< >      the same by a frame of the film
 q        park as far as the seats may move, and leave; Ctrl-C does the same, a second one
          half a second later or more ends at once";
 
@@ -95,6 +98,8 @@ const fn of_letter(byte: u8) -> Option<Action> {
         b'-' | b'_' => Action::Level(-5),
         b'.' => Action::Trim(10),
         b',' => Action::Trim(-10),
+        b'>' => Action::Nudge(1),
+        b'<' => Action::Nudge(-1),
         b'q' => Action::Leave,
         b'?' | b'h' => Action::Help,
         _ => return None,
@@ -121,6 +126,8 @@ mod tests {
             ("-", Action::Level(-5)),
             (",", Action::Trim(-10)),
             (".", Action::Trim(10)),
+            ("<", Action::Nudge(-1)),
+            (">", Action::Nudge(1)),
             ("q", Action::Leave),
             ("?", Action::Help),
             ("h", Action::Help),

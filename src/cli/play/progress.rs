@@ -50,7 +50,8 @@ impl Progress {
         let (notes, notes_end) = channel();
         let on_terminal = std::io::stderr().is_terminal();
         let keys = on_terminal.then(Keyboard::take).flatten().and_then(|keyboard| {
-            let leader = Leader::new(said.control.clone(), said.length);
+            let leader =
+                Leader::new(said.control.clone(), said.length, said.film.clone().unwrap_or_default());
             keyboard::start(leader, keyboard, commands_end, notes, Arc::clone(&over)).ok()
         });
         let led = keys.is_some();

@@ -115,10 +115,10 @@ fn seats_that_hold_for_five_minutes_park_and_join_no_more_by_themselves() {
     assert_eq!(stand.run(10.0), ChaseVerdict::Park(ParkCause::HeldTooLong));
 }
 
-/// Seats that follow a film for so many seconds of a cue of 100 s, from one place in it on, and then from another; why they park at
-/// its end.
-fn parked_after(legs: [(f64, f64); 2]) -> ChaseVerdict {
-    let mut stand = Stand::new(ChaseRules::until(ShowTime::from_millis(100_000)));
+/// Seats that follow a film for so many seconds of a cue of so many, from one place in it on, and then from another; why they park
+/// at its end.
+fn parked_after(cue_s: f64, legs: [(f64, f64); 2]) -> ChaseVerdict {
+    let mut stand = Stand::new(ChaseRules::until(ShowTime::from_secs_f64(cue_s)));
     for (from_s, seconds) in legs {
         stand.ahead_s = from_s - stand.now_s();
         stand.run(seconds);
@@ -138,7 +138,23 @@ fn a_film_that_is_over_has_led_its_cue_only_where_seats_followed_it_through_nine
         ([(0.0, 60.0), (0.0, 60.0)], ParkCause::FilmCutShort),
         ([(-9.0, 5.0), (-4.0, 3.0)], ParkCause::FilmCutShort),
     ] {
-        assert_eq!(parked_after(legs), ChaseVerdict::Park(cause), "{legs:?}");
+        assert_eq!(parked_after(100.0, legs), ChaseVerdict::Park(cause), "{legs:?}");
+    }
+}
+
+#[test]
+fn a_short_film_has_led_its_cue_if_seats_joined_within_the_seconds_that_a_join_takes_and_in_its_first_half() {
+    for (cue_s, joins_s, cause) in [
+        (8.0, 2.3, ParkCause::FilmEnded),
+        (8.0, 3.2, ParkCause::FilmCutShort),
+        (20.0, 2.9, ParkCause::FilmEnded),
+        (4.0, 1.9, ParkCause::FilmEnded),
+        (4.0, 2.1, ParkCause::FilmCutShort),
+    ] {
+        // They join half a second after the film is known.
+        let from_s = joins_s - 0.5;
+        let legs = [(from_s, cue_s / 2.0), (from_s + cue_s / 2.0, cue_s / 2.0 - from_s)];
+        assert_eq!(parked_after(cue_s, legs), ChaseVerdict::Park(cause), "{joins_s} of {cue_s}");
     }
 }
 

@@ -50,10 +50,51 @@ fn without_sound_the_picture_counts_less_the_frame_that_it_is_early() {
     assert_eq!(told(&mut client, &at_10_s), [], "the sound is better");
     client.poll(mono(0.9)).expect("it is due");
     assert_eq!(told(&mut client, "{\"request_id\":1,\"error\":\"property unavailable\"}\n"), []);
+    assert_eq!(client.rate(), Some(FrameRate::F24));
     let shown = |ms| [FilmWord::Position(ShowTime::from_millis(ms))];
     told(&mut client, &changed("container-fps", "25"));
     assert_eq!(told(&mut client, &at_10_s), shown(9_960));
     assert_eq!(told(&mut client, &changed("time-pos", "null")), []);
+}
+
+/// What a client that asks makes of the answer, or of none, at an instant.
+fn answered(client: &mut MpvClient, at_s: f64, media_s: Option<f64>) -> Vec<FilmWord> {
+    let line = client.poll(mono(at_s)).expect("it is due");
+    let asked: Value = serde_json::from_str(&line).expect("JSON");
+    let error = if media_s.is_some() { "success" } else { "property unavailable" };
+    let answer = json!({ "request_id": asked["request_id"], "data": media_s, "error": error });
+    let mut words = Vec::new();
+    client.hear(format!("{answer}\n").as_bytes(), mono(at_s), &mut |told| words.push(told.word));
+    words
+}
+
+#[test]
+fn after_a_seek_the_sound_is_waited_for_while_the_picture_runs_beside_it_and_a_film_that_stands_shows_its_picture()
+ {
+    let mut client = client();
+    let at = |media_s| [FilmWord::Position(ShowTime::from_secs_f64(media_s))];
+    assert_eq!(answered(&mut client, 0.9, Some(10.0)), at(10.0));
+    told(&mut client, "{\"event\":\"seek\"}\n");
+    let picture = changed("time-pos", "60.041666667");
+    assert_eq!(told(&mut client, "{\"event\":\"playback-restart\"}\n"), [FilmWord::Landed]);
+    for ms in (0..300_u32).step_by(10) {
+        assert_eq!(answered(&mut client, 1.0 + f64::from(ms) * 1e-3, None), [], "{ms} ms after it landed");
+        assert_eq!(told(&mut client, &picture), [], "{ms} ms after it landed");
+    }
+    assert_eq!(answered(&mut client, 1.3, Some(60.33)), at(60.33));
+    told(&mut client, &changed("pause", "true"));
+    told(&mut client, "{\"event\":\"seek\"}\n");
+    assert_eq!(answered(&mut client, 2.0, None), []);
+    assert_eq!(told(&mut client, &picture).len(), 1);
+}
+
+#[test]
+fn what_was_asked_before_a_seek_is_no_answer_after_it() {
+    let mut client = client();
+    client.poll(mono(0.9)).expect("it is due");
+    told(&mut client, "{\"event\":\"seek\"}\n{\"event\":\"playback-restart\"}\n");
+    assert_eq!(told(&mut client, "{\"data\":83.25,\"request_id\":1,\"error\":\"success\"}\n"), []);
+    assert_eq!(answered(&mut client, 1.0, Some(60.0)).len(), 1, "and it is asked again at once");
 }
 
 #[test]

@@ -3,6 +3,7 @@ use std::sync::{Arc, OnceLock};
 use super::ear::{EarState, HeardPlace, SoundEar};
 use super::index::{IndexMaker, SoundIndex};
 use super::kernel::Resampler;
+use crate::film::follower::tests::tries;
 
 const RATE: usize = 8_000;
 const FILM_S: usize = 40;
@@ -226,6 +227,79 @@ fn sound_of_any_rate_is_made_into_that_of_another_without_a_delay() {
         let worst = out.iter().enumerate().skip(50).map(off).fold(0.0, f32::max);
         assert!(worst < 0.02 && out.len() > 500, "{from} to {to}: {worst}");
     }
+}
+
+/// When a place is heard first where it is, seconds, the soonest first; of `all` tries of `seconds` each from anywhere in the film.
+fn first_heard_s(
+    all: u32,
+    seconds: usize,
+    mut damage: impl FnMut(&mut Dice, std::ops::Range<usize>) -> Vec<f32>,
+) -> Vec<f64> {
+    let (_, _, index) = the_film();
+    let mut dice = Dice(0x50_1d);
+    let (mut places, mut off) = (0, 0);
+    let mut found: Vec<f64> = (0..all)
+        .map(|_| {
+            let at = (dice.next() * ((FILM_S - seconds) * RATE) as f32) as usize;
+            let heard = listen(index, &damage(&mut dice, at..at + seconds * RATE));
+            let begin_s = at as f64 / RATE as f64;
+            let is_off = |place: &&HeardPlace| (place.media_s - begin_s - place.line_s).abs() > 0.002;
+            places += heard.places.len();
+            off += heard.places.iter().filter(is_off).count();
+            judge(&heard, begin_s, 1.0).0
+        })
+        .collect();
+    println!("{off} of {places} places are off by more than 2 ms");
+    assert!(50 * off <= places, "a tracker leaves out what does not fit");
+    found.sort_by(f64::total_cmp);
+    found
+}
+
+/// What another cinema's line does: noise as loud as the film, somebody who talks, and tone controls.
+fn badly_damaged(dice: &mut Dice, plain: &[f32]) -> Vec<f32> {
+    let loud = loudness(plain);
+    let mut line: Vec<f32> = plain.iter().map(|sample| sample + dice.noise() * 1.41 * loud).collect();
+    add_notes(&mut line, dice, 0.08, 0.25);
+    let mut low = 0.0;
+    line.iter_mut().for_each(|sample| {
+        low += 0.3 * (*sample - low);
+        *sample = 1.5 * *sample - 1.1 * low;
+    });
+    line
+}
+
+/// `KINOCUE_FILM_TRIES=80` tries often enough for a figure.
+#[test]
+fn most_places_are_found_within_four_seconds_under_noise_talk_and_tone_controls_at_once_or_another_dialogue()
+{
+    let ([effects, _], whole, _) = the_film();
+    let damaged = first_heard_s(tries(5), 12, |dice, span| badly_damaged(dice, &whole[span]));
+    let dubbed = first_heard_s(tries(5), 12, |dice, span| {
+        let mut line = effects[span].to_vec();
+        add_notes(&mut line, dice, 0.08, 0.25);
+        line
+    });
+    let at = |all: &[f64], percent: usize| all[(all.len() - 1) * percent / 100];
+    for (what, all) in [("damaged", &damaged), ("dubbed", &dubbed)] {
+        println!("{what}: median {:.2} s, p95 {:.2} s, of {}", at(all, 50), at(all, 95), all.len());
+    }
+    assert!(at(&damaged, 50) <= 4.0 && at(&dubbed, 50) <= 4.0);
+}
+
+/// `KINOCUE_FILM_TRIES=1250` tries ten thousand passages.
+#[test]
+fn no_passage_of_another_film_is_ever_taken_for_one_of_this() {
+    let (_, _, index) = the_film();
+    let (mut passages, mut wrong) = (0, 0);
+    for seed in 0..tries(1) {
+        let [effects, speech] = film(1_000 + u64::from(seed));
+        for passage in sum(&effects, &speech).chunks(5 * RATE) {
+            passages += 1;
+            wrong += u32::from(!listen(index, passage).places.is_empty());
+        }
+    }
+    println!("{wrong} of {passages} passages of other films were taken for the film");
+    assert_eq!(wrong, 0);
 }
 
 mod file {

@@ -326,12 +326,17 @@ fn frames_last_as_long_as_those_of_the_film_that_is_configured_or_heard() {
     let ms =
         |hall: &HallContext| [-1, 1, 2].map(|frames| crate::app::supervisor::film::frames_ms(frames, hall));
     assert_eq!(ms(&hall), [-42, 42, 83], "24 a second, where nobody knows");
-    let mut row = SourceRow { may_lead: true, ..SourceRow::named("ltc", FilmState::Locked) };
-    row.notes.fps = Some("30".to_owned());
-    hall.film =
-        Some(SharedTable::of(FilmTable { sources: vec![row], leads: Some(0), ..FilmTable::default() }));
+    let told = |fps: &str| {
+        let mut row = SourceRow::named("ltc", FilmState::Locked);
+        row.notes.fps = Some(fps.to_owned());
+        row
+    };
+    let mut table = FilmTable { sources: ["25", "30"].map(told).to_vec(), ..FilmTable::default() };
+    hall.film = Some(SharedTable::of(table.clone()));
+    assert_eq!(ms(&hall), [-40, 40, 80], "as of the first, while none leads");
+    table.leads = Some(1);
+    hall.film = Some(SharedTable::of(table));
     assert_eq!(ms(&hall), [-33, 33, 67]);
-    assert_eq!(ms(&Reel::new(State::Armed, "one").hall), [-40, 40, 80], "25 are configured");
 }
 
 #[test]

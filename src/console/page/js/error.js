@@ -43,7 +43,7 @@ function greatestOf(all) {
 function showWords(error, greatest) {
   setText(byId('error-now'), error === null ? '–' : figure(error, '+'));
   setText(byId('error-greatest'), greatest === null ? '–' : figure(greatest));
-  setText(byId('error-scale'), greatest === null ? 'The seats have followed no film for a minute.' : `Scale ±${end} ms; above 0 the seats are ahead of the film.`);
+  setText(byId('error-scale'), greatest === null ? 'Of the last minute no error is known.' : `Scale ±${end} ms; above 0 the seats are ahead of the film.`);
   setAttribute(byId('error-curve'), 'aria-label', `Error over the last minute, at the most ${greatest === null ? 'unknown' : figure(greatest)}`);
 }
 

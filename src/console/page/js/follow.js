@@ -5,10 +5,14 @@ import { byId, onChange, setAttribute, setProperty, setText } from './dom.js';
 import { addError, resizeErrors } from './error.js';
 import { filmLook, mark } from './marks.js';
 import { showSources } from './sources.js';
+import { linkState } from './state.js';
 import { clock, sentence, span } from './words.js';
 
-/** Keeps the curve as wide as its place. */
+const AGE_MS = 1000;
+
+/** Keeps the curve as wide as its place, and has it grow old where nothing is heard any more. */
 export function startFollow() {
+  setInterval(() => linkState() !== 'live' && addError(null), AGE_MS);
   new ResizeObserver(resizeErrors).observe(byId('error-curve'));
 }
 

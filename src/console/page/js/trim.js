@@ -1,8 +1,8 @@
 // Trim: how much later than the film the motion is.
 
-import { byId, setText } from './dom.js';
+import { byId, setProperty, setText } from './dom.js';
 import { change } from './api.js';
-import { ask } from './press.js';
+import { ask, onPress } from './press.js';
 import { hall } from './state.js';
 import { signed } from './words.js';
 
@@ -18,6 +18,7 @@ export function startTrim() {
   for (const button of document.querySelectorAll('[data-trim]')) {
     button.addEventListener('click', () => press(button, Number(button.dataset.trim)));
   }
+  for (const button of nudges()) onPress(button, () => nudge(button, Number(button.dataset.nudge)));
 }
 
 async function press(button, step) {
@@ -27,13 +28,32 @@ async function press(button, step) {
   const to = wanted;
   show(to);
   await ask(button, `trim ${signed(to)}`, () => change('PUT', 'trim', { offset_s: to / 1000 }));
+  forget(mine);
+}
+
+/** From the next status on the server is believed again. */
+function forget(mine) {
   setTimeout(() => {
     if (mine === asked) wanted = null;
   }, SETTLE_MS);
 }
 
-/** Shows the trim of the hall. */
+const nudges = () => document.querySelectorAll('[data-nudge]');
+
+/** Only the server knows how long a frame is: what it makes of the press is what the next goes on from. */
+async function nudge(button, frames) {
+  const mine = (asked += 1);
+  await ask(button, `trim ${frames > 0 ? 'a frame later' : 'a frame earlier'}`, async () => {
+    const status = await change('PUT', 'trim', { frames });
+    if (mine === asked) show((wanted = status.trim_ms));
+    return status;
+  });
+  forget(mine);
+}
+
+/** Shows the trim of the hall; by frames only where there is a film. */
 export function showTrim(status) {
+  for (const button of nudges()) setProperty(button, 'hidden', !status?.film);
   if (status && wanted === null) show(status.trim_ms);
 }
 
