@@ -1,5 +1,5 @@
 //! The host's end of a line of SilverMax units: what is asked of them, how a seat on them finds its zero, and how poses become motion.
-//! Straight-line blocking procedures over a [`LinkPort`], which knows the time, so that whole homings and shows run in
+//! Straight-line blocking procedures over a [`LinkPort`](super::link::LinkPort), which knows the time, so that whole homings and shows run in
 //! virtual time. The thread of the link; nothing here is called by the tick thread.
 //!
 //! ```text
