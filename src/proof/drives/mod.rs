@@ -20,6 +20,9 @@ use crate::timeline::{Figure, Timeline};
 use crate::wire::sixpack2::greatest_divider;
 use course::WantedCourse;
 
+/// Slices fall on a cue as its play begins, and a trim moves them: the course is run with so many beginnings, evenly over a slice.
+const PHASES: u32 = 4;
+
 /// A way to play to serial drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DriveTerms {
@@ -95,6 +98,11 @@ pub(crate) struct DriveProof {
 }
 
 /// Proves a cue for serial drives. Takes time in proportion to its length.
+///
+/// What passes at a level passes at each below it: a fit is linear in the poses, and the level draws these towards one that is inside
+/// the stroke, so places, speeds, accelerations, steps of them and the distance from the cue shrink with it. The way of a brake
+/// shrinks by its square. What is rounded to counts and ticks stays as it is, and so does not grow. The ends of the stroke, where
+/// a fit is held, draw away from it.
 #[must_use]
 pub(crate) fn prove_driven(timeline: &Timeline, terms: &Terms, link: &DriveTerms) -> DriveProof {
     let mut found = Vec::new();
@@ -148,18 +156,30 @@ impl Driven<'_> {
     fn prove(&self, found: &mut Vec<Found>) -> Option<DriveAxisProof> {
         // An axis that never vibrates costs no swing.
         let shake = self.is_shaken().then_some(self.link.shake);
-        let course = WantedCourse::of(self.subject, self.terms.rate.period(), self.link.period, shake);
-        let most = match self.link.family {
-            DrivenBy::SilverMax => silvermax::execute(self, &course, found)?,
-            DrivenBy::SixPack { clock_divider, propdiv, jump } => {
-                let axis = self.subject.geometry();
-                let jump = jump.unwrap_or(axis.max_acceleration * self.link.period.as_secs_f64());
-                sixpack::execute(self, &course, self.lag(clock_divider, propdiv, jump, found)?, jump)
-            }
-        };
+        let (mut most, begun): (Option<MostExecuted>, _) = (None, found.len());
+        for phase in 0..PHASES {
+            let sooner = self.link.period * phase / PHASES;
+            let (tick, slice) = (self.terms.rate.period(), self.link.period);
+            let executed = self.execute(&WantedCourse::of(self.subject, tick, slice, sooner, shake), found)?;
+            // What leaves the stroke by one of them mostly does by all.
+            found.truncate(begun + 1);
+            most = Some(most.map_or(executed, |most| most.and(executed)));
+        }
+        let most = most?;
         self.judge(&most, found);
         self.too_quick(found);
         Some(self.executed(&most))
+    }
+
+    fn execute(&self, course: &WantedCourse, found: &mut Vec<Found>) -> Option<MostExecuted> {
+        match self.link.family {
+            DrivenBy::SilverMax => silvermax::execute(self, course, found),
+            DrivenBy::SixPack { clock_divider, propdiv, jump } => {
+                let axis = self.subject.geometry();
+                let jump = jump.unwrap_or(axis.max_acceleration * self.link.period.as_secs_f64());
+                Some(sixpack::execute(self, course, self.lag(clock_divider, propdiv, jump, found)?, jump))
+            }
+        }
     }
 
     /// What the axis does in the middle of each slice, of poses as a play would push them, each in the unit that `scale` makes of strokes.
@@ -295,6 +315,7 @@ impl Driven<'_> {
 }
 
 /// The most that was met of one axis, in its unit.
+#[derive(Debug, Clone, Copy)]
 struct MostExecuted {
     deviation: Worst,
     /// Places; the limit is the end of the stroke.
@@ -313,6 +334,26 @@ impl MostExecuted {
             lowest: Worst { value: place, ..below(axis.low) },
             highest: Worst { value: place, ..below(axis.high) },
             velocity: below(velocity),
+            roughness,
+        }
+    }
+
+    /// What is the most of both.
+    fn and(self, other: Self) -> Self {
+        let larger = |one: Worst, other: Worst| if other.value > one.value { other } else { one };
+        let roughness = match (self.roughness, other.roughness) {
+            (
+                Roughness::Segments { acceleration: a, jerk: j },
+                Roughness::Segments { acceleration, jerk },
+            ) => Roughness::Segments { acceleration: larger(a, acceleration), jerk: larger(j, jerk) },
+            (Roughness::Jumps(one), Roughness::Jumps(other)) => Roughness::Jumps(larger(one, other)),
+            (one, _) => one,
+        };
+        Self {
+            deviation: larger(self.deviation, other.deviation),
+            lowest: if other.lowest.value < self.lowest.value { other.lowest } else { self.lowest },
+            highest: larger(self.highest, other.highest),
+            velocity: larger(self.velocity, other.velocity),
             roughness,
         }
     }
