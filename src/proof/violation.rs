@@ -2,11 +2,12 @@
 
 mod drives;
 
-pub(crate) use drives::{DriveBreach, OnDrive, OverLimit};
+pub(crate) use drives::{DriveBreach, LinkBreach, OnDrive, OverLimit};
 
 use std::time::Duration;
 
 use crate::cue::Place;
+use crate::drive::rates::TooSlow;
 use crate::motion::AxisUnit;
 use crate::time::ShowTime;
 
@@ -29,6 +30,12 @@ impl std::fmt::Display for Violation {
 }
 
 impl Violation {
+    /// True if links of the hall are what it is about: no change of amplitude is looked for then.
+    #[must_use]
+    pub(crate) const fn is_of_links(&self) -> bool {
+        matches!(self.breach, Breach::OnLink(_) | Breach::TooSlow { .. })
+    }
+
     /// What is broken, with the column that it is about.
     #[must_use]
     pub(crate) fn message(&self) -> String {
@@ -276,4 +283,15 @@ pub(crate) enum Breach {
     /// Serial drives would not execute it as they must.
     #[error(transparent)]
     Drive(#[from] DriveBreach),
+    /// The drives on a link of the hall would not.
+    #[error(transparent)]
+    OnLink(Box<LinkBreach>),
+    /// A link is to play more often than it can.
+    #[error("rate_hz of [link.{link}]: {slow}")]
+    TooSlow {
+        /// Its name.
+        link: String,
+        /// Why, and what would fit.
+        slow: TooSlow,
+    },
 }

@@ -79,6 +79,14 @@ impl WantedCourse {
     }
 }
 
+/// How an axis moves at the first row of the cue and at the last, and the show time of that, nanoseconds.
+pub(super) fn edges(subject: &Subject<'_>) -> (AxisState, AxisState, i64) {
+    let pieces = Pieces::new(subject.timeline, subject.axis, &subject.slot);
+    let [position, velocity, bend, _] = pieces.list()[0].cubic.0;
+    let first = AxisState { position, velocity, acceleration: 2.0 * bend };
+    (first, pieces.last_motion(), pieces.end())
+}
+
 /// The ways from rest and to rest.
 struct Ends {
     before: Option<Halt>,
@@ -88,17 +96,15 @@ struct Ends {
 
 impl Ends {
     fn of(subject: &Subject<'_>, slice: Duration) -> Self {
-        let pieces = Pieces::new(subject.timeline, subject.axis, &subject.slot);
-        let first = pieces.list()[0].cubic.0;
+        let (mut first, last, end) = edges(subject);
         // A way from rest is one to rest that is run backwards.
-        let first = AxisState { position: first[0], velocity: -first[1], acceleration: 2.0 * first[2] };
+        first.velocity = -first.velocity;
         let halt = |from: AxisState, slot: &Slot| {
             let moves = from.velocity.abs() > standing(slot.limits, slice);
             let inside = || Halt::inside(from, slot.limits, &SHARES);
             moves.then(|| inside().unwrap_or_else(|| Halt::full(from, slot.limits)))
         };
-        let after = halt(pieces.last_motion(), &subject.slot);
-        Self { before: halt(first, &subject.slot), after, end: pieces.end() }
+        Self { before: halt(first, &subject.slot), after: halt(last, &subject.slot), end }
     }
 
     /// How long a way to rest takes, nanoseconds.

@@ -11,14 +11,14 @@ use std::time::Duration;
 
 use super::axis::Subject;
 use super::violation::{DriveBreach, OnDrive, OverLimit};
-use super::{Breach, Found, Quantity, SLACK, Terms, Violation, Worst, placed, subjects};
+use super::{Breach, Found, Quantity, SLACK, Terms, Violation, Worst, on_threads, placed, subjects};
 use crate::cue::{FAULTS_TOLD, Vibration};
 use crate::drive::{Lag, Middle, Middles, Shaker};
 use crate::motion::SeatAxis;
 use crate::time::ShowTime;
 use crate::timeline::{Figure, Timeline};
 use crate::wire::sixpack2::greatest_divider;
-use course::WantedCourse;
+use course::{WantedCourse, edges, standing};
 
 /// Slices fall on a cue as its play begins, and a trim moves them: the course is run with so many beginnings, evenly over a slice.
 const PHASES: u32 = 4;
@@ -106,10 +106,15 @@ pub(crate) struct DriveProof {
 #[must_use]
 pub(crate) fn prove_driven(timeline: &Timeline, terms: &Terms, link: &DriveTerms) -> DriveProof {
     let mut found = Vec::new();
-    let axes: Vec<_> = subjects(timeline, terms)
-        .iter()
-        .filter_map(|subject| Driven { subject, terms, link }.prove(&mut found))
-        .collect();
+    let prove = |subject: &Subject<'_>, found: &mut Vec<Found>| Driven { subject, terms, link }.prove(found);
+    let axes = on_threads(&subjects(timeline, terms), &mut found, prove).into_iter().flatten().collect();
+    // What no cue has a part in is told once, whichever axes it is met on.
+    let mut told = Vec::new();
+    found.retain(|one| {
+        let is_new = one.axis.is_some() || !told.contains(&one.breach);
+        told.extend((one.axis.is_none() && is_new).then(|| one.breach.clone()));
+        is_new
+    });
     found.sort_by_key(|one| one.at);
     let more = found.len().saturating_sub(FAULTS_TOLD) as u64;
     found.truncate(FAULTS_TOLD);
@@ -145,6 +150,27 @@ pub(crate) fn rate_that_fits(
     }
 }
 
+/// Where a cue begins or ends in motion, for axes that are led ahead of it by slices of a `period`: those stand there, as they have
+/// nothing else to be led to.
+#[must_use]
+pub(crate) fn in_motion(timeline: &Timeline, terms: &Terms, period: Duration) -> Vec<Violation> {
+    let of_axis = |subject: &Subject<'_>| {
+        let (first, last, end) = edges(subject);
+        let (axis, moves) = (subject.axis, standing(subject.slot.limits, period));
+        let found = |edge, row, at, velocity: f64| {
+            let (hz, at) = (period.as_secs_f64().recip(), ShowTime::from_nanos(at));
+            let on = OnDrive { unit: subject.geometry().unit, seat: subject.seat(), hz, at };
+            let speed = velocity.abs() * subject.geometry().stroke();
+            let breach = Breach::Drive(DriveBreach::InMotion { on, edge, row, speed });
+            let found = Found { at, axis: Some(axis), column: format!("a{}", axis + 1), breach };
+            (velocity.abs() > moves).then_some(found)
+        };
+        [found("begins", "first", 0, first.velocity), found("ends", "last", end, last.velocity)]
+    };
+    let found = subjects(timeline, terms).iter().flat_map(of_axis).flatten().collect::<Vec<_>>();
+    found.into_iter().map(|one| placed(timeline, one)).collect()
+}
+
 /// One axis on its way to a drive.
 struct Driven<'a> {
     subject: &'a Subject<'a>,
@@ -160,7 +186,8 @@ impl Driven<'_> {
         for phase in 0..PHASES {
             let sooner = self.link.period * phase / PHASES;
             let (tick, slice) = (self.terms.rate.period(), self.link.period);
-            let executed = self.execute(&WantedCourse::of(self.subject, tick, slice, sooner, shake), found)?;
+            let executed =
+                self.execute(&WantedCourse::of(self.subject, tick, slice, sooner, shake), found)?;
             // What leaves the stroke by one of them mostly does by all.
             found.truncate(begun + 1);
             most = Some(most.map_or(executed, |most| most.and(executed)));
@@ -300,12 +327,14 @@ impl Driven<'_> {
         }
     }
 
-    /// Notes once what no cue has a part in.
+    /// Notes what no cue has a part in.
     fn of_seat(&self, breach: DriveBreach, found: &mut Vec<Found>) {
-        let breach = Breach::Drive(breach);
-        if found.iter().all(|one| one.breach != breach) {
-            found.push(Found { at: ShowTime::ZERO, axis: None, column: String::new(), breach });
-        }
+        found.push(Found {
+            at: ShowTime::ZERO,
+            axis: None,
+            column: String::new(),
+            breach: Breach::Drive(breach),
+        });
     }
 
     fn found(&self, at: ShowTime, breach: DriveBreach) -> Found {
