@@ -469,8 +469,6 @@ fn nothing_that_plays_takes_a_hall_with_drives() {
     let serve = ["serve", "--config", DRIVES, "--socket", &socket, "--state", &socket];
     for (args, names) in [
         (&["play", CUE, "--config", DRIVES][..], "D1, D2 on"),
-        (&["preflight", "--config", DRIVES], "D1, D2 on"),
-        (&["preflight", "--config", DRIVES, "D2"], "D2 on"),
         (&["latency", "--config", DRIVES], "D1, D2 on"),
         (&serve, "D1, D2 on"),
     ] {

@@ -20,17 +20,13 @@ mod talk;
 mod tests;
 
 pub(crate) use home::{Homing, Step, home};
-pub(crate) use look::look;
+pub(crate) use look::{UnitFacts, look};
 pub(crate) use port::{LinkFault, LinkPort};
-pub(crate) use set_up::{HomeError, SeatUnits};
+pub(crate) use set_up::{HomeError, SeatUnits, UnitSettings, kill_names};
 pub(crate) use stream::{
     AxisFigures, BrakeReason, LaneUnits, LinkPose, Stream, StreamEvent, StreamTerms, lead,
 };
-pub(crate) use talk::{Talk, TalkTerms};
+pub(crate) use talk::{Talk, TalkCounts, TalkFault, TalkTerms};
 
-#[expect(unused_imports, reason = "for the thread of a link, and preflight")]
-pub(crate) use {
-    look::UnitFacts,
-    stream::{Account, LinkFigures},
-    talk::{TalkCounts, TalkFault},
-};
+#[expect(unused_imports, reason = "for the thread of a link")]
+pub(crate) use stream::{Account, LinkFigures};

@@ -104,13 +104,6 @@ pub(crate) struct Moment {
     pub(crate) answered: MonoTime,
 }
 
-impl Moment {
-    /// How long the answer took to begin.
-    pub(crate) const fn delay(&self) -> Duration {
-        self.answered.since(self.sent)
-    }
-}
-
 /// A conversation with the units of a line.
 #[derive(Debug)]
 pub(crate) struct Talk<P> {
@@ -146,6 +139,11 @@ impl<P: LinkPort> Talk<P> {
     /// What 99 of 100 answers take to begin.
     pub(crate) fn delay_p99(&self) -> Duration {
         self.delays.p99()
+    }
+
+    /// What nine of ten answers took to begin at the most; none where there were none.
+    pub(crate) fn usual_delay(&self) -> Option<Duration> {
+        self.delays.most_of(90)
     }
 
     /// When the last exchange was.
