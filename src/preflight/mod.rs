@@ -7,6 +7,7 @@
 //!  configuration ---+                                      `checks`: the one table of what there is to find
 //! ```
 //!
+//! Seats on serial links have a survey and a judge of their own (`drives`); the table of checks, and what a site accepts, is the same.
 //! One file for each family of checks; of motion four. A finding has a name that never changes, so that a configuration can accept it for
 //! good, with its reason.
 

@@ -26,7 +26,9 @@ mod violation;
 
 pub(crate) use axis::AxisProof;
 pub use digest::Digest;
-pub(crate) use drives::{DriveAxisProof, DriveProof, DriveTerms, DrivenBy, prove_driven, rate_that_fits};
+pub(crate) use drives::DriveProof;
+pub(crate) use drives::{DriveAxisProof, DrivenBy, rate_that_fits};
+pub use drives::{DriveTerms, prove_driven};
 pub(crate) use end::HURRY;
 pub(crate) use figures::AxisFigures;
 pub use figures::figures;

@@ -12,6 +12,7 @@ use std::time::Duration;
 use super::axis::Subject;
 use super::violation::{DriveBreach, OnDrive, OverLimit};
 use super::{Breach, Found, Quantity, SLACK, Terms, Violation, Worst, on_threads, placed, subjects};
+use crate::config::drive::MAX_DEVIATION_MM;
 use crate::cue::{FAULTS_TOLD, Vibration};
 use crate::drive::{Lag, Middle, Middles, Shaker};
 use crate::motion::SeatAxis;
@@ -25,7 +26,7 @@ const PHASES: u32 = 4;
 
 /// A way to play to serial drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct DriveTerms {
+pub struct DriveTerms {
     /// Which family, and what of its settings counts.
     pub(crate) family: DrivenBy,
     /// From one segment or target of an axis to the next.
@@ -34,6 +35,14 @@ pub(crate) struct DriveTerms {
     pub(crate) max_deviation: f64,
     /// Level of vibration, on top of that of the terms, 0 to 1.
     pub(crate) shake: f64,
+}
+
+impl DriveTerms {
+    /// SilverMax units that are told a segment each `period`, with vibration.
+    #[must_use]
+    pub fn silvermax(period: Duration) -> Self {
+        Self { family: DrivenBy::SilverMax, period, max_deviation: MAX_DEVIATION_MM, shake: 1.0 }
+    }
 }
 
 /// A family of serial drives.
@@ -88,7 +97,7 @@ pub(crate) enum Roughness {
 
 /// What drives execute of a cue, one entry for each axis on each different seat, and what of it may not be.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct DriveProof {
+pub struct DriveProof {
     /// One entry for each axis on each different seat.
     pub(crate) axes: Vec<DriveAxisProof>,
     /// What is broken, in order of show time; the first [`FAULTS_TOLD`].
@@ -104,7 +113,7 @@ pub(crate) struct DriveProof {
 /// shrinks by its square. What is rounded to counts and ticks stays as it is, and so does not grow. The ends of the stroke, where
 /// a fit is held, draw away from it.
 #[must_use]
-pub(crate) fn prove_driven(timeline: &Timeline, terms: &Terms, link: &DriveTerms) -> DriveProof {
+pub fn prove_driven(timeline: &Timeline, terms: &Terms, link: &DriveTerms) -> DriveProof {
     let mut found = Vec::new();
     let prove = |subject: &Subject<'_>, found: &mut Vec<Found>| Driven { subject, terms, link }.prove(found);
     let axes = on_threads(&subjects(timeline, terms), &mut found, prove).into_iter().flatten().collect();
