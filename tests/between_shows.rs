@@ -158,7 +158,7 @@ struct Link<'a> {
 }
 
 impl FrameSink for Link<'_> {
-    fn send(&mut self, _lane: usize, datagram: &[u8]) -> Delivery {
+    fn send(&mut self, _lane: usize, datagram: &[u8], _at: MonoTime) -> Delivery {
         let request = MotionRequest::parse(datagram).expect("only frames are sent");
         // Each frame is acked at once, and leads the seat.
         self.hands.live.evidence(0).expect("there is one lane").on_ack(request.frame);

@@ -11,8 +11,7 @@ use std::path::Path;
 use process::{Guarded, kinocue};
 use rustix::process::Signal;
 
-/// A hall with one seat of three SilverMax units, on the line at `port`, at a rate that is left where the other end answers late, on a
-/// busy machine.
+/// A hall with one seat of three axes, on the line at `port`, at a rate that is left where the other end answers late, on a busy machine.
 fn hall(folder: &Path, port: &Path, dialect: &str) -> String {
     let units = if dialect == "silvermax" { "units = [16, 17, 18]" } else { "unit = 1\nmotors = [0, 1, 2]" };
     let text = format!(
@@ -59,11 +58,12 @@ fn home(hall: &str) -> (serde_json::Value, String, Option<i32>) {
     (serde_json::from_str(&run.stdout).expect("JSON"), run.stderr, run.code)
 }
 
-/// Three virtual units, at the end of that line.
-fn units(port: &Path) -> Guarded {
+/// Virtual units, at the end of that line.
+fn units(port: &Path, dialect: &str) -> Guarded {
     let tty = port.to_str().expect("text");
-    let silvermax = ["sim", "--dialect", "silvermax", "--tty", tty, "--units", "16,17,18"];
-    let mut sim = Guarded::start(&[&silvermax[..], &["--seed", "1", "--json"]].concat());
+    let numbers = if dialect == "silvermax" { "16,17,18" } else { "1" };
+    let sim = ["sim", "--dialect", dialect, "--tty", tty, "--units", numbers, "--seed", "1", "--json"];
+    let mut sim = Guarded::start(&sim);
     let mut ready = String::new();
     sim.stderr().read_line(&mut ready).expect("text");
     assert_eq!(ready, format!("ready {tty}\n"));
@@ -74,7 +74,7 @@ fn units(port: &Path) -> Guarded {
 fn a_seat_on_silvermax_units_is_homed_and_homed_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let port = folder.path().join("stalls");
-    let sim = units(&port);
+    let sim = units(&port, "silvermax");
     let hall = hall(folder.path(), &port, "silvermax");
     for time in ["from anywhere", "from park"] {
         let (told, said, exit) = home(&hall);
@@ -101,7 +101,7 @@ fn a_seat_on_silvermax_units_is_homed_and_homed_again() {
 fn ctrl_c_brakes_the_axis_that_searches_and_the_seat_is_not_home() {
     let folder = tempfile::tempdir().expect("a folder");
     let port = folder.path().join("stalls");
-    let sim = units(&port);
+    let sim = units(&port, "silvermax");
     let hall = hall(folder.path(), &port, "silvermax");
     let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
     let mut said = homing.stderr().lines().map(|line| line.expect("text"));
@@ -124,12 +124,68 @@ fn a_port_that_is_not_there_is_told_with_what_to_do() {
 }
 
 #[test]
-fn a_sixpack_is_refused_by_name_before_anything_moves() {
+fn a_seat_on_a_sixpack_that_woke_is_switched_homed_and_homed_again() {
     let folder = tempfile::tempdir().expect("a folder");
-    let hall = hall(folder.path(), &folder.path().join("none"), "sixpack2");
-    let (_, said, exit) = home(&hall);
-    assert_eq!(exit, Some(76), "{said}");
-    assert!(said.contains("A1: SIXpack 2 units are not homed yet"), "{said}");
+    let port = folder.path().join("stalls");
+    let sim = units(&port, "sixpack2");
+    let hall = hall(folder.path(), &port, "sixpack2");
+    for time in ["as it woke", "from park"] {
+        let (told, said, exit) = home(&hall);
+        assert_eq!(exit, Some(0), "{time}: {said}");
+        assert_eq!(told["controllers"][0]["home"], true);
+        assert!(
+            said.contains(
+                "A1: motors 0, 1, 2 of unit 1 on link stalls look for their switch, down, at 40 mm/s"
+            ),
+            "{said}"
+        );
+        assert!(said.contains("A1: axis 3 has found its zero") && said.contains("A1: home after"), "{said}");
+    }
+    sim.signal(Signal::TERM);
+    let unit = sim.finish().report_of(0)["units"][0].clone();
+    assert_eq!(
+        (&unit["baud"], &unit["unknown"], &unit["settings_in_motion"]),
+        (&56_818.into(), &0.into(), &0.into())
+    );
+    for motor in &unit["motors"].as_array().expect("a list")[..3] {
+        assert_eq!((&motor["position"], &motor["own_searches"]), (&1_000_000.into(), &0.into()), "{unit}");
+        // The switch is at -3,200, and -2 mm of 800 microsteps.
+        let place = motor["place"].as_f64().expect("a number");
+        assert!((place + 1_600.0).abs() < 100.0, "{unit}");
+    }
+}
+
+#[test]
+fn ctrl_c_ends_the_search_of_a_motor_that_would_go_on_for_ever() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let sim = units(&port, "sixpack2");
+    let hall = hall(folder.path(), &port, "sixpack2");
+    let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
+    let mut said = homing.stderr().lines().map(|line| line.expect("text"));
+    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    homing.signal(Signal::INT);
+    assert!(said.any(|line| line.ends_with("homing was stopped; the seat is not home")));
+    assert_eq!(homing.finish().code, Some(130));
+    sim.signal(Signal::TERM);
+    let motor = sim.finish().report_of(0)["units"][0]["motors"][0].clone();
+    assert_eq!(motor["action"], 0, "{motor}");
+    assert!(motor["executed"]["lowest"].as_f64() > Some(0.0), "it stands above its switch: {motor}");
+}
+
+#[test]
+fn a_sixpack_that_is_not_there_is_told_with_what_to_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let sim = units(&port, "sixpack2");
+    let hall = hall(folder.path(), &port, "sixpack2");
+    let text = fs::read_to_string(&hall).expect("a file").replace("unit = 1", "unit = 7");
+    fs::write(&hall, text).expect("a file");
+    let (told, said, exit) = home(&hall);
+    assert_eq!((exit, &told["controllers"][0]["home"]), (Some(69), &false.into()), "{said}");
+    assert!(said.contains("unit 7 answers neither at 56818 nor at 19231 baud"), "{said}");
+    sim.signal(Signal::TERM);
+    assert_eq!(sim.finish().code, Some(0));
 }
 
 /// What `kinocue preflight` says of a hall as JSON, the checks that the seat A1 fails, and how it ends.
@@ -146,7 +202,7 @@ fn preflight(hall: &str) -> (serde_json::Value, Vec<String>, Option<i32>) {
 fn preflight_passes_a_seat_once_it_is_homed_and_takes_one_that_was_never_for_not_home() {
     let folder = tempfile::tempdir().expect("a folder");
     let port = folder.path().join("stalls");
-    let sim = units(&port);
+    let sim = units(&port, "silvermax");
     let hall = hall(folder.path(), &port, "silvermax");
     let (told, fails, exit) = preflight(&hall);
     assert_eq!((fails, exit), (vec!["not-home".to_owned()], Some(1)), "{told}");
@@ -203,7 +259,7 @@ fn preflight_tells_a_port_that_is_missing_and_one_that_another_program_has() {
     let hall = hall(folder.path(), &port, "silvermax");
     let (told, fails, exit) = preflight(&hall);
     assert_eq!((fails, exit), (vec!["port-missing".to_owned()], Some(69)), "{told}");
-    let sim = units(&port);
+    let sim = units(&port, "silvermax");
     let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
     let mut said = homing.stderr().lines().map(|line| line.expect("text"));
     assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));

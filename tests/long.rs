@@ -228,7 +228,7 @@ struct Link {
 }
 
 impl FrameSink for Link {
-    fn send(&mut self, _lane: usize, datagram: &[u8]) -> Delivery {
+    fn send(&mut self, _lane: usize, datagram: &[u8], _at: MonoTime) -> Delivery {
         let frame = MotionRequest::parse(datagram).expect("only frames are sent");
         assert_eq!(frame.frame, self.next, "numbers follow each other");
         self.next = frame.frame.next();

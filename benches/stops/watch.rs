@@ -35,8 +35,8 @@ impl Watch {
 }
 
 impl FrameSink for Watch {
-    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
-        let delivery = self.sender.send(lane, datagram);
+    fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery {
+        let delivery = self.sender.send(lane, datagram, at);
         let at = Monotonic.now();
         let frame = MotionRequest::parse(datagram).expect("only frames are sent");
         let seen = &mut self.lanes[lane];

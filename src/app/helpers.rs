@@ -1,20 +1,21 @@
 //! The threads beside the tick thread, of a play as of a hall: started before the first tick, ended after the last.
 
 use std::io;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, Scope, ScopedJoinHandle, Thread};
 
 use super::run::Run;
 use crate::drive::Lane;
-use crate::net::{DrainGrid, Sender};
+use crate::net::DrainGrid;
 use crate::plan::PlanError;
-use crate::rt::{Accounts, AckLoop, Ended, PlanLoop, Spinning, TickLoop};
+use crate::rt::{Accounts, AckLoop, Ended, LinkLoop, Outlets, PlanLoop, Spinning, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock as _, MonoTime};
 
 /// The tick loop on real time and real sockets.
-pub(super) type Ticks<'a> = TickLoop<'a, Spinning<'a, Monotonic>, Sender>;
+pub(super) type Ticks<'a> = TickLoop<'a, Spinning<'a, Monotonic>, Outlets>;
 
 /// The ack thread and the planner's.
 #[derive(Debug)]
@@ -22,6 +23,9 @@ pub(super) struct Helpers<'scope> {
     over: &'scope AtomicBool,
     acks: ScopedJoinHandle<'scope, Accounts>,
     planner: ScopedJoinHandle<'scope, Vec<PlanError>>,
+    /// Those of links, which go on until the ack thread has heard of them that all seats rest.
+    links: Vec<ScopedJoinHandle<'scope, ()>>,
+    are_unheard: Arc<AtomicBool>,
 }
 
 impl<'scope> Helpers<'scope> {
@@ -34,9 +38,9 @@ impl<'scope> Helpers<'scope> {
         scope: &'scope Scope<'scope, '_>,
         over: &'scope AtomicBool,
         granted: &RealTime,
-        mut acks: AckLoop,
-        drains: DrainGrid,
+        (mut acks, drains): (AckLoop, DrainGrid),
         mut plans: PlanLoop,
+        links: Vec<LinkLoop>,
     ) -> io::Result<Self> {
         let priority = granted.priority;
         let acks = Builder::new().name("acks".to_owned()).spawn_scoped(scope, move || {
@@ -50,7 +54,21 @@ impl<'scope> Helpers<'scope> {
             plans.run(over)
         });
         let planner = planner.inspect_err(|_| over.store(true, Ordering::Release))?;
-        Ok(Self { over, acks, planner })
+        let are_unheard = Arc::new(AtomicBool::new(false));
+        let mut threads = Vec::new();
+        for (index, link) in links.into_iter().enumerate() {
+            let unheard = Arc::clone(&are_unheard);
+            let thread = Builder::new().name(format!("link{index}")).spawn_scoped(scope, move || {
+                // As the ack thread: below the ticks, before all else.
+                let _ = realtime::request_below(priority);
+                link.run(&unheard);
+            });
+            let ends = |_: &io::Error| {
+                [over, &are_unheard].into_iter().for_each(|end| end.store(true, Ordering::Release))
+            };
+            threads.push(thread.inspect_err(ends)?);
+        }
+        Ok(Self { over, acks, planner, links: threads, are_unheard })
     }
 
     /// The planner's thread, to be woken when there is something for it.
@@ -67,6 +85,8 @@ impl<'scope> Helpers<'scope> {
         self.planner.thread().unpark();
         let refusals = self.planner.join().expect("the planner does not panic");
         let mut accounts = self.acks.join().expect("the ack thread does not panic");
+        self.are_unheard.store(true, Ordering::Release);
+        self.links.into_iter().for_each(|link| link.join().expect("the thread of a link does not panic"));
         let closed_at = Monotonic.now();
         accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
         let lanes = 0..ticks.lanes.len();

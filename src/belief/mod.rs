@@ -288,7 +288,7 @@ impl Belief {
     #[must_use]
     pub(crate) fn start(&self, now: MonoTime) -> Option<KnownPose> {
         // Where no acks are asked for nobody reads either.
-        let within = if self.asks { BEGINS + self.period } else { FRESH };
+        let within = if self.asks { BEGINS + self.period + self.lead } else { FRESH };
         self.pose(now).filter(|_| self.is_recent(now, within))
     }
 
@@ -352,6 +352,12 @@ impl Belief {
             Known::Commanded(_) => !self.asks,
             Known::Nothing | Known::Contradicted(_) => false,
         }
+    }
+
+    /// Whether its frames are made a while before the seat executes them.
+    #[must_use]
+    pub(crate) fn is_led_ahead(&self) -> bool {
+        !self.lead.is_zero()
     }
 
     /// When the seat has executed all that the controller was sent.

@@ -161,7 +161,7 @@ impl Info {
         let mut links: Vec<_> = told.into_iter().chain(plays).chain(faults).collect();
         for violation in &driven.violations {
             let words = violation.to_string().trim_start().to_owned();
-            if !links.contains(&words) {
+            if !links.iter().any(|told| told.ends_with(&words)) {
                 links.push(words);
             }
         }

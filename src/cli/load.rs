@@ -186,6 +186,20 @@ pub(super) fn playable(path: &Path) -> Result<Config, Failure> {
     Ok(config)
 }
 
+/// Reads a configuration that is about to be played in the foreground.
+pub(super) fn streamed(path: &Path, silent: bool) -> Result<Config, Failure> {
+    let config = config(path)?;
+    config.streamed().or_exit(Exit::Config)?;
+    if silent && let Some(one) = config.on_links().next() {
+        let error = anyhow!(
+            "{} is on a serial link, whose drives answer whatever they are sent; leave --no-acks out",
+            one.name
+        );
+        return Err(error).or_exit(Exit::Usage);
+    }
+    Ok(config)
+}
+
 /// Reads a cue; its faults end the program.
 pub(super) fn cue(path: &Path, source: &Source) -> Result<Cue, Failure> {
     cue::load(path, source).map_err(|faults| Failure { exit: cue_exit(&faults), error: faults.into() })

@@ -176,7 +176,7 @@ fn uses_effects(timeline: &Timeline) -> bool {
 
 fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     let mut config = match &args.config {
-        Some(path) => load::playable(path)?,
+        Some(path) => load::streamed(path, args.stream.no_acks)?,
         None => from_to_args(&args.to, &args.effect, axes).or_exit(Exit::Usage)?,
     };
     if let Some(hz) = args.rate {

@@ -3,6 +3,7 @@
 use std::io;
 use std::net::SocketAddrV4;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
 
@@ -46,6 +47,8 @@ pub(super) struct Driven {
     pub(super) controllers: Vec<Controller>,
     /// All links of the hall.
     pub(super) links: Vec<Link>,
+    /// From one target of an axis to the next on each of them, by all that is on it.
+    pub(super) periods: Vec<Duration>,
     /// What each of them carries; none where nobody is on it.
     pub(super) loads: Vec<Option<LinkLoad>>,
 }
@@ -56,6 +59,7 @@ struct Meant {
     loads: Vec<Option<LinkLoad>>,
     /// The hall without its controllers.
     config: Config,
+    periods: Vec<Duration>,
 }
 
 impl TargetArgs {
@@ -78,8 +82,8 @@ impl TargetArgs {
         names: &[String],
         cue_axes: usize,
     ) -> Result<(Targets, Driven), Failure> {
-        let Meant { on_network, on_links, loads, config } = self.meant(names, cue_axes)?;
-        Ok((on_network, Driven { controllers: on_links, links: config.links, loads }))
+        let Meant { on_network, on_links, loads, config, periods } = self.meant(names, cue_axes)?;
+        Ok((on_network, Driven { controllers: on_links, links: config.links, loads, periods }))
     }
 
     fn meant(&self, names: &[String], cue_axes: usize) -> Result<Meant, Failure> {
@@ -88,6 +92,7 @@ impl TargetArgs {
             None => from_to_args(&self.to, &[], cue_axes).or_exit(Exit::Usage)?,
         };
         let loads = config.links.iter().map(|link| LinkLoad::of(link, &config)).collect();
+        let periods = config.links.iter().map(|link| period(link, &config)).collect();
         let (controllers, absent) =
             (std::mem::take(&mut config.controllers), std::mem::take(&mut config.absent));
         let mut show = config.show.clone();
@@ -101,7 +106,7 @@ impl TargetArgs {
         let chosen = self.choose(controllers.into_iter().chain(named).collect(), names)?;
         let stations = chosen.iter().filter_map(Controller::on_network).collect();
         let on_links = chosen.into_iter().filter(|one| one.drives().is_some()).collect();
-        Ok(Meant { on_network: Targets { controllers: stations, show }, on_links, loads, config })
+        Ok(Meant { on_network: Targets { controllers: stations, show }, on_links, loads, config, periods })
     }
 
     /// True if anybody is meant: without, `home` and `preflight` ask the daemon for its own.
@@ -146,6 +151,12 @@ impl TargetArgs {
         };
         Ok(all.into_iter().filter(chosen).collect())
     }
+}
+
+/// What `check` says that a link plays at; at the most that fits where more is asked for.
+fn period(link: &Link, config: &Config) -> Duration {
+    let load = LinkLoad::of(link, config);
+    load.map_or(Duration::MAX, |load| load.period_for(link.rate_hz).unwrap_or_else(|_| load.period()))
 }
 
 impl Targets {

@@ -256,6 +256,18 @@ impl Config {
         if names.is_empty() { Ok(()) } else { Err(DrivesUnplayed(names.join(", "))) }
     }
 
+    /// Whether this program can play the hall in the foreground: of drives it plays SilverMax units.
+    ///
+    /// # Errors
+    /// [`DrivesUnplayed`] with the names of those that it cannot.
+    pub(crate) fn streamed(&self) -> Result<(), DrivesUnplayed> {
+        let is_other = |one: &&Controller| {
+            one.drives().is_some_and(|drives| drives.motors.family() != drive::DriveFamily::SilverMax)
+        };
+        let names: Vec<_> = self.controllers.iter().filter(is_other).map(|one| one.name.as_str()).collect();
+        if names.is_empty() { Ok(()) } else { Err(DrivesUnplayed(names.join(", "))) }
+    }
+
     /// The folder with the playlists: the one of the configuration, else `playlists` beside the library.
     #[must_use]
     pub(crate) fn playlists(&self) -> PathBuf {

@@ -1,9 +1,12 @@
 //! Builds the lanes of a play from configuration and cue.
 
+use std::time::Duration;
+
 use super::Lane;
 use super::lane::Codec;
+use super::link::StreamTerms;
 use super::mbox::{MotionCodec, Wiring};
-use crate::config::{Config, Connection, Controller, FanOut, FansOut as _};
+use crate::config::{Config, Connection, Controller, Drives, FanOut, FansOut as _};
 use crate::motion::{SeatType, Slot, Window};
 use crate::timeline::Timeline;
 use crate::wire::{Code, FrameNo, motion_channel_and_slots};
@@ -38,6 +41,7 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         FanOut::Shared => shared(config, controller, slots, timeline, manner.level),
     };
     let vibrates = window.moving().filter_map(|(_, slot)| slot.axis).any(|axis| timeline.vibrates(axis));
+    let window = window.led_ahead(lead(config, controller));
     let codec = match &controller.connection {
         Connection::Udp(station) => Codec::Mbox(MotionCodec {
             channel,
@@ -55,6 +59,16 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         longest_ms: controller.seat.max_interval_ms,
         next_frame: FrameNo::FIRST,
     }
+}
+
+/// How long before its seat is there its poses have to come.
+fn lead(config: &Config, controller: &Controller) -> Duration {
+    let lead = |drives: &Drives| {
+        let link = config.links.iter().find(|link| link.name == drives.link)?;
+        let terms = StreamTerms::of(link, config).ok().flatten()?;
+        Some(terms.lead(drives.motors.family()))
+    };
+    controller.drives().and_then(lead).unwrap_or_default()
 }
 
 /// Just the controller's own axes, the first of them in the first slot; padding rests.

@@ -10,13 +10,11 @@ pub(crate) mod link;
 mod mbox;
 pub(crate) mod rates;
 mod rounds;
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "the clocks of drives, and their settings, come with their links")
-)]
 mod segments;
 #[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "the thread of a link comes next"))]
 pub(crate) mod silvermax;
+#[cfg_attr(not(test), expect(dead_code, reason = "a look is for preflight"))]
+pub(crate) mod sixpack2;
 
 pub use lane::Lane;
 pub(crate) use lane::Stamped;
@@ -28,7 +26,9 @@ pub(crate) use segments::{
     TargetMaker,
 };
 
-use crate::belief::Reading;
+use std::sync::Arc;
+
+use crate::belief::{Fall, Reading};
 use crate::config::Controller;
 use crate::health::Sighting;
 use crate::motion::Pulses;
@@ -43,7 +43,7 @@ pub(crate) enum Peer {
     /// SMC, IMAX and MBOX controllers.
     Mbox(mbox::MboxPeer),
     /// Drives on a serial link, whose thread asks them by itself.
-    Link,
+    Link(link::LinkPeer),
 }
 
 /// What is wanted of a controller.
@@ -97,6 +97,17 @@ pub(crate) enum Evidence {
     Code(ReplyCode),
     /// What all of a look says of an emergency stop.
     Stop(Look),
+    /// A drive let go of its motor: the axis, from 1, and by what.
+    Drive {
+        /// The axis, from 1.
+        axis: usize,
+        /// The bits of what killed.
+        error: u16,
+    },
+    /// It has restarted, or let go of its seat: it does not know its zero any more.
+    LostZero,
+    /// It stopped by itself, or is elsewhere than it was led: nothing leads it before it was looked at.
+    Fell(Fall),
 }
 
 /// Evidence of one message; room for all of it is made at the start.
@@ -142,7 +153,7 @@ impl Peer {
     pub(crate) fn new(controller: &Controller, lane: &Lane) -> Self {
         match controller.on_network() {
             Some(station) => Self::Mbox(mbox::MboxPeer::new(&station, lane)),
-            None => Self::Link,
+            None => Self::Link(link::LinkPeer::new(controller, lane)),
         }
     }
 
@@ -150,7 +161,7 @@ impl Peer {
     pub(crate) fn poll(&mut self, need: Need, now: MonoTime, send: &mut dyn FnMut(&[u8]) -> bool) -> u32 {
         match self {
             Self::Mbox(peer) => peer.poll(need, now, send),
-            Self::Link => 0,
+            Self::Link(peer) => peer.poll(need, now),
         }
     }
 
@@ -158,7 +169,23 @@ impl Peer {
     pub(crate) fn receive(&mut self, arrival: Incoming<'_>, out: &mut EvidenceList) {
         match self {
             Self::Mbox(peer) => peer.receive(arrival, out),
-            Self::Link => {}
+            Self::Link(_) => {}
+        }
+    }
+
+    /// Takes what the thread of its link tells; as [`Self::receive`].
+    pub(crate) fn hear(&mut self, event: &link::StreamEvent, now: MonoTime, out: &mut EvidenceList) {
+        match self {
+            Self::Mbox(_) => {}
+            Self::Link(peer) => peer.hear(event, now, out),
+        }
+    }
+
+    /// What is wanted of it by that thread; none where there is none.
+    pub(crate) fn wants(&self) -> Option<Arc<link::LaneWants>> {
+        match self {
+            Self::Mbox(_) => None,
+            Self::Link(peer) => Some(peer.wants()),
         }
     }
 
@@ -166,7 +193,7 @@ impl Peer {
     pub(crate) fn on_reply_code(&mut self, code: ReplyCode) -> bool {
         match self {
             Self::Mbox(peer) => peer.on_reply_code(code),
-            Self::Link => false,
+            Self::Link(_) => false,
         }
     }
 
@@ -174,7 +201,7 @@ impl Peer {
     pub(crate) fn on_report(&mut self, positions: &[Pulses], at: MonoTime) -> Option<Whereabouts> {
         match self {
             Self::Mbox(peer) => Some(peer.on_report(positions, at)),
-            Self::Link => None,
+            Self::Link(_) => None,
         }
     }
 
@@ -182,7 +209,7 @@ impl Peer {
     pub(crate) fn on_sent(&mut self, at: MonoTime) {
         match self {
             Self::Mbox(peer) => peer.position.on_sent(at),
-            Self::Link => {}
+            Self::Link(peer) => peer.on_sent(at),
         }
     }
 
@@ -190,7 +217,7 @@ impl Peer {
     pub(crate) fn on_cut_off(&mut self, shakes: f64) {
         match self {
             Self::Mbox(peer) => peer.position.on_cut_off(shakes),
-            Self::Link => {}
+            Self::Link(_) => {}
         }
     }
 
@@ -198,7 +225,7 @@ impl Peer {
     pub(crate) fn on_homed(&mut self) {
         match self {
             Self::Mbox(peer) => peer.position.on_homed(),
-            Self::Link => {}
+            Self::Link(_) => {}
         }
     }
 
@@ -206,7 +233,7 @@ impl Peer {
     pub(crate) fn is_behind(&mut self, now: MonoTime) -> bool {
         match self {
             Self::Mbox(peer) => peer.pending.is_full(now),
-            Self::Link => false,
+            Self::Link(_) => false,
         }
     }
 
@@ -214,7 +241,7 @@ impl Peer {
     pub(crate) fn has_answered(&mut self) -> bool {
         match self {
             Self::Mbox(peer) => peer.probe.has_answered(),
-            Self::Link => false,
+            Self::Link(_) => false,
         }
     }
 }

@@ -60,6 +60,13 @@ impl Engine {
         }
     }
 
+    /// Nothing goes to lanes any more that are led ahead: their seats are stopped where they are, by whoever leads them there, and not by
+    /// poses that they would reach a while later.
+    pub(crate) fn cut_led_ahead(&mut self) {
+        let is_led_ahead = |motion: &&mut LaneMotion| !motion.window.lead().is_zero();
+        self.lanes.all.iter_mut().filter(is_led_ahead).for_each(LaneMotion::cut);
+    }
+
     /// The seat of that lane, which was cut off, vibrates on about that pose: slow frames lead it there, without vibration. It is looked at
     /// then.
     pub(crate) fn still(&mut self, lane: usize, pose: &Pose) {

@@ -383,7 +383,7 @@ struct Link<'a> {
 }
 
 impl FrameSink for Link<'_> {
-    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
+    fn send(&mut self, lane: usize, datagram: &[u8], _at: MonoTime) -> Delivery {
         let request = MotionRequest::parse(datagram).expect("only frames are sent");
         self.live.evidence(lane).expect("there is such a lane").on_ack(request.frame);
         let stroke = AxisGeometry::BENCH.stroke_pulses();

@@ -91,8 +91,8 @@ pub mod proof {
 pub mod rt {
     pub use crate::rt::{
         Accounts, AckLoop, Alarm, Answer, Command, Conductor, Desk, Ended, FilmLead, FrameSink, Line, Live,
-        Loaded, MailEnds, News, NewsIn, Order, Places, PlanLoop, Planning, Sent, Spinning, Task, TickLoop,
-        TickReport, Ticked, mailboxes,
+        Loaded, MailEnds, News, NewsIn, Order, Outlets, Places, PlanLoop, Planning, Sent, Spinning, Task,
+        TickLoop, TickReport, Ticked, mailboxes,
     };
 }
 pub mod sim {

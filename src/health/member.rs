@@ -92,6 +92,11 @@ impl Member {
         }
     }
 
+    /// Acks of what it is sent come so much later.
+    pub(super) fn expect_acks_after(&mut self, lead: Duration) {
+        self.replies = Replies::new(self.replies.interval()).led_ahead(lead);
+    }
+
     pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
         self.traffic.sent += 1;
         self.framed = Some(at);
@@ -146,7 +151,7 @@ impl Member {
             return;
         }
         self.on_answer(at);
-        if let Some(packets) = sighting.packets {
+        if let Some(packets) = sighting.packets() {
             // A look at a time, somebody else's frames are no more than may be under way: what they add up to tells.
             self.counter.hear(packets);
         }
@@ -164,6 +169,11 @@ impl Member {
             self.replies.forget_gap();
             self.seen = is_well.then_some(at);
         }
+    }
+
+    /// It has restarted, or let go of its seat.
+    pub(super) fn on_lost_zero(&mut self) {
+        self.must_rehome.get_or_insert(Why::NotHome(self.controller));
     }
 
     /// From now on it has to say that it knows its zero.

@@ -25,7 +25,7 @@ use std::time::Duration;
 pub use groups::Groups;
 pub use health_state::Notice;
 pub(crate) use health_state::{Change, HealthState, Why};
-pub(crate) use proof::{Identity, Sighting};
+pub(crate) use proof::{Continuity, Identity, Sighting};
 pub(crate) use words::ACKS_OFF;
 
 use crate::belief::Fall;
@@ -75,6 +75,15 @@ impl HealthTable {
         let place = Place { standing, why, poor: MonoTime::default() };
         let places = vec![place; groups.len()];
         Self { groups, members, places, policy, watched, stop_told: false, latch_told: Latch::Free }
+    }
+
+    /// The same where what is sent is confirmed so much later, controller by controller, because it is executed as late.
+    #[must_use]
+    pub(crate) fn led_ahead(mut self, leads: impl Iterator<Item = Duration>) -> Self {
+        for (member, lead) in self.members.iter_mut().zip(leads) {
+            member.expect_acks_after(lead);
+        }
+        self
     }
 
     /// The same for a hall that homes its seats: one that does not know its zero is out, whenever it is first seen.
@@ -160,6 +169,16 @@ impl HealthTable {
     /// What DPF0 says, read by itself, of whether a controller knows its zero.
     pub(crate) fn on_zero(&mut self, controller: usize, homed: bool) {
         self.members[controller].on_zero(homed);
+    }
+
+    /// A drive of a controller has let go of its motor: its axis, from 1, and by what.
+    pub(crate) fn on_drive(&mut self, controller: usize, axis: usize, error: u16) {
+        self.members[controller].faults.on_drive(axis, error);
+    }
+
+    /// It has restarted, or let go of its seat: it does not know its zero.
+    pub(crate) fn on_lost_zero(&mut self, controller: usize) {
+        self.members[controller].on_lost_zero();
     }
 
     /// It has answered something that this thread or another one asked.

@@ -21,10 +21,21 @@ pub(crate) struct Sighting {
     pub(crate) error: u16,
     /// What kind of alarm its drives have (DPFE of an MBOX controller); 0 for none.
     pub(crate) alarm: u16,
-    /// DP34, the datagrams it received; `None` if it has no such register.
-    pub(crate) packets: Option<u16>,
+    /// By what it can be told that it has not restarted.
+    pub(crate) continuity: Continuity,
     /// True if DPF0 says that it knows its zero.
     pub(crate) homed: bool,
+}
+
+/// By what a controller tells that it has not restarted since it was believed last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Continuity {
+    /// DP34, the datagrams it received.
+    Packets(u16),
+    /// Nothing but that it answered all the while.
+    Answers,
+    /// A number of ours that it keeps until it restarts: it says so itself, by not being home.
+    Mark,
 }
 
 /// What a controller is, as far as registers tell.
@@ -60,7 +71,7 @@ pub(super) struct Traffic {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Baseline {
     identity: Identity,
-    packets: Option<u16>,
+    continuity: Continuity,
     homed: bool,
     traffic: Traffic,
     /// What it had not counted then of all that was sent before.
@@ -79,14 +90,27 @@ pub(super) enum Verdict {
     Unproved,
 }
 
+impl Continuity {
+    const fn packets(self) -> Option<u16> {
+        if let Self::Packets(packets) = self { Some(packets) } else { None }
+    }
+}
+
+impl Sighting {
+    /// The datagrams that it counts, if it does.
+    pub(super) const fn packets(&self) -> Option<u16> {
+        self.continuity.packets()
+    }
+}
+
 impl Baseline {
     pub(super) const fn homed(&self) -> bool {
         self.homed
     }
 
     pub(super) fn of(sighting: &Sighting, traffic: Traffic) -> Self {
-        let Sighting { identity, packets, homed, .. } = *sighting;
-        Self { identity, packets, homed, traffic, late: Overdue::default() }
+        let Sighting { identity, continuity, homed, .. } = *sighting;
+        Self { identity, continuity, homed, traffic, late: Overdue::default() }
     }
 
     /// The one that follows it, of a sighting that it believes.
@@ -98,7 +122,7 @@ impl Baseline {
         };
         let sent = traffic.sent - self.traffic.sent;
         let late =
-            self.packets.zip(sighting.packets).map(grown).map(|grown| self.late.after(sent, grown, now));
+            self.packets().zip(sighting.packets()).map(grown).map(|grown| self.late.after(sent, grown, now));
         Self { late: late.unwrap_or_default(), ..Self::of(sighting, traffic) }
     }
 
@@ -112,10 +136,12 @@ impl Baseline {
             return Verdict::NotHome;
         }
         let late = self.late.most(now);
-        let (then, now) = match (self.packets, sighting.packets) {
-            (Some(then), Some(now)) => (then, now),
-            (None, None) if gap => return Verdict::Gap,
-            (None, None) => return Verdict::Same,
+        let (then, now) = match (self.continuity, sighting.continuity) {
+            (Continuity::Packets(then), Continuity::Packets(now)) => (then, now),
+            (Continuity::Answers, Continuity::Answers) if gap => return Verdict::Gap,
+            (Continuity::Answers, Continuity::Answers) | (Continuity::Mark, Continuity::Mark) => {
+                return Verdict::Same;
+            }
             _ => return Verdict::Unproved,
         };
         let doubt = self.doubt(traffic) + late + 2 * UNDER_WAY;
@@ -135,12 +161,16 @@ impl Baseline {
     /// begins anew, so it is read again as soon as it may have counted twice as much.
     pub(super) fn is_stale(&self, traffic: Traffic) -> bool {
         let counted = |packets: u16| u64::from(packets).clamp(UNDER_WAY, REFRESH);
-        self.packets.is_some_and(|packets| self.doubt(traffic) > counted(packets))
+        self.packets().is_some_and(|packets| self.doubt(traffic) > counted(packets))
     }
 
     /// True if it has a counter.
     pub(super) const fn is_counted(&self) -> bool {
-        self.packets.is_some()
+        self.packets().is_some()
+    }
+
+    const fn packets(&self) -> Option<u16> {
+        self.continuity.packets()
     }
 
     /// Datagrams that it may have received or not.
@@ -159,7 +189,7 @@ mod tests {
 
     const fn sighting(packets: u16) -> Sighting {
         let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 3 };
-        Sighting { identity, error: 0, alarm: 0, packets: Some(packets), homed: true }
+        Sighting { identity, error: 0, alarm: 0, continuity: Continuity::Packets(packets), homed: true }
     }
 
     fn after(packets: u16, sent: u64, acked: u64, now: u16) -> Verdict {
@@ -199,7 +229,7 @@ mod tests {
 
     #[test]
     fn a_controller_that_counts_nothing_is_believed_as_long_as_it_has_answered_all_the_while() {
-        let blind = Sighting { packets: None, ..sighting(0) };
+        let blind = Sighting { continuity: Continuity::Answers, ..sighting(0) };
         let none = Traffic::default();
         let after = |gap| Baseline::of(&blind, none).judge(&blind, none, gap, NOW);
         assert_eq!((after(false), after(true)), (Verdict::Same, Verdict::Gap));
@@ -223,6 +253,17 @@ mod tests {
             Baseline::of(&sighting(7), Traffic::default()).judge(&other, Traffic::default(), false, NOW),
             Verdict::Other
         );
+    }
+
+    #[test]
+    fn a_drive_that_keeps_its_mark_is_believed_however_long_it_was_silent_and_no_more_once_it_is_not_home() {
+        let marked = Sighting { continuity: Continuity::Mark, ..sighting(0) };
+        let after = |now: &Sighting| {
+            let none = Traffic::default();
+            Baseline::of(&marked, none).judge(now, none, true, NOW)
+        };
+        assert_eq!(after(&marked), Verdict::Same);
+        assert_eq!(after(&Sighting { homed: false, ..marked }), Verdict::NotHome);
     }
 
     proptest! {

@@ -22,6 +22,8 @@ const GAP: Duration = Duration::from_millis(600);
 pub(super) struct Replies {
     window: Window,
     interval: Duration,
+    /// So much later acks come than from a controller that executes what it has at once.
+    lead: Duration,
     /// Since when an ack is waited for, and how many frames have asked since.
     waiting: Option<MonoTime>,
     unheard: u32,
@@ -37,8 +39,9 @@ impl Replies {
     /// Nothing was asked yet; frames that ask go out once an `interval`.
     pub(super) fn new(interval: Duration) -> Self {
         Self {
-            window: Window::new(interval),
+            window: Window::new(interval, Duration::ZERO),
             interval,
+            lead: Duration::ZERO,
             waiting: None,
             unheard: 0,
             heard: MonoTime::default(),
@@ -46,6 +49,15 @@ impl Replies {
             unanswered: None,
             gap: false,
         }
+    }
+
+    /// The same for acks that come so much later.
+    pub(super) fn led_ahead(self, lead: Duration) -> Self {
+        Self { window: Window::new(self.interval, lead), lead, ..self }
+    }
+
+    pub(super) const fn interval(&self) -> Duration {
+        self.interval
     }
 
     pub(super) fn on_asked(&mut self, frame: FrameNo, at: MonoTime) {
@@ -68,7 +80,7 @@ impl Replies {
 
     /// It has answered something.
     pub(super) fn on_answer(&mut self, at: MonoTime) {
-        let late = GAP.max(2 * self.interval);
+        let late = GAP.max(2 * self.interval) + self.lead;
         self.gap |= self.unanswered.take().is_some_and(|since| at.since(since) > late);
     }
 
@@ -129,7 +141,7 @@ impl Replies {
     }
 
     pub(super) fn is_silent(&self, now: MonoTime) -> bool {
-        let limit = SILENCE.max(UNHEARD * self.interval);
+        let limit = SILENCE.max(UNHEARD * self.interval) + self.lead;
         self.unheard >= UNHEARD && self.waiting.is_some_and(|since| now.since(since) >= limit)
     }
 }

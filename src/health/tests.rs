@@ -98,7 +98,11 @@ impl Hall {
             identity: IDENTITY,
             error: 0,
             alarm: self.alarm,
-            packets: self.counts.then(|| self.packets[controller]),
+            continuity: if self.counts {
+                Continuity::Packets(self.packets[controller])
+            } else {
+                Continuity::Answers
+            },
             homed: self.homed,
         }
     }

@@ -7,7 +7,7 @@ use crate::time::{MonoTime, nanos};
 use crate::wire::FrameNo;
 
 /// An ack later than this counts as missing.
-pub(super) const DUE: Duration = Duration::from_millis(100);
+const DUE: Duration = Duration::from_millis(100);
 /// Over how long missing acks are counted.
 const SPAN: Duration = Duration::from_secs(1);
 /// So many missing in a row are too many.
@@ -33,15 +33,24 @@ pub(super) struct Window {
     missing: usize,
     /// Missing in a row up to the newest that is due.
     run: u32,
+    /// An ack later than this counts as missing.
+    limit: Duration,
     newest_answered: Option<FrameNo>,
 }
 
 impl Window {
-    /// Room for a span of frames of which one asks in each `interval`.
-    pub(super) fn new(interval: Duration) -> Self {
-        let fit = nanos(SPAN + DUE).div_ceil(nanos(interval).max(1));
+    /// Room for a span of frames of which one asks in each `interval`, and is acked `lead` later than by a controller that is not led ahead.
+    pub(super) fn new(interval: Duration, lead: Duration) -> Self {
+        let fit = nanos(SPAN + DUE + lead).div_ceil(nanos(interval).max(1));
         let room = usize::try_from(fit).unwrap_or(usize::MAX).min(1 << 11) + 16;
-        Self { asked: VecDeque::with_capacity(room), due: 0, missing: 0, run: 0, newest_answered: None }
+        Self {
+            asked: VecDeque::with_capacity(room),
+            due: 0,
+            missing: 0,
+            run: 0,
+            limit: DUE + lead,
+            newest_answered: None,
+        }
     }
 
     pub(super) fn on_asked(&mut self, frame: FrameNo, at: MonoTime) {
@@ -57,7 +66,7 @@ impl Window {
         let index = self.asked.partition_point(|asked| frame.since(asked.frame) > 0);
         let asked = self.asked.get_mut(index).filter(|asked| asked.frame == frame && !asked.answered)?;
         asked.answered = true;
-        if at.since(asked.at) > DUE {
+        if at.since(asked.at) > self.limit {
             self.count_missing(index);
         } else if std::mem::take(&mut asked.missing) {
             // It came in time, and was only read late.
@@ -72,7 +81,7 @@ impl Window {
 
     /// Moves on to `now`: every ack that came up to then has been told.
     pub(super) fn tick(&mut self, now: MonoTime) {
-        while let Some(asked) = self.asked.get(self.due).filter(|asked| now.since(asked.at) > DUE) {
+        while let Some(asked) = self.asked.get(self.due).filter(|asked| now.since(asked.at) > self.limit) {
             let good = asked.answered && !asked.missing;
             self.run = if good { 0 } else { self.run.saturating_add(1) };
             if !good {
@@ -80,7 +89,7 @@ impl Window {
             }
             self.due += 1;
         }
-        while self.asked.front().is_some_and(|asked| now.since(asked.at) > SPAN + DUE) {
+        while self.asked.front().is_some_and(|asked| now.since(asked.at) > SPAN + self.limit) {
             self.forget_oldest();
         }
     }

@@ -17,6 +17,7 @@ pub(crate) use measure::Readings;
 pub use measure::{Measure, Spacing};
 pub(crate) use seat::{FACTORY_INTERVAL_MS, PulseRange, in_stroke};
 pub use seat::{Pulses, SeatAxis, SeatType};
+pub(crate) use window::MAX_LEAD;
 pub use window::{Limits, Slot, Window};
 
 /// The most axes a cue, a frame or a controller can have (PA02, SMC manual 1.5).

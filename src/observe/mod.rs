@@ -107,6 +107,11 @@ impl Observer {
         }
     }
 
+    /// Knows of so many more behind them, which are on no network.
+    pub(crate) fn add(&mut self, controllers: usize) {
+        self.states.resize(self.states.len() + controllers, ControllerState::default());
+    }
+
     /// A datagram, as that controller writes them.
     #[must_use]
     pub(crate) fn read<'a>(&self, controller: usize, bytes: &'a [u8]) -> FromController<'a> {
@@ -197,7 +202,7 @@ impl Observer {
     }
 
     fn is_smc(&self, controller: usize) -> bool {
-        self.watched[controller].dialect == Dialect::Smc
+        self.watched.get(controller).is_some_and(|watched| watched.dialect == Dialect::Smc)
     }
 
     /// Hears a status report; one of another station is not taken. Says whether it was.
@@ -260,7 +265,8 @@ impl Observer {
         let state = &mut self.states[controller];
         state.heard_at = Some(at);
         state.inputs = Some(Heard { value: inputs, at });
-        if inputs & self.watched[controller].estop_inputs != 0 {
+        let estop_inputs = self.watched.get(controller).map_or(0, |watched| watched.estop_inputs);
+        if inputs & estop_inputs != 0 {
             self.note_stop(controller, Cause::Inputs, true, at);
         }
     }

@@ -7,8 +7,9 @@ use super::{Check, Notes};
 use crate::config::drive::DriveFamily;
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Drives, Link};
+use crate::drive::link::TalkCounts;
 use crate::drive::rates::{LinkLoad, short};
-use crate::drive::silvermax::{SeatUnits, TalkCounts, TalkFault, UnitFacts, UnitSettings, kill_names};
+use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
 use crate::sys::serial::SerialError;
 use crate::wire::silvermax::{Poll, StatusWord as _};
 

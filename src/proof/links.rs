@@ -12,8 +12,8 @@ use crate::config::drive::sixpack2::{PropDiv, Sixpack2Drive};
 use crate::config::drive::{DriveFamily, SeatDrive};
 use crate::config::{Config, Controller, Drives, Link};
 use crate::cue::{FAULTS_TOLD, Place};
-use crate::drive::rates::{LinkLoad, TooSlow};
-use crate::drive::silvermax::{StreamTerms, lead};
+use crate::drive::link::StreamTerms;
+use crate::drive::rates::LinkLoad;
 use crate::timeline::Timeline;
 
 /// What the drives of a type of seat on a link execute of a cue.
@@ -62,14 +62,15 @@ pub(crate) fn prove_links(config: &Config, timeline: &Timeline, terms: &Terms) -
         let on_it = config.on_links().filter(|one| one.drives().is_some_and(|it| it.link == link.name));
         let seats = alike(on_it);
         let Some(load) = LinkLoad::of(link, config).filter(|_| !seats.is_empty()) else { continue };
-        match load.period_for(link.rate_hz) {
-            Ok(period) => {
+        match StreamTerms::of(link, config) {
+            Ok(None) => {}
+            Ok(Some(StreamTerms { period, .. })) => {
                 let count = seats.iter().map(Vec::len).sum::<usize>();
                 let count = u32::try_from(count).unwrap_or(u32::MAX);
                 let line = Line { link, load, period, seats: count, timeline, terms };
                 seats.iter().for_each(|seats| line.prove(seats, &mut all));
             }
-            Err(slow) => all.violations.push(too_slow(link, slow)),
+            Err(why) => all.violations.push(too_slow(why)),
         }
     }
     all.more += all.violations.len().saturating_sub(FAULTS_TOLD) as u64;
@@ -90,9 +91,8 @@ fn alike<'a>(controllers: impl Iterator<Item = &'a Controller>) -> Vec<Vec<&'a C
     groups
 }
 
-fn too_slow(link: &Link, slow: TooSlow) -> Violation {
-    let breach = Breach::TooSlow { link: link.name.clone(), slow };
-    Violation { place: Place::File, column: String::new(), breach }
+fn too_slow(why: String) -> Violation {
+    Violation { place: Place::File, column: String::new(), breach: Breach::TooSlow { why } }
 }
 
 /// A link that plays a cue.
@@ -120,7 +120,7 @@ impl Line<'_> {
         all.violations.extend(violations.map(|one| self.named(one, &controllers, &remedy)));
         all.more += proof.more;
         let stream = StreamTerms { period: self.period, tick: self.terms.rate.period() };
-        let lead = matches!(driven.family, DrivenBy::SilverMax).then(|| lead(stream));
+        let lead = Some(stream.lead(self.load.family));
         let (link, period) = (self.link.name.clone(), self.period);
         all.plays.push(LinkPlay { link, controllers, period, lead, axes: proof.axes });
     }
@@ -244,6 +244,7 @@ mod tests {
         prove_at(config, timeline, 1.0).violations.iter().map(ToString::to_string).collect()
     }
 
+    const QUICK: (&str, &str) = ("baud = 57600", "baud = 115200");
     const SECOND: (&str, &str) = (
         "units = [16, 17, 18]\n",
         "units = [16, 17, 18]\n[[controller]]\nname = \"D3\"\nseat = \"silver3\"\naddress = \"link:stalls\"\n\
@@ -269,35 +270,35 @@ mod tests {
 
     #[test]
     fn seats_of_one_type_on_a_link_are_proved_once_and_share_its_rate() {
-        let proof = prove_at(&hall(&[SECOND]), &bench_ride(), 1.0);
+        let proof = prove_at(&hall(&[SECOND, QUICK]), &bench_ride(), 1.0);
         let [play] = &proof.links[..] else { panic!("{proof:?}") };
         assert_eq!(play.controllers, ["D1", "D3"]);
-        assert!(play.period > Duration::from_millis(66) && play.axes.len() == 3);
+        assert!(play.period > Duration::from_millis(34) && play.axes.len() == 3);
     }
 
     #[test]
     fn too_far_beside_the_cue_is_refused_with_link_seats_place_and_what_fits() {
-        let allowed = ("max_error_mm = 3.0", "max_error_mm = 3.0\nmax_deviation_mm = 0.3");
-        let said = said(&hall(&[SECOND, allowed]), &bench_ride());
-        let named = "a2: link stalls, D1, D3: a drive of seat silver3 at 15.0 Hz would be 0.4";
-        let fits = "it fits at 29.0 Hz: baud = 115200";
+        let allowed = ("max_error_mm = 3.0", "max_error_mm = 3.0\nmax_deviation_mm = 0.03");
+        let said = said(&hall(&[SECOND, QUICK, allowed]), &bench_ride());
+        let named = "a2: link stalls, D1, D3: a drive of seat silver3 at 29.0 Hz would be 0.0";
+        let fits = "it fits at 54.5 Hz: baud = 230400";
         let all = |one: &String| {
             one.contains("mm beside the cue at 00:0")
-                && one.contains("0.30 are allowed")
+                && one.contains("0.03 are allowed")
                 && one.ends_with(fits)
         };
         assert!(said.iter().any(|one| one.contains(named)) && said.iter().all(all), "{said:?}");
-        let faster = hall(&[SECOND, allowed, ("baud = 57600", "baud = 115200")]);
+        let faster = hall(&[SECOND, allowed, ("baud = 57600", "baud = 230400")]);
         assert!(prove_at(&faster, &bench_ride(), 1.0).passed(), "and so it does");
     }
 
     #[test]
     fn a_limit_that_the_fit_breaks_is_refused_with_the_level_that_fits() {
-        let jerky = ("max_jerk_mm_s3 = 60000", "max_jerk_mm_s3 = 60000\nmax_acceleration_mm_s2 = 1980");
+        let jerky = ("max_jerk_mm_s3 = 60000", "max_jerk_mm_s3 = 60000\nmax_acceleration_mm_s2 = 1955");
         let config = hall(&[
             ("max_acceleration_mm_s2 = 3000\n", ""),
             jerky,
-            ("baud = 57600", "baud = 57600\nrate_hz = 12"),
+            ("baud = 57600", "baud = 57600\nrate_hz = 20"),
         ]);
         let said = said(&config, &bench_ride());
         let level = said[0]
@@ -339,7 +340,7 @@ mod tests {
     {
         let said = said(&hall(&[("baud = 57600", "baud = 57600\nrate_hz = 50")]), &bench_ride());
         assert!(
-            said.len() == 1 && said[0].trim_start().starts_with("rate_hz of [link.stalls]: 3 axes play at"),
+            said.len() == 1 && said[0].trim_start().starts_with("[link.stalls]: 3 axes play at"),
             "{said:?}"
         );
         let slow = hall(&[("max_velocity_mm_s = 240", "max_velocity_mm_s = 100")]);

@@ -7,7 +7,6 @@ pub(crate) use drives::{DriveBreach, LinkBreach, OnDrive, OverLimit};
 use std::time::Duration;
 
 use crate::cue::Place;
-use crate::drive::rates::TooSlow;
 use crate::motion::AxisUnit;
 use crate::time::ShowTime;
 
@@ -287,11 +286,9 @@ pub(crate) enum Breach {
     #[error(transparent)]
     OnLink(Box<LinkBreach>),
     /// A link is to play more often than it can.
-    #[error("rate_hz of [link.{link}]: {slow}")]
+    #[error("{why}")]
     TooSlow {
-        /// Its name.
-        link: String,
-        /// Why, and what would fit.
-        slow: TooSlow,
+        /// Which, why, and what would fit.
+        why: String,
     },
 }

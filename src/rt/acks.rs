@@ -6,8 +6,9 @@ use std::time::Duration;
 use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
-use super::{Live, Sent, TickReport, Watch};
+use super::{LinkNews, Live, Sent, TickReport, Watch};
 use crate::drive::Incoming;
+use crate::drive::link::StreamEvent;
 use crate::health::Change;
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Answer, Observer, Watched};
@@ -74,6 +75,9 @@ pub struct AckLoop {
     ticks: Consumer<TickReport>,
     /// The newest instant at which a frame was sent.
     last_sent: MonoTime,
+    /// What links tell, and how many frames ask for a reply.
+    links: Vec<LinkNews>,
+    ack_every: u32,
     /// Who judges how the controllers stand.
     watch: Option<Watch>,
     /// Whom to tell which frames were acked, and the times so far.
@@ -96,6 +100,8 @@ impl AckLoop {
             accounts: Accounts::new(watched, ack_every),
             sent,
             ticks,
+            links: Vec::new(),
+            ack_every,
             watch: None,
             last_sent: MonoTime::default(),
             live: None,
@@ -108,6 +114,13 @@ impl AckLoop {
     pub(crate) fn going_on(mut self, firsts: &[FrameNo], ack_every: u32) -> Self {
         self.accounts.books = Books::new(Tracker::starting_at(firsts, ack_every));
         self
+    }
+
+    /// The same that hears links as well, whose seats come behind those on the network.
+    #[must_use]
+    pub(crate) fn hearing(mut self, links: Vec<LinkNews>) -> Self {
+        self.accounts.observer.add(links.iter().map(|link| link.controllers.len()).sum());
+        Self { links, ..self }
     }
 
     /// Tells `live` which frames were acked, and the times so far, again and again while it runs.
@@ -181,7 +194,7 @@ impl AckLoop {
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, Incoming<'_>) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, .. } = self;
+        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, links, ack_every, .. } = self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
             let controller = match origin {
@@ -213,6 +226,22 @@ impl AckLoop {
                 books.tracker_mut().on_stray(controller);
             }
         });
+        for (controller, event) in links.iter_mut().flat_map(LinkNews::take) {
+            if let Some(live) = live {
+                live.on_heard(controller);
+            }
+            if let StreamEvent::Confirmed { first, last, .. } = event {
+                let next = |frame: &FrameNo| (frame.since(last) < 0).then(|| frame.next());
+                let asked = |frame: &FrameNo| frame.asks(*ack_every);
+                for frame in std::iter::successors(Some(first), next).filter(asked) {
+                    let reply =
+                        Reply { controller, frame, code: ReplyCode::Running, error: 0, inputs: 0, at: began };
+                    books.on_reply(reply, &mut Records { sent, last_sent, watch, observer, live });
+                }
+            } else if let Some(watch) = watch {
+                watch.hear_link(observer, controller, &event, began);
+            }
+        }
         books.settle(began, &mut Records { sent, last_sent, watch, observer, live });
         if let Some(live) = live {
             live.on_told(began);

@@ -267,14 +267,18 @@ impl Conductor {
 
     /// Has the engine do what the state says.
     pub(super) fn steer(&self, engine: &mut Engine) {
-        engine.obey(match self.machine.state() {
+        let directive = match self.machine.state() {
             State::Boot | State::Recovering => Directive::Off,
             State::Homing | State::Parked | State::Armed => Directive::Wait,
             State::Playing(_) if self.film().is_none_or(FilmLead::leads) => Directive::Play,
             State::Playing(_) | State::Paused => Directive::Hold,
             State::Stopping | State::Stopped | State::Fault => Directive::Stop,
             State::Parking => Directive::Park,
-        });
+        };
+        if directive == Directive::Stop {
+            engine.cut_led_ahead();
+        }
+        engine.obey(directive);
     }
 
     /// Tells the machine what the engine does; to be called every tick, after the engine's. What happened comes before how far it is.

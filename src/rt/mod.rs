@@ -8,6 +8,7 @@ mod conductor;
 mod desk;
 mod film;
 mod line;
+mod links;
 mod live;
 mod mail;
 mod places;
@@ -24,6 +25,8 @@ pub use film::FilmLead;
 pub(crate) use film::FilmStart;
 pub use line::Line;
 pub(crate) use line::line;
+pub use links::Outlets;
+pub(crate) use links::{LinkLane, LinkLoop, LinkNews, Port};
 pub use live::Live;
 pub(crate) use live::Times;
 pub use mail::{
@@ -54,12 +57,12 @@ use crate::wire::MAX_LEN;
 
 /// Where the frames of a tick go.
 pub trait FrameSink {
-    /// Hands one lane's datagram to the kernel; never blocks.
-    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery;
+    /// Hands one lane's datagram to the kernel, `at` being now; never blocks.
+    fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery;
 }
 
 impl FrameSink for Sender {
-    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
+    fn send(&mut self, lane: usize, datagram: &[u8], _at: MonoTime) -> Delivery {
         Sender::send(self, lane, datagram)
     }
 }
@@ -302,7 +305,7 @@ impl Outgoing<'_> {
         let Self { index, stamped: Stamped { frame, asked, shakes }, pose, lasts_ms, at_most_ms, at } = *self;
         // Posted before it is sent: a reply can overtake what is posted after.
         mail.post(Sent::Posted { lane: places::number(index), frame, asked, at });
-        let delivery = sink.send(index, datagram);
+        let delivery = sink.send(index, datagram, at);
         places.sent(index, &Taken { frame, asked, pose, lasts_ms, at_most_ms, shakes, at }, delivery);
         if let Delivery::Failed(_) = delivery {
             mail.post(Sent::Failed { lane: places::number(index), frame });

@@ -90,6 +90,10 @@ impl Places {
         for lane in 0..self.lanes.len() {
             match self.take_evidence(lane, mail, now) {
                 Found::Nothing => {}
+                // One that is led ahead brakes by itself where nothing reaches it; slow lines do not.
+                Found::Gap if self.lanes[lane].belief.is_led_ahead() => {
+                    engine.order(lane, LaneOrder::FallOut(Fall::Gap));
+                }
                 Found::Gap => engine.order(lane, LaneOrder::GoBlind),
                 Found::Astray => engine.order(lane, LaneOrder::FallOut(Fall::Astray)),
             }

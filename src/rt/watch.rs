@@ -15,6 +15,7 @@ use super::mail::{Alarm, Sent};
 use super::standby::Standby;
 use super::table::{Row, Turns};
 use crate::config::Controller;
+use crate::drive::link::LaneWants;
 use crate::drive::{EvidenceList, Lane, MOST_EVIDENCE, Need, Peer, Rounds, Whereabouts};
 use crate::health::{Change, HealthState, HealthTable, Notice};
 use crate::net::Sender;
@@ -136,6 +137,12 @@ impl Watch {
         };
         let gone = (0..groups.controllers()).filter(is_gone).collect();
         (self.changes, gone)
+    }
+
+    /// What is wanted of a controller by the thread of its link; none where it has none.
+    #[must_use]
+    pub(crate) fn wants(&self, controller: usize) -> Option<Arc<LaneWants>> {
+        self.peers.get(controller)?.wants()
     }
 
     pub(super) fn on_sent(&mut self, sent: Sent) {

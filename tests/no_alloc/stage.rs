@@ -106,9 +106,9 @@ struct Counted<'a> {
 }
 
 impl FrameSink for Counted<'_> {
-    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
+    fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery {
         self.pace.sent.fetch_add(1, Ordering::AcqRel);
-        self.sender.send(lane, datagram)
+        FrameSink::send(&mut self.sender, lane, datagram, at)
     }
 }
 

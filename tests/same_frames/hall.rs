@@ -381,7 +381,7 @@ struct Link<'a> {
 }
 
 impl FrameSink for Link<'_> {
-    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
+    fn send(&mut self, lane: usize, datagram: &[u8], _at: MonoTime) -> Delivery {
         let Hall { tick, live, stands, seen, unheard, .. } = self.hall;
         let mut now = seen.get();
         now.frames.add(&tick.get().to_le_bytes());

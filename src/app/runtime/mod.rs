@@ -3,6 +3,7 @@
 
 mod boot;
 mod device_job;
+mod links;
 
 pub(crate) use device_job::{DeviceJob, Finding, run_on_devices};
 
@@ -28,8 +29,8 @@ use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    AckLoop, Command, Conductor, Desk, FilmLead, Line, Live, Mail, MailEnds, NewsIn, Order, Places, PlanLoop,
-    Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
+    AckLoop, Command, Conductor, Desk, FilmLead, Line, LinkLoop, Live, Mail, MailEnds, NewsIn, Order,
+    Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
@@ -54,6 +55,9 @@ pub enum RuntimeError {
     /// The system starts no further thread.
     #[error("no thread could be started; allow more with `ulimit -u`, or TasksMax= in the unit")]
     Thread(#[source] io::Error),
+    /// A serial link.
+    #[error("{0}")]
+    Link(String),
 }
 
 /// The number of each controller's next frame, by its address: a number never comes twice within one process.
@@ -101,6 +105,7 @@ pub struct Runtime {
     acks: AckLoop,
     watch: Watch,
     plans: PlanLoop,
+    links: Vec<LinkLoop>,
     ticks: Ticks,
 }
 
@@ -159,11 +164,12 @@ impl Runtime {
     ) -> Result<Self, RuntimeError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
+        let ports = links::open(&config)?;
         let halves = boot::bind(&config)?;
-        Self::over(config, purpose, numbers, signals, halves)
+        Self::over_all(config, purpose, numbers, signals, halves, ports)
     }
 
-    /// The same by sockets, or another network, that are open.
+    /// The same of a hall without links, by sockets, or another network, that are open.
     ///
     /// # Errors
     /// As [`Runtime::open`].
@@ -172,7 +178,22 @@ impl Runtime {
         purpose: Purpose,
         numbers: &Numbers,
         signals: &Arc<AtomicBool>,
+        halves: (Sender, Receiver),
+    ) -> Result<Self, RuntimeError> {
+        Self::over_all(config, purpose, numbers, signals, halves, Vec::new())
+    }
+
+    /// The same with its links, by ports that are open.
+    ///
+    /// # Errors
+    /// As [`Runtime::open`].
+    pub(crate) fn over_all(
+        config: Arc<Config>,
+        purpose: Purpose,
+        numbers: &Numbers,
+        signals: &Arc<AtomicBool>,
         (sender, receiver): (Sender, Receiver),
+        ports: Vec<Port>,
     ) -> Result<Self, RuntimeError> {
         let manner = Manner { level: 0.0, silent: purpose.is_silent() };
         let (engine, lanes, planner, timeline) = boot::open(&config, numbers, manner)?.split();
@@ -185,7 +206,8 @@ impl Runtime {
         let (orders, orders_end) = RingBuffer::new(ORDERS);
         let groups = Groups::of(&config.controllers);
         let ack_every = manner.ack_every(&config);
-        let health = HealthTable::new(groups, config.show.loss_policy, ack_every, rate.period());
+        let health = HealthTable::new(groups, config.show.loss_policy, ack_every, rate.period())
+            .led_ahead(lanes.iter().map(|lane| lane.window.lead()));
         let live_end = Arc::clone(&live);
         let watch =
             |health| Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, live_end);
@@ -197,15 +219,19 @@ impl Runtime {
             }
             Purpose::Play { film, .. } => (engine.waiting(), watch(health), film),
         };
-        let watched = config.stations().iter().map(Watched::of).collect();
+        let links = links::Links::over(&config, &lanes, &watch, ports, &live)?;
+        let watched: Vec<_> = config.stations().iter().map(Watched::of).collect();
+        let sink = Outlets::new(sender, watched.len(), links.poses, links.led);
         let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
-        let acks = AckLoop::new(receiver, watched, ack_every, sent, ticks).going_on(&firsts, ack_every);
+        let acks = AckLoop::new(receiver, watched, ack_every, sent, ticks)
+            .going_on(&firsts, ack_every)
+            .hearing(links.news);
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let (leave, granted) = (Arc::default(), RealTime::NOTHING);
         let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
         let silent = manner.silent;
-        let ticks = Ticks { engine, lanes, film, sender, mail };
-        Ok(Self { handle, line, silent, acks, watch, plans, ticks })
+        let ticks = Ticks { engine, lanes, film, sink, mail };
+        Ok(Self { handle, line, silent, acks, watch, plans, links: links.loops, ticks })
     }
 
     /// The same with a film that shows may follow.
@@ -236,8 +262,8 @@ impl Runtime {
     /// second, in which it sends nothing else.
     pub(super) fn find_other_masters(&mut self) -> Vec<(usize, u16)> {
         let Self { handle: RuntimeHandle { config, leave: stop, .. }, acks, ticks, .. } = self;
-        let Ticks { sender, lanes, .. } = ticks;
-        Company { sender, acks, controllers: &config.controllers, lanes, stop }.look()
+        let Ticks { sink, lanes, .. } = ticks;
+        Company { sender: sink.sender(), acks, controllers: &config.controllers, lanes, stop }.look()
     }
 
     /// Runs it on the calling thread, which becomes the tick thread, until it is told to leave. Before the first tick `lead`
@@ -255,7 +281,7 @@ impl Runtime {
         let granted = realtime::request();
         self.handle.granted = granted.clone();
         let (config, control, silent) = (Arc::clone(self.config()), self.control(), self.silent);
-        let (runtime, line, Parts { acks, plans, mut ticks }) = self.part();
+        let (runtime, line, Parts { acks, plans, links, mut ticks }) = self.part();
         let rate = Rate::from_hz(config.show.rate_hz);
         let spin = Duration::from_micros(u64::from(config.show.spin_us));
         let over = AtomicBool::new(false);
@@ -263,8 +289,8 @@ impl Runtime {
             let origin = Monotonic.now() + RUN_UP;
             let grid_of_drains = if silent { DrainGrid::rare } else { DrainGrid::new };
             let drains = grid_of_drains(origin, rate.period());
-            let helpers =
-                Helpers::start(scope, &over, &granted, acks, drains, plans).map_err(RuntimeError::Thread)?;
+            let helpers = Helpers::start(scope, &over, &granted, (acks, drains), plans, links)
+                .map_err(RuntimeError::Thread)?;
             ticks.mail.wakes(helpers.planner());
             let clock = Spinning::new(&Monotonic, spin, rate.period());
             let mut ticks = ticks.on(&clock, TickGrid::new(origin, rate), &control);
@@ -285,35 +311,39 @@ impl Runtime {
         drive: impl FnOnce(RuntimeHandle, Line, &mut Loops<'_, C>) -> T,
     ) -> (T, Numbers) {
         let (config, control) = (Arc::clone(self.config()), self.control());
-        let (runtime, line, Parts { acks, plans, ticks }) = self.part();
+        let (runtime, line, Parts { acks, plans, links, ticks }) = self.part();
         let grid = TickGrid::new(origin, Rate::from_hz(config.show.rate_hz));
-        let mut loops = Loops { ticks: ticks.on(clock, grid, &control), acks, plans };
+        let mut loops = Loops { ticks: ticks.on(clock, grid, &control), acks, plans, links };
         let outcome = drive(runtime, line, &mut loops);
         (outcome, next_numbers(&config, &loops.ticks.lanes))
     }
 
     fn part(self) -> (RuntimeHandle, Line, Parts) {
-        let Self { handle, line, mut acks, watch, plans, ticks, .. } = self;
+        let Self { handle, line, mut acks, watch, plans, links, ticks, .. } = self;
         acks.tell(Arc::clone(&handle.live));
         acks.watched_by(watch);
-        (handle, line, Parts { acks, plans, ticks })
+        (handle, line, Parts { acks, plans, links, ticks })
     }
 }
 
 /// The loops of a hall that somebody steps.
 pub struct Loops<'a, C> {
     /// The tick thread's.
-    pub ticks: TickLoop<'a, C, Sender>,
+    pub ticks: TickLoop<'a, C, Outlets>,
     /// The ack thread's.
     pub acks: AckLoop,
     /// The planner's.
     pub plans: PlanLoop,
+    /// Those of links.
+    #[cfg_attr(not(test), expect(dead_code, reason = "virtual halls of other programs have none"))]
+    pub(crate) links: Vec<LinkLoop>,
 }
 
 /// What becomes the loops of a hall.
 struct Parts {
     acks: AckLoop,
     plans: PlanLoop,
+    links: Vec<LinkLoop>,
     ticks: Ticks,
 }
 
@@ -323,14 +353,19 @@ struct Ticks {
     engine: Engine,
     lanes: Vec<Lane>,
     film: Option<LeadingFilm>,
-    sender: Sender,
+    sink: Outlets,
     mail: Mail,
 }
 
 impl Ticks {
     /// The loop on that clock, from the grid's first tick on.
-    fn on<'a, C: Clock>(self, clock: &'a C, grid: TickGrid, control: &'a Control) -> TickLoop<'a, C, Sender> {
-        let Self { engine, lanes, film, sender: sink, mail } = self;
+    fn on<'a, C: Clock>(
+        self,
+        clock: &'a C,
+        grid: TickGrid,
+        control: &'a Control,
+    ) -> TickLoop<'a, C, Outlets> {
+        let Self { engine, lanes, film, sink, mail } = self;
         let now = grid.next_deadline();
         let film = film.map(|LeadingFilm { source, rules }| match rules {
             Some(rules) => FilmLead::new(source, rules, now),

@@ -11,11 +11,13 @@ use super::super::play::leave_on_signals;
 use super::super::targets::{Driven, Troubles};
 use super::super::token::chance;
 use super::super::{Exit, Failure, OrExit as _, print};
+use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
+use crate::config::link::LinkWiring;
 use crate::config::{Controller, Drives, Link};
-use crate::drive::link::LinkLine;
-use crate::drive::silvermax::{HomeError, Homing, SeatUnits, Step, Talk, TalkFault, home};
+use crate::drive::link::{LinkLine, Step, TalkTerms};
+use crate::drive::{silvermax, sixpack2};
 
 /// How the homing of a seat went: how long it took, or why it is not home.
 pub(super) type Homed = Result<Duration, String>;
@@ -38,15 +40,20 @@ enum Fault {
 pub(super) fn explain(driven: &Driven, troubles: &mut Troubles) -> Vec<Homed> {
     let one = |controller: &Controller| {
         let drives = controller.drives().ok_or("it is on no link")?;
-        match &drives.motors {
-            Motors::SilverMax(units) => {
-                let units: Vec<_> = units.iter().map(u8::to_string).collect();
-                let (link, way) = (&drives.link, way(&drives.drive.homing));
-                print::tell(&format!("{}: units {} on link {link} {way}", controller.name, units.join(", ")));
-                Ok(Duration::ZERO)
-            }
-            Motors::Sixpack2 { .. } => Err("SIXpack 2 units are not homed yet; home it with its own program"),
+        let is_bus = |link: &Link| link.name == drives.link && link.wiring == LinkWiring::Can;
+        if driven.links.iter().any(is_bus) {
+            return Err(
+                "no CAN bus is spoken to yet; connect it by a serial line, or home it with its own program",
+            );
         }
+        let list = |numbers: &[u8]| numbers.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
+        let who = match &drives.motors {
+            Motors::SilverMax(units) => format!("units {}", list(units)),
+            Motors::Sixpack2 { unit, motors } => format!("motors {} of unit {unit}", list(motors)),
+        };
+        let (link, way) = (&drives.link, way(&drives.drive.homing));
+        print::tell(&format!("{}: {who} on link {link} {way}", controller.name));
+        Ok(Duration::ZERO)
     };
     let tell = |(controller, result): (&Controller, Result<Duration, &str>)| {
         result.map_err(|why| {
@@ -85,10 +92,10 @@ pub(super) fn home_all(
     };
     thread::scope(|scope| {
         let (tell, told) = channel();
-        for link in &driven.links {
+        for (link, period) in driven.links.iter().zip(&driven.periods) {
             let (seats, tell, abort) = (on(link), tell.clone(), &*abort);
             if !seats.is_empty() {
-                scope.spawn(move || home_link(link, driven, &seats, abort, &tell));
+                scope.spawn(move || home_link((link, *period), driven, &seats, abort, &tell));
             }
         }
         drop(tell);
@@ -135,8 +142,14 @@ fn words(step: Step) -> String {
     }
 }
 
-/// Homes the seats of a link.
-fn home_link(link: &Link, driven: &Driven, seats: &[usize], abort: &AtomicBool, tell: &Sender<Told>) {
+/// Homes the seats of a link, which tells each axis something new each period.
+fn home_link(
+    (link, period): (&Link, Duration),
+    driven: &Driven,
+    seats: &[usize],
+    abort: &AtomicBool,
+    tell: &Sender<Told>,
+) {
     // Whoever shows it listens until all have told.
     let over = |index, result| drop(tell.send(Told::Over(index, result)));
     let line = match LinkLine::open(link) {
@@ -146,38 +159,80 @@ fn home_link(link: &Link, driven: &Driven, seats: &[usize], abort: &AtomicBool, 
             return;
         }
     };
-    let terms = line.terms(link);
-    let mut talk = Talk::new(line, terms);
+    let mut talk = LinkTalk::over(line, link, period);
     for &index in seats {
         let step = &mut |step| drop(tell.send(Told::Step(index, step)));
-        over(index, home_seat(&mut talk, &driven.controllers[index], abort, step));
+        over(index, talk.home(&driven.controllers[index], abort, step));
     }
 }
 
-#[expect(clippy::disallowed_methods, reason = "it is people who wait for a homing")]
-fn home_seat(
-    talk: &mut Talk<LinkLine>,
-    controller: &Controller,
-    abort: &AtomicBool,
-    told: &mut dyn FnMut(Step),
-) -> Result<Duration, Fault> {
-    if abort.load(Ordering::Relaxed) {
-        return Err(Fault::Refused("not begun, as you asked for the end".to_owned()));
-    }
-    let none = || Fault::Refused("it has no SilverMax units".to_owned());
-    let Some(Drives { drive, motors: Motors::SilverMax(units), .. }) = controller.drives() else {
-        return Err(none());
-    };
-    let silvermax = drive.silvermax.as_ref().ok_or_else(none)?;
-    let seat = SeatUnits { seat: &controller.seat, drive, silvermax, units };
-    let canary = canary().map_err(|error| Fault::Refused(format!("the system gives no chance: {error}")))?;
-    let begun = Instant::now();
-    match home(talk, seat, Homing { canary, abort, told }) {
-        Ok(()) => Ok(begun.elapsed()),
-        Err(error @ HomeError::Talk(TalkFault::Silent { .. } | TalkFault::Link(_))) => {
-            Err(Fault::Silent(error.to_string()))
+/// The conversation with the drives of a link.
+enum LinkTalk {
+    SilverMax(silvermax::Talk<LinkLine>),
+    Sixpack2(sixpack2::Talk<LinkLine>, Duration),
+}
+
+impl LinkTalk {
+    fn over(line: LinkLine, link: &Link, period: Duration) -> Self {
+        let terms = TalkTerms::of(link);
+        match link.family {
+            Some(DriveFamily::Sixpack2) => Self::Sixpack2(sixpack2::Talk::new(line, terms), period),
+            _ => Self::SilverMax(silvermax::Talk::new(line, terms)),
         }
-        Err(error) => Err(Fault::Refused(error.to_string())),
+    }
+
+    /// Homes a seat; how long that took.
+    #[expect(clippy::disallowed_methods, reason = "it is people who wait for a homing")]
+    fn home(
+        &mut self,
+        controller: &Controller,
+        abort: &AtomicBool,
+        told: &mut dyn FnMut(Step),
+    ) -> Result<Duration, Fault> {
+        if abort.load(Ordering::Relaxed) {
+            return Err(Fault::Refused("not begun, as you asked for the end".to_owned()));
+        }
+        let none = || Fault::Refused("it has no drives of that link".to_owned());
+        let Drives { drive, motors, .. } = controller.drives().ok_or_else(none)?;
+        let (seat, begun) = (&*controller.seat, Instant::now());
+        match (self, motors) {
+            (Self::SilverMax(talk), Motors::SilverMax(units)) => {
+                let silvermax = drive.silvermax.as_ref().ok_or_else(none)?;
+                let canary = canary()
+                    .map_err(|error| Fault::Refused(format!("the system gives no chance: {error}")))?;
+                let seat = silvermax::SeatUnits { seat, drive, silvermax, units };
+                silvermax::home(talk, seat, silvermax::Homing { canary, abort, told })?;
+            }
+            (Self::Sixpack2(talk, period), Motors::Sixpack2 { unit, motors }) => {
+                let (sixpack2, unit, period) = (drive.sixpack2.as_ref().ok_or_else(none)?, *unit, *period);
+                let seat = sixpack2::SeatMotors { seat, drive, sixpack2, unit, motors, period };
+                sixpack2::home(talk, seat, sixpack2::Homing { abort, told })?;
+            }
+            _ => return Err(none()),
+        }
+        Ok(begun.elapsed())
+    }
+}
+
+impl From<silvermax::HomeError> for Fault {
+    fn from(error: silvermax::HomeError) -> Self {
+        use silvermax::{HomeError, TalkFault};
+        match error {
+            HomeError::Talk(TalkFault::Silent { .. } | TalkFault::Link(_)) => Self::Silent(error.to_string()),
+            _ => Self::Refused(error.to_string()),
+        }
+    }
+}
+
+impl From<sixpack2::HomeError> for Fault {
+    fn from(error: sixpack2::HomeError) -> Self {
+        use sixpack2::{FindError, HomeError};
+        match error {
+            HomeError::Talk(_) | HomeError::Find(FindError::Nowhere { .. } | FindError::Link(_)) => {
+                Self::Silent(error.to_string())
+            }
+            _ => Self::Refused(error.to_string()),
+        }
     }
 }
 

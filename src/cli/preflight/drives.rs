@@ -6,8 +6,8 @@ use std::thread;
 use super::super::targets::Driven;
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Link};
-use crate::drive::link::LinkLine;
-use crate::drive::silvermax::{Talk, TalkCounts, TalkFault, look};
+use crate::drive::link::{LinkLine, TalkCounts, TalkTerms};
+use crate::drive::silvermax::{Talk, TalkFault, look};
 use crate::preflight::{DriveSubject, LinkSurvey};
 
 /// What was read of the links that somebody is on, in the order of the links; none where nobody is.
@@ -47,8 +47,7 @@ fn look_at(link: &Link, units: &[u8]) -> LinkSurvey {
             return LinkSurvey { opened: Err(error), delay: None, counts, units };
         }
     };
-    let terms = line.terms(link);
-    let mut talk = Talk::new(line, terms);
+    let mut talk = Talk::new(line, TalkTerms::of(link));
     let mut told = BTreeMap::new();
     for &unit in units {
         let facts = look(&mut talk, unit);

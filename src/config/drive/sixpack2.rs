@@ -6,7 +6,7 @@ use crate::motion::{AxisGeometry, SeatType};
 use crate::wire::sixpack2::{GREATEST_DIVIDER, MOST_STEPS, greatest_divider};
 
 /// The shares of its peak current that it can be set to, percent (CMD $11).
-const SHARES: [u8; 9] = [100, 75, 50, 38, 25, 19, 13, 9, 0];
+pub(crate) const SHARES: [u8; 9] = [100, 75, 50, 38, 25, 19, 13, 9, 0];
 /// The divider that its manual starts with.
 const USUAL_DIVIDER: u8 = 5;
 

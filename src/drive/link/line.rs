@@ -1,10 +1,11 @@
 //! A serial line as procedures have it: opened by what the configuration says of a link, and ours alone until it is dropped.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
+use super::{LinkFault, LinkPort};
 use crate::config::Link;
 use crate::config::link::LinkWiring;
-use crate::drive::silvermax::{LinkFault, LinkPort, TalkTerms};
 use crate::sys::clock::Monotonic;
 use crate::sys::serial::{SerialError, SerialPort, SerialSettings, StopBits};
 use crate::time::{Clock as _, MonoTime};
@@ -14,7 +15,11 @@ const HAND_OVER: Duration = Duration::from_millis(50);
 
 /// A line that is open.
 #[derive(Debug)]
-pub(crate) struct LinkLine(SerialPort);
+pub(crate) struct LinkLine {
+    port: SerialPort,
+    path: PathBuf,
+    settings: SerialSettings,
+}
 
 impl LinkLine {
     /// Opens the port of a link.
@@ -25,13 +30,8 @@ impl LinkLine {
         let stop_bits = if link.stop_bits == 2 { StopBits::Two } else { StopBits::One };
         let is_rs485 = link.wiring == LinkWiring::Rs485;
         let settings = SerialSettings { baud: link.baud, stop_bits, is_rs485 };
-        SerialPort::open(&link.port, settings).map(Self)
-    }
-
-    /// What is to be known of it to tell how long an exchange takes.
-    pub(crate) fn terms(&self, link: &Link) -> TalkTerms {
-        let octet_bits = 9 + u32::from(link.stop_bits);
-        TalkTerms { baud: self.0.baud(), octet_bits, has_echo: link.has_echo }
+        let port = SerialPort::open(&link.port, settings)?;
+        Ok(Self { port, path: link.port.clone(), settings })
     }
 }
 
@@ -41,21 +41,30 @@ impl LinkPort for LinkLine {
     }
 
     fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
-        let taken = self.0.line().write(octets, self.now() + HAND_OVER).map_err(|_| LinkFault)?;
+        let taken = self.port.line().write(octets, self.now() + HAND_OVER).map_err(|_| LinkFault)?;
         if taken == octets.len() { Ok(()) } else { Err(LinkFault) }
     }
 
     fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault> {
-        self.0.line().read(buf, deadline).map_err(|_| LinkFault)
+        self.port.line().read(buf, deadline).map_err(|_| LinkFault)
     }
 
     fn flush(&mut self) -> usize {
         let (mut octets, mut dropped) = ([0; 64], 0);
         // A port that is gone is found by whoever asks next.
-        while let Ok(count @ 1..) = self.0.line().read(&mut octets, MonoTime::default()) {
+        while let Ok(count @ 1..) = self.port.line().read(&mut octets, MonoTime::default()) {
             dropped += count;
         }
         dropped
+    }
+
+    fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
+        self.port.send_break(span).map_err(|_| LinkFault)
+    }
+
+    fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
+        self.settings.baud = baud;
+        self.port.set(&self.path, self.settings).map_err(|_| LinkFault)
     }
 
     fn sleep_until(&mut self, at: MonoTime) {

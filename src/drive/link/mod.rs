@@ -3,14 +3,33 @@
 //! A lane on a link writes a record of this program's own in place of a datagram, so that everything before the sink stays the same for all
 //! families; the thread of the link makes of poses what its drives are sent.
 
+mod delays;
+mod exchange;
+mod homing;
 mod line;
+mod peer;
+mod port;
+pub(crate) mod streaming;
+mod terms;
+#[cfg(test)]
+mod virtual_port;
 
+pub(crate) use delays::Delays;
+pub(crate) use exchange::{Moment, TalkCounts, TalkTerms};
+pub(crate) use homing::Step;
 pub(crate) use line::LinkLine;
+pub(crate) use peer::{LaneWants, LinkPeer};
+pub(crate) use port::{LinkFault, LinkPort};
+pub(crate) use streaming::{Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent};
+pub(crate) use terms::StreamTerms;
+#[cfg(test)]
+pub(crate) use virtual_port::VirtualPort;
 
 use crate::channel::ChannelId;
 use crate::cue::Vibration;
 use crate::engine::{Beat, Mix};
 use crate::motion::{MAX_AXES, Pose, Window};
+use crate::time::MonoTime;
 use crate::wire::{FrameNo, MAX_LEN};
 
 use super::Stamped;
@@ -27,9 +46,20 @@ pub(crate) struct LinkPose {
     /// How long after the one before it is reached, ms.
     pub(crate) lasts_ms: u32,
     /// Where, as fractions of each axis's stroke.
-    pub(crate) pose: Pose,
+    pub(crate) axes: Pose,
     /// What each axis is to swing by beside that, amplitudes as fractions of its stroke.
     pub(crate) vibration: [Vibration; MAX_AXES],
+}
+
+/// A pose on its way to the thread of a link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LedPose {
+    /// The lane of the link, from 0.
+    pub(crate) lane: u16,
+    /// When the seat is to be there: the lane's lead after the tick.
+    pub(crate) at: MonoTime,
+    /// Where.
+    pub(crate) pose: LinkPose,
 }
 
 impl LinkPose {
@@ -43,12 +73,12 @@ impl LinkPose {
             *own = Vibration { hz, amplitude: amplitude * slot.to_stroke };
             stamped.shakes = stamped.shakes.max(own.amplitude);
         }
-        Self { frame: stamped.frame, lasts_ms: beat.lasts_ms, pose: window.reached(pose), vibration }
+        Self { frame: stamped.frame, lasts_ms: beat.lasts_ms, axes: window.reached(pose), vibration }
     }
 
     /// Writes it.
     pub(super) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let numbers = self.pose.iter().copied();
+        let numbers = self.axes.iter().copied();
         let numbers = numbers.chain(self.vibration.iter().flat_map(|one| [one.hz, one.amplitude]));
         buf[..4].copy_from_slice(&self.frame.0.to_le_bytes());
         buf[4..8].copy_from_slice(&self.lasts_ms.to_le_bytes());
@@ -59,7 +89,6 @@ impl LinkPose {
 
     /// Reads what [`Self::emit`] wrote.
     #[must_use]
-    #[cfg_attr(not(test), expect(dead_code, reason = "the threads of links come with the drives' masters"))]
     pub(crate) fn parse(record: &[u8; RECORD_LEN]) -> Self {
         let (words, _) = record[..8].as_chunks::<4>();
         let (cells, _) = record[8..].as_chunks::<8>();
@@ -71,7 +100,7 @@ impl LinkPose {
         Self {
             frame: FrameNo(u32::from_le_bytes(words[0])),
             lasts_ms: u32::from_le_bytes(words[1]),
-            pose: std::array::from_fn(number),
+            axes: std::array::from_fn(number),
             vibration: std::array::from_fn(swing),
         }
     }
@@ -83,10 +112,10 @@ mod tests {
 
     #[test]
     fn a_record_reads_as_it_was_written() {
-        let pose = std::array::from_fn(|axis| 0.1 * f64::from(u8::try_from(axis).unwrap()));
-        let swing = |axis: usize| Vibration { hz: 2.0 + pose[axis], amplitude: pose[axis] * 1e-3 };
+        let axes: Pose = std::array::from_fn(|axis| 0.1 * f64::from(u8::try_from(axis).unwrap()));
+        let swing = |axis: usize| Vibration { hz: 2.0 + axes[axis], amplitude: axes[axis] * 1e-3 };
         let written =
-            LinkPose { frame: FrameNo(7), lasts_ms: 10, pose, vibration: std::array::from_fn(swing) };
+            LinkPose { frame: FrameNo(7), lasts_ms: 10, axes, vibration: std::array::from_fn(swing) };
         let mut buf = [0; MAX_LEN];
         let record = written.emit(&mut buf).try_into().expect("one record");
         assert_eq!(LinkPose::parse(record), written);

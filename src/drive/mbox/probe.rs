@@ -3,7 +3,7 @@
 use super::reads::MonitorRead::{self, Inputs, Mode, Packets, StopMask, Versions, Zero};
 use super::reads::ZERO_KNOWN;
 use super::stop_signs::StopSigns;
-use crate::health::{Identity, Sighting};
+use crate::health::{Continuity, Identity, Sighting};
 use crate::observe::Look;
 use crate::wire::{Dialect, RegisterReply, ReplyCode};
 
@@ -93,6 +93,7 @@ impl Probe {
         let [minor_version, version, _] = self.told(Versions)?;
         let [zero, ..] = self.told(Zero)?;
         let packets = self.told(Packets).map(|[packets, ..]| packets);
+        let continuity = packets.map_or(Continuity::Answers, Continuity::Packets);
         let is_told = packets.is_some() || self.dialect != Dialect::Smc;
         let has_place = |read: &MonitorRead| {
             read.first_axis().is_none_or(|first| first >= self.axes) || self.told(*read).is_some()
@@ -107,7 +108,7 @@ impl Probe {
             Dialect::Mbox => (0, minor_version),
         };
         let identity = Identity { version, minor_version, work_mode, axes };
-        Some(Sighting { identity, error: self.seen.error, alarm, packets, homed: zero == ZERO_KNOWN })
+        Some(Sighting { identity, error: self.seen.error, alarm, continuity, homed: zero == ZERO_KNOWN })
     }
 
     /// True if all was answered that tells of an emergency stop, by its code or by the inputs.

@@ -15,6 +15,20 @@ pub(crate) struct Middle {
     pub(crate) velocity: f64,
 }
 
+impl Middle {
+    /// By the cubic through four poses a `tick` apart, seconds: what the axis does `part` of a tick behind the second of them.
+    #[must_use]
+    pub(crate) fn between([a, b, c, d]: [f64; 4], part: f64, tick: f64) -> Self {
+        // By its differences about the second pose: what stands still stays so to the last bit.
+        let (before, first, after) = (b - a, c - b, d - c);
+        let (second, third) = (first - before, (after - first) - (first - before));
+        let slope = first - second / 2.0 - third / 6.0;
+        let (bend, twist) = (second / 2.0, third / 6.0);
+        let position = b + part * (slope + part * (bend + part * twist));
+        Self { position, velocity: (slope + part * (2.0 * bend + 3.0 * part * twist)) / tick }
+    }
+}
+
 /// Makes middles of poses, one axis.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Middles {
@@ -54,19 +68,7 @@ impl Middles {
         }
         let part = self.next as f64 / self.tick as f64;
         self.next += self.slice;
-        Some(self.at(part, self.tick as f64 * 1e-9))
-    }
-
-    /// The cubic through the poses, `part` of a tick behind the second of them.
-    fn at(&self, part: f64, tick: f64) -> Middle {
-        let [a, b, c, d] = self.poses;
-        // By its differences about the second pose: what stands still stays so to the last bit.
-        let (before, first, after) = (b - a, c - b, d - c);
-        let (second, third) = (first - before, (after - first) - (first - before));
-        let slope = first - second / 2.0 - third / 6.0;
-        let (bend, twist) = (second / 2.0, third / 6.0);
-        let position = b + part * (slope + part * (bend + part * twist));
-        Middle { position, velocity: (slope + part * (2.0 * bend + 3.0 * part * twist)) / tick }
+        Some(Middle::between(self.poses, part, self.tick as f64 * 1e-9))
     }
 }
 

@@ -7,10 +7,10 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use super::port::LinkPort;
 use super::set_up::{HomeError, SeatUnits, UnitAxis, write, write_once};
 use super::talk::Talk;
 use crate::config::drive::homing::{HomeWay, Side};
+use crate::drive::link::{LinkPort, Step};
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{ACCUMULATOR, INPUT_POSITION, POSITION};
 use crate::wire::silvermax::{Internal, Io, Poll, Request, StatusWord, StopOn};
@@ -27,23 +27,6 @@ const PARKED_MM: f64 = 0.1;
 const PATIENCE: (f64, f64) = (1.5, 2.0);
 /// Between two looks whether it still moves.
 const LOOKS: Duration = Duration::from_millis(10);
-
-/// What a homing does, for whoever watches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
-    /// An axis, from 0, is disarmed and held where it is.
-    Held(usize),
-    /// It moves off its switch.
-    OffSwitch(usize),
-    /// It looks for its zero.
-    Searching(usize),
-    /// It knows where it is.
-    Found(usize),
-    /// All go to park.
-    Parking,
-    /// Its settings are written and read back.
-    Set(usize),
-}
 
 /// Around a homing.
 pub(crate) struct Homing<'a> {

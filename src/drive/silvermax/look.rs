@@ -1,7 +1,7 @@
 //! What a unit says of itself; nothing is written, nothing moves, nothing is cleared.
 
-use super::port::LinkPort;
 use super::talk::{Answer, INTERNAL, Talk, TalkFault, internal_word};
+use crate::drive::link::LinkPort;
 use crate::wire::silvermax::register::{
     CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, POSITION, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW, TARGET,
     TORQUE_CLOSED, TORQUE_OPEN,

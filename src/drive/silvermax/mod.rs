@@ -8,10 +8,8 @@
 //!                     '--events--> ring
 //! ```
 
-mod delays;
 mod home;
 mod look;
-mod port;
 mod scale;
 mod set_up;
 mod stream;
@@ -19,14 +17,8 @@ mod talk;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use home::{Homing, Step, home};
+pub(crate) use home::{Homing, home};
 pub(crate) use look::{UnitFacts, look};
-pub(crate) use port::{LinkFault, LinkPort};
 pub(crate) use set_up::{HomeError, SeatUnits, UnitSettings, kill_names};
-pub(crate) use stream::{
-    AxisFigures, BrakeReason, LaneUnits, LinkPose, Stream, StreamEvent, StreamTerms, lead,
-};
-pub(crate) use talk::{Talk, TalkCounts, TalkFault, TalkTerms};
-
-#[expect(unused_imports, reason = "for the thread of a link")]
-pub(crate) use stream::{Account, LinkFigures};
+pub(crate) use stream::{LaneUnits, Stream, lead};
+pub(crate) use talk::{Talk, TalkFault};

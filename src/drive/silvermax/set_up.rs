@@ -1,10 +1,10 @@
 //! The settings of the units of a seat: written where a person is, at rest, and read back (command reference, pages 47 to 75).
 
-use super::port::LinkPort;
 use super::scale::DriveScale;
 use super::talk::{Answer, Talk, TalkFault};
 use crate::config::drive::{SeatDrive, SilverMaxDrive};
 use crate::drive::TICK_NS;
+use crate::drive::link::LinkPort;
 use crate::motion::{AxisGeometry, SeatType};
 use crate::wire::silvermax::register::{
     self, CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, QUEUE_SOURCE, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW,

@@ -6,8 +6,7 @@
 
 use std::time::Duration;
 
-use super::delays::Delays;
-use super::port::{LinkFault, LinkPort};
+use crate::drive::link::{Delays, LinkFault, LinkPort, Moment, TalkCounts, TalkTerms};
 use crate::time::MonoTime;
 use crate::wire::silvermax::{
     ALL_UNITS, Collected, Internal, LineCollector, MAX_LINE, NakReason, Reply, Request, Words,
@@ -28,17 +27,6 @@ pub(super) const INTERNAL: u8 = 3;
 /// What stands in that register, above the state of the drive.
 pub(super) fn internal_word(register: i32) -> Internal {
     Internal(u16::try_from(register.cast_unsigned() >> 16).unwrap_or_default())
-}
-
-/// What a line is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct TalkTerms {
-    /// Bits a second.
-    pub(crate) baud: u32,
-    /// Bits of an octet with start and stop.
-    pub(crate) octet_bits: u32,
-    /// The adapter returns what is sent.
-    pub(crate) has_echo: bool,
 }
 
 /// What a unit answered.
@@ -76,34 +64,6 @@ pub(crate) enum TalkFault {
     },
 }
 
-/// What came over a line, counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct TalkCounts {
-    /// Requests that wait for an answer.
-    pub(crate) asked: u64,
-    /// Those that got one in time.
-    pub(crate) answered: u64,
-    /// Answers that came after their time.
-    pub(crate) late: u64,
-    /// Answers where none was waited for any more.
-    pub(crate) doubled: u64,
-    /// Lines that are no answer, and octets that are no line.
-    pub(crate) malformed: u64,
-    /// Answers of a unit, or to a command, that was not asked.
-    pub(crate) foreign: u64,
-    /// The echo was not what was sent.
-    pub(crate) echo_differs: u64,
-}
-
-/// When an exchange happened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Moment {
-    /// The last octet of the request had left.
-    pub(crate) sent: MonoTime,
-    /// The first octet of the answer began to arrive.
-    pub(crate) answered: MonoTime,
-}
-
 /// A conversation with the units of a line.
 #[derive(Debug)]
 pub(crate) struct Talk<P> {
@@ -127,7 +87,7 @@ impl<P: LinkPort> Talk<P> {
     }
 
     /// The port.
-    pub(crate) fn port(&mut self) -> &mut P {
+    pub(crate) const fn port(&mut self) -> &mut P {
         &mut self.port
     }
 

@@ -61,7 +61,7 @@ fn a_controller_that_is_not_home_or_is_another_is_out() {
     for (sighting, why) in [
         (Sighting { homed: false, ..same }, Why::NotHome(2)),
         (Sighting { identity: other, ..same }, Why::Other(2)),
-        (Sighting { packets: None, ..same }, Why::Unproved(2)),
+        (Sighting { continuity: Continuity::Answers, ..same }, Why::Unproved(2)),
     ] {
         let mut hall = Hall::with_lost();
         hall.health.on_read_sent(2, 1);

@@ -52,7 +52,8 @@ impl Hall {
                 }
             }
             Junk::Sighting(packets) => {
-                let sighting = Sighting { packets: Some(packets), ..self.sighting(controller) };
+                let sighting =
+                    Sighting { continuity: Continuity::Packets(packets), ..self.sighting(controller) };
                 self.health.on_sighting(controller, &sighting, self.now);
             }
         }

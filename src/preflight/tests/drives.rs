@@ -6,8 +6,9 @@ use std::time::Duration;
 use super::super::{Check, DriveSubject, LinkSurvey, judge_driven};
 use crate::config::drive_controller::Motors;
 use crate::config::{self, Acceptance, Config};
+use crate::drive::link::TalkCounts;
 use crate::drive::rates::LinkLoad;
-use crate::drive::silvermax::{SeatUnits, TalkCounts, TalkFault, UnitFacts};
+use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts};
 use crate::sys::serial::SerialError;
 use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
 

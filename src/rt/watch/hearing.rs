@@ -1,6 +1,7 @@
 //! What controllers answer to what they were asked, beside acks: evidence for health, observer and the tick thread.
 
 use super::Watch;
+use crate::drive::link::StreamEvent;
 use crate::drive::{Evidence, Incoming, Seen, Whereabouts};
 use crate::observe::Observer;
 use crate::time::MonoTime;
@@ -29,6 +30,22 @@ impl Watch {
         is_answer
     }
 
+    /// Hears what the thread of a link tells of one of its lanes.
+    pub(in super::super) fn hear_link(
+        &mut self,
+        observer: &mut Observer,
+        controller: usize,
+        event: &StreamEvent,
+        at: MonoTime,
+    ) {
+        let mut evidence = std::mem::take(&mut self.evidence);
+        self.peers[controller].hear(event, at, &mut evidence);
+        for one in evidence.drain(..) {
+            self.take(observer, controller, one, at);
+        }
+        self.evidence = evidence;
+    }
+
     fn take(&mut self, observer: &mut Observer, controller: usize, evidence: Evidence, at: MonoTime) {
         match evidence {
             Evidence::Answered => self.health.on_answer(controller, at),
@@ -51,6 +68,13 @@ impl Watch {
             Evidence::Seen(seen) => self.on_seen(controller, seen, at),
             Evidence::Code(code) => observer.on_code(controller, code, at),
             Evidence::Stop(look) => observer.on_look(controller, look, at),
+            Evidence::Drive { axis, error } => self.health.on_drive(controller, axis, error),
+            Evidence::LostZero => self.health.on_lost_zero(controller),
+            // One that is out already is looked at anyway.
+            Evidence::Fell(why) if self.stands(controller).may_move() => {
+                self.health.on_fell_out(controller, why)
+            }
+            Evidence::Fell(_) => {}
         }
     }
 

@@ -50,7 +50,10 @@ fn what_a_controller_tells_is_taken_whole_and_once() {
     look(&mut probe, ReplyCode::Running, 0);
     let sighting = probe.take().unwrap();
     let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 1 };
-    assert_eq!(sighting, Sighting { identity, error: 0, alarm: 0, packets: Some(77), homed: true });
+    assert_eq!(
+        sighting,
+        Sighting { identity, error: 0, alarm: 0, continuity: Continuity::Packets(77), homed: true }
+    );
     assert!(probe.take().is_none());
 }
 

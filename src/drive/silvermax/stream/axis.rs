@@ -6,7 +6,8 @@ use std::time::Duration;
 use super::super::scale::DriveScale;
 use super::clock::{UnitClock, seconds};
 use super::polls::Polls;
-use super::report::{Account, AxisFigures};
+use crate::cue::Vibration;
+use crate::drive::link::{Account, AxisFigures};
 use crate::drive::{DriveCourse, Knots, Middles, Segment, SegmentFit, Shaker, TICK_NS};
 use crate::time::MonoTime;
 use crate::wire::silvermax::Request;
@@ -103,7 +104,8 @@ pub(super) struct Axis {
     pub(super) not_before: MonoTime,
     pub(super) doubt: Option<Doubt>,
     pub(super) failing_since: Option<MonoTime>,
-    /// Canaries, and targets, that were wrong one after the other.
+    /// What register 40 held when it was read last; and canaries, and targets, that were wrong one after the other.
+    pub(super) canary: Option<i32>,
     pub(super) strikes: u8,
     pub(super) strayed: u8,
     /// It has to be told to brake.
@@ -136,6 +138,7 @@ impl Axis {
             not_before: now,
             doubt: None,
             failing_since: None,
+            canary: None,
             strikes: 0,
             strayed: 0,
             owes_stop: true,
@@ -169,8 +172,8 @@ impl Axis {
     }
 
     /// The next pose, in strokes, and what vibrates on it. Slices end where `knot` says, the first at 1.
-    pub(super) fn push(&mut self, pose: f64, (hz, amplitude): (f64, f64), knot: impl Fn(u32) -> MonoTime) {
-        let swing = self.shaker.after(self.terms.tick, hz, amplitude);
+    pub(super) fn push(&mut self, pose: f64, swing: Vibration, knot: impl Fn(u32) -> MonoTime) {
+        let swing = self.shaker.after(self.terms.tick, swing.hz, swing.amplitude);
         self.middles.push(pose + swing);
         while let Some(middle) = self.middles.next() {
             self.pushed += 1;

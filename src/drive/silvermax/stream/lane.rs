@@ -2,11 +2,10 @@
 
 use std::time::Duration;
 
-use super::LinkPose;
 use super::axis::{Axis, Kind};
 use super::clock::{after, seconds};
-use super::report::StreamEvent;
 use crate::drive::Segment;
+use crate::drive::link::{LedPose, LinkPose, StreamEvent};
 use crate::motion::{MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
@@ -15,6 +14,8 @@ use crate::wire::FrameNo;
 const FRAMES: usize = 64;
 /// How much of each tick the grid is stretched at most to come back to when poses are to be there.
 const STRETCH: f64 = 0.01;
+/// A seat stands where it is led from so near, mm: as far as a loaded motor may be beside its target.
+const STANDS_MM: f64 = 0.1;
 /// Poses that differ by less, in strokes, stand still.
 const STILL: f64 = 1e-7;
 
@@ -40,8 +41,10 @@ pub(super) enum Stage {
 pub(super) struct Lane {
     pub(super) axes: Vec<Axis>,
     pub(super) stage: Stage,
-    /// What register 40 of its units holds while they are home.
-    pub(super) canary: i32,
+    /// What register 40 of its units holds while they are home; none before it was seen.
+    pub(super) canary: Option<i32>,
+    /// One that is out comes back as soon as its units are seen to be home.
+    pub(super) returns: bool,
     period: Duration,
     tick: Duration,
     /// When its first slice begins.
@@ -50,7 +53,8 @@ pub(super) struct Lane {
     poses: u32,
     /// How much later its knots are than an even grid from the origin, seconds.
     shift: f64,
-    /// The last frame in each slice.
+    /// The first frame that is not confirmed, and the last one in each slice.
+    unconfirmed: FrameNo,
     frames: [Option<FrameNo>; FRAMES],
     /// Slices that all axes have, and that were told.
     told: u32,
@@ -64,16 +68,24 @@ pub(super) struct Lane {
 }
 
 impl Lane {
-    pub(super) fn new(axes: Vec<Axis>, canary: i32, period: Duration, tick: Duration, now: MonoTime) -> Self {
+    pub(super) fn new(
+        axes: Vec<Axis>,
+        canary: Option<i32>,
+        period: Duration,
+        tick: Duration,
+        now: MonoTime,
+    ) -> Self {
         Self {
             axes,
-            stage: Stage::Readying,
+            stage: if canary.is_some() { Stage::Readying } else { Stage::Out },
             canary,
+            returns: false,
             period,
             tick,
             origin: now,
             poses: 0,
             shift: 0.0,
+            unconfirmed: FrameNo::FIRST,
             frames: [None; FRAMES],
             told: 0,
             moves: true,
@@ -93,11 +105,47 @@ impl Lane {
         off.enumerate().find(|(_, off)| off.is_nan() || *off > most_mm)
     }
 
+    /// True if it stands where a pose leads, which goes on nowhere.
+    pub(super) fn stands_at(&self, pose: &LinkPose) -> bool {
+        !self.moves_to(pose) && self.off(pose, STANDS_MM).is_none()
+    }
+
+    /// True if a pose leads elsewhere than the one before it, or vibrates.
+    fn moves_to(&self, pose: &LinkPose) -> bool {
+        let differs = |last: LinkPose| {
+            let pairs = last.axes.iter().zip(pose.axes).take(self.axes.len());
+            pairs.into_iter().any(|(a, b)| (a - b).abs() > STILL)
+        };
+        self.last.is_some_and(differs) || pose.vibration.iter().any(|swing| swing.amplitude > 0.0)
+    }
+
+    /// Hears a pose that leads it nowhere.
+    pub(super) const fn hear(&mut self, pose: LinkPose, now: MonoTime) {
+        (self.last, self.heard) = (Some(pose), now);
+    }
+
+    /// True if a pose that comes now is the first of a motion: one that was cut off while it moved is over before another begins.
+    pub(super) fn may_begin(&self, now: MonoTime) -> bool {
+        self.is_left_alone(now) || self.last.is_some_and(|last| self.off(&last, STANDS_MM).is_none())
+    }
+
+    /// Whether its units are home, once all have told: they hold the one number that homing wrote.
+    pub(super) fn is_home(&self) -> Option<bool> {
+        let mut told = self.axes.iter().map(|axis| axis.canary);
+        let first = told.next()??;
+        let mut is_home = first != 0 && self.canary.is_none_or(|canary| canary == first);
+        for canary in told {
+            is_home &= canary? == first;
+        }
+        Some(is_home)
+    }
+
     /// All axes rest until the first pose is to be there, or later where that is too soon.
-    pub(super) fn begin(&mut self, pose: &LinkPose, soonest: MonoTime) {
+    pub(super) fn begin(&mut self, pose: &LedPose, soonest: MonoTime) {
         self.origin = pose.at.max(soonest);
         (self.poses, self.shift, self.told, self.stage) = (0, 0.0, 0, Stage::Runs);
         (self.last, self.still_moves, self.moves) = (None, false, false);
+        self.unconfirmed = pose.pose.frame;
         for axis in &mut self.axes {
             let place = axis.last().position;
             axis.make(Segment::resting(1, place), Kind::Start);
@@ -106,20 +154,17 @@ impl Lane {
 
     /// Takes the next pose. Poses go on in stream time, one tick after the other: where ticks were missed, and `at` leaps, what was
     /// ahead shrinks by that, and the grid is stretched by up to 1 % until it is regained.
-    pub(super) fn push(&mut self, pose: LinkPose, now: MonoTime) {
+    pub(super) fn push(&mut self, led: LedPose, now: MonoTime) {
         let stream = f64::from(self.poses) * self.tick.as_secs_f64();
         let slice = whole(stream / self.period.as_secs_f64());
+        let LedPose { at, pose, .. } = led;
         self.frames[slice % FRAMES] = Some(pose.frame);
-        let wanted = seconds(pose.at, self.origin) - stream;
+        let wanted = seconds(at, self.origin) - stream;
         let most = STRETCH * self.tick.as_secs_f64();
         self.shift += (wanted - self.shift).clamp(-most, most);
         self.poses += 1;
-        let differs = |last: LinkPose| {
-            let pairs = last.axes.iter().zip(pose.axes).take(self.axes.len());
-            pairs.into_iter().any(|(a, b)| (a - b).abs() > STILL)
-        };
-        self.still_moves = self.last.is_some_and(differs) || pose.vibration.iter().any(|swing| swing.1 > 0.0);
-        (self.last, self.heard) = (Some(pose), now);
+        self.still_moves = self.moves_to(&pose);
+        self.hear(pose, now);
         self.feed(&pose);
     }
 
@@ -160,8 +205,9 @@ impl Lane {
         let told = self.told;
         self.told = confirmed.max(told);
         let newest = (told..confirmed).rev().find_map(|slice| self.frames[slice as usize % FRAMES].take());
-        if let Some(frame) = newest {
-            tell(StreamEvent::Confirmed { lane, frame });
+        if let Some(last) = newest {
+            let first = std::mem::replace(&mut self.unconfirmed, last.next());
+            tell(StreamEvent::Confirmed { lane, first, last });
         }
         let moves = self.axes.iter().any(Axis::ends_moving);
         if confirmed > told && moves != self.moves {

@@ -14,10 +14,7 @@ mod lane;
 mod polls;
 mod queue;
 mod ready;
-mod report;
 mod watch;
-
-pub(crate) use report::{Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent};
 
 use std::time::Duration;
 
@@ -26,12 +23,12 @@ use rtrb::{Consumer, Producer};
 use self::axis::{Axis, AxisTerms, Doubt};
 use self::lane::{Lane, Stage};
 use self::polls::Question;
-use super::port::{LinkFault, LinkPort};
 use super::set_up::{HomeError, SeatUnits};
 use super::talk::{Talk, TalkFault};
-use crate::motion::{MAX_AXES, Pose};
+use crate::drive::link::{
+    AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms,
+};
 use crate::time::MonoTime;
-use crate::wire::FrameNo;
 use crate::wire::silvermax::Request;
 
 /// How far a first pose may be from where the seat stands, mm.
@@ -45,39 +42,13 @@ const LOST: Duration = Duration::from_millis(250);
 /// How often a unit that is lost is asked.
 const PROBES: Duration = Duration::from_millis(250);
 
-/// A pose of a lane, as it comes tick by tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LinkPose {
-    /// The lane, from 0.
-    pub(crate) lane: u16,
-    /// The frame that it is.
-    pub(crate) frame: FrameNo,
-    /// When the seat is to be there: [`lead`] after the tick.
-    pub(crate) at: MonoTime,
-    /// Until the next, ms.
-    pub(crate) lasts_ms: u32,
-    /// In strokes.
-    pub(crate) axes: Pose,
-    /// Hz, and amplitude in strokes.
-    pub(crate) vibration: [(f64, f64); MAX_AXES],
-}
-
-/// How a link plays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct StreamTerms {
-    /// From one segment of an axis to the next.
-    pub(crate) period: Duration,
-    /// From one pose to the next.
-    pub(crate) tick: Duration,
-}
-
 /// A lane: a seat that is home.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LaneUnits<'a> {
     /// The seat.
     pub(crate) seat: SeatUnits<'a>,
-    /// What homing wrote into register 40 of its units.
-    pub(crate) canary: i32,
+    /// What homing wrote into register 40 of its units; none where that is to be found out, and the lane is out meanwhile.
+    pub(crate) canary: Option<i32>,
 }
 
 /// How long before the seat is to be there its poses have to come: two slices and a half and two ticks until a segment is made of
@@ -105,7 +76,7 @@ pub(crate) struct Stream<P> {
     talk: Talk<P>,
     terms: StreamTerms,
     lanes: Vec<Lane>,
-    poses: Consumer<LinkPose>,
+    poses: Consumer<LedPose>,
     events: Producer<StreamEvent>,
     figures: LinkFigures,
 }
@@ -119,7 +90,7 @@ impl<P: LinkPort> Stream<P> {
         talk: Talk<P>,
         terms: StreamTerms,
         lanes: &[LaneUnits<'_>],
-        poses: Consumer<LinkPose>,
+        poses: Consumer<LedPose>,
         events: Producer<StreamEvent>,
     ) -> Result<Self, HomeError> {
         let (now, StreamTerms { period, tick }) = (talk.now(), terms);
@@ -180,9 +151,35 @@ impl<P: LinkPort> Stream<P> {
     /// A lane that was out was homed again.
     pub(crate) fn rejoin(&mut self, lane: u16, canary: i32) {
         if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
-            lane.canary = canary;
+            lane.canary = Some(canary);
             lane.make_ready(true);
         }
+    }
+
+    /// Has a lane's axes read as soon as there is time.
+    pub(crate) fn locate(&mut self, lane: u16) {
+        self.hurry(lane, Question::Position);
+    }
+
+    /// Has it looked whether the units of a lane are home; one that is out comes back then.
+    pub(crate) fn look(&mut self, lane: u16) {
+        self.hurry(lane, Question::Canary);
+        if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
+            lane.returns = true;
+            lane.axes.iter_mut().for_each(|axis| axis.canary = None);
+        }
+    }
+
+    fn hurry(&mut self, lane: u16, question: Question) {
+        let now = self.talk.now();
+        let axes = self.lanes.get_mut(usize::from(lane)).map(|lane| &mut lane.axes);
+        axes.into_iter().flatten().for_each(|axis| axis.polls.hurry(question, now));
+    }
+
+    /// True if a lane moves, or may.
+    #[must_use]
+    pub(crate) fn is_busy(&self) -> bool {
+        self.lanes.iter().any(|lane| matches!(lane.stage, Stage::Runs | Stage::Ends | Stage::Readying))
     }
 
     /// How an axis of a lane stands.
@@ -204,26 +201,41 @@ impl<P: LinkPort> Stream<P> {
         LinkFigures { talk: self.talk.counts(), delay_p99: self.talk.delay_p99(), ..self.figures }
     }
 
+    /// The port.
+    pub(crate) const fn port(&mut self) -> &mut P {
+        self.talk.port()
+    }
+
     /// The conversation, for other procedures while no lane runs.
+    #[cfg(test)]
     pub(crate) const fn talk(&mut self) -> &mut Talk<P> {
         &mut self.talk
     }
 
     fn take_poses(&mut self) {
-        while let Ok(pose) = self.poses.pop() {
-            let now = self.talk.now();
-            let index = usize::from(pose.lane);
-            match self.lanes.get(index).map(|lane| lane.stage) {
-                Some(Stage::Runs) => self.lanes[index].push(pose, now),
-                Some(Stage::Ready) => self.begin(index, pose, now),
-                _ => self.figures.poses_skipped += 1,
+        while let Ok(led) = self.poses.pop() {
+            let (now, index) = (self.talk.now(), usize::from(led.lane));
+            let Some(lane) = self.lanes.get_mut(index) else { continue };
+            match lane.stage {
+                Stage::Runs => lane.push(led, now),
+                Stage::Ready if lane.stands_at(&led.pose) => {
+                    lane.hear(led.pose, now);
+                    let (lane, first) = (led.lane, led.pose.frame);
+                    self.tell(StreamEvent::Confirmed { lane, first, last: first });
+                }
+                Stage::Ready if lane.may_begin(now) => self.begin(index, led, now),
+                _ => {
+                    lane.hear(led.pose, now);
+                    self.figures.poses_skipped += 1;
+                }
             }
         }
     }
 
-    /// The first pose of a lane that stands.
-    fn begin(&mut self, index: usize, pose: LinkPose, now: MonoTime) {
-        if let Some((axis, by_mm)) = self.lanes[index].off(&pose, NEAR_MM) {
+    /// The first pose that leads a lane which stands elsewhere.
+    fn begin(&mut self, index: usize, pose: LedPose, now: MonoTime) {
+        if let Some((axis, by_mm)) = self.lanes[index].off(&pose.pose, NEAR_MM) {
+            self.lanes[index].hear(pose.pose, now);
             // Told once while it stands, not at each tick.
             if !self.lanes[index].moves {
                 self.lanes[index].moves = true;

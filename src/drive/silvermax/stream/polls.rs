@@ -77,7 +77,8 @@ impl Polls {
     /// To be asked as soon as there is time.
     pub(super) fn hurry(&mut self, question: Question, now: MonoTime) {
         let at = QUESTIONS.iter().position(|(other, _)| *other == question).unwrap_or(0);
-        self.due[at] = now;
+        // Who is asked for it again and again is not put off by that.
+        self.due[at] = self.due[at].min(now);
     }
 
     /// What is due longest, and since when.

@@ -4,7 +4,7 @@ use super::axis::Doubt;
 use super::lane::Stage;
 use super::polls::Question;
 use super::{BrakeReason, LOST, PROBES, Stream, StreamEvent, axis_number, number};
-use crate::drive::silvermax::port::LinkPort;
+use crate::drive::link::LinkPort;
 use crate::drive::silvermax::talk::{Answer, TalkFault, internal_word};
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{CANARY, KILL_CAUSE};
@@ -46,6 +46,11 @@ impl<P: LinkPort> Stream<P> {
                 axis.figures.position = scale.fraction(f64::from(value));
                 let course = if axis.has_started() { axis.course_at(sent) } else { axis.course };
                 axis.figures.error_mm = scale.mm(f64::from(value) - course.position());
+                let position = axis.figures.position;
+                if !matches!(self.lanes[l].stage, Stage::Out | Stage::Lost) {
+                    let (lane, axis) = (number(l), axis_number(a));
+                    self.tell(StreamEvent::Read { lane, axis, position, at: sent });
+                }
             }
             Question::Target if self.lanes[l].stage == Stage::Runs => self.compare(l, a, value, sent),
             Question::Status => self.lanes[l].axes[a].figures.is_hot = internal_word(value).is_hot(),
@@ -56,14 +61,29 @@ impl<P: LinkPort> Stream<P> {
 
     /// A unit that was restarted has another canary. One bad digit makes one, too: twice is believed.
     fn compare_canary(&mut self, l: usize, a: usize, value: i32) {
-        let (now, canary) = (self.talk.now(), self.lanes[l].canary);
-        let axis = &mut self.lanes[l].axes[a];
-        axis.strikes = if value == canary { 0 } else { axis.strikes + 1 };
+        let now = self.talk.now();
+        let lane = &mut self.lanes[l];
+        let (canary, axis) = (lane.canary, &mut lane.axes[a]);
+        axis.canary = Some(value);
+        let is_wrong = canary.is_some_and(|canary| value != canary) && lane.stage != Stage::Out;
+        axis.strikes = if is_wrong { axis.strikes + 1 } else { 0 };
         match axis.strikes {
-            0 => {}
+            0 => self.mind_home(l),
             1 => axis.polls.hurry(Question::Canary, now),
             _ => self.put_out(l, StreamEvent::Restarted { lane: number(l), axis: axis_number(a) }),
         }
+    }
+
+    /// Tells whether all units of a lane are home; one that is out, and waits for that, is made ready.
+    fn mind_home(&mut self, l: usize) {
+        let lane = &mut self.lanes[l];
+        let Some(homed) = lane.is_home() else { return };
+        if homed && lane.stage == Stage::Out && std::mem::take(&mut lane.returns) {
+            lane.canary = lane.axes.first().and_then(|axis| axis.canary);
+            lane.make_ready(true);
+        }
+        let homed = homed && lane.stage != Stage::Out;
+        self.tell(StreamEvent::Homed { lane: number(l), homed });
     }
 
     /// The target against the model of the segments: one that was damaged on the way is obeyed all the same.
@@ -173,7 +193,7 @@ impl<P: LinkPort> Stream<P> {
         self.heard(l, a, read, &answer);
         let Answer::Data(words) = answer? else { return Ok(()) };
         let lane = &mut self.lanes[l];
-        if words.value() != Some(lane.canary) {
+        if words.value() != lane.canary {
             self.compare_canary(l, a, words.value().unwrap_or_default());
         } else if lane.axes.iter().all(|axis| axis.failing_since.is_none() && !axis.owes_stop) {
             lane.make_ready(true);

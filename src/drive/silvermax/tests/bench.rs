@@ -8,6 +8,8 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::super::*;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive::{SeatDrive, SilverMaxDrive, Torque};
+use crate::cue::Vibration;
+use crate::drive::link::*;
 use crate::motion::{AxisGeometry, MAX_AXES, SeatType};
 use crate::sim::serial::{LineFaults, SerialLine};
 use crate::sim::silvermax::{SilverBus, Unit, UnitSetup};
@@ -20,65 +22,18 @@ pub(super) const BAUD: u32 = 57_600;
 pub(super) const MM: f64 = 800.0;
 pub(super) const ZERO: f64 = 3_200.0;
 
-/// The host's end of a virtual line.
-pub(super) struct VirtualPort {
-    pub(super) line: SerialLine<SilverBus>,
-    pub(super) now: MonoTime,
-    /// The port is gone altogether.
-    pub(super) is_gone: bool,
-    /// What was sent, with when.
-    pub(super) sent: Vec<(MonoTime, String)>,
-}
-
-impl LinkPort for VirtualPort {
-    fn now(&self) -> MonoTime {
-        self.now
-    }
-
-    fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
-        if self.is_gone {
-            return Err(LinkFault);
-        }
-        self.sent.push((self.now, String::from_utf8_lossy(octets).into_owned()));
-        self.line.send(octets, self.now);
-        Ok(())
-    }
-
-    fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault> {
-        if self.is_gone {
-            return Err(LinkFault);
-        }
-        loop {
-            self.line.advance(self.now);
-            if let Some(octet) = self.line.receive(self.now) {
-                buf[0] = octet;
-                return Ok(1);
-            }
-            if self.now >= deadline {
-                return Ok(0);
-            }
-            self.now = self.line.next().map_or(deadline, |next| next.max(self.now).min(deadline));
-        }
-    }
-
-    fn flush(&mut self) -> usize {
-        self.line.advance(self.now);
-        std::iter::from_fn(|| self.line.receive(self.now)).count()
-    }
-
-    fn sleep_until(&mut self, at: MonoTime) {
-        self.now = self.now.max(at);
-        self.line.advance(self.now);
-    }
-}
+/// The host's end of a virtual line of units.
+pub(super) type VirtualPort = crate::drive::link::VirtualPort<SilverBus>;
 
 /// Units 16 and up as they are set up, on a line without faults.
 pub(super) fn talk_to(setups: &[UnitSetup]) -> Talk<VirtualPort> {
     let now = MonoTime::from_nanos(3_000_000_000);
     let bus = SilverBus::new(setups, BAUD, now);
     let line = SerialLine::new(bus, 11, LineFaults::default(), 7);
-    let port = VirtualPort { line, now, is_gone: false, sent: Vec::new() };
-    Talk::new(port, TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false })
+    Talk::new(
+        VirtualPort::new(line, now),
+        TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false, is_two_wires: false },
+    )
 }
 
 /// A seat type of three axes as the drives of the bench have it.
@@ -139,7 +94,7 @@ pub(super) fn unit(talk: &mut Talk<VirtualPort>, index: usize) -> &Unit {
 /// A seat that is home, and a play to it.
 pub(super) struct Play {
     pub(super) stream: Stream<VirtualPort>,
-    poses: Producer<LinkPose>,
+    poses: Producer<LedPose>,
     pub(super) events: Consumer<StreamEvent>,
     pub(super) terms: StreamTerms,
     /// Ticks so far, and when the first was.
@@ -176,7 +131,7 @@ impl Play {
         let terms = StreamTerms { period: PERIOD, tick: TICK };
         let (seat, silvermax) = (seat(), drive.silvermax.clone().unwrap());
         let seat = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16, 17, 18] };
-        let lanes = [LaneUnits { seat, canary: CANARY }];
+        let lanes = [LaneUnits { seat, canary: Some(CANARY) }];
         let stream = Stream::new(talk, terms, &lanes, from_tick, to_health).unwrap();
         let mut play = Self {
             stream,
@@ -246,15 +201,9 @@ impl Play {
             for (index, place) in axes.iter_mut().take(3).enumerate() {
                 *place = (self.course)(stream, index) / 150.0;
             }
-            let pose = LinkPose {
-                lane: 0,
-                frame: FrameNo(self.ticks),
-                at: due + lead(self.terms),
-                lasts_ms: 10,
-                axes,
-                vibration: [(0.0, 0.0); MAX_AXES],
-            };
-            let _ = self.poses.push(pose);
+            let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
+            let pose = LinkPose { frame: FrameNo(self.ticks), lasts_ms: 10, axes, vibration };
+            let _ = self.poses.push(LedPose { lane: 0, at: due + lead(self.terms), pose });
             self.ticks += 1;
         }
     }

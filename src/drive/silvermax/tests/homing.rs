@@ -2,6 +2,7 @@
 
 use super::bench::*;
 use crate::config::drive::homing::HomeWay;
+use crate::drive::link::Step;
 use crate::drive::silvermax::*;
 use crate::sim::silvermax::{Action, UnitSetup};
 
@@ -131,7 +132,7 @@ fn a_homing_is_stopped_between_two_looks() {
     let homed = home(&mut talk, of, Homing { canary: CANARY, abort: &abort, told: &mut told });
     assert_eq!(homed, Err(HomeError::Aborted));
     let last = talk.port().sent.last().unwrap().1.clone();
-    assert_eq!(last, "@16 3 2319282\r");
+    assert_eq!(last, b"@16 3 2319282\r");
     assert!(unit(&mut talk, 0).place() > 63_000.0, "it had hardly begun to move");
 }
 

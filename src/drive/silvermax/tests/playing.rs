@@ -1,7 +1,7 @@
 //! Plays over a good line.
 
 use super::bench::*;
-use crate::drive::silvermax::*;
+use crate::drive::link::*;
 
 #[test]
 fn a_ride_over_three_units_is_executed_within_a_tenth_of_a_millimetre_whatever_their_crystals() {
@@ -26,7 +26,7 @@ fn frames_are_confirmed_once_all_axes_have_them_before_they_are_executed() {
     let origin = play.origin;
     let mut last = None;
     for (at, event) in &play.told {
-        if let StreamEvent::Confirmed { frame, .. } = event {
+        if let StreamEvent::Confirmed { last: frame, .. } = event {
             assert!(last < Some(frame.0), "{last:?} {frame:?}");
             last = Some(frame.0);
             let executed = origin + TICK * frame.0;

@@ -1,8 +1,9 @@
-//! What a play on a link tells: events for whoever keeps health and belief, and figures that can be copied.
+//! What a play on a link is given, and what it tells: poses tick by tick; events for whoever keeps health and belief, and figures that can
+//! be copied. The same for all families.
 
 use std::time::Duration;
 
-use super::super::talk::TalkCounts;
+use super::TalkCounts;
 use crate::motion::Pose;
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
@@ -11,8 +12,35 @@ use crate::wire::silvermax::NakReason;
 /// What happened to a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StreamEvent {
-    /// All axes have taken the segments up to that frame.
+    /// All axes have taken the segments of these frames, or stand where they lead.
     Confirmed {
+        /// The lane.
+        lane: u16,
+        /// The first that was not told before.
+        first: FrameNo,
+        /// The last that is covered.
+        last: FrameNo,
+    },
+    /// An axis of a seat that is home was read.
+    Read {
+        /// The lane.
+        lane: u16,
+        /// The axis, from 0.
+        axis: u8,
+        /// Where it is, in strokes.
+        position: f64,
+        /// When.
+        at: MonoTime,
+    },
+    /// All units were asked whether they are home, and have been since.
+    Homed {
+        /// The lane.
+        lane: u16,
+        /// They are.
+        homed: bool,
+    },
+    /// What leads it up to that frame was sent to drives that confirm nothing.
+    Sent {
         /// The lane.
         lane: u16,
         /// The last frame that is covered.
@@ -94,6 +122,27 @@ pub(crate) enum StreamEvent {
         /// The axis, from 0.
         axis: u8,
     },
+}
+
+impl StreamEvent {
+    /// The lane that it is about.
+    pub(crate) const fn lane(&self) -> u16 {
+        match *self {
+            Self::Confirmed { lane, .. }
+            | Self::Read { lane, .. }
+            | Self::Homed { lane, .. }
+            | Self::Rests { lane, .. }
+            | Self::Moves { lane, .. }
+            | Self::Braked { lane, .. }
+            | Self::Lost { lane, .. }
+            | Self::Back { lane }
+            | Self::Restarted { lane, .. }
+            | Self::Killed { lane, .. }
+            | Self::Elsewhere { lane, .. }
+            | Self::OffCourse { lane, .. }
+            | Self::Doubt { lane, .. } => lane,
+        }
+    }
 }
 
 /// Why a lane brakes.

@@ -1,0 +1,112 @@
+//! The serial links of a hall: their ports are opened, and each gets a loop and its ends of the rings between.
+
+use std::sync::Arc;
+
+use rtrb::{Producer, RingBuffer};
+
+use super::RuntimeError;
+use crate::config::drive_controller::Motors;
+use crate::config::{Config, Controller, Drives, Link};
+use crate::drive::Lane;
+use crate::drive::link::{LedPose, LinkLine, StreamTerms, TalkTerms};
+use crate::drive::silvermax::{LaneUnits, SeatUnits, Stream, Talk};
+use crate::rt::{LinkLane, LinkLoop, LinkNews, Live, Port, Watch};
+
+/// Poses of a lane that wait for the thread of its link: a tenth of a second at 1 kHz.
+const POSES: usize = 128;
+/// Events of a link that wait for the ack thread.
+const EVENTS: usize = 4_096;
+
+/// What becomes of the links of a hall.
+#[derive(Debug, Default)]
+pub(super) struct Links {
+    /// The tick thread's ends of their rings, and which lane goes to which.
+    pub(super) poses: Vec<Producer<LedPose>>,
+    pub(super) led: Vec<LinkLane>,
+    /// The ack thread's ends.
+    pub(super) news: Vec<LinkNews>,
+    /// What becomes their threads.
+    pub(super) loops: Vec<LinkLoop>,
+}
+
+/// Opens the ports of those links of a hall that have seats on them.
+pub(super) fn open(config: &Config) -> Result<Vec<Port>, RuntimeError> {
+    let port = |link: &Link| match LinkLine::open(link) {
+        Ok(line) => Ok(Box::new(line) as Port),
+        Err(error) => Err(RuntimeError::Link(format!("[link.{}]: {error}", link.name))),
+    };
+    used(config).map(port).collect()
+}
+
+/// The links that have seats on them which take part.
+fn used(config: &Config) -> impl Iterator<Item = &Link> {
+    config.links.iter().filter(|link| seats(config, link).next().is_some())
+}
+
+/// The seats on a link, each with its lane.
+fn seats<'c>(config: &'c Config, link: &Link) -> impl Iterator<Item = (usize, &'c Controller, &'c Drives)> {
+    let all = config.controllers.iter().enumerate();
+    let seats = all.filter_map(|(lane, one)| one.drives().map(|drives| (lane, one, drives)));
+    seats.filter(|(.., drives)| drives.link == link.name)
+}
+
+impl Links {
+    /// Over ports that are open, one for each link that has seats.
+    pub(super) fn over(
+        config: &Config,
+        lanes: &[Lane],
+        watch: &Watch,
+        ports: Vec<Port>,
+        live: &Arc<Live>,
+    ) -> Result<Self, RuntimeError> {
+        let mut links = Self::default();
+        let none = LinkLane { link: usize::MAX, lane: 0, lead: std::time::Duration::ZERO };
+        links.led = vec![none; config.controllers.len() - config.stations().len()];
+        for (link, port) in used(config).zip(ports) {
+            links.add(config, link, lanes, watch, port, live).map_err(RuntimeError::Link)?;
+        }
+        Ok(links)
+    }
+
+    fn add(
+        &mut self,
+        config: &Config,
+        link: &Link,
+        lanes: &[Lane],
+        watch: &Watch,
+        port: Port,
+        live: &Arc<Live>,
+    ) -> Result<(), String> {
+        let terms = StreamTerms::of(link, config)?.ok_or("no seat is on it")?;
+        let on_it: Vec<_> = seats(config, link).collect();
+        let stations = config.stations().len();
+        for (own, (lane, ..)) in (0..).zip(&on_it) {
+            let lead = lanes[*lane].window.lead();
+            self.led[*lane - stations] = LinkLane { link: self.poses.len(), lane: own, lead };
+        }
+        let units = on_it.iter().map(|(_, controller, drives)| unit_of(controller, drives));
+        let units = units.collect::<Result<Vec<_>, _>>()?;
+        let (poses, from_tick) = RingBuffer::new(POSES * on_it.len());
+        let (to_acks, events) = RingBuffer::new(EVENTS);
+        let talk = Talk::new(port, TalkTerms::of(link));
+        let stream = Stream::new(talk, terms, &units, from_tick, to_acks);
+        let stream = stream.map_err(|error| format!("[link.{}]: {error}", link.name))?;
+        let wants = on_it.iter().filter_map(|(lane, ..)| watch.wants(*lane)).collect();
+        self.poses.push(poses);
+        self.news.push(LinkNews { events, controllers: on_it.iter().map(|(lane, ..)| *lane).collect() });
+        self.loops.push(LinkLoop::new(stream, wants, Arc::clone(live)));
+        Ok(())
+    }
+}
+
+/// What moves a seat; whether it is home is found out by the thread of its link.
+fn unit_of<'c>(controller: &'c Controller, drives: &'c Drives) -> Result<LaneUnits<'c>, String> {
+    let (Motors::SilverMax(units), Some(silvermax)) = (&drives.motors, &drives.drive.silvermax) else {
+        return Err(format!("{}: SIXpack 2 units are not played yet", controller.name));
+    };
+    let seat = SeatUnits { seat: &controller.seat, drive: &drives.drive, silvermax, units };
+    Ok(LaneUnits { seat, canary: None })
+}
+
+#[cfg(test)]
+mod tests;

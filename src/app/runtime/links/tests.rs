@@ -1,0 +1,328 @@
+//! Whole plays to virtual units, in virtual time: tick loop, ack loop, planner and the loop of the link; judged by where axes really were.
+
+#![expect(clippy::cast_possible_truncation, reason = "numbers of ticks")]
+
+use std::cell::Cell;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, MutexGuard};
+use std::time::Duration;
+
+use super::*;
+use crate::app::StagedShow;
+use crate::app::runtime::{Loops, Numbers, Purpose, Runtime, RuntimeHandle};
+use crate::belief::Reading;
+use crate::cue::{self, Source};
+use crate::drive::Manner;
+use crate::drive::link::{LinkFault, LinkPort, VirtualPort};
+use crate::drive::silvermax::{Homing, home};
+use crate::engine::Show;
+use crate::net::{Delivery, DrainGrid, Network, Origin};
+use crate::rt::{Command, Ticked};
+use crate::sim::serial::{LineFaults, SerialLine};
+use crate::sim::silvermax::{SilverBus, Unit, UnitSetup};
+use crate::state::{Event, Finding, Readiness, State, Transition};
+use crate::time::{Clock, MonoTime, Rate, ShowTime};
+use crate::timeline::Timeline;
+use crate::wire::Timing;
+
+const BAUD: u32 = 57_600;
+const MM: f64 = 800.0;
+/// Counts of 0 mm above the lower stop.
+const ZERO: f64 = 3_200.0;
+
+const HALL: &str = "[show]\nrate_hz = 100\n[link.stalls]\nport = \"/dev/ttyUSB0\"\n\
+    [seat.s]\naxes = 3\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 4000\n\
+    max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n\
+    [seat.s.drive]\n\
+    home = { way = \"switch\", input = 1, toward = \"down\", travel_mm = 165, zero_mm = -2, speed_mm_s = 50 }\n\
+    torque = { hold = \"60%\", move = 1.0, full = 20000 }\n\
+    [[controller]]\nname = \"A1\"\nseat = \"s\"\naddress = \"link:stalls\"\ndialect = \"silvermax\"\nunits = [16, 17, 18]\n";
+
+/// A hall without any controller on the network.
+#[derive(Debug)]
+struct Nobody;
+
+impl Network for Nobody {
+    fn lanes(&self) -> usize {
+        0
+    }
+
+    fn send(&self, _lane: usize, _datagram: &[u8]) -> Delivery {
+        unreachable!("nobody is there")
+    }
+
+    fn drain(&self, _on: &mut dyn FnMut(Origin, &[u8], MonoTime)) -> MonoTime {
+        NOW.get()
+    }
+
+    fn port_closed(&self, _lane: usize) -> u64 {
+        0
+    }
+}
+
+thread_local! {
+    /// The virtual time of the hall of a test.
+    static NOW: Cell<MonoTime> = const { Cell::new(MonoTime::from_nanos(3_000_000_000)) };
+}
+
+/// Time that jumps to each deadline.
+#[derive(Debug)]
+struct Jumps;
+
+impl Clock for Jumps {
+    fn now(&self) -> MonoTime {
+        NOW.get()
+    }
+
+    fn sleep_until(&self, at: MonoTime) {
+        NOW.set(NOW.get().max(at));
+    }
+}
+
+/// The line, which its loop has and the test looks at.
+#[derive(Clone)]
+struct SharedLine(Arc<Mutex<VirtualPort<SilverBus>>>);
+
+impl SharedLine {
+    fn lock(&self) -> MutexGuard<'_, VirtualPort<SilverBus>> {
+        self.0.lock().expect("nobody panics with it")
+    }
+}
+
+impl LinkPort for SharedLine {
+    fn now(&self) -> MonoTime {
+        self.lock().now()
+    }
+
+    fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
+        self.lock().send(octets)
+    }
+
+    fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault> {
+        self.lock().receive(buf, deadline)
+    }
+
+    fn flush(&mut self) -> usize {
+        self.lock().flush()
+    }
+
+    fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
+        self.lock().send_break(span)
+    }
+
+    fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
+        self.lock().set_baud(baud)
+    }
+
+    fn sleep_until(&mut self, at: MonoTime) {
+        self.lock().sleep_until(at);
+    }
+}
+
+/// A hall of one seat, as a script leads it.
+struct Hall<'h, 'l> {
+    line: SharedLine,
+    runtime: RuntimeHandle,
+    loops: &'h mut Loops<'l, Jumps>,
+    drains: DrainGrid,
+    ticked: Ticked,
+    tell_at: MonoTime,
+    next_drain: MonoTime,
+    next_tick: MonoTime,
+}
+
+impl Hall<'_, '_> {
+    /// All loops, for so long.
+    fn run(&mut self, seconds: f64, mut each: impl FnMut(&mut Self)) {
+        let until = NOW.get() + Duration::from_secs_f64(seconds);
+        while self.next_tick < until {
+            let at = self.next_tick.min(self.next_drain);
+            for link in &mut self.loops.links {
+                while link.now() < at {
+                    link.step();
+                }
+            }
+            NOW.set(NOW.get().max(at));
+            if at == self.next_drain {
+                self.next_drain = self.loops.acks.step(&Jumps, self.drains, &mut self.tell_at);
+            } else {
+                self.loops.ticks.step(&mut self.ticked);
+                self.next_tick = self.loops.ticks.grid.next_deadline();
+                self.loops.plans.serve(&mut Vec::new());
+                while self.runtime.news.take().is_some() {}
+                each(self);
+            }
+        }
+    }
+
+    fn ask(&mut self, commands: impl IntoIterator<Item = Command>) {
+        for command in commands {
+            self.runtime.commands.push(command).expect("there is room");
+        }
+    }
+
+    fn state(&self) -> State {
+        self.runtime.live.state()
+    }
+
+    fn reading(&self) -> Option<Reading> {
+        self.runtime.live.evidence(0)?.reading().map(|(_, reading)| reading)
+    }
+
+    /// Lets a show go, once the seat was read.
+    fn go(&mut self, show: StagedShow) {
+        self.run(1.0, |hall| hall.runtime.live.want(NOW.get()));
+        assert!(self.reading().is_some_and(|reading| reading.rests), "{:?}", self.reading());
+        let found = Finding { homed: true, at_park: true, crashed: false };
+        self.ask([
+            Command::Event(Event::Identified(found)),
+            Command::Event(Event::Readiness(Readiness::Ready)),
+        ]);
+        self.ask([
+            Command::Load(show.loaded()),
+            Command::Request(Transition::Arm),
+            Command::Request(Transition::Go),
+        ]);
+    }
+
+    fn units<T>(&self, of: impl Fn(&Unit) -> T) -> Vec<T> {
+        self.line.lock().line.bus().units().iter().map(of).collect()
+    }
+
+    fn places_mm(&self) -> Vec<f64> {
+        self.units(|unit| (unit.place() - ZERO) / MM)
+    }
+}
+
+/// Reads a configuration.
+fn read(text: &str) -> Config {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("hall.toml");
+    std::fs::write(&file, text).expect("it is written");
+    crate::config::load(&file).expect("it is right")
+}
+
+/// Opens a hall whose seat was homed, with a cue on it.
+fn hall(lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline)) {
+    NOW.set(MonoTime::from_nanos(3_000_000_000));
+    let config = Arc::new(read(HALL));
+    let setups = [16, 17, 18].map(|unit| UnitSetup { place: 12_000, ..UnitSetup::new(unit) });
+    let bus = SilverBus::new(&setups, BAUD, NOW.get());
+    let port = VirtualPort::new(SerialLine::new(bus, 11, LineFaults::default(), 7), NOW.get());
+    let line = SharedLine(Arc::new(Mutex::new(port)));
+    let link = config.links.first().expect("there is a link");
+    let seat = unit_of(&config.controllers[0], config.controllers[0].drives().unwrap()).unwrap().seat;
+    let homing = Homing { canary: 7_311, abort: &AtomicBool::new(false), told: &mut |_| {} };
+    home(&mut Talk::new(line.clone(), TalkTerms::of(link)), seat, homing).expect("it finds its zero");
+    line.lock().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
+    NOW.set(line.lock().now());
+    let cue = cue::load(Path::new("cues/bench-ride.csv"), &Source::Native).expect("it ships");
+    let show = Show { rate: Rate::from_hz(100.0), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
+    let manner = Manner { level: 1.0, silent: false };
+    let staged = StagedShow::new(&config, Timeline::new(cue.clone()), show, manner).expect("there is a way");
+    let purpose = Purpose::Play { silent: false, film: None };
+    let network = crate::net::over(Arc::new(Nobody));
+    let runtime = Runtime::over_all(
+        Arc::clone(&config),
+        purpose,
+        &Numbers::new(),
+        &Arc::default(),
+        network,
+        vec![Box::new(line.clone())],
+    )
+    .expect("it opens");
+    let origin = NOW.get() + Duration::from_millis(20);
+    runtime.stepped(&Jumps, origin, |runtime, _, loops| {
+        let desk = Arc::clone(&runtime.desk);
+        staged.mixes.iter().enumerate().for_each(|(lane, mix)| desk.set(lane, *mix));
+        let mut hall = Hall {
+            line,
+            runtime,
+            loops,
+            drains: DrainGrid::new(origin, Duration::from_millis(10)),
+            ticked: Ticked::default(),
+            tell_at: origin,
+            next_drain: origin,
+            next_tick: origin,
+        };
+        lead(&mut hall, staged, &Timeline::new(cue));
+    });
+}
+
+/// That no axis left its stroke, and none moved harder than a seat may.
+fn assert_gentle(hall: &Hall<'_, '_>) {
+    for unit in hall.units(|unit| unit.executed().clone()) {
+        let mm = |counts: f64| counts / MM;
+        let (low, high) = (mm(unit.lowest - ZERO), mm(unit.highest - ZERO));
+        assert!(low > -0.1 && high < 150.1, "{low} to {high} mm");
+        assert!(mm(unit.velocity) < 241.0, "{} mm/s", mm(unit.velocity));
+        assert!(mm(unit.acceleration) < 3_030.0, "{} mm/s2", mm(unit.acceleration));
+        assert_eq!(unit.jumps, 0);
+    }
+}
+
+#[test]
+fn a_cue_is_executed_within_a_tenth_of_a_millimetre_its_lead_after_the_ticks() {
+    hall(|hall, show, cue| {
+        let lead = show.lanes[0].window.lead();
+        hall.go(show);
+        let (mut worst, mut rode) = (0.0_f64, false);
+        let mut begun = None;
+        hall.run(25.0, |hall| {
+            // Frame 0 is reached a lead and a tick after it was sent.
+            if hall.runtime.live.ticks() == 1 && begun.is_none() {
+                begun = Some(NOW.get());
+            }
+            let Some(begun) = begun else { return };
+            let show_ns = NOW.get().since(begun).as_nanos() as i64 - lead.as_nanos() as i64;
+            let at = ShowTime::from_nanos(show_ns);
+            if hall.state().may_send_motion() && show_ns > 0 && at < cue.duration() {
+                let wanted = cue.sample(at, &mut crate::timeline::Hint::default());
+                for (place, wanted) in hall.places_mm().iter().zip(wanted) {
+                    rode |= wanted > 0.5;
+                    worst = worst.max((place - 150.0 * wanted).abs());
+                }
+            }
+        });
+        assert_eq!(hall.state(), State::Parked);
+        assert!(rode && worst < 0.1, "{worst} mm");
+        assert_gentle(hall);
+        for place in hall.places_mm() {
+            assert!(place.abs() < 0.02, "{place} mm off park");
+        }
+    });
+}
+
+#[test]
+fn a_stop_brakes_the_drives_at_once_and_no_pose_that_was_under_way_moves_them_on() {
+    hall(|hall, show, _| {
+        hall.go(show);
+        hall.run(6.0, |_| {});
+        assert!(hall.units(Unit::is_moving).contains(&true));
+        hall.runtime.desk.stop();
+        // 203 mm/s and 3000 mm/s²: at rest after 68 ms, and a tick and an exchange for each unit.
+        hall.run(0.2, |_| {});
+        let places = hall.places_mm();
+        hall.run(2.0, |_| {});
+        assert_eq!(hall.places_mm(), places);
+        assert_eq!(hall.state(), State::Stopped);
+        assert_gentle(hall);
+    });
+}
+
+#[test]
+fn a_line_that_is_cut_brings_the_seat_to_rest_within_the_lead_and_puts_its_lane_out() {
+    hall(|hall, show, _| {
+        let lead = show.lanes[0].window.lead();
+        hall.go(show);
+        hall.run(6.0, |_| {});
+        hall.line.lock().is_gone = true;
+        hall.run(lead.as_secs_f64() + 0.1, |_| {});
+        let places = hall.places_mm();
+        hall.run(1.0, |_| {});
+        assert_eq!(hall.places_mm(), places);
+        assert!(!hall.loops.ticks.engine.lane(0).gets_a_frame(), "no pose goes to it");
+        assert_gentle(hall);
+    });
+}

@@ -1,0 +1,218 @@
+//! What the thread of a link tells of a lane, as evidence: the drives of a seat say where they are, and whether they are home. Ack
+//! thread; pure; allocates nothing.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::time::Duration;
+
+use super::{BrakeReason, StreamEvent};
+use crate::belief::{Fall, Reading, Source};
+use crate::config::Controller;
+use crate::drive::{Evidence, EvidenceList, Lane, Need, Seen, Whereabouts};
+use crate::health::{Continuity, Identity, Sighting};
+use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
+use crate::time::MonoTime;
+use crate::wire::PerAxis;
+
+/// Two places of an axis are the same, strokes: a servo that holds its place wanders by so much.
+const STILL: f64 = 0.000_5;
+/// So long in one place is rest: the next poll of that axis found it there.
+const REST: Duration = Duration::from_millis(15);
+/// Readings further apart say nothing of what was between them.
+const APART: Duration = Duration::from_millis(1_500);
+/// How far from park a seat at rest may stand, strokes.
+const AT_PARK: f64 = 0.002;
+
+/// What is wanted of a lane by the thread of its link: levels, so that none is lost, and nobody waits.
+#[derive(Debug, Default)]
+pub(crate) struct LaneWants {
+    /// Since when its axes are to have been read, ns.
+    located: AtomicU64,
+    /// How often somebody wanted to know whether it is home.
+    looks: AtomicU32,
+}
+
+impl LaneWants {
+    /// Since when its axes are to have been read.
+    pub(crate) fn located(&self) -> u64 {
+        self.located.load(Ordering::Relaxed)
+    }
+
+    /// How often somebody wanted to know whether it is home.
+    pub(crate) fn looks(&self) -> u32 {
+        self.looks.load(Ordering::Relaxed)
+    }
+}
+
+/// An axis as it was read.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    place: f64,
+    at: MonoTime,
+    /// Where it has been since then, and whether it was elsewhere before.
+    stays: (f64, MonoTime),
+    moved: bool,
+}
+
+/// A seat whose drives are on a link.
+#[derive(Debug)]
+pub(crate) struct LinkPeer {
+    seat: Arc<SeatType>,
+    /// The place of its first own axis in a pose.
+    first_slot: usize,
+    park: Pose,
+    told: [Option<Told>; MAX_AXES],
+    /// Its units are known to be home.
+    homed: bool,
+    /// Until when it executes what went to it.
+    sent: MonoTime,
+    lead: Duration,
+    wants: Arc<LaneWants>,
+}
+
+impl LinkPeer {
+    /// One of which nothing is known yet.
+    pub(crate) fn new(controller: &Controller, lane: &Lane) -> Self {
+        Self {
+            seat: Arc::clone(&controller.seat),
+            first_slot: controller.first_slot(),
+            park: lane.window.park(),
+            told: [None; MAX_AXES],
+            homed: false,
+            sent: MonoTime::default(),
+            lead: lane.window.lead(),
+            wants: Arc::default(),
+        }
+    }
+
+    /// What is wanted of it by the thread of its link.
+    pub(crate) fn wants(&self) -> Arc<LaneWants> {
+        Arc::clone(&self.wants)
+    }
+
+    /// Has the thread of the link find out what is needed; says in how many messages, for whoever waits for an answer.
+    pub(crate) fn poll(&self, need: Need, now: MonoTime) -> u32 {
+        match need {
+            Need::Position => self.wants.located.store(now.as_nanos(), Ordering::Relaxed),
+            Need::Identity => drop(self.wants.looks.fetch_add(1, Ordering::Relaxed)),
+            // Its thread asks for signs of life by itself.
+            Need::KeepAlive { .. } => {}
+            Need::Count | Need::Dark => return 0,
+        }
+        1
+    }
+
+    /// A pose went to it: where it stood before says nothing of whether it rests.
+    pub(crate) fn on_sent(&mut self, at: MonoTime) {
+        self.sent = at + self.lead;
+    }
+
+    /// Takes what the thread of its link tells at an instant: puts into `out` of what it is evidence.
+    pub(crate) fn hear(&mut self, event: &StreamEvent, now: MonoTime, out: &mut EvidenceList) {
+        match *event {
+            StreamEvent::Confirmed { .. } | StreamEvent::Rests { .. } | StreamEvent::Moves { .. } => {}
+            StreamEvent::Read { axis, position, at, .. } => {
+                out.extend([Evidence::Answered, Evidence::Alive]);
+                if self.homed {
+                    out.push(Evidence::Position(self.read(usize::from(axis), position, at)));
+                }
+            }
+            StreamEvent::Homed { homed, .. } => {
+                self.homed = homed;
+                out.extend([Evidence::Answered, Evidence::Alive, Evidence::Homed(homed)]);
+                out.push(Evidence::Seen(self.seen(now)));
+            }
+            StreamEvent::Restarted { .. } => self.lose_zero(out),
+            StreamEvent::Killed { axis, cause, .. } => {
+                // The bits of register 211 stand in its upper word.
+                let error = u16::try_from(cause.cast_unsigned() >> 16).unwrap_or(u16::MAX);
+                out.push(Evidence::Drive { axis: usize::from(axis) + 1, error });
+                self.lose_zero(out);
+            }
+            StreamEvent::Braked { why: BrakeReason::Stopped, .. } => {}
+            StreamEvent::Braked { .. } | StreamEvent::Lost { .. } => out.push(Evidence::Fell(Fall::Gap)),
+            StreamEvent::OffCourse { .. } | StreamEvent::Elsewhere { .. } => {
+                out.push(Evidence::Fell(Fall::Astray));
+            }
+            // What is in doubt is found out, or the lane brakes.
+            StreamEvent::Doubt { .. } | StreamEvent::Back { .. } => {}
+        }
+    }
+
+    fn lose_zero(&mut self, out: &mut EvidenceList) {
+        (self.homed, self.told) = (false, [None; MAX_AXES]);
+        out.push(Evidence::LostZero);
+    }
+
+    /// An axis was read.
+    fn read(&mut self, axis: usize, place: f64, at: MonoTime) -> Whereabouts {
+        if let Some(told) = self.told.get_mut(axis) {
+            let before = told.filter(|told| at.since(told.at) <= APART);
+            let stays = before.map(|told| told.stays).filter(|(stay, _)| (place - stay).abs() <= STILL);
+            let moved = before.is_some_and(|told| told.moved || stays.is_none());
+            *told = Some(Told { place, at, stays: stays.unwrap_or((place, at)), moved });
+        }
+        let reading = self.reading();
+        let slot = self.first_slot + axis;
+        let mut passing =
+            Reading { slots: 0, rests: false, by: Source::Passing, ..Reading::at_rest([0.0; MAX_AXES], at) };
+        if let Some(cell) = passing.pose.get_mut(slot) {
+            (*cell, passing.slots) = (place, 1 << slot);
+        }
+        Whereabouts {
+            reading,
+            passing: Some(passing),
+            told: self.pulses(),
+            outside: None,
+            is_ambiguous: false,
+            is_off_park: reading.is_some_and(|reading| !self.is_at_park(&reading)),
+        }
+    }
+
+    /// The seat as it was told last; none while an axis has not told since the last pose went to it.
+    fn reading(&self) -> Option<Reading> {
+        let mut reading = Reading::at_rest([0.0; MAX_AXES], MonoTime::from_nanos(u64::MAX));
+        reading.slots = 0;
+        for axis in 0..self.seat.axes {
+            let told = self.told[axis].filter(|told| told.at > self.sent)?;
+            let slot = self.first_slot + axis;
+            reading.pose[slot] = told.place;
+            reading.slots |= 1 << slot;
+            reading.at = reading.at.min(told.at);
+            let rests = told.stays.1 >= self.sent && told.at.since(told.stays.1) >= REST;
+            reading.rests &= rests;
+            reading.moves |= told.moved && !rests;
+        }
+        Some(reading)
+    }
+
+    fn is_at_park(&self, reading: &Reading) -> bool {
+        let own = self.first_slot..self.first_slot + self.seat.axes;
+        own.into_iter().all(|slot| (reading.pose[slot] - self.park[slot]).abs() <= AT_PARK)
+    }
+
+    fn pulses(&self) -> Option<PerAxis<Pulses>> {
+        let known = self.told.iter().take_while(|told| told.is_some()).count();
+        let place = |axis: usize| self.told[axis].map_or(0.0, |told| told.place);
+        (known > 0).then(|| PerAxis::from_fn(known, |axis| self.seat.each[axis].pulses(place(axis))))
+    }
+
+    fn seen(&self, now: MonoTime) -> Seen {
+        let axes = u16::try_from(self.seat.axes).unwrap_or(u16::MAX);
+        let fresh = self.reading().filter(|reading| now.since(reading.at) <= APART);
+        let rests = fresh.filter(|reading| reading.rests);
+        Seen {
+            sighting: Sighting {
+                identity: Identity { axes, ..Identity::default() },
+                error: 0,
+                alarm: 0,
+                continuity: Continuity::Mark,
+                homed: self.homed,
+            },
+            rests: rests.is_some(),
+            sways: false,
+            at_park: rests.is_some_and(|reading| self.is_at_park(&reading)),
+            leads_more_axes: false,
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! How a link plays: on which grid, and how far ahead.
+
+use std::time::Duration;
+
+use crate::config::drive::DriveFamily;
+use crate::config::{Config, Link};
+use crate::drive::rates::LinkLoad;
+use crate::drive::silvermax;
+use crate::motion::MAX_LEAD;
+use crate::time::Rate;
+
+/// How a link plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct StreamTerms {
+    /// From one segment of an axis to the next.
+    pub(crate) period: Duration,
+    /// From one pose to the next.
+    pub(crate) tick: Duration,
+}
+
+impl StreamTerms {
+    /// Those of a link of a hall that has seats on it; none where it has none.
+    ///
+    /// # Errors
+    /// Why it cannot play, with what would.
+    pub(crate) fn of(link: &Link, config: &Config) -> Result<Option<Self>, String> {
+        let Some(load) = LinkLoad::of(link, config) else { return Ok(None) };
+        let fault = |why: String| format!("[link.{}]: {why}", link.name);
+        let period = load.period_for(link.rate_hz).map_err(|slow| fault(slow.to_string()))?;
+        let terms = Self { period, tick: Rate::from_hz(config.show.rate_hz).period() };
+        let (lead, most) = (terms.lead(load.family), MAX_LEAD);
+        if lead > most {
+            let least_hz = 6.0 / most.saturating_sub(2 * terms.tick).as_secs_f64();
+            let (lead, most, remedy) = (lead.as_millis(), most.as_millis(), load.remedy(least_hz));
+            return Err(fault(format!("its seats would follow {lead} ms ahead, over {most} ms; {remedy}")));
+        }
+        Ok(Some(terms))
+    }
+
+    /// How long before a seat is there its poses have to come.
+    pub(crate) fn lead(self, family: DriveFamily) -> Duration {
+        match family {
+            // Those of a SIXpack 2 are not played yet.
+            DriveFamily::SilverMax | DriveFamily::Sixpack2 => silvermax::lead(self),
+        }
+    }
+}

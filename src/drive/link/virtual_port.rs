@@ -1,0 +1,92 @@
+//! The host's end of a line in virtual time, with virtual drives at its far end.
+
+use std::time::Duration;
+
+use super::{LinkFault, LinkPort};
+use crate::sim::serial::{Bus, SerialLine};
+use crate::time::MonoTime;
+
+/// The host's end of a virtual line.
+pub(crate) struct VirtualPort<B> {
+    pub(crate) line: SerialLine<B>,
+    pub(crate) now: MonoTime,
+    /// The port is gone altogether.
+    pub(crate) is_gone: bool,
+    /// What was sent, with when.
+    pub(crate) sent: Vec<(MonoTime, Vec<u8>)>,
+    /// What happens to the line next, and when.
+    pub(crate) script: Option<(MonoTime, Happening<B>)>,
+}
+
+/// Something that happens to a line.
+pub(crate) type Happening<B> = fn(&mut SerialLine<B>, MonoTime);
+
+impl<B: Bus> VirtualPort<B> {
+    /// That of a line, from now on.
+    pub(crate) fn new(line: SerialLine<B>, now: MonoTime) -> Self {
+        Self { line, now, is_gone: false, sent: Vec::new(), script: None }
+    }
+
+    /// Goes on in time, if that is later.
+    fn go(&mut self, at: MonoTime) {
+        if let Some((then, happens)) = self.script.take_if(|(then, _)| *then <= at) {
+            self.line.advance(then);
+            happens(&mut self.line, then);
+        }
+        self.now = self.now.max(at);
+        self.line.advance(self.now);
+    }
+}
+
+impl<B: Bus> LinkPort for VirtualPort<B> {
+    fn now(&self) -> MonoTime {
+        self.now
+    }
+
+    fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
+        if self.is_gone {
+            return Err(LinkFault);
+        }
+        self.sent.push((self.now, octets.to_vec()));
+        self.line.send(octets, self.now);
+        Ok(())
+    }
+
+    fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault> {
+        if self.is_gone {
+            return Err(LinkFault);
+        }
+        loop {
+            self.line.advance(self.now);
+            if let Some(octet) = self.line.receive(self.now) {
+                buf[0] = octet;
+                return Ok(1);
+            }
+            if self.now >= deadline {
+                return Ok(0);
+            }
+            let next = self.line.next().map_or(deadline, |next| next.max(self.now).min(deadline));
+            self.go(next);
+        }
+    }
+
+    fn flush(&mut self) -> usize {
+        self.line.advance(self.now);
+        std::iter::from_fn(|| self.line.receive(self.now)).count()
+    }
+
+    fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
+        self.line.send_break(self.now);
+        self.sleep_until(self.now + span);
+        Ok(())
+    }
+
+    fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
+        self.line.set_host_baud(Some(baud));
+        Ok(())
+    }
+
+    fn sleep_until(&mut self, at: MonoTime) {
+        self.go(at);
+    }
+}

@@ -1,0 +1,91 @@
+//! What a unit says of itself; nothing is written and nothing moves. Asking clears its reset flag, and the stop flag of a motor.
+
+use super::find::WHO;
+use super::talk::{ANSWER, Talk, TalkFault};
+use crate::drive::link::LinkPort;
+use crate::wire::sixpack2::{InputQuery, PositionQuery, PositionTold, SixpackOrder, SixpackReply};
+
+/// The input that is the supply, and its units a volt (manual, page 43).
+const SUPPLY: u8 = 7;
+const UNITS_A_VOLT: f64 = 22.0;
+
+/// A unit as it was read. Its settings cannot be.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct UnitFacts {
+    /// Its number.
+    pub(crate) unit: u8,
+    /// Its version.
+    pub(crate) firmware: u8,
+    /// It was reset since somebody asked last: it has no settings, and its motors know no place.
+    pub(crate) was_reset: bool,
+    /// °C.
+    pub(crate) celsius: i8,
+    /// Its serial number.
+    pub(crate) serial: u16,
+    /// Of its supply.
+    pub(crate) volts: f64,
+    /// Each that was asked for, in that order.
+    pub(crate) motors: Vec<MotorFacts>,
+}
+
+/// A motor as it was read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MotorFacts {
+    /// Its number, from 0.
+    pub(crate) motor: u8,
+    /// Microsteps; a seat that is home has the lower end of its stroke at 1,000,000.
+    pub(crate) position: i32,
+    /// What it does, one of [`crate::wire::sixpack2::action`].
+    pub(crate) action: u8,
+    /// Its switch or an input stopped it.
+    pub(crate) was_stopped: bool,
+}
+
+/// Reads a unit, and some of its motors.
+///
+/// # Errors
+/// A [`TalkFault`] where it does not answer.
+pub(crate) fn look<P: LinkPort>(talk: &mut Talk<P>, unit: u8, motors: &[u8]) -> Result<UnitFacts, TalkFault> {
+    let silent = TalkFault::Silent { unit, baud: talk.baud() };
+    let SixpackReply::UnitTold(told) = talk.insist(unit, WHO)? else { return Err(silent) };
+    let supply = SixpackOrder::AskInput(InputQuery { channel: SUPPLY, response: ANSWER });
+    let SixpackReply::InputTold(supply) = talk.insist(unit, supply)? else { return Err(silent) };
+    let motor = |motor: &u8| {
+        let PositionTold { motor, position, action, stop } = position(talk, unit, *motor)?;
+        Ok(MotorFacts { motor, position, action, was_stopped: stop != 0 })
+    };
+    let motors = motors.iter().map(motor).collect::<Result<_, TalkFault>>()?;
+    Ok(UnitFacts {
+        unit,
+        firmware: told.firmware,
+        was_reset: told.reset != 0,
+        celsius: told.celsius,
+        serial: told.serial,
+        volts: f64::from(supply.value) / UNITS_A_VOLT,
+        motors,
+    })
+}
+
+/// Where a motor is.
+pub(super) fn position<P: LinkPort>(
+    talk: &mut Talk<P>,
+    unit: u8,
+    motor: u8,
+) -> Result<PositionTold, TalkFault> {
+    let reply = talk.insist(unit, where_is(motor))?;
+    told_place(reply, TalkFault::Silent { unit, baud: talk.baud() })
+}
+
+/// Where is it?
+pub(super) const fn where_is(motor: u8) -> SixpackOrder {
+    SixpackOrder::AskPosition(PositionQuery { motor, response: ANSWER })
+}
+
+/// What was answered to that.
+pub(super) fn told_place(reply: SixpackReply, other: TalkFault) -> Result<PositionTold, TalkFault> {
+    match reply {
+        SixpackReply::PositionTold(told) => Ok(told),
+        // Cannot be: an answer is one to the question.
+        _ => Err(other),
+    }
+}

@@ -1,0 +1,31 @@
+//! The host's end of a line of SIXpack 2 units: how they are found and brought to the rate of the link, what is asked of them, how a seat on
+//! one finds its zero, and how poses become motion. Straight-line blocking procedures over a [`LinkPort`](super::link::LinkPort), which knows the time, so
+//! that whole homings and shows run in virtual time. The thread of the link; nothing here is called by the tick thread.
+//!
+//! ```text
+//!  find, look, home --SixpackOrder--> Talk --break, nine octets--> LinkPort        one exchange at a time
+//!  poses --ring--> Stream --targets--> Talk                                        all of a slice at once
+//!                     '--events--> ring
+//! ```
+
+mod find;
+mod home;
+mod look;
+mod scale;
+mod set_up;
+mod stream;
+mod talk;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use find::FindError;
+pub(crate) use home::{Homing, home};
+pub(crate) use set_up::{HomeError, SeatMotors};
+pub(crate) use talk::Talk;
+
+#[cfg_attr(not(test), expect(unused_imports, reason = "for preflight, and the thread of a link"))]
+pub(crate) use {
+    find::find,
+    look::look,
+    stream::{Stream, lead},
+};

@@ -1,0 +1,125 @@
+//! From the places of an axis to the microsteps of its motor, and back.
+
+use crate::motion::AxisGeometry;
+use crate::wire::sixpack2::{MOST_SPEED, steps_of_a_unit};
+
+/// What the counter reads at the lower end of the stroke: one that was reset, at 0, never looks like a place.
+const BASE: f64 = 1_000_000.0;
+
+/// How a motor counts one axis. Where it is reversed its counter goes down as the axis goes up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct MotorScale {
+    /// Microsteps a millimetre, negative where it is reversed.
+    per_mm: f64,
+    low_mm: f64,
+    stroke_mm: f64,
+    clock_divider: u8,
+}
+
+impl MotorScale {
+    /// Of an axis of a seat.
+    pub(crate) fn of(axis: &AxisGeometry, is_reversed: bool, clock_divider: u8) -> Self {
+        let size = axis.pulses_per_rev / axis.lead;
+        let per_mm = if is_reversed { -size } else { size };
+        Self { per_mm, low_mm: axis.low, stroke_mm: axis.stroke(), clock_divider }
+    }
+
+    /// The counter at a place.
+    pub(crate) fn steps(&self, mm: f64) -> f64 {
+        BASE + (mm - self.low_mm) * self.per_mm
+    }
+
+    /// The same, whole.
+    #[expect(clippy::cast_possible_truncation, reason = "a stroke fits i32; saturating")]
+    pub(crate) fn whole(&self, mm: f64) -> i32 {
+        self.steps(mm).round() as i32
+    }
+
+    /// Microsteps of a way, whatever its direction.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a stroke fits; saturating")]
+    pub(crate) fn way(&self, mm: f64) -> u32 {
+        (mm * self.per_mm).abs().ceil() as u32
+    }
+
+    /// The counter at a fraction of the stroke.
+    pub(crate) fn at(&self, fraction: f64) -> f64 {
+        BASE + self.way_of(fraction)
+    }
+
+    /// Microsteps of a part of the stroke.
+    pub(crate) fn way_of(&self, fraction: f64) -> f64 {
+        fraction * self.stroke_mm * self.per_mm
+    }
+
+    /// The fraction of the stroke at the counter.
+    pub(crate) fn fraction(&self, steps: f64) -> f64 {
+        (steps - BASE) / (self.stroke_mm * self.per_mm)
+    }
+
+    /// The ends of the stroke, and so far beyond, by the counter, the lower number first.
+    pub(crate) fn reach(&self, margin_mm: f64) -> (f64, f64) {
+        let down = self.steps(self.low_mm - margin_mm);
+        let up = self.steps(self.low_mm + self.stroke_mm + margin_mm);
+        (down.min(up), down.max(up))
+    }
+
+    /// The place of the counter.
+    pub(crate) fn mm(&self, steps: f64) -> f64 {
+        self.low_mm + self.mm_of(steps - BASE)
+    }
+
+    /// The way of microsteps, in mm.
+    pub(crate) fn mm_of(&self, steps: f64) -> f64 {
+        steps / self.per_mm
+    }
+
+    /// A speed in units of the motor, rounded down, from 1 to the greatest.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 511")]
+    pub(crate) fn speed(&self, mm_s: f64) -> u16 {
+        ((mm_s * self.per_mm).abs() / self.unit()).clamp(1.0, f64::from(MOST_SPEED)) as u16
+    }
+
+    /// A speed in units of the motor, in mm/s.
+    pub(crate) fn mm_s(&self, speed: u16) -> f64 {
+        f64::from(speed) * self.unit() / self.per_mm.abs()
+    }
+
+    /// An acceleration in units a loop of 2 ms, rounded down, from 1.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 511")]
+    pub(crate) fn acceleration(&self, mm_s2: f64) -> u16 {
+        let a_loop = crate::drive::LOOP.as_secs_f64();
+        ((mm_s2 * self.per_mm).abs() * a_loop / self.unit()).clamp(1.0, f64::from(MOST_SPEED)) as u16
+    }
+
+    fn unit(&self) -> f64 {
+        steps_of_a_unit(self.clock_divider)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lower_end_of_the_stroke_is_at_a_million_whichever_way_the_motor_counts() {
+        let axis = AxisGeometry { pulses_per_rev: 3_200.0, low: 10.0, high: 160.0, ..AxisGeometry::BENCH };
+        let [plain, reversed] = [false, true].map(|reversed| MotorScale::of(&axis, reversed, 3));
+        assert_eq!([plain.whole(10.0), plain.whole(160.0)], [1_000_000, 1_096_000]);
+        assert_eq!([reversed.whole(10.0), reversed.whole(160.0)], [1_000_000, 904_000]);
+        assert!((reversed.mm(reversed.steps(33.0)) - 33.0).abs() < 1e-9);
+        assert_eq!(reversed.reach(1.0), (903_360.0, 1_000_640.0));
+        assert!(
+            (reversed.at(0.5) - 952_000.0).abs() < 1e-6 && (reversed.fraction(952_000.0) - 0.5).abs() < 1e-12
+        );
+        assert_eq!((plain.way(165.0), reversed.way(165.0)), (105_600, 105_600));
+    }
+
+    #[test]
+    fn speeds_are_never_above_what_was_asked_for() {
+        let axis = AxisGeometry { pulses_per_rev: 3_200.0, ..AxisGeometry::BENCH };
+        let scale = MotorScale::of(&axis, true, 3);
+        assert_eq!([10.0, 240.0, 1e9, 0.0].map(|speed| scale.speed(speed)), [20, 503, 511, 1]);
+        assert!((scale.mm_s(20) - 9.54).abs() < 0.01);
+        assert_eq!([3_000.0, 1.0].map(|acceleration| scale.acceleration(acceleration)), [12, 1]);
+    }
+}

@@ -1,0 +1,115 @@
+//! One axis of a play: the targets of its motor, and where that is by them.
+
+use std::time::Duration;
+
+use super::super::scale::MotorScale;
+use super::super::set_up::MotorAxis;
+use crate::drive::link::streaming::AxisFigures;
+use crate::drive::{LOOP, Lag, Middle, Motor, Shaker, TargetMaker};
+use crate::motion::Limits;
+use crate::time::MonoTime;
+
+/// How long a motor may be off its course at the least.
+const STRAYED: Duration = Duration::from_millis(250);
+
+/// One axis.
+#[derive(Debug)]
+pub(super) struct Axis {
+    pub(super) motor: u8,
+    pub(super) scale: MotorScale,
+    pub(super) limits: Limits,
+    pub(super) shaker: Shaker,
+    lag: Lag,
+    maker: TargetMaker,
+    target: i32,
+    /// Where its motor is by its targets, and until when that was reckoned.
+    model: Motor,
+    reckoned: MonoTime,
+    /// As it was read last while it is made ready; whether it rests there.
+    pub(super) stood_at: Option<i32>,
+    pub(super) rests: bool,
+    /// Readings that it is off its course, one after the other, and when the first was.
+    pub(super) strayed: u32,
+    pub(super) strays_since: MonoTime,
+    pub(super) figures: AxisFigures,
+}
+
+impl Axis {
+    pub(super) fn new(of: &MotorAxis<'_>, now: MonoTime) -> Self {
+        let stroke = of.axis.stroke();
+        let limits = Limits {
+            velocity: of.axis.max_velocity / stroke,
+            acceleration: of.axis.max_acceleration / stroke,
+            jerk: of.axis.max_jerk / stroke,
+        };
+        let (scale, lag) = (of.scale, of.lag);
+        Self {
+            motor: of.motor,
+            scale,
+            limits,
+            shaker: Shaker::default(),
+            lag,
+            maker: TargetMaker::at_rest(lag, scale.reach(0.0), scale.at(0.0)),
+            target: 0,
+            model: Motor::at_rest(lag, scale.at(0.0)),
+            reckoned: now,
+            stood_at: None,
+            rests: false,
+            strayed: 0,
+            strays_since: now,
+            figures: AxisFigures { clock: 1.0, ..AxisFigures::default() },
+        }
+    }
+
+    /// It stands there, by its counter.
+    pub(super) fn rest_at(&mut self, position: i32, now: MonoTime) {
+        self.maker = TargetMaker::at_rest(self.lag, self.scale.reach(0.0), position.into());
+        self.model = Motor::at_rest(self.lag, position.into());
+        self.shaker = Shaker::default();
+        (self.target, self.reckoned, self.rests, self.strayed) = (position, now, true, 0);
+    }
+
+    /// The target that has arrived at an instant, of what the axis is to do half a slice later, in strokes; the one before where
+    /// that is not known.
+    pub(super) fn aim(&mut self, middle: Option<Middle>, at: MonoTime) -> i32 {
+        self.run(at);
+        if let Some(Middle { position, velocity }) = middle {
+            let (position, velocity) = (self.scale.at(position), self.scale.way_of(velocity));
+            self.target = self.maker.push(Middle { position, velocity });
+        }
+        self.figures.account.made += 1;
+        self.figures.account.sent += 1;
+        self.target
+    }
+
+    /// Reckons where its motor is at an instant.
+    pub(super) fn run(&mut self, at: MonoTime) {
+        while self.reckoned + LOOP <= at {
+            self.model.run(self.target);
+            self.reckoned = self.reckoned + LOOP;
+        }
+    }
+
+    /// True if its motor follows something.
+    pub(super) fn moves(&self) -> bool {
+        self.model.velocity() != 0.0
+    }
+
+    /// Where its motor is, in strokes.
+    pub(super) fn place(&self) -> f64 {
+        self.scale.fraction(self.model.position())
+    }
+
+    /// How far a reading is beside where its motor should be by now, and how fast that is, mm and mm/s.
+    pub(super) fn beside(&self, position: i32) -> (f64, f64) {
+        // A target waits for the next loop of the unit, whenever that is; here it is taken up by the one that runs.
+        let velocity = self.model.velocity();
+        let by = f64::from(position) - (self.model.position() - velocity * LOOP.as_secs_f64());
+        (self.scale.mm_of(by), self.scale.mm_of(velocity).abs())
+    }
+
+    /// How long what one wrong target did to it takes to be gone.
+    pub(super) fn heals_in(&self) -> Duration {
+        STRAYED.max(Duration::from_secs_f64(4.0 * self.lag.tau()))
+    }
+}

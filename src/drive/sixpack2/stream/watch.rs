@@ -1,0 +1,267 @@
+//! What is asked of units while they play, and what the answers mean.
+
+use std::time::Duration;
+
+use super::lane::{Lane, Stage};
+use super::{Stream, StreamEvent, TARGETS, Track, axis_number, number};
+use crate::drive::link::{LinkFault, LinkPort};
+use crate::drive::sixpack2::find::{WHO, waking_baud, who};
+use crate::drive::sixpack2::look::where_is;
+use crate::drive::sixpack2::talk::TalkFault;
+use crate::time::MonoTime;
+use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackReply, action};
+
+/// How often a unit is asked who it is.
+const IDENTITY: Duration = Duration::from_secs(10);
+/// From one look whether a motor still moves to the next.
+const LOOKS: Duration = Duration::from_millis(20);
+/// A unit that does not answer for so long is lost, or for ten periods.
+const LOST: Duration = Duration::from_millis(250);
+/// How often a unit that is lost is asked.
+const PROBES: Duration = Duration::from_millis(250);
+/// How far a motor may be from where its targets lead, mm.
+const OFF_COURSE_MM: f64 = 0.5;
+/// When exactly a unit reads its counter is not known to better than this, seconds: its loop, and when that falls.
+const READING: f64 = 0.004;
+/// How far outside its stroke a seat that is home may stand, mm; what is farther than the other is no place of it at all.
+const OUTSIDE_MM: f64 = 0.5;
+const LOST_ZERO_MM: f64 = 10.0;
+
+impl<P: LinkPort> Stream<P> {
+    /// True if a question does not make the next slice later than it has to.
+    pub(super) fn has_time(&self) -> bool {
+        !self.lanes.iter().any(|lane| lane.is_led()) || self.targets >= TARGETS
+    }
+
+    /// Asks what is due; false where nothing is.
+    pub(super) fn ask_next(&mut self, now: MonoTime) -> Result<bool, LinkFault> {
+        let count = self.lanes.len();
+        let Some((first, _)) = (count > 0).then_some(self.next_asked) else { return Ok(false) };
+        for step in 0..count {
+            let index = (first + step) % count;
+            let lane = &self.lanes[index];
+            let is_due = lane.not_before <= now;
+            match lane.stage {
+                Stage::Lost if is_due => self.probe(index, now)?,
+                Stage::Readying if is_due => self.look_at(index, now)?,
+                Stage::Ready | Stage::Runs | Stage::Ends => self.ask(index, now)?,
+                _ => continue,
+            }
+            self.targets = 0;
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    /// Asks a lane that is led: its next motor, or who it is.
+    fn ask(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
+        let (_, axis) = self.next_asked;
+        let lane = &self.lanes[index];
+        if lane.known.is_none_or(|at| now.since(at) >= IDENTITY) {
+            return self.ask_who(index, now);
+        }
+        let axis = axis.min(lane.axes.len() - 1);
+        let is_last = axis + 1 == lane.axes.len();
+        self.next_asked = if is_last { ((index + 1) % self.lanes.len(), 0) } else { (index, axis + 1) };
+        if let Some(told) = self.place_of(index, axis)? {
+            self.judge(index, axis, told)?;
+        }
+        Ok(())
+    }
+
+    /// Who it is, which tells that it was restarted.
+    fn ask_who(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
+        let answer = self.talk.ask(self.lanes[index].unit, WHO);
+        if let Some(SixpackReply::UnitTold(told)) = self.heard(index, answer)? {
+            self.lanes[index].known = Some(now);
+            if told.reset != 0 {
+                self.put_out(index, StreamEvent::Restarted { lane: number(index), axis: 0 })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a motor is, if it answers.
+    fn place_of(&mut self, index: usize, axis: usize) -> Result<Option<PositionTold>, LinkFault> {
+        let (unit, motor) = (self.lanes[index].unit, self.lanes[index].axes[axis].motor);
+        let answer = self.talk.ask(unit, where_is(motor));
+        let Some(SixpackReply::PositionTold(told)) = self.heard(index, answer)? else {
+            // By one bit the question is the order to search; nothing else is ended by this.
+            self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
+            return Ok(None);
+        };
+        let axis = &mut self.lanes[index].axes[axis];
+        axis.figures.position = axis.scale.fraction(told.position.into());
+        Ok(Some(told))
+    }
+
+    /// Whether a motor that is led is where it is led.
+    fn judge(&mut self, index: usize, a: usize, told: PositionTold) -> Result<(), LinkFault> {
+        let sent = self.talk.moment().sent;
+        let lane = &mut self.lanes[index];
+        let axis = &mut lane.axes[a];
+        axis.run(sent);
+        let (by_mm, mm_s) = axis.beside(told.position);
+        axis.figures.error_mm = by_mm;
+        let searches = matches!(told.action, action::SEARCH..=action::LAST_SEARCH | action::MECHANICAL);
+        let is_off = by_mm.abs() > OFF_COURSE_MM + mm_s * READING;
+        if !is_off {
+            axis.figures.off_course_mm = axis.figures.off_course_mm.max(by_mm.abs());
+        }
+        if !(is_off || searches) {
+            axis.strayed = 0;
+            return Ok(());
+        }
+        if axis.strayed == 0 {
+            axis.strays_since = sent;
+        }
+        axis.strayed += 1;
+        // What was damaged may be the answer: it is believed twice. A target that was brings it off its course for a while.
+        let axis = &self.lanes[index].axes[a];
+        let (low, high) = axis.scale.reach(LOST_ZERO_MM);
+        let is_lost = !(low..=high).contains(&f64::from(told.position));
+        let is_for_good = searches || is_lost || sent.since(axis.strays_since) > axis.heals_in();
+        if axis.strayed > 1 && is_for_good {
+            let (lane, axis) = (number(index), axis_number(a));
+            return self.put_out(
+                index,
+                if is_lost {
+                    StreamEvent::Restarted { lane, axis }
+                } else {
+                    StreamEvent::OffCourse { lane, axis, by_mm }
+                },
+            );
+        }
+        self.next_asked = (index, a);
+        self.targets = TARGETS;
+        Ok(())
+    }
+
+    /// Looks whether all motors of a lane stand, and where.
+    fn look_at(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
+        let lane = &mut self.lanes[index];
+        if lane.known.is_none() {
+            return self.ask_who(index, now);
+        }
+        let Some(a) = lane.axes.iter().position(|axis| !axis.rests) else {
+            self.is_ready_now(index, now);
+            return Ok(());
+        };
+        let Some(told) = self.place_of(index, a)? else { return Ok(()) };
+        let lane = &mut self.lanes[index];
+        let axis = &mut lane.axes[a];
+        let is_idle = matches!(told.action, action::IDLE | action::PI);
+        if !is_idle || axis.stood_at != Some(told.position) {
+            axis.stood_at = is_idle.then_some(told.position);
+            lane.not_before = now + LOOKS;
+            return Ok(());
+        }
+        let (low, high) = axis.scale.reach(OUTSIDE_MM);
+        if (low..=high).contains(&f64::from(told.position)) {
+            axis.rest_at(told.position, self.talk.now());
+            return Ok(());
+        }
+        // Its counter says nothing of where it is: it is not home.
+        self.put_out(index, StreamEvent::Restarted { lane: number(index), axis: axis_number(a) })
+    }
+
+    /// All of its motors stand: it follows poses from here.
+    fn is_ready_now(&mut self, index: usize, now: MonoTime) {
+        let tick = self.terms.tick;
+        let lane = &mut self.lanes[index];
+        let axes = lane.places();
+        lane.track = Track::at_rest(tick, axes, now);
+        (lane.stage, lane.moves, lane.is_elsewhere) = (Stage::Ready, false, false);
+        self.tell(StreamEvent::Rests { lane: number(index), axes, at: now });
+    }
+
+    /// Whether a unit answers.
+    fn heard(
+        &mut self,
+        index: usize,
+        answer: Result<SixpackReply, TalkFault>,
+    ) -> Result<Option<SixpackReply>, LinkFault> {
+        let (now, lane) = (self.talk.now(), &mut self.lanes[index]);
+        match answer {
+            Ok(reply) => {
+                lane.failing_since = None;
+                Ok(Some(reply))
+            }
+            Err(TalkFault::Link(fault)) => Err(fault),
+            Err(TalkFault::Silent { .. }) => {
+                let since = *lane.failing_since.get_or_insert(now);
+                // Soon again: what is silent is asked first.
+                self.targets = TARGETS;
+                if now.since(since) > LOST.max(self.terms.period * 10) {
+                    self.lose(index);
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// A lane's unit does not answer any more. Its motors go where the last target led them, and rest there.
+    pub(super) fn lose(&mut self, index: usize) {
+        let now = self.talk.now();
+        let lane = &mut self.lanes[index];
+        if matches!(lane.stage, Stage::Lost | Stage::Out) {
+            return;
+        }
+        (lane.stage, lane.not_before) = (Stage::Lost, now + PROBES);
+        self.tell(StreamEvent::Lost { lane: number(index), axis: 0 });
+    }
+
+    /// Out until a person has looked: stopped, and led no more.
+    fn put_out(&mut self, index: usize, event: StreamEvent) -> Result<(), LinkFault> {
+        if self.lanes[index].stage == Stage::Out {
+            return Ok(());
+        }
+        self.lanes[index].stage = Stage::Out;
+        self.tell(event);
+        self.stop_motors(index)
+    }
+
+    /// Ends what each motor may search, and stops it by its ramp. Nobody answers, so it is said twice.
+    pub(super) fn stop_motors(&mut self, index: usize) -> Result<(), LinkFault> {
+        let unit = self.lanes[index].unit;
+        for motor in self.lanes[index].axes.iter().map(|axis| axis.motor) {
+            for _ in 0..2 {
+                self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
+                self.talk.tell(unit, SixpackOrder::RampedStop { motor })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the unit of a lost lane answers; at the rate with which it wakes only while nobody plays on the link.
+    fn probe(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
+        self.lanes[index].not_before = now + PROBES;
+        let unit = self.lanes[index].unit;
+        let restarted = StreamEvent::Restarted { lane: number(index), axis: 0 };
+        if let Some(told) = who(&mut self.talk, unit)? {
+            if told.reset != 0 {
+                return self.put_out(index, restarted);
+            }
+            let lane = &mut self.lanes[index];
+            lane.failing_since = None;
+            lane.make_ready();
+            self.tell(StreamEvent::Back { lane: number(index) });
+        } else if !self.lanes.iter().any(Lane::plays) {
+            let baud = self.talk.baud();
+            self.talk.set_baud(waking_baud())?;
+            let found = who(&mut self.talk, unit);
+            self.talk.set_baud(baud)?;
+            if found?.is_some() {
+                return self.put_out(index, restarted);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Lane {
+    /// True if poses move it, or may at once.
+    const fn plays(&self) -> bool {
+        matches!(self.stage, Stage::Runs | Stage::Ends)
+    }
+}

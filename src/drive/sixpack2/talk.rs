@@ -1,0 +1,288 @@
+//! One exchange at a time, in frames of nine octets: what a unit is told, and what it answers where it is asked.
+//!
+//! Nothing but a question is answered, and no frame carries a sum. So each frame begins behind a break, by which a unit forgets what it
+//! has of another: an octet that is lost or comes twice costs one frame and no more. What has to be taken is sent with a question right
+//! behind it ([`Talk::confirm`]): the question is answered only where what stands before it had nine octets. A bit that is flipped
+//! is obeyed all the same, so what can be read back is.
+
+use std::time::Duration;
+
+use crate::drive::link::{Delays, LinkFault, LinkPort, Moment, TalkCounts, TalkTerms};
+use crate::time::MonoTime;
+use crate::wire::sixpack2::{
+    BAUD_CLOCK, BaudSwitch, FRAME_LEN, SixpackFrame, SixpackOrder, SixpackReply, baud_of,
+};
+
+/// The address of answers: no unit has it, so that none takes an answer on the same wires for a question.
+pub(super) const ANSWER: u8 = 255;
+/// How long a break is, in octets: longer than one.
+const BREAK: u32 = 2;
+/// What a unit makes of a question, beyond its octets and its delay.
+const SLACK: Duration = Duration::from_millis(4);
+/// A unit holds two wires after its answer for as long as it waited before it, at power-up for so long (manual, page 44).
+const LONGEST_HOLD: Duration = Duration::from_millis(6);
+/// How often what does no harm twice is asked.
+const TRIES: u32 = 4;
+/// How long a unit is told to wait before it answers, and to hold the line, in 2 ms: what a host needs to let go of two wires.
+const DELAY: u16 = 1;
+
+/// Why there is no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum TalkFault {
+    /// The port.
+    #[error(transparent)]
+    Link(#[from] LinkFault),
+    /// Nothing that answers the question came in time.
+    #[error("unit {unit} does not answer at {baud} baud; check its number, its power and the wiring")]
+    Silent {
+        /// Who was asked.
+        unit: u8,
+        /// Bits a second.
+        baud: u32,
+    },
+}
+
+/// A conversation with the units of a line.
+#[derive(Debug)]
+pub(crate) struct Talk<P> {
+    port: P,
+    terms: TalkTerms,
+    delays: Delays,
+    counts: TalkCounts,
+    moment: Moment,
+    /// Until when somebody drives the line.
+    busy: MonoTime,
+}
+
+impl<P: LinkPort> Talk<P> {
+    /// Over a port that is open.
+    pub(crate) fn new(port: P, terms: TalkTerms) -> Self {
+        let busy = port.now();
+        let (counts, moment) = (TalkCounts::default(), Moment::default());
+        Self { port, terms, delays: Delays::new(), counts, moment, busy }
+    }
+
+    /// The present instant.
+    pub(crate) fn now(&self) -> MonoTime {
+        self.port.now()
+    }
+
+    /// The port.
+    pub(crate) fn port(&mut self) -> &mut P {
+        &mut self.port
+    }
+
+    /// Bits a second.
+    pub(crate) const fn baud(&self) -> u32 {
+        self.terms.baud
+    }
+
+    /// What came so far.
+    pub(crate) const fn counts(&self) -> TalkCounts {
+        self.counts
+    }
+
+    /// What 99 of 100 answers take to begin.
+    pub(crate) fn delay_p99(&self) -> Duration {
+        self.delays.p99()
+    }
+
+    /// When the last question was asked and answered.
+    pub(crate) const fn moment(&self) -> Moment {
+        self.moment
+    }
+
+    /// When a frame that is sent now has wholly arrived, and how long one takes.
+    pub(crate) fn arrival(&self) -> (MonoTime, Duration) {
+        let frame = self.octets(NINE);
+        (self.now().max(self.busy) + self.octets(BREAK) + frame, frame)
+    }
+
+    /// How long so many octets take.
+    pub(crate) fn octets(&self, count: u32) -> Duration {
+        let bits = u64::from(count * self.terms.octet_bits);
+        Duration::from_nanos(bits * 1_000_000_000 / u64::from(self.terms.baud.max(1)))
+    }
+
+    /// How long a question holds up what is said next.
+    pub(crate) fn question(&self) -> Duration {
+        let delay = self.delays.p99();
+        let hold = if self.terms.is_two_wires { delay.min(LONGEST_HOLD) } else { Duration::ZERO };
+        self.octets(BREAK + 2 * NINE) + delay + hold
+    }
+
+    /// Does nothing for so long.
+    pub(crate) fn pause(&mut self, span: Duration) {
+        let until = self.now() + span;
+        self.port.sleep_until(until);
+    }
+
+    /// Sends and listens at another rate from now on; what units make of it is theirs.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    pub(super) fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
+        self.port.sleep_until(self.busy);
+        self.port.set_baud(baud)?;
+        self.terms.baud = baud;
+        Ok(())
+    }
+
+    /// Tells a unit to talk at another rate. Nobody answers.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    pub(super) fn switch(&mut self, unit: u8, baud: u32) -> Result<(), LinkFault> {
+        let near = (1..=u16::MAX)
+            .min_by_key(|divisor| baud_of(*divisor).map_or(BAUD_CLOCK, |made| made.abs_diff(baud)));
+        let divisor = near.unwrap_or(1);
+        self.tell(unit, SixpackOrder::Baud(BaudSwitch { divisor, delay: DELAY }))
+    }
+
+    /// Tells a unit something. Nobody answers; returns once it has left.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    pub(crate) fn tell(&mut self, unit: u8, order: SixpackOrder) -> Result<(), LinkFault> {
+        self.send(&[order.frame(unit)])?;
+        self.port.sleep_until(self.busy);
+        Ok(())
+    }
+
+    /// Asks a unit, once.
+    ///
+    /// # Errors
+    /// A [`TalkFault`] where it does not answer.
+    pub(crate) fn ask(&mut self, unit: u8, question: SixpackOrder) -> Result<SixpackReply, TalkFault> {
+        self.exchange(unit, &[question.frame(unit)], question)
+    }
+
+    /// Asks a unit, a few times if need be.
+    ///
+    /// # Errors
+    /// The last [`TalkFault`].
+    pub(crate) fn insist(&mut self, unit: u8, question: SixpackOrder) -> Result<SixpackReply, TalkFault> {
+        self.repeat(unit, &[question.frame(unit)], question)
+    }
+
+    /// Tells a unit what does no harm if it is told it twice, with a question right behind it, until that is answered.
+    ///
+    /// # Errors
+    /// The last [`TalkFault`].
+    pub(crate) fn confirm(
+        &mut self,
+        unit: u8,
+        order: SixpackOrder,
+        question: SixpackOrder,
+    ) -> Result<SixpackReply, TalkFault> {
+        self.repeat(unit, &[order.frame(unit), question.frame(unit)], question)
+    }
+
+    fn repeat(
+        &mut self,
+        unit: u8,
+        frames: &[SixpackFrame],
+        question: SixpackOrder,
+    ) -> Result<SixpackReply, TalkFault> {
+        let mut last = self.exchange(unit, frames, question);
+        for _ in 1..TRIES {
+            match last {
+                Ok(_) | Err(TalkFault::Link(_)) => break,
+                Err(TalkFault::Silent { .. }) => last = self.exchange(unit, frames, question),
+            }
+        }
+        last
+    }
+
+    /// Sends frames of which the last is a question, and waits for its answer.
+    fn exchange(
+        &mut self,
+        unit: u8,
+        frames: &[SixpackFrame],
+        question: SixpackOrder,
+    ) -> Result<SixpackReply, TalkFault> {
+        self.counts.doubled += u64::from(self.port.flush() > 0);
+        self.send(frames)?;
+        self.counts.asked += 1;
+        let sent = self.busy;
+        let deadline = sent + self.octets(NINE) + 2 * self.delays.p99() + SLACK;
+        let Some((reply, begun)) = self.answer(question, deadline)? else {
+            return Err(TalkFault::Silent { unit, baud: self.terms.baud });
+        };
+        self.counts.answered += 1;
+        self.moment = Moment { sent, answered: begun.max(sent) };
+        let delay = self.moment.delay();
+        self.delays.push(delay);
+        if self.terms.is_two_wires {
+            self.busy = self.now() + delay.min(LONGEST_HOLD);
+        }
+        Ok(reply)
+    }
+
+    /// Sends frames behind a break, once the line is free, and takes the echo back; it is busy until they have left.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    pub(super) fn send(&mut self, frames: &[SixpackFrame]) -> Result<(), LinkFault> {
+        self.port.sleep_until(self.busy);
+        self.port.send_break(self.octets(BREAK))?;
+        if self.terms.has_echo {
+            self.port.flush();
+        }
+        let octets: Vec<u8> = frames.iter().flat_map(|frame| frame.octets()).collect();
+        let takes = self.octets(u32::try_from(octets.len()).unwrap_or(u32::MAX));
+        self.port.send(&octets)?;
+        self.busy = self.now() + takes;
+        if self.terms.has_echo {
+            let (deadline, mut echo, mut at) = (self.busy + SLACK, vec![0; octets.len()], 0);
+            while at < echo.len() {
+                match self.port.receive(&mut echo[at..], deadline)? {
+                    0 => break,
+                    count => at += count,
+                }
+            }
+            self.counts.echo_differs += u64::from(echo[..at] != octets);
+            self.busy = self.now();
+        }
+        Ok(())
+    }
+
+    /// The answer to a question, with when it began to arrive; none at the deadline. Among other octets it is found where it begins.
+    fn answer(
+        &mut self,
+        question: SixpackOrder,
+        deadline: MonoTime,
+    ) -> Result<Option<(SixpackReply, MonoTime)>, LinkFault> {
+        let (mut window, mut count, mut octet) = ([0; FRAME_LEN], 0, [0]);
+        while self.port.receive(&mut octet, deadline)? > 0 {
+            if count == FRAME_LEN {
+                window.rotate_left(1);
+                self.counts.malformed += 1;
+                count -= 1;
+            }
+            window[count] = octet[0];
+            count += 1;
+            if count < FRAME_LEN {
+                continue;
+            }
+            let frame = SixpackFrame::from_octets(window);
+            if let Some(reply) = question.answered_by(frame) {
+                return Ok(Some((reply, self.now().before(self.octets(NINE)))));
+            }
+            match SixpackReply::of(frame) {
+                SixpackReply::Other { .. } => {}
+                _ if frame.address == ANSWER => {
+                    self.counts.late += 1;
+                    count = 0;
+                }
+                _ => self.counts.foreign += 1,
+            }
+        }
+        self.counts.malformed += u64::from(count > 0);
+        Ok(None)
+    }
+}
+
+/// Octets of a frame.
+const NINE: u32 = 9;
+const _: () = assert!(NINE as usize == FRAME_LEN);

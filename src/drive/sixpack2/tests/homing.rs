@@ -1,0 +1,183 @@
+//! How seats find their zero.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use super::bench::*;
+use crate::config::drive::homing::{HomeWay, Side};
+use crate::config::drive::sixpack2::PropDiv;
+use crate::drive::link::Step;
+use crate::drive::sixpack2::*;
+use crate::motion::SeatType;
+use crate::sim::serial::LineFaults;
+use crate::sim::sixpack2::{ShaftSetup, SixpackFault};
+
+/// What the counter of a motor reads.
+fn counts(talk: &mut Talk<VirtualPort>, index: usize) -> i32 {
+    motor(talk, index).position()
+}
+
+#[test]
+fn a_seat_is_homed_by_the_edges_of_its_switches_and_stands_at_park_with_its_settings() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    let (homed, steps) = home_as(&mut talk, &drive(SWITCH), &[0, 1, 2]);
+    assert_eq!(homed, Ok(()));
+    let order = [Step::Searching(0), Step::Found(0), Step::Searching(1), Step::Parking, Step::Set(2)];
+    let at: Vec<_> = order.iter().map(|step| steps.iter().position(|told| told == step)).collect();
+    assert!(at.is_sorted() && at[0].is_some(), "{steps:?}");
+    for index in 0..3 {
+        assert!(place(&mut talk, index).abs() < 0.06, "{}", place(&mut talk, index));
+        assert_eq!(counts(&mut talk, index), 1_000_000);
+        let motor = motor(&mut talk, index);
+        let (written, executed) = (motor.written, motor.shaft.executed());
+        assert_eq!((written.ramp.amax, written.ramp.vmax, written.pi.propdiv), (12, 503, 25));
+        assert_eq!((written.kind.p5, written.kind.p6, written.start.div), (0x90, 0x72, 0));
+        assert_eq!(written.currents.map(|it| [it.power_down, it.stand, it.run, it.ramp]), Some([2, 2, 1, 0]));
+        assert_eq!(written.peak.map(|it| it.value), Some(238));
+        assert!(executed.lost == 0.0 && executed.velocity <= 20.0 * MM, "{executed:?}");
+        assert!(executed.lowest >= -2.55 * MM, "{executed:?}");
+    }
+    let books = unit(&mut talk).books;
+    assert_eq!((books.unknown, books.settings_in_motion, books.left_alone, books.no_motor), (0, 0, 0, 0));
+    assert_eq!(counts(&mut talk, 3), 0, "of no axis of this seat");
+}
+
+#[test]
+fn a_seat_is_homed_again_from_its_switch_and_from_anywhere() {
+    for start in [-5.0, -2.0, 20.0, 150.0] {
+        let shaft = ShaftSetup { start: start * MM, ..shaft() };
+        let mut talk = talk_to(&[unit_with(1, shaft)]);
+        for _ in 0..2 {
+            assert_eq!(home_as(&mut talk, &drive(SWITCH), &[2, 4]).0, Ok(()), "{start}");
+            assert!(place(&mut talk, 2).abs() < 0.06 && place(&mut talk, 4).abs() < 0.06, "{start}");
+        }
+    }
+}
+
+#[test]
+fn a_reversed_axis_and_one_whose_zero_is_up_find_theirs() {
+    let mut reversed = drive(SWITCH);
+    reversed.reverse[0] = true;
+    let mut talk = talk_to(&[unit_with(1, ShaftSetup { is_reversed: true, ..shaft() })]);
+    assert_eq!(home_as(&mut talk, &reversed, &[0]).0, Ok(()));
+    assert!(place(&mut talk, 0).abs() < 0.06, "{}", place(&mut talk, 0));
+    assert_eq!(counts(&mut talk, 0), 1_000_000);
+    assert_eq!(motor(&mut talk, 0).written.kind.p5, 0x80);
+    // The virtual switch is below: up, for an axis that goes the other way than its motor is said to.
+    let mut up = drive(SWITCH);
+    (up.homing.toward, up.homing.zero_mm, up.reverse[0]) = (Side::Up, 152.0, true);
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    assert_eq!(home_as(&mut talk, &up, &[0]).0, Ok(()));
+    assert!((place(&mut talk, 0) - 150.0).abs() < 0.06, "{}", place(&mut talk, 0));
+}
+
+#[test]
+fn a_hard_stop_is_run_into_gently_and_a_person_says_here() {
+    let mut stop = drive(HomeWay::HardStop);
+    stop.homing.zero_mm = -10.0;
+    let mut talk = talk_to(&[unit_with(1, ShaftSetup { switch: None, ..shaft() })]);
+    assert_eq!(home_as(&mut talk, &stop, &[0]).0, Ok(()));
+    assert!(place(&mut talk, 0).abs() < 0.06, "{}", place(&mut talk, 0));
+    let mut here = drive(HomeWay::Here);
+    here.homing.zero_mm = 75.0;
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    assert_eq!(home_as(&mut talk, &here, &[0]).0, Ok(()));
+    assert!((place(&mut talk, 0) - 5.0).abs() < 0.06, "80 mm were called 75: {}", place(&mut talk, 0));
+}
+
+#[test]
+fn a_search_is_made_with_less_current_and_a_show_with_all_of_it() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    let (seat, drive) = (SeatType { axes: 1, ..seat() }, drive(SWITCH));
+    let sixpack2 = drive.sixpack2.clone().unwrap();
+    let of =
+        SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors: &[0], period: PERIOD };
+    let abort = AtomicBool::new(false);
+    let mut told = |step| abort.store(matches!(step, Step::Searching(_)), Ordering::Relaxed);
+    let homed = home(&mut talk, of, Homing { abort: &abort, told: &mut told });
+    assert_eq!(homed, Err(HomeError::Aborted));
+    let written = motor(&mut talk, 0).written;
+    assert_eq!(written.currents.map(|it| [it.stand, it.run, it.ramp]), Some([2, 3, 3]));
+    assert_eq!(written.ramp.vmax, 41);
+    talk.pause(Duration::from_secs(1));
+    let stood = place(&mut talk, 0);
+    assert!(stood > 79.0, "it had hardly begun to move: {stood}");
+    talk.pause(Duration::from_secs(9));
+    assert_eq!(place(&mut talk, 0), stood);
+}
+
+#[test]
+fn a_switch_that_is_not_found_ends_the_search_and_is_told_in_words() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    suffer(&mut talk, SixpackFault::BreakSwitch { motor: 1, is_broken: true });
+    let begun = talk.now();
+    let words = home_as(&mut talk, &drive(SWITCH), &[0, 1]).0.unwrap_err().to_string();
+    assert_eq!(
+        words,
+        "motor 1 of unit 1: its switch not found within 16 s, 165 mm at 19.6 mm/s; the search was ended, check it, its wiring, \
+         `active` and `toward`"
+    );
+    assert!(talk.now().since(begun).as_secs_f64() < 30.0);
+    let place = place(&mut talk, 1);
+    talk.pause(Duration::from_secs(5));
+    assert_eq!(motor(&mut talk, 1).action(), 0);
+    assert!((motor(&mut talk, 1).shaft.place() / MM - place).abs() < 1.0);
+}
+
+#[test]
+fn a_unit_that_restarts_while_it_homes_is_not_home() {
+    for (after, baud) in
+        [(500, BAUD), (500, 19_231), (3_000, 19_231), (7_000, 19_231), (9_300, 19_231), (9_800, 19_231)]
+    {
+        let mut talk = talk_at(&[unit_with(1, shaft())], baud);
+        let at = talk.now() + Duration::from_millis(after);
+        talk.port().script = Some((at, |line, now| line.bus_mut().suffer(None, SixpackFault::Reset, now)));
+        let (homed, steps) = home_as(&mut talk, &drive(SWITCH), &[0, 1]);
+        assert!(talk.port().script.is_none(), "it was over after {:?}", talk.now());
+        assert!(homed.is_err(), "{after} ms: a unit that lost its place is taken for home");
+        let restarted = Err(HomeError::Restarted { unit: 1 });
+        assert!(after > 9_000 || !steps.contains(&Step::Parking), "{after} ms: {steps:?}");
+        assert!(baud == BAUD || after > 9_000 || homed == restarted, "{after} ms: {homed:?}");
+        talk.pause(Duration::from_secs(1));
+        assert_eq!(motor(&mut talk, 0).speed(), 0);
+    }
+}
+
+#[test]
+fn settings_that_do_not_fit_the_seat_are_refused_before_anything_is_said() {
+    let mut slow = drive(SWITCH);
+    slow.sixpack2.as_mut().unwrap().clock_divider = 5;
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    let words = home_as(&mut talk, &slow, &[0]).0.unwrap_err().to_string();
+    assert_eq!(words, "240 mm/s needs clock_divider 3 or less, it is 5");
+    let mut still = drive(SWITCH);
+    still.sixpack2.as_mut().unwrap().jump_mm_s = Some(0.5);
+    let words = home_as(&mut talk, &still, &[0]).0.unwrap_err().to_string();
+    assert!(words.starts_with("axis 1: with clock_divider 3 no propdiv keeps the jumps of speed"), "{words}");
+    assert_eq!(talk.counts().asked, 0);
+    let mut fixed = drive(SWITCH);
+    fixed.sixpack2.as_mut().unwrap().propdiv = PropDiv::Fixed(8);
+    assert_eq!(home_as(&mut talk, &fixed, &[0]).0, Ok(()));
+    assert_eq!(motor(&mut talk, 0).written.pi.propdiv, 8);
+}
+
+#[test]
+fn over_a_bad_line_a_homing_ends_at_the_edge_or_says_what_is_wrong() {
+    let mut homes = 0;
+    for seed in 0..12_u64 {
+        let shaft = ShaftSetup { start: (20.0 + seed as f64) * MM, ..shaft() };
+        let mut talk = talk_to(&[unit_with(1, shaft)]);
+        talk.port().line.faults =
+            LineFaults { lost: 0.001, doubled: 0.001, answer_lost: 0.02, ..LineFaults::default() };
+        let (homed, _) = home_as(&mut talk, &drive(SWITCH), &[0, 1]);
+        talk.port().line.faults = LineFaults::default();
+        if homed == Ok(()) {
+            homes += 1;
+            let places = [0, 1].map(|index| place(&mut talk, index));
+            assert!(places.iter().all(|place| place.abs() < 0.06), "{seed}: {places:?}");
+            let pi = [0, 1].map(|index| motor(&mut talk, index).written.pi.propdiv);
+            assert_eq!(pi, [25, 25], "{seed}");
+        }
+    }
+    assert!(homes >= 8, "{homes}");
+}

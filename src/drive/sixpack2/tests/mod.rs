@@ -1,0 +1,10 @@
+//! Homings and plays in virtual time, against virtual units; judged by where their axes really were.
+
+#![expect(clippy::cast_precision_loss, reason = "numbers of axes and seeds")]
+
+mod bench;
+mod finding;
+mod homing;
+mod play;
+mod playing;
+mod trouble;

@@ -1,0 +1,121 @@
+//! Plays over a good line.
+
+use super::bench::*;
+use super::play::*;
+use crate::drive::link::streaming::{BrakeReason, StreamEvent};
+
+#[test]
+fn a_ride_is_executed_within_a_fifth_of_a_millimetre_by_axes_that_do_not_wait_for_each_other() {
+    for (baud, is_two_wires) in [(BAUD, false), (113_636, false), (BAUD, true)] {
+        let mut play = Play::over(&[wired(1, is_two_wires)], baud);
+        play.begin(ride);
+        play.play(30.0, 0);
+        assert!(play.worst.iter().all(|worst| *worst <= 0.2), "{baud} {is_two_wires}: {:?}", play.worst);
+        let figures = [0, 1, 2].map(|axis| play.stream.axis(0, axis).unwrap());
+        assert!(
+            figures.iter().all(|axis| axis.off_course_mm < 0.6 && axis.account.acked == 0),
+            "{figures:?}"
+        );
+        assert!(play.rare().is_empty(), "{:?}", play.rare());
+        play.assert_gentle();
+    }
+}
+
+#[test]
+fn frames_are_told_as_sent_before_they_are_executed_and_never_as_confirmed() {
+    let mut play = Play::over(&[wired(1, false)], BAUD);
+    play.begin(ride);
+    play.play(10.0, 0);
+    let mut last = None;
+    for (at, event) in &play.told {
+        assert!(!matches!(event, StreamEvent::Confirmed { .. }), "nothing confirms anything");
+        if let StreamEvent::Sent { frame, .. } = event {
+            assert!(last < Some(frame.0), "{last:?} {frame:?}");
+            last = Some(frame.0);
+            assert!(*at < play.origin + TICK * frame.0 + TICK, "{frame:?} {at:?}");
+        }
+    }
+    assert!(last > Some(980), "{last:?}");
+    let moves = play.told.iter().filter(|(_, event)| matches!(event, StreamEvent::Moves { .. })).count();
+    assert_eq!(moves, 1);
+}
+
+#[test]
+fn it_ends_at_rest_where_the_poses_ended_and_begins_again_from_there() {
+    fn there(at: f64, axis: usize) -> f64 {
+        let part = (at / 2.0).clamp(0.0, 1.0);
+        (40.0 + 10.0 * axis as f64) * part * part * part * (10.0 - part * (15.0 - 6.0 * part))
+    }
+    fn back(at: f64, axis: usize) -> f64 {
+        there(2.0 - at, axis)
+    }
+    let mut play = Play::over(&[wired(1, false)], BAUD);
+    play.begin(there);
+    play.play(2.5, 0);
+    play.judged = false;
+    play.wait(1.0);
+    assert!(
+        play.stream.is_ready(0) && play.off([40.0, 50.0, 60.0]) < 0.1,
+        "{}",
+        play.off([40.0, 50.0, 60.0])
+    );
+    play.begin(back);
+    play.judged = true;
+    play.play(2.5, 0);
+    play.judged = false;
+    play.wait(1.0);
+    assert!(play.stream.is_ready(0) && play.off([0.0; 3]) < 0.1, "{}", play.off([0.0; 3]));
+    assert!(play.worst.iter().all(|worst| *worst < 0.2), "{:?}", play.worst);
+    assert!(play.rare().is_empty(), "{:?}", play.rare());
+}
+
+#[test]
+fn poses_that_end_in_motion_brake_it_within_the_limits() {
+    let mut play = Play::over(&[wired(1, false)], BAUD);
+    play.begin(ride);
+    play.play(8.0, 0);
+    play.judged = false;
+    play.wait(1.5);
+    let braked =
+        |event: &StreamEvent| matches!(event, StreamEvent::Braked { why: BrakeReason::PosesEnded, .. });
+    assert!(play.told.iter().any(|(_, event)| braked(event)), "{:?}", play.rare());
+    assert!(play.stream.is_ready(0));
+    play.assert_gentle();
+}
+
+#[test]
+fn missed_ticks_cost_lead_that_is_regained() {
+    let mut play = Play::over(&[wired(1, false)], BAUD);
+    play.begin(ride);
+    play.play(8.0, 0);
+    play.play(12.0, 2);
+    assert!(play.rare().is_empty(), "{:?}", play.rare());
+    play.worst = [0.0; 3];
+    play.origin = play.origin + 2 * TICK;
+    play.play(5.0, 0);
+    assert!(play.worst.iter().all(|worst| *worst <= 0.2), "{:?}", play.worst);
+}
+
+#[test]
+fn a_first_pose_elsewhere_moves_nothing() {
+    let mut play = Play::over(&[wired(1, false)], BAUD);
+    play.judged = false;
+    play.begin(|_, _| 70.0);
+    play.play(1.0, 0);
+    assert!(play.off([0.0; 3]) < 0.06);
+    assert_eq!(play.rare().len(), 1, "{:?}", play.rare());
+    assert!(play.stream.figures().poses_skipped > 90);
+}
+
+#[test]
+fn two_units_on_two_wires_ride_together() {
+    let mut play = Play::over(&[wired(1, true), wired(2, true)], 113_636);
+    play.begin(ride);
+    play.play(20.0, 0);
+    assert!(play.worst.iter().all(|worst| *worst <= 0.2), "{:?}", play.worst);
+    let books: Vec<_> =
+        play.bus().units().iter().map(|unit| (unit.books.collisions, unit.books.unknown)).collect();
+    assert_eq!(books, [(0, 0), (0, 0)]);
+    assert!(play.rare().is_empty(), "{:?}", play.rare());
+    play.assert_gentle();
+}

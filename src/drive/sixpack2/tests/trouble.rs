@@ -1,0 +1,142 @@
+//! Plays over bad lines, and to units in trouble.
+
+use super::bench::*;
+use super::play::*;
+use crate::drive::link::LinkFault;
+use crate::sim::serial::LineFaults;
+use crate::sim::sixpack2::SixpackFault;
+
+fn riding(seconds: f64) -> Play {
+    let mut play = Play::over(&[wired(1, false)], BAUD);
+    play.begin(ride);
+    play.play(seconds, 0);
+    play.judged = false;
+    play
+}
+
+#[test]
+fn a_stop_is_in_the_very_next_slice_and_ends_at_rest_within_the_limits() {
+    let mut play = riding(10.0);
+    let sent = play.stream.talk().port().sent.len();
+    play.stream.stop(None).unwrap();
+    let speed = play.speed();
+    play.wait(0.03);
+    let next = play.stream.talk().port().sent[sent].1.clone();
+    assert_eq!((next.len(), next[1]), (27, 0x24));
+    play.wait(0.1);
+    assert!(speed > 20.0 && play.speed() < speed, "{speed} {}", play.speed());
+    play.wait(1.0);
+    assert!(play.speed() == 0.0 && play.stream.is_ready(0) && play.has("Stopped"), "{:?}", play.rare());
+    play.assert_gentle();
+}
+
+#[test]
+fn unplugged_in_mid_course_it_is_at_rest_inside_its_stroke_and_comes_back_where_it_stands() {
+    let mut play = riding(10.0);
+    play.line().faults.unplugged = true;
+    play.play(1.5, 0);
+    let rest = play.places();
+    play.play(1.0, 0);
+    assert_eq!(play.places(), rest);
+    assert!(play.has("Lost") && rest.iter().all(|place| (0.0..=150.0).contains(place)), "{rest:?}");
+    play.line().faults.unplugged = false;
+    play.wait(1.5);
+    assert!(play.has("Back") && play.stream.is_ready(0), "{:?}", play.rare());
+    assert_eq!(play.places(), rest);
+    play.assert_gentle();
+}
+
+#[test]
+fn where_only_its_answers_are_lost_a_seat_comes_to_rest_all_the_same() {
+    let mut play = riding(10.0);
+    play.line().faults.answer_lost = 1.0;
+    play.play(2.0, 0);
+    assert!(play.has("Lost") && play.speed() == 0.0, "{:?}", play.rare());
+    play.assert_gentle();
+}
+
+#[test]
+fn a_port_that_is_gone_is_an_error_and_all_lanes_are_lost() {
+    let mut play = riding(2.0);
+    play.stream.talk().port().is_gone = true;
+    let rounds: Vec<_> = (0..50).map(|_| play.stream.round()).collect();
+    play.hear();
+    assert!(rounds.contains(&Err(LinkFault)) && play.has("Lost"), "{:?}", play.rare());
+}
+
+#[test]
+fn a_unit_that_restarted_is_told_and_stands_until_it_is_homed_again() {
+    let mut play = riding(10.0);
+    let now = play.now();
+    play.line().bus_mut().suffer(None, SixpackFault::Reset, now);
+    let rest = play.places();
+    play.play(2.0, 0);
+    assert!(play.has("Lost") && play.has("Restarted"), "{:?}", play.rare());
+    assert_eq!(play.places(), rest, "it heard nothing that it could follow");
+    assert!(!play.stream.is_ready(0));
+    let homed = home_as(play.stream.talk(), &drive(SWITCH), &[0, 1, 2]).0;
+    assert_eq!(homed, Ok(()));
+    play.stream.rejoin(0);
+    play.wait(1.0);
+    assert!(play.stream.is_ready(0), "{:?}", play.rare());
+}
+
+#[test]
+fn at_the_rate_of_a_unit_that_restarted_nothing_is_played() {
+    let talk = talk_at(&[unit_with(1, shaft())], 19_231);
+    let refused = Play::stream_over(talk, 1).map(|_| ()).unwrap_err().to_string();
+    assert!(refused.starts_with("19231 baud is what a unit that was restarted talks at"), "{refused}");
+}
+
+#[test]
+fn a_seat_that_is_not_home_is_told_so_and_never_led() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    crate::drive::sixpack2::find(&mut talk, &[1]).unwrap();
+    let (mut stream, _poses, mut events, _) = Play::stream_over(talk, 1).unwrap();
+    (0..500).for_each(|_| stream.round().unwrap());
+    let told = std::iter::from_fn(|| events.pop().ok()).map(|event| format!("{event:?}"));
+    assert_eq!(told.collect::<Vec<_>>(), ["Restarted { lane: 0, axis: 0 }"]);
+    let sent = stream.talk().port().sent.clone();
+    assert!(!stream.is_ready(0) && sent.iter().all(|(_, octets)| octets[1] != 0x24), "{sent:?}");
+}
+
+#[test]
+fn a_motor_that_searches_by_a_damaged_question_is_ended_and_out() {
+    let mut play = riding(10.0);
+    let now = play.now();
+    let search =
+        crate::wire::sixpack2::SixpackCommand::ReferenceSearch(crate::wire::sixpack2::ReferenceSearch {
+            motor: 1,
+        });
+    play.line().send_break(now);
+    play.line().send(&search.frame(1).octets(), now);
+    play.play(0.2, 0);
+    let action = play.bus().units()[0].motors[1].action();
+    assert!(play.has("OffCourse { lane: 0, axis: 1") && action == 0, "{action} {:?}", play.rare());
+}
+
+#[test]
+fn octets_that_are_damaged_lead_no_axis_out_of_its_stroke() {
+    for (index, faults) in [
+        LineFaults { lost: 0.000_5, ..LineFaults::default() },
+        LineFaults { doubled: 0.000_5, ..LineFaults::default() },
+        LineFaults { flipped: 0.000_5, ..LineFaults::default() },
+        LineFaults { answer_lost: 0.1, ..LineFaults::default() },
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mut play = Play::over(&[wired(1, false)], BAUD);
+        play.begin(ride);
+        play.play(6.0, 0);
+        play.judged = false;
+        play.line().faults = faults;
+        play.bus_mut().forget();
+        play.play(40.0, 0);
+        play.assert_inside();
+        if index != 2 {
+            let through = play.rare();
+            assert!(through.is_empty(), "{index}: {through:?}");
+        }
+    }
+}
