@@ -1,5 +1,6 @@
 //! How long the limits proof of a two-hour six-axis cue at 100 Hz takes, as a ratio to loading that cue in the same run:
-//! of smooth motion, and of motion with noise on every row, where nothing can be ruled out at a glance.
+//! of smooth motion, and of motion with noise on every row, where nothing can be ruled out at a glance. And how long the proof of what
+//! SilverMax units execute of it takes, as a ratio to that one.
 //!
 //! `cargo bench --bench proof`, and with `-- --quick` for the smooth cue at 100 frames a second alone.
 
@@ -16,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use kinocue::cue::{self, Source};
 use kinocue::harness::motion::SeatType;
-use kinocue::harness::proof::{Digest, Terms, prove};
+use kinocue::harness::proof::{Digest, DriveTerms, Terms, prove, prove_driven};
 use kinocue::harness::time::Rate;
 use kinocue::harness::timeline::Timeline;
 
@@ -28,6 +29,8 @@ const ROUNDS: usize = 7;
 /// The goal that the ratio is held against, and the rate that it is for.
 const GOAL: f64 = 1.0;
 const GOAL_RATE: f64 = 100.0;
+/// Segments a second of the drives.
+const LINK_HZ: f64 = 30.0;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -66,7 +69,9 @@ fn write_cue(path: &Path, noise: f64) -> io::Result<()> {
 
 fn compare(path: &Path, what: &str, rate: f64) -> Outcome<()> {
     let seat = Arc::new(SeatType::bench3(AXES));
-    let (mut loads, mut proofs) = (Vec::new(), Vec::new());
+    let (mut loads, mut proofs, mut driven) = (Vec::new(), Vec::new(), Vec::new());
+    let counts = seat.as_ref().clone().with_each(|axis| axis.pulses_per_rev = 4_000.0);
+    let link = DriveTerms::silvermax(Duration::from_secs_f64(LINK_HZ.recip()));
     for _ in 0..ROUNDS {
         let (timeline, load) = timed(|| Ok(Timeline::new(cue::load(path, &Source::Native)?)))?;
         let (_, proof) = timed(|| {
@@ -74,8 +79,14 @@ fn compare(path: &Path, what: &str, rate: f64) -> Outcome<()> {
             let terms = Terms::of_seat(Arc::clone(&seat), AXES, digest, Rate::from_hz(rate), 1.0);
             Ok(prove(&timeline, terms))
         })?;
+        let (_, drives) = timed(|| {
+            let digest = Digest::of(timeline.cue());
+            let terms = Terms::of_seat(Arc::new(counts.clone()), AXES, digest, Rate::from_hz(rate), 1.0);
+            Ok(prove_driven(&timeline, &terms, &link))
+        })?;
         loads.push(load);
         proofs.push(proof);
+        driven.push(drives);
     }
     let ratios = Spread::of(proofs.iter().zip(&loads).map(|(a, b)| a.as_secs_f64() / b.as_secs_f64()));
     println!("{what}, {rate} frames a second");
@@ -86,6 +97,9 @@ fn compare(path: &Path, what: &str, rate: f64) -> Outcome<()> {
         _ => String::new(),
     };
     println!("{:<42} {ratios:.2}   {verdict}", "  ratio");
+    let ratios = Spread::of(driven.iter().zip(&proofs).map(|(a, b)| a.as_secs_f64() / b.as_secs_f64()));
+    print_times("  digest and proof of drives", &driven);
+    println!("{:<42} {ratios:.2}", "  ratio to the proof");
     Ok(())
 }
 

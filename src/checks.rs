@@ -130,9 +130,12 @@ checks! {
     RepliesMissed "replies-missed" Answers Warn
         "One or two of 20 reads without an answer within 100 ms: the network loses datagrams.";
     SlowReplies "slow-replies" Answers Warn
-        "An answer that took over 20 ms: a show notices a silent controller after 250 ms, and late replies hide it.";
+        "An answer that took over 20 ms: a show notices a silent controller after 250 ms, and late replies hide it. On a serial link: \
+         answers so late that it cannot carry what it plays and be watched as well.";
     BrokenReplies "broken-replies" Answers Warn
         "Datagrams came from the controller's address that are no messages: a broken cable or switch, or another device.";
+    DrivesUnasked "drives-unasked" Answers Fail
+        "Drives of this family are not asked yet, and of a seat that nobody asked nothing is known.";
 
     Address "address" Identity Fail
         "The controller takes itself for another address or port than the one it was reached at (PA10 to PA14): its \
@@ -140,6 +143,8 @@ checks! {
     DuplicateAddress "duplicate-address" Identity Fail
         "Two controllers of the configuration have one address, or one hardware address (PA16 to PA1b): what is meant \
          for one seat moves another.";
+    DuplicateUnit "duplicate-unit" Identity Fail
+        "Two drives on a link have one number: both obey what one is told, and their answers garble each other.";
     TwoAnswer "two-answer" Identity Warn
         "A request was answered more than once: two controllers may have one address, or the network repeats datagrams.";
     Contradiction "contradiction" Identity Fail
@@ -185,6 +190,18 @@ checks! {
         "PA20 to PA23 must be this machine's address as the controller sees it: that is where it answers and reports.";
     ReplyPort "reply-port" Network Fail
         "PA24 must be the frame port: SMC controllers take frames from that port alone, and answer to it.";
+    PortMissing "port-missing" Network Fail
+        "The serial port of the link is not there, so none of its drives can be reached.";
+    PortTaken "port-taken" Network Fail
+        "Another program has the serial port: two masters on one line garble each other.";
+    PortForbidden "port-forbidden" Network Fail
+        "The system does not let this user open the serial port; the service needs its drop-in for drives.";
+    PortUnfit "port-unfit" Network Fail
+        "The port is no serial line, or cannot be set as the link needs it.";
+    AdapterSlow "adapter-slow" Network Warn
+        "The adapter holds answers back, 16 ms unless it is told otherwise, and a link that waits for each plays slowly.";
+    EchoDiffers "echo-differs" Network Fail
+        "Some two-wire adapters return what is sent; taken for an answer, or an answer for it, no exchange can be trusted.";
     FramePortFree "frame-port-free" Network Info
         "With port 0 in bind the frame port is another each time, so PA24 cannot be compared with it.";
 
@@ -233,6 +250,16 @@ checks! {
     AnaloguePosition "analogue-position" Motion Fail
         "With PA60 = 1 positions come from the analogue inputs too (times PA61 over PA62): the seat does not go where it \
          is sent.";
+    LinkTooSlow "link-too-slow" Motion Fail
+        "The link cannot carry segments as often as its drives are to be told something new.";
+    SoftLimits "soft-limits" Motion Fail
+        "Registers 38 and 39 of a drive are not those of the seat, which homing wrote: past the stroke nothing but them holds it.";
+    ErrorLimits "error-limits" Motion Fail
+        "Register 208 of a drive is not what homing wrote: it lets go too soon, or not where something blocks it.";
+    DriveTorque "drive-torque" Motion Fail
+        "Registers 206 and 207 of a drive are not what homing wrote: it is too weak to hold the seat, or stronger than it may be.";
+    BrakeRate "brake-rate" Motion Fail
+        "Register 19 of a drive is not what homing wrote: where its link dies it brakes too hard, or past the stroke.";
     AutoReset "auto-reset" Motion Fail
         "With PA0d above 0 the controller resets by itself some time after the last frame: the seat moves without a \
          command, perhaps in a pause with people on it.";
@@ -311,6 +338,18 @@ checks! {
         "An emergency stop is in effect now.";
     ActiveError "active-error" Status Fail
         "The controller or one of its drives reports an error now (chapter 6 of both manuals).";
+    NotHome "not-home" Status Fail
+        "A drive counts from where it was switched on until it is homed, and no place of it is known.";
+    Restarted "restarted" Status Fail
+        "Drives of one seat were not homed together: one of them was off since, and counts from elsewhere.";
+    Killed "killed" Status Fail
+        "A drive let go of its motor, by an error or by heat, and waits for a person.";
+    DriveError "drive-error" Status Fail
+        "A drive is farther from its course than it may be: something blocks it, or it is too weak.";
+    DriveHot "drive-hot" Status Fail
+        "A drive is too hot, and lets go of its motor where it gets hotter.";
+    Supply "supply" Status Fail
+        "The supply of a drive left its bounds: over them it lets go of its motor, and braking raises it.";
     StatusOff "status-off" Status Fail
         "With PA1f = 0 the controller never reports its state, so a drive's alarm between frames goes unnoticed.";
     StatusElsewhere "status-elsewhere" Status Fail
@@ -334,13 +373,37 @@ impl Check {
     /// True if it means that something is not known.
     #[must_use]
     pub(crate) const fn is_unknown(self) -> bool {
-        matches!(self, Self::NoAnswer | Self::RegisterUnread | Self::Route)
+        matches!(
+            self,
+            Self::NoAnswer
+                | Self::RegisterUnread
+                | Self::Route
+                | Self::DrivesUnasked
+                | Self::DuplicateUnit
+                | Self::PortMissing
+                | Self::PortTaken
+                | Self::PortForbidden
+                | Self::PortUnfit
+                | Self::EchoDiffers
+        )
     }
 
     /// True if it is about this moment, and no setting.
     #[must_use]
     pub(crate) const fn is_present(self) -> bool {
-        matches!(self, Self::EmergencyStopActive | Self::ActiveError | Self::BeltsOpen | Self::Position)
+        matches!(
+            self,
+            Self::EmergencyStopActive
+                | Self::ActiveError
+                | Self::BeltsOpen
+                | Self::Position
+                | Self::NotHome
+                | Self::Restarted
+                | Self::Killed
+                | Self::DriveError
+                | Self::DriveHot
+                | Self::Supply
+        )
     }
 }
 
@@ -370,39 +433,4 @@ impl FromStr for Check {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn each_check_has_a_name_of_its_own_in_kebab_case() {
-        for (index, check) in Check::ALL.iter().enumerate() {
-            assert_eq!(check.id().parse(), Ok(*check));
-            assert!(check.id().bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-'), "{check}");
-            assert!(Check::ALL[..index].iter().all(|before| before.id() != check.id()), "{check}");
-        }
-        assert_eq!("estop".parse::<Check>(), Err(UnknownCheck));
-    }
-
-    #[test]
-    fn checks_are_explained_in_whole_sentences() {
-        for check in Check::ALL {
-            assert!(check.why().ends_with('.'), "{check}");
-            assert!(!check.why().contains("  "), "{check}");
-        }
-    }
-
-    #[test]
-    fn silence_and_present_trouble_cannot_be_accepted() {
-        for check in [
-            Check::NoAnswer,
-            Check::RegisterUnread,
-            Check::Route,
-            Check::EmergencyStopActive,
-            Check::ActiveError,
-        ] {
-            assert!(!check.can_be_accepted(), "{check}");
-        }
-        assert!(Check::EstopDisabled.can_be_accepted() && Check::FastForward.can_be_accepted());
-        assert!(!Check::Version.can_be_accepted());
-    }
-}
+mod tests;

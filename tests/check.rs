@@ -374,6 +374,9 @@ fn info_measures_what_check_does_and_says_by_its_exit_code_that_a_curve_leaves_t
     );
 }
 
+/// What that ride asks for beside motion.
+const EFFECTS: &str = "\n[effects]\nair = 1\nwater = 2\nwind = 3\nleg = 4\nsmoke = 5\nlight = 6\n";
+const RIDE: &str = "cues/bench-ride.csv";
 const DRIVES: &str = "tests/data/config/drives.toml";
 
 #[test]
@@ -385,12 +388,50 @@ fn a_hall_with_drives_passes_its_check_which_says_how_often_its_links_play() {
         "drives.toml: plays at 29.98 Hz on link stalls, 3 axes\n",
         "drives.toml: link circle runs at 56818 baud, what its drives make of 57600\n",
         "Hz on link circle, 3 axes, by a USB adapter whose latency timer is 1 ms\n",
-        "how far beside a cue drives play it was not looked at\n",
     ] {
         assert!(run.stdout.contains(text), "{text}: {}", run.stdout);
     }
     let cue = kinocue(&["info", CUE, "--config", DRIVES]);
     assert!(cue.stdout.contains("plays at 29.98 Hz on link stalls"), "{}", cue.stdout);
+}
+
+#[test]
+fn check_and_info_say_how_far_ahead_and_how_far_beside_the_cue_a_link_plays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let drives = std::fs::read_to_string(DRIVES).expect("it is there");
+    let (silver, _) = drives.rsplit_once("[[controller]]").expect("two seats");
+    let still = silver.replace("[seat.silver3.drive]", "[seat.silver3.drive]\nvibration = \"0%\"") + EFFECTS;
+    let hall = write(folder.path(), "hall.toml", &still);
+    let said = "plays at 29.98 Hz on link stalls, 220 ms ahead, at most 0.05 mm beside the cue (a1 of D1 at ";
+    for command in ["check", "info"] {
+        let run = kinocue(&[command, RIDE, "--config", &hall]);
+        assert_eq!(run.code, Some(0), "{command}: {}", run.stderr);
+        assert!(run.stdout.contains(said), "{command}: {}", run.stdout);
+        let json = kinocue(&[command, RIDE, "--config", &hall, "--json"]).json();
+        let axis = &json["drives"][0];
+        assert_eq!((&axis["link"], &axis["controllers"][0]), (&"stalls".into(), &"D1".into()), "{json}");
+        assert!(axis["lead_ms"].as_f64().is_some_and(|ms| (220.0..221.0).contains(&ms)), "{json}");
+    }
+}
+
+#[test]
+fn what_a_link_misses_of_a_cue_fails_check_fit_and_upload_with_place_and_remedy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let drives = std::fs::read_to_string(DRIVES).expect("it is there");
+    let (silver, _) = drives.rsplit_once("[[controller]]").expect("two seats");
+    let hall = write(folder.path(), "hall.toml", &(silver.to_owned() + EFFECTS));
+    let out = folder.path().join("out.csv").display().to_string();
+    for args in [
+        &["check", RIDE, "--config", &hall][..],
+        &["fit", RIDE, "-o", &out, "--config", &hall],
+        &["prove", RIDE, "--config", &hall],
+    ] {
+        let run = kinocue(args);
+        let said = run.stdout.clone() + &run.stderr;
+        assert_eq!(run.code, Some(1), "{args:?}: {said}");
+        assert!(said.contains("v1_hz: link stalls, D1: vibration at 20.0 Hz at 00:"), "{args:?}: {said}");
+    }
+    assert!(!std::path::Path::new(&out).exists(), "fit wrote what it cannot mend");
 }
 
 #[test]
@@ -428,8 +469,6 @@ fn nothing_that_plays_takes_a_hall_with_drives() {
     let serve = ["serve", "--config", DRIVES, "--socket", &socket, "--state", &socket];
     for (args, names) in [
         (&["play", CUE, "--config", DRIVES][..], "D1, D2 on"),
-        (&["preflight", "--config", DRIVES], "D1, D2 on"),
-        (&["preflight", "--config", DRIVES, "D2"], "D2 on"),
         (&["latency", "--config", DRIVES], "D1, D2 on"),
         (&serve, "D1, D2 on"),
     ] {

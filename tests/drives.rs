@@ -11,7 +11,7 @@ use std::path::Path;
 use process::{Guarded, kinocue};
 use rustix::process::Signal;
 
-/// A hall with one seat of three axes, on the line at `port`.
+/// A hall with one seat of three axes, on the line at `port`, at a rate that is left where the other end answers late, on a busy machine.
 fn hall(folder: &Path, port: &Path, dialect: &str) -> String {
     let units = if dialect == "silvermax" { "units = [16, 17, 18]" } else { "unit = 1\nmotors = [0, 1, 2]" };
     let text = format!(
@@ -19,6 +19,7 @@ fn hall(folder: &Path, port: &Path, dialect: &str) -> String {
 [link.stalls]
 port = "{}"
 baud = {}
+rate_hz = 5
 
 [seat.lift]
 axes = 3
@@ -185,4 +186,88 @@ fn a_sixpack_that_is_not_there_is_told_with_what_to_do() {
     assert!(said.contains("unit 7 answers neither at 56818 nor at 19231 baud"), "{said}");
     sim.signal(Signal::TERM);
     assert_eq!(sim.finish().code, Some(0));
+}
+
+/// What `kinocue preflight` says of a hall as JSON, the checks that the seat A1 fails, and how it ends.
+fn preflight(hall: &str) -> (serde_json::Value, Vec<String>, Option<i32>) {
+    let run = kinocue(&["preflight", "--config", hall, "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&run.stdout).expect("JSON");
+    let findings = told["controllers"][0]["findings"].as_array().expect("a list");
+    let fails = findings.iter().filter(|one| one["severity"] == "fail");
+    let fails = fails.map(|one| one["check"].as_str().expect("text").to_owned()).collect();
+    (told, fails, run.code)
+}
+
+#[test]
+fn preflight_passes_a_seat_once_it_is_homed_and_takes_one_that_was_never_for_not_home() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let sim = units(&port, "silvermax");
+    let hall = hall(folder.path(), &port, "silvermax");
+    let (told, fails, exit) = preflight(&hall);
+    assert_eq!((fails, exit), (vec!["not-home".to_owned()], Some(1)), "{told}");
+    let text = kinocue(&["preflight", "--config", &hall]);
+    assert!(
+        text.stdout.contains("link:stalls") && text.stdout.contains("home it, seats empty"),
+        "{}",
+        text.stdout
+    );
+    let (_, said, _) = home(&hall);
+    let (told, fails, exit) = preflight(&hall);
+    assert_eq!((fails, exit), (vec![], Some(0)), "{said}{told}");
+    let registers = &told["controllers"][0]["registers"];
+    assert_eq!((&registers["16.38"], &registers["18.39"]), (&(-800).into(), &120_800.into()), "{told}");
+    sim.signal(Signal::TERM);
+    let counts = sim.finish().report_of(0);
+    assert!(counts["units"].as_array().is_some_and(|units| units.len() == 3), "{counts}");
+}
+
+#[test]
+fn preflight_tells_a_unit_that_is_not_there_and_an_adapter_that_repeats_what_is_sent() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let tty = port.to_str().expect("text");
+    let mut sim = Guarded::start(&[
+        "sim",
+        "--dialect",
+        "silvermax",
+        "--tty",
+        tty,
+        "--units",
+        "16,17",
+        "--faults",
+        "echo=1",
+        "--json",
+    ]);
+    let mut ready = String::new();
+    sim.stderr().read_line(&mut ready).expect("text");
+    let (told, mut fails, exit) = preflight(&hall(folder.path(), &port, "silvermax"));
+    fails.sort();
+    assert_eq!(
+        (fails, exit),
+        (["echo-differs", "no-answer", "not-home"].map(str::to_owned).to_vec(), Some(1)),
+        "{told}"
+    );
+    sim.signal(Signal::TERM);
+    sim.finish();
+}
+
+#[test]
+fn preflight_tells_a_port_that_is_missing_and_one_that_another_program_has() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let hall = hall(folder.path(), &port, "silvermax");
+    let (told, fails, exit) = preflight(&hall);
+    assert_eq!((fails, exit), (vec!["port-missing".to_owned()], Some(69)), "{told}");
+    let sim = units(&port, "silvermax");
+    let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
+    let mut said = homing.stderr().lines().map(|line| line.expect("text"));
+    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    let (told, fails, exit) = preflight(&hall);
+    assert_eq!((fails, exit), (vec!["port-taken".to_owned()], Some(69)), "{told}");
+    homing.signal(Signal::INT);
+    assert!(said.any(|line| line.ends_with("the seat is not home")));
+    homing.finish();
+    sim.signal(Signal::TERM);
+    sim.finish();
 }

@@ -172,7 +172,7 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
 
 fn keeps_limits(config: &Config, timeline: &Timeline, rate: Rate, level: f64) -> Result<(), PlayError> {
     let terms = Terms::of_hall(config, Digest::of(timeline.cue()), rate, level);
-    let proof = proof::prove(timeline, terms);
+    let proof = proof::prove_in(config, timeline, terms);
     if proof.passed() {
         return Ok(());
     }

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::config::Config;
+use crate::config::drive::SeatDrive;
+use crate::config::{Config, Connection};
 use crate::drive::{Lane, Manner, lanes};
 use crate::engine::{Engine, Headroom, Mix, Show};
 use crate::film::follower::PaceLimits;
@@ -48,6 +49,11 @@ pub(super) fn at_any_pace(config: &Config, pace: PaceLimits) -> Config {
                 pace.leave(axis.max_velocity, axis.max_acceleration, axis.max_jerk);
         });
         controller.seat = Arc::new(seat);
+        if let Connection::Link(drives) = &mut controller.connection {
+            // What a fit misses is in proportion to the jerk of what it follows.
+            let max_deviation_mm = drives.drive.max_deviation_mm / pace.most().powi(3);
+            drives.drive = Arc::new(SeatDrive { max_deviation_mm, ..SeatDrive::clone(&drives.drive) });
+        }
     }
     config
 }

@@ -6,14 +6,15 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
-use crate::config::drive::DriveFamily;
+use crate::config::drive::{DriveFamily, MAX_DEVIATION_MM};
 use crate::config::parse_level;
+use crate::drive::rates::short;
 use crate::plain;
-use crate::proof::{DriveAxisProof, DriveProof, DriveTerms, DrivenBy, Terms, prove_driven, rate_that_fits};
+use crate::proof::{
+    DriveAxisProof, DriveProof, DriveTerms, DrivenBy, LinkPlay, Terms, prove_driven, rate_that_fits,
+};
 use crate::timeline::Timeline;
 
-/// How far a drive may be beside a cue, in the unit of its axis, where no configuration says it.
-const MAX_DEVIATION: f64 = 0.5;
 /// The divider of the clock of a SIXpack 2 that the fastest bench seat takes.
 const CLOCK_DIVIDER: u8 = 3;
 /// The highest rate of a link that is advised.
@@ -44,8 +45,13 @@ pub(super) struct DriveReport {
     file: String,
     axis: String,
     seat: String,
+    /// The link of the hall that it is on, and who is there; null and none where no hall was asked about.
+    link: Option<String>,
+    controllers: Vec<String>,
     unit: &'static str,
     rate_hz: f64,
+    /// How long before the seat is there its poses are made; null where that is not known.
+    lead_ms: Option<f64>,
     deviation: f64,
     max_deviation: f64,
     at_s: f64,
@@ -69,7 +75,8 @@ impl DriveArgs {
             }
         };
         let period = Duration::from_secs_f64(hz.recip());
-        let link = DriveTerms { family, period, max_deviation: MAX_DEVIATION, shake: self.drive_vibration };
+        let link =
+            DriveTerms { family, period, max_deviation: MAX_DEVIATION_MM, shake: self.drive_vibration };
         let proof = prove_driven(timeline, terms, &link);
         let words = if proof.violations.is_empty() {
             passed(path, &proof, hz)
@@ -82,32 +89,80 @@ impl DriveArgs {
     }
 }
 
+impl DriveReport {
+    fn new(path: &Path, axis: &DriveAxisProof, rate_hz: f64) -> Self {
+        Self {
+            file: path.display().to_string(),
+            axis: format!("a{}", axis.axis + 1),
+            seat: axis.on.seat.name.clone(),
+            link: None,
+            controllers: Vec::new(),
+            unit: axis.on.geometry().unit.name(),
+            rate_hz,
+            lead_ms: None,
+            deviation: axis.deviation.value,
+            max_deviation: axis.deviation.limit,
+            at_s: axis.deviation.at.as_secs_f64(),
+        }
+    }
+}
+
 fn reports(path: &Path, proof: &DriveProof, rate_hz: f64) -> Vec<DriveReport> {
-    let report = |axis: &DriveAxisProof| DriveReport {
-        file: path.display().to_string(),
-        axis: format!("a{}", axis.axis + 1),
-        seat: axis.on.seat.name.clone(),
-        unit: axis.on.geometry().unit.name(),
-        rate_hz,
-        deviation: axis.deviation.value,
-        max_deviation: axis.deviation.limit,
-        at_s: axis.deviation.at.as_secs_f64(),
+    proof.axes.iter().map(|axis| DriveReport::new(path, axis, rate_hz)).collect()
+}
+
+/// What the links of a hall play of a cue, axis by axis.
+pub(super) fn on_links(path: &Path, plays: &[LinkPlay]) -> Vec<DriveReport> {
+    let of_play = |play: &LinkPlay| {
+        let report = |axis: &DriveAxisProof| DriveReport {
+            link: Some(play.link.clone()),
+            controllers: play.controllers.clone(),
+            lead_ms: play.lead.map(ms),
+            ..DriveReport::new(path, axis, play.period.as_secs_f64().recip())
+        };
+        play.axes.iter().map(report).collect::<Vec<_>>()
     };
-    proof.axes.iter().map(report).collect()
+    plays.iter().flat_map(of_play).collect()
+}
+
+/// What each link plays of a cue, in words.
+pub(super) fn links_in_words(plays: &[LinkPlay]) -> Vec<String> {
+    let of_link = |plays: &[LinkPlay]| {
+        let LinkPlay { link, period, .. } = &plays[0];
+        let ahead = plays.iter().filter_map(|play| play.lead).max();
+        let ahead = ahead.map_or_else(String::new, |lead| format!(", {:.0} ms ahead", ms(lead)));
+        let axes = plays.iter().flat_map(|play| play.axes.iter().map(move |axis| (play, axis)));
+        let worst = axes.max_by(|(_, one), (_, other)| part(one).total_cmp(&part(other)));
+        let beside = worst.map_or_else(String::new, |(play, axis)| {
+            let (at, who) = (axis.deviation.at, play.controllers.join(", "));
+            format!(", {} (a{} of {who} at {at})", beside(axis), axis.axis + 1)
+        });
+        format!("plays at {} Hz on link {link}{ahead}{beside}", short(period.as_secs_f64().recip()))
+    };
+    plays.chunk_by(|one, other| one.link == other.link).map(of_link).collect()
+}
+
+/// What of the deviation that is allowed an axis takes.
+fn part(axis: &DriveAxisProof) -> f64 {
+    axis.deviation.value / axis.deviation.limit
+}
+
+fn beside(axis: &DriveAxisProof) -> String {
+    let value = (100.0 * axis.deviation.value).ceil() / 100.0;
+    format!("at most {value:.2} {} beside the cue", axis.on.geometry().unit.name())
+}
+
+fn ms(span: Duration) -> f64 {
+    span.as_secs_f64() * 1e3
 }
 
 /// At which rate it is played, and how far beside the cue drives are at the most.
 fn passed(path: &Path, proof: &DriveProof, hz: f64) -> String {
-    let part = |axis: &&DriveAxisProof| axis.deviation.value / axis.deviation.limit;
     let Some(worst) = proof.axes.iter().max_by(|a, b| part(a).total_cmp(&part(b))) else {
         return String::new();
     };
-    let (deviation, unit, axis) = (worst.deviation, worst.on.geometry().unit.name(), worst.axis + 1);
-    let (path, value) = (plain::path(path), (100.0 * deviation.value).ceil() / 100.0);
-    format!(
-        "{path}: drives play it at {hz:.1} Hz, at most {value:.2} {unit} beside the cue (a{axis} at {})\n",
-        deviation.at
-    )
+    let (path, axis, at) = (plain::path(path), worst.axis + 1, worst.deviation.at);
+    format!("{path}: drives play it at {hz:.1} Hz, {} (a{axis} at {at})\n", beside(worst))
 }
 
 /// Reads a family by its word in the configuration.

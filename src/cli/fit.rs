@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::convert;
 use super::figures::{self, AxisReport};
-use super::load::{self, SeatArgs, SourceArgs};
+use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, OrExit as _, print};
 use crate::config::parse_level;
 use crate::motion::AxisUnit;
@@ -21,7 +21,8 @@ use crate::timeline::Timeline;
 /// A cue that ends in motion, without a way to rest from there, is brought to rest in its last stretch where that changes less.
 /// What amplitude cannot cure, as the steps of coarse sources and the corners of straight lines, --smooth takes out with a
 /// low-pass that moves nothing in time; of low-pass and amplitude it takes the pair that changes the cue least. Vibration
-/// that is more than the seat stands on top of that is lowered too. What is written passes `kinocue check` on the same terms.
+/// that is more than the seat stands on top of that is lowered too. What serial links of the hall miss it tells, and does not mend. What
+/// is written passes `kinocue check` on the same terms.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue fit ride.csv -o fitted.csv",
@@ -81,6 +82,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             anyhow!("{}: what was made of it still breaks limits; nothing is written", args.cue.display());
         return Err(error).or_exit(Exit::CheckFailed);
     }
+    refuse_what_links_miss(args, &judge, &fitted)?;
     convert::write(fitted.timeline.cue(), &args.output, target)?;
     let report = Report::new(args, &fitted);
     if args.json {
@@ -89,6 +91,19 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::tell(&report.text(&fitted));
     }
     Ok(Exit::Done)
+}
+
+/// What a link makes of a cue is a matter of its rate and of the level: it is told, and nothing is changed for it.
+fn refuse_what_links_miss(args: &Args, judge: &Judge, fitted: &Fitted) -> Result<(), Failure> {
+    let broken = judge.links(&fitted.timeline, args.level).violations;
+    if broken.is_empty() {
+        return Ok(());
+    }
+    let lines: String = broken.iter().map(|one| format!("{}:{one}\n", args.cue.display())).collect();
+    let error = anyhow!(
+        "{lines}what serial links miss of a cue is nothing that fit mends: change the link, the level or the cue; nothing is written"
+    );
+    Err(error).or_exit(Exit::CheckFailed)
 }
 
 /// Whatever was asked for, a cue is never written over itself.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::drives::{self, DriveReport};
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
@@ -76,6 +77,9 @@ struct Info {
     markers: Vec<MarkerReport>,
     notes: Vec<String>,
     axes: Vec<AxisReport>,
+    /// What the links of the hall play of it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    drives: Vec<DriveReport>,
     #[serde(skip)]
     figures: Vec<AxisFigures>,
 }
@@ -152,7 +156,15 @@ impl Info {
         let stroke = judge.stroke(timeline);
         let notes = stroke.held.iter().filter_map(|held| note(held, &figures, timeline));
         let (told, faults) = judge.hall.as_ref().map(rates::in_words).unwrap_or_default();
-        let links = told.into_iter().chain(faults);
+        let driven = judge.links(timeline, 1.0);
+        let plays = drives::links_in_words(&driven.plays);
+        let mut links: Vec<_> = told.into_iter().chain(plays).chain(faults).collect();
+        for violation in &driven.violations {
+            let words = violation.to_string().trim_start().to_owned();
+            if !links.iter().any(|told| told.ends_with(&words)) {
+                links.push(words);
+            }
+        }
         Self {
             axes: figures::report(&name, &figures),
             cue: name,
@@ -172,6 +184,7 @@ impl Info {
                 .iter()
                 .map(|m| MarkerReport { name: m.name.clone(), at_s: m.at.as_secs_f64() })
                 .collect(),
+            drives: drives::on_links(cue.path(), &driven.plays),
             notes: notes.chain(stroke.faults.iter().map(ToString::to_string)).chain(links).collect(),
             figures,
         }

@@ -10,7 +10,7 @@ use super::{Exit, Failure, OrExit as _};
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
 use crate::motion::{SeatAxis, SeatType};
-use crate::proof::{Digest, Terms};
+use crate::proof::{Digest, LinksProof, Proof, Terms, prove, prove_in, prove_links};
 use crate::time::Rate;
 use crate::timeline::Timeline;
 
@@ -138,6 +138,20 @@ impl Judge {
             (Some(seat), None) => of_seat(seat),
             (None, None) => of_seat(&Arc::new(SeatType::bench3(axes))),
         }
+    }
+
+    /// Proves a cue on these terms, and what the links of the configuration make of it, unless another seat is asked for.
+    pub(super) fn prove(&self, timeline: &Timeline, terms: Terms) -> Proof {
+        match (&self.seat, &self.hall) {
+            (None, Some(hall)) => prove_in(hall, timeline, terms),
+            _ => prove(timeline, terms),
+        }
+    }
+
+    /// What the links of the configuration make of a cue, unless another seat is asked for.
+    pub(super) fn links(&self, timeline: &Timeline, level: f64) -> LinksProof {
+        let hall = self.hall.as_ref().filter(|_| self.seat.is_none());
+        hall.map(|hall| prove_links(hall, timeline, &self.terms(timeline, level))).unwrap_or_default()
     }
 
     /// Holds a cue against the stroke of the seat asked for, else of each seat of the configuration, else of the

@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
+use std::thread;
 use std::time::Duration;
 
 use anyhow::anyhow;
@@ -14,21 +15,22 @@ use super::{Exit, Failure, OrExit as _, print};
 use crate::device::survey::{Survey, survey};
 use crate::motion::MAX_AXES;
 use crate::net::{Route, route};
-use crate::preflight::{Check, Subject, Terms, judge, wanted};
+use crate::preflight::{Check, Subject, Terms, judge, judge_driven, wanted};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 use crate::timeline::Timeline;
 
+mod drives;
 mod explain;
 mod report;
 
-use report::Report;
+use report::{ControllerReport, Report};
 
 /// Checks every controller before anyone sits down.
 ///
 /// Who answers, how fast, and whether its settings are right and safe.
 ///
-/// Reads only; nothing moves and nothing is changed. Controllers are asked side by side: 64 of them take seconds, also
+/// Reads only; nothing moves and nothing is changed; seats on serial links are looked at over their ports. Controllers are asked side by side: 64 of them take seconds, also
 /// where some are dead. Ends with 0 only where nothing fails. Without --to and --config the daemon checks its own hall.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -88,7 +90,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let cue =
         args.cue.as_ref().map(|path| load::cue(path, &args.source.source())).transpose()?.map(Timeline::new);
     let cue_axes = cue.as_ref().map_or(MAX_AXES, Timeline::axes);
-    let targets = args.targets.resolve_for(&args.names, cue_axes)?;
+    let (targets, driven) = args.targets.resolve_all_for(&args.names, cue_axes)?;
     let terms = Terms {
         frame_port: targets.show.bind.port(),
         rate_hz: args.rate.unwrap_or(targets.show.rate_hz),
@@ -97,7 +99,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     // What --to means where neither it nor a cue gives the axes reaches to the last one there may be.
     let axes_are_open = !args.targets.are_configured() && args.cue.is_none();
     let begun = Monotonic.now();
-    let asked = ask(&targets)?;
+    let (asked, looked) = thread::scope(|scope| {
+        let looked = scope.spawn(|| drives::look_at_all(&driven));
+        (ask(&targets), looked.join().expect("whoever looks does not panic"))
+    });
+    let asked = asked?;
     let subjects: Vec<_> = (targets.controllers.iter().zip(&asked))
         .map(|(controller, asked)| Subject {
             controller,
@@ -107,7 +113,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         })
         .collect();
     let findings = judge(&subjects, &terms, &targets.show.accept_findings);
-    let report = Report::new(&subjects, findings, Monotonic.now().since(begun));
+    let on_links = drives::subjects(&driven, &looked);
+    let found = judge_driven(&on_links, &targets.show.accept_findings);
+    let all = ControllerReport::of_all(&subjects, findings);
+    let all = all.chain(ControllerReport::of_driven(&on_links, found));
+    let report = Report::new(all.collect(), Monotonic.now().since(begun));
     tell(&report, args.server.json)
 }
 

@@ -13,7 +13,7 @@ use crate::cue::{self, Cue, CueFaults, Source};
 use crate::drive::Manner;
 use crate::engine::Show;
 use crate::library::{Drawing, Hashed, MAX_POINTS, Verdict, draw, needs_hall};
-use crate::proof::{Digest, Terms, prove};
+use crate::proof::{Digest, Terms, prove_in};
 use crate::sys::humble::{self, Bounds};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -113,7 +113,7 @@ fn of_cue(cue: Cue, config: Config, verdict: &mut Verdict) {
     }
     config.fits_stroke(&timeline).faults.iter().for_each(|faults| note(faults, verdict));
     let rate = Rate::from_hz(config.show.rate_hz);
-    let proof = prove(&timeline, Terms::of_hall(&config, digest, rate, 1.0));
+    let proof = prove_in(&config, &timeline, Terms::of_hall(&config, digest, rate, 1.0));
     verdict.faults.extend(proof.violations.iter().map(|one| one.to_string().trim_start().to_owned()));
     verdict.more += proof.more;
     if verdict.faults.is_empty() {

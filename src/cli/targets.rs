@@ -49,11 +49,14 @@ pub(super) struct Driven {
     pub(super) links: Vec<Link>,
     /// From one target of an axis to the next on each of them, by all that is on it.
     pub(super) periods: Vec<Duration>,
+    /// What each of them carries; none where nobody is on it.
+    pub(super) loads: Vec<Option<LinkLoad>>,
 }
 
 struct Meant {
     on_network: Targets,
     on_links: Vec<Controller>,
+    loads: Vec<Option<LinkLoad>>,
     /// The hall without its controllers.
     config: Config,
     periods: Vec<Duration>,
@@ -63,20 +66,24 @@ impl TargetArgs {
     /// The controllers that the arguments and `names` mean.
     pub(super) fn resolve(&self, names: &[String]) -> Result<Targets, Failure> {
         // Without a cue nothing limits the axes but the protocol.
-        self.resolve_for(names, MAX_AXES)
-    }
-
-    /// The same, for a cue of `cue_axes` axes.
-    pub(super) fn resolve_for(&self, names: &[String], cue_axes: usize) -> Result<Targets, Failure> {
-        let meant = self.meant(names, cue_axes)?;
+        let meant = self.meant(names, MAX_AXES)?;
         Config { controllers: meant.on_links, ..meant.config }.playable().or_exit(Exit::Config)?;
         Ok(meant.on_network)
     }
 
     /// The same, those on links apart.
     pub(super) fn resolve_all(&self, names: &[String]) -> Result<(Targets, Driven), Failure> {
-        let Meant { on_network, on_links, config, periods } = self.meant(names, MAX_AXES)?;
-        Ok((on_network, Driven { controllers: on_links, links: config.links, periods }))
+        self.resolve_all_for(names, MAX_AXES)
+    }
+
+    /// The same, for a cue of `cue_axes` axes.
+    pub(super) fn resolve_all_for(
+        &self,
+        names: &[String],
+        cue_axes: usize,
+    ) -> Result<(Targets, Driven), Failure> {
+        let Meant { on_network, on_links, loads, config, periods } = self.meant(names, cue_axes)?;
+        Ok((on_network, Driven { controllers: on_links, links: config.links, loads, periods }))
     }
 
     fn meant(&self, names: &[String], cue_axes: usize) -> Result<Meant, Failure> {
@@ -84,6 +91,7 @@ impl TargetArgs {
             Some(path) => load::config(path)?,
             None => from_to_args(&self.to, &[], cue_axes).or_exit(Exit::Usage)?,
         };
+        let loads = config.links.iter().map(|link| LinkLoad::of(link, &config)).collect();
         let periods = config.links.iter().map(|link| period(link, &config)).collect();
         let (controllers, absent) =
             (std::mem::take(&mut config.controllers), std::mem::take(&mut config.absent));
@@ -98,7 +106,7 @@ impl TargetArgs {
         let chosen = self.choose(controllers.into_iter().chain(named).collect(), names)?;
         let stations = chosen.iter().filter_map(Controller::on_network).collect();
         let on_links = chosen.into_iter().filter(|one| one.drives().is_some()).collect();
-        Ok(Meant { on_network: Targets { controllers: stations, show }, on_links, config, periods })
+        Ok(Meant { on_network: Targets { controllers: stations, show }, on_links, loads, config, periods })
     }
 
     /// True if anybody is meant: without, `home` and `preflight` ask the daemon for its own.

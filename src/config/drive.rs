@@ -40,6 +40,9 @@ impl DriveFamily {
     }
 }
 
+/// How far drives may be beside a cue, where nobody says more, mm.
+pub(crate) const MAX_DEVIATION_MM: f64 = 0.5;
+
 /// How drives move a type of seat.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SeatDrive {
@@ -49,6 +52,10 @@ pub(crate) struct SeatDrive {
     pub(crate) homing: DriveHoming,
     /// How far outside the stroke the soft limits lie, mm.
     pub(crate) margin_mm: f64,
+    /// The farthest that its drives may be beside a cue, mm, their own error apart.
+    pub(crate) max_deviation_mm: f64,
+    /// Level of vibration on its drives, 0 to 1, on top of all that operators set.
+    pub(crate) vibration: f64,
     /// What only a SilverMax has; `None` if its torque is not said.
     pub(crate) silvermax: Option<SilverMaxDrive>,
     /// What only a SIXpack 2 has; `None` if its current is not said.
@@ -111,11 +118,21 @@ fn seat_drive(seat: &SeatType, entry: Entry<'_>, faults: &mut Faults<'_>) -> Opt
     section.require(&["home"]);
     let reverse = reverse(&mut section, seat.axes);
     let margin_mm = section.number_in("margin_mm", 0.1..=10.0).unwrap_or(1.0);
+    let max_deviation_mm = section.number_in("max_deviation_mm", 0.01..=10.0).unwrap_or(MAX_DEVIATION_MM);
+    let vibration = level(&mut section, "vibration").unwrap_or(1.0);
     let homing = section.get("home").and_then(|entry| homing::homing(entry, seat.own(), section.faults));
     let silvermax = silvermax(&mut section);
     let sixpack2 = sixpack2::sixpack2(&mut section);
     section.finish();
-    Some(SeatDrive { reverse, homing: homing?, margin_mm, silvermax: silvermax?, sixpack2: sixpack2? })
+    Some(SeatDrive {
+        reverse,
+        homing: homing?,
+        margin_mm,
+        max_deviation_mm,
+        vibration,
+        silvermax: silvermax?,
+        sixpack2: sixpack2?,
+    })
 }
 
 /// Which axes go the other way, from a list that counts from 1.

@@ -26,7 +26,10 @@ pub(super) enum Codec {
     /// SMC, IMAX and MBOX controllers.
     Mbox(MotionCodec),
     /// The thread of a serial link, which makes its own of poses.
-    Link,
+    Link {
+        /// Level of vibration on its drives, 0 to 1, on top of the mix.
+        shake: f64,
+    },
 }
 
 /// A frame that was written: its number, and whether it asks for a reply.
@@ -52,7 +55,10 @@ impl Lane {
         let mut stamped = self.stamp();
         let octets = match &self.codec {
             Codec::Mbox(codec) => codec.write(&self.window, beat, pose, mix, &mut stamped, buf),
-            Codec::Link => LinkPose::of(&self.window, beat, pose, mix, &mut stamped).emit(buf),
+            Codec::Link { shake } => {
+                let mix = Mix { vibration: shake * mix.vibration, ..mix };
+                LinkPose::of(&self.window, beat, pose, mix, &mut stamped).emit(buf)
+            }
         };
         (stamped, octets)
     }
@@ -65,7 +71,7 @@ impl Lane {
     ) -> (Stamped, &'b [u8]) {
         let set_vibrates = |lane: &mut Self, vibrates| match &mut lane.codec {
             Codec::Mbox(codec) => std::mem::replace(&mut codec.vibrates, vibrates),
-            Codec::Link => vibrates,
+            Codec::Link { .. } => vibrates,
         };
         let vibrates = set_vibrates(self, false);
         let park = self.window.park();
@@ -79,7 +85,7 @@ impl Lane {
         self.window.hold();
         match &mut self.codec {
             Codec::Mbox(codec) => codec.hold(),
-            Codec::Link => {}
+            Codec::Link { .. } => {}
         }
     }
 

@@ -50,7 +50,7 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
             vibration_port: station.vibration_port,
             wiring: wiring(config, controller, timeline),
         }),
-        Connection::Link(_) => Codec::Link,
+        Connection::Link(drives) => Codec::Link { shake: drives.drive.vibration },
     };
     Lane {
         window,

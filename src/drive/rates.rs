@@ -126,16 +126,42 @@ impl LinkLoad {
         if period >= self.period() { Ok(period) } else { Err(TooSlow { load: *self, wanted_hz }) }
     }
 
-    /// What to do for so many times a second, each with the number that fits.
+    /// What would make it faster, with `seats` on it, none of which two lines may share: times a second, and the words of it, the
+    /// slowest first.
     #[must_use]
-    pub(crate) fn remedy(&self, wanted_hz: f64) -> String {
-        let bauds: &[u32] = match (self.family, self.wiring) {
+    pub(crate) fn changes(&self, seats: u32) -> Vec<(f64, String)> {
+        let bauds = self.bauds().iter().copied().filter(|baud| *baud > self.baud);
+        let bauds: Vec<u32> = std::iter::once(self.baud).chain(bauds).collect();
+        let mut changes = Vec::new();
+        for links in 1..=seats.max(1) {
+            let axes = self.axes / seats.max(1) * seats.div_ceil(links);
+            for &baud in &bauds {
+                let apart = (links > 1).then(|| format!("{links} links"));
+                let quicker = (baud > self.baud).then(|| format!("baud = {baud}"));
+                let words: Vec<_> = quicker.into_iter().chain(apart).collect();
+                let words =
+                    if words.is_empty() { "rate_hz = \"auto\"".to_owned() } else { words.join(" and ") };
+                changes.push((Self { axes: axes.max(1), baud, ..*self }.rate_hz(), words));
+            }
+        }
+        changes.sort_by(|one, other| one.0.total_cmp(&other.0));
+        changes
+    }
+
+    /// Baud rates that are worth changing to.
+    const fn bauds(&self) -> &'static [u32] {
+        match (self.family, self.wiring) {
             (_, LinkWiring::Can) => &[],
             (DriveFamily::SilverMax, _) => &SILVERMAX_BAUDS,
             (DriveFamily::Sixpack2, _) => &SIXPACK2_BAUDS,
-        };
+        }
+    }
+
+    /// What to do for so many times a second, each with the number that fits.
+    #[must_use]
+    pub(crate) fn remedy(&self, wanted_hz: f64) -> String {
         let fits = |load: &Self| load.rate_hz() >= wanted_hz;
-        let baud = bauds.iter().copied().filter(|baud| *baud > self.baud);
+        let baud = self.bauds().iter().copied().filter(|baud| *baud > self.baud);
         let baud = baud.into_iter().find(|baud| fits(&Self { baud: *baud, ..*self }));
         let axes = (1..self.axes).rev().find(|axes| fits(&Self { axes: *axes, ..*self }));
         let links = axes.map(|axes| self.axes.div_ceil(axes));
@@ -204,7 +230,7 @@ fn plays_at(link: &Link, load: &LinkLoad, period: Duration) -> String {
 }
 
 /// Rounded down to hundredths, whole from 100 on: what is told can also be asked for.
-fn short(hz: f64) -> String {
+pub(crate) fn short(hz: f64) -> String {
     let steps = if hz < 100.0 { 100.0 } else { 1.0 };
     // A whole number may come out a hair below itself.
     format!("{}", (hz * steps + 1e-6).floor() / steps)

@@ -86,7 +86,7 @@ pub mod preflight {
     pub use crate::preflight::Check;
 }
 pub mod proof {
-    pub use crate::proof::{Digest, Proof, Terms, figures, prove};
+    pub use crate::proof::{Digest, DriveTerms, Proof, Terms, figures, prove, prove_driven};
 }
 pub mod rt {
     pub use crate::rt::{

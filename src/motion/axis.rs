@@ -52,7 +52,7 @@ pub struct AxisGeometry {
     /// Travel per turn of the motor, above 0.
     pub(crate) lead: f64,
     /// Pulses per turn of the motor, above 0.
-    pub(crate) pulses_per_rev: f64,
+    pub pulses_per_rev: f64,
     /// Greatest speed, above 0.
     pub max_velocity: f64,
     /// Greatest acceleration, above 0.

@@ -46,7 +46,7 @@ impl SeatType {
 
     /// The same seat with a change to each axis.
     #[must_use]
-    pub(crate) fn with_each(mut self, change: impl FnMut(&mut AxisGeometry)) -> Self {
+    pub fn with_each(mut self, change: impl FnMut(&mut AxisGeometry)) -> Self {
         self.each.iter_mut().for_each(change);
         self
     }

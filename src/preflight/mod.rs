@@ -7,10 +7,12 @@
 //!  configuration ---+                                      `checks`: the one table of what there is to find
 //! ```
 //!
+//! Seats on serial links have a survey and a judge of their own (`drives`); the table of checks, and what a site accepts, is the same.
 //! One file for each family of checks; of motion four. A finding has a name that never changes, so that a configuration can accept it for
 //! good, with its reason.
 
 mod answers;
+mod drives;
 mod estop;
 mod geometry;
 mod identity;
@@ -31,6 +33,7 @@ use crate::config::Acceptance;
 pub use crate::checks::Check;
 pub(crate) use crate::checks::{Family, Severity};
 pub(crate) use answers::round_trip;
+pub(crate) use drives::{DriveSubject, LinkSurvey};
 pub(crate) use subject::{Subject, Terms, wanted};
 
 /// One thing that was found.
@@ -77,16 +80,29 @@ pub(crate) fn judge(subjects: &[Subject<'_>], terms: &Terms, accepted: &[Accepta
     let mut all: Vec<Notes> = subjects.iter().map(|subject| one(subject, terms)).collect();
     identity::judge_together(subjects, &mut all);
     geometry::judge_together(subjects, &mut all);
-    let accept = |(Notes(mut findings), subject): (Notes, &Subject<'_>)| {
-        for finding in &mut findings {
-            let own = subject.controller.accept_findings.iter();
-            let why = own.chain(accepted).find(|one| one.check == finding.check);
-            finding.accepted = why.filter(|_| finding.check.can_be_accepted()).map(|one| one.why.clone());
-        }
-        findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity()), finding.check));
-        findings
+    let accept = |(notes, subject): (Notes, &Subject<'_>)| {
+        sorted(notes, &subject.controller.accept_findings, accepted)
     };
     all.into_iter().zip(subjects).map(accept).collect()
+}
+
+/// The same for controllers on serial links.
+#[must_use]
+pub(crate) fn judge_driven(subjects: &[DriveSubject<'_>], accepted: &[Acceptance]) -> Vec<Vec<Finding>> {
+    let one = |subject: &DriveSubject<'_>| {
+        sorted(drives::one(subject), &subject.controller.accept_findings, accepted)
+    };
+    subjects.iter().map(one).collect()
+}
+
+/// The gravest first, with why the site lives with what it accepts.
+fn sorted(Notes(mut findings): Notes, own: &[Acceptance], hall: &[Acceptance]) -> Vec<Finding> {
+    for finding in &mut findings {
+        let why = own.iter().chain(hall).find(|one| one.check == finding.check);
+        finding.accepted = why.filter(|_| finding.check.can_be_accepted()).map(|one| one.why.clone());
+    }
+    findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity()), finding.check));
+    findings
 }
 
 fn one(subject: &Subject<'_>, terms: &Terms) -> Notes {

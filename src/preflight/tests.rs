@@ -1,5 +1,6 @@
 //! Each unsafe setting by itself, and what is found beside settings.
 
+mod drives;
 mod places;
 mod surprises;
 

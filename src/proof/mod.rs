@@ -12,6 +12,7 @@ mod effects;
 mod end;
 mod figures;
 mod fit;
+mod links;
 mod loads;
 mod pieces;
 mod shake;
@@ -25,11 +26,14 @@ mod violation;
 
 pub(crate) use axis::AxisProof;
 pub use digest::Digest;
-pub(crate) use drives::{DriveAxisProof, DriveProof, DriveTerms, DrivenBy, prove_driven, rate_that_fits};
+pub(crate) use drives::DriveProof;
+pub(crate) use drives::{DriveAxisProof, DrivenBy, rate_that_fits};
+pub use drives::{DriveTerms, prove_driven};
 pub(crate) use end::HURRY;
 pub(crate) use figures::AxisFigures;
 pub use figures::figures;
 pub(crate) use fit::{Fitted, Manner, fit};
+pub(crate) use links::{LinkPlay, LinksProof, prove_in, prove_links};
 pub(crate) use loads::Loads;
 pub(crate) use terms::LimitedEffect;
 pub use terms::Terms;
@@ -77,6 +81,8 @@ pub struct Proof {
     pub(crate) terms: Terms,
     /// One entry for each axis on each different seat that takes it.
     pub(crate) axes: Vec<AxisProof>,
+    /// What the links of the hall execute of it, where they were looked at.
+    pub(crate) links: Vec<LinkPlay>,
     /// What is broken, in order of show time; the first [`FAULTS_TOLD`].
     pub(crate) violations: Vec<Violation>,
     /// How many there are beyond those.
@@ -116,43 +122,43 @@ pub fn prove(timeline: &Timeline, terms: Terms) -> Proof {
     hall(&terms, &mut found);
     let stencils = Stencils::at(terms.rate);
     let subjects = subjects(timeline, &terms);
-    let axes = prove_all(&subjects, &terms, &stencils, &mut found);
+    let axes = on_threads(&subjects, &mut found, |subject, found| subject.prove(&terms, &stencils, found));
     effects::prove(timeline, &terms, &mut found);
     found.sort_by_key(|one| one.at);
     let more = found.len().saturating_sub(FAULTS_TOLD) as u64;
     found.truncate(FAULTS_TOLD);
     let violations = found.into_iter().map(|one| placed(timeline, one)).collect();
-    Proof { terms, axes, violations, more }
+    Proof { terms, axes, links: Vec::new(), violations, more }
 }
 
-/// Proves the axes, on as many threads as there are processors.
-fn prove_all(
+/// Proves each axis, on as many threads as there are processors.
+fn on_threads<P: Send>(
     subjects: &[Subject<'_>],
-    terms: &Terms,
-    stencils: &Stencils,
     found: &mut Vec<Found>,
-) -> Vec<AxisProof> {
+    prove: impl Fn(&Subject<'_>, &mut Vec<Found>) -> P + Sync,
+) -> Vec<P> {
     let processors = thread::available_parallelism().map_or(1, NonZero::get);
     let share = subjects.len().div_ceil(processors).max(1);
     let prove_some = |some: &[Subject<'_>]| {
         let mut found = Vec::new();
-        let axes: Vec<_> = some.iter().map(|one| one.prove(terms, stencils, &mut found)).collect();
-        (axes, found)
+        let proofs: Vec<_> = some.iter().map(|one| prove(one, &mut found)).collect();
+        (proofs, found)
     };
-    let mut axes = Vec::with_capacity(subjects.len());
+    let mut all = Vec::with_capacity(subjects.len());
     thread::scope(|scope| {
         let (own, others) = subjects.split_at(share.min(subjects.len()));
+        let prove_some = &prove_some;
         let workers: Vec<_> =
             others.chunks(share).map(|some| scope.spawn(move || prove_some(some))).collect();
         let proved = iter::once(prove_some(own));
         let proved =
             proved.chain(workers.into_iter().map(|worker| worker.join().expect("a proof does not panic")));
         for (some, broken) in proved {
-            axes.extend(some);
+            all.extend(some);
             found.extend(broken);
         }
     });
-    axes
+    all
 }
 
 /// Each axis of the cue on each different seat that takes it.

@@ -2,7 +2,7 @@
 
 mod drives;
 
-pub(crate) use drives::{DriveBreach, OnDrive, OverLimit};
+pub(crate) use drives::{DriveBreach, LinkBreach, OnDrive, OverLimit};
 
 use std::time::Duration;
 
@@ -29,6 +29,12 @@ impl std::fmt::Display for Violation {
 }
 
 impl Violation {
+    /// True if links of the hall are what it is about: no change of amplitude is looked for then.
+    #[must_use]
+    pub(crate) const fn is_of_links(&self) -> bool {
+        matches!(self.breach, Breach::OnLink(_) | Breach::TooSlow { .. })
+    }
+
     /// What is broken, with the column that it is about.
     #[must_use]
     pub(crate) fn message(&self) -> String {
@@ -276,4 +282,13 @@ pub(crate) enum Breach {
     /// Serial drives would not execute it as they must.
     #[error(transparent)]
     Drive(#[from] DriveBreach),
+    /// The drives on a link of the hall would not.
+    #[error(transparent)]
+    OnLink(Box<LinkBreach>),
+    /// A link is to play more often than it can.
+    #[error("{why}")]
+    TooSlow {
+        /// Which, why, and what would fit.
+        why: String,
+    },
 }

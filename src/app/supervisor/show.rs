@@ -86,8 +86,9 @@ impl ProvedShow {
             return Err(refused(strokes.iter().map(ToString::to_string).collect()));
         }
         let paced = film.map(|film| at_any_pace(config, film.rules.pace));
-        let terms = Terms::of_hall(paced.as_ref().unwrap_or(config), Digest::of(timeline.cue()), rate, 1.0);
-        let proof = proof::prove(&timeline, terms);
+        let paced = paced.as_ref().unwrap_or(config);
+        let terms = Terms::of_hall(paced, Digest::of(timeline.cue()), rate, 1.0);
+        let proof = proof::prove_in(paced, &timeline, terms);
         if !proof.passed() {
             let mut faults: Vec<String> = proof.violations.iter().map(ToString::to_string).collect();
             if proof.more > 0 {

@@ -1,13 +1,13 @@
 //! What preflight found, as a table with a list, and as JSON.
 
 use std::collections::BTreeMap;
-use std::net::SocketAddrV4;
 use std::time::Duration;
 
 use comfy_table::{LineStyle, Table, TableStyle};
 use serde::Serialize;
 
-use crate::preflight::{Check, Family, Finding, Severity, Subject, round_trip};
+use crate::drive::silvermax::UnitFacts;
+use crate::preflight::{Check, DriveSubject, Family, Finding, Severity, Subject, round_trip};
 
 /// A line under the header, and no other lines.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
@@ -29,16 +29,17 @@ pub(super) struct Report {
     controllers: Vec<ControllerReport>,
 }
 
+/// What was found of one controller.
 #[derive(Debug, Serialize)]
-struct ControllerReport {
+pub(super) struct ControllerReport {
     name: String,
     row: Option<String>,
-    address: SocketAddrV4,
+    address: String,
     answered: bool,
     /// Of reads; null if none was answered.
     round_trip_us: Option<RoundTrip>,
     /// What was read, by the manuals' names.
-    registers: BTreeMap<String, u16>,
+    registers: BTreeMap<String, i32>,
     findings: Vec<FindingReport>,
 }
 
@@ -59,12 +60,7 @@ struct FindingReport {
 }
 
 impl Report {
-    pub(super) fn new(subjects: &[Subject<'_>], findings: Vec<Vec<Finding>>, took: Duration) -> Self {
-        let controllers: Vec<_> = subjects
-            .iter()
-            .zip(findings)
-            .map(|(subject, found)| ControllerReport::new(subject, found))
-            .collect();
+    pub(super) fn new(controllers: Vec<ControllerReport>, took: Duration) -> Self {
         let all = || controllers.iter().flat_map(|one| &one.findings).map(|one| &one.finding);
         let failed = all().filter(|finding| finding.fails()).count();
         let warned = all().filter(|one| one.severity() == Severity::Warn && one.accepted.is_none()).count();
@@ -153,7 +149,7 @@ impl ControllerReport {
         Self {
             name: controller.name.clone(),
             row: controller.row.clone(),
-            address: controller.connection.address,
+            address: controller.connection.address.to_string(),
             answered: subject.answered(),
             round_trip_us: subject.survey.and_then(|survey| {
                 let (p50, max) = round_trip(&survey.round_trips)?;
@@ -161,16 +157,39 @@ impl ControllerReport {
                 let (reads, answered) = (survey.rounds, survey.round_trips.len());
                 Some(RoundTrip { p50: us(p50), max: us(max), reads, answered })
             }),
-            registers: registers.map(|(address, value)| (address.to_string(), *value)).collect(),
-            findings: findings
-                .into_iter()
-                .map(|finding| FindingReport {
-                    family: finding.check.family(),
-                    severity: finding.severity(),
-                    finding,
-                })
-                .collect(),
+            registers: registers.map(|(address, value)| (address.to_string(), i32::from(*value))).collect(),
+            findings: findings.into_iter().map(FindingReport::new).collect(),
         }
+    }
+
+    /// On a serial link: its units have no clock of ours, and answer one after the other.
+    fn on_link(subject: &DriveSubject<'_>, findings: Vec<Finding>) -> Self {
+        let controller = subject.controller;
+        Self {
+            name: controller.name.clone(),
+            row: controller.row.clone(),
+            address: controller.address(),
+            answered: subject.answered(),
+            round_trip_us: None,
+            registers: subject.facts().flat_map(registers).collect(),
+            findings: findings.into_iter().map(FindingReport::new).collect(),
+        }
+    }
+
+    /// Those on the network.
+    pub(super) fn of_all(
+        subjects: &[Subject<'_>],
+        findings: Vec<Vec<Finding>>,
+    ) -> impl Iterator<Item = Self> {
+        subjects.iter().zip(findings).map(|(subject, found)| Self::new(subject, found))
+    }
+
+    /// Those on serial links.
+    pub(super) fn of_driven(
+        subjects: &[DriveSubject<'_>],
+        findings: Vec<Vec<Finding>>,
+    ) -> impl Iterator<Item = Self> {
+        subjects.iter().zip(findings).map(|(subject, found)| Self::on_link(subject, found))
     }
 
     /// Its line of the table.
@@ -201,6 +220,31 @@ impl ControllerReport {
             "ok"
         }
     }
+}
+
+impl FindingReport {
+    fn new(finding: Finding) -> Self {
+        Self { family: finding.check.family(), severity: finding.severity(), finding }
+    }
+}
+
+/// What was read of a SilverMax, by unit and register.
+fn registers(facts: &UnitFacts) -> [(String, i32); 10] {
+    let [low, high] = facts.soft_limits;
+    let [closed, open] = facts.torque;
+    [
+        (0, facts.target),
+        (1, facts.position),
+        (19, facts.dry_brake),
+        (38, low),
+        (39, high),
+        (40, facts.canary),
+        (206, closed),
+        (207, open),
+        (208, facts.error_limits),
+        (211, facts.kill_cause),
+    ]
+    .map(|(register, value)| (format!("{}.{register}", facts.unit), value))
 }
 
 /// One finding and all controllers that have it.

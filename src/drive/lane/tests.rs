@@ -141,3 +141,23 @@ fn the_way_home_is_relative_and_plain_and_takes_a_frame_number() {
         lane.encode(&Beat::still(Timing::Relative, 10), &lane.window.park(), Mix::FULL, &mut buf);
     assert_eq!((second.frame, &bytes[4..6]), (FrameNo(2), &[0x19, 0x01][..]));
 }
+
+#[test]
+fn drives_vibrate_by_the_level_of_their_seat_on_top_of_the_mix() {
+    let text = std::fs::read_to_string("tests/data/config/drives.toml").unwrap();
+    let text = text.replace("max_error_mm = 3.0", "max_error_mm = 3.0\nvibration = \"50%\"");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hall.toml");
+    std::fs::write(&path, text).unwrap();
+    let config = crate::config::load(&path).unwrap();
+    let cue = cue("# units: fraction\ntime_ms,a1,v1_hz,v1_amp\n0,0.5,5,0.1\n1000,0.5,5,0.1\n");
+    let mut beat = Beat::still(Timing::Relative, 10);
+    beat.samples.set(ChannelId::Vibration.on(0), Sample([5.0, 0.1]));
+    let amplitudes = lanes(&config, &cue, FULL).into_iter().map(|mut lane| {
+        let mut buf = [0; MAX_LEN];
+        let mix = Mix { vibration: 0.5, ..Mix::FULL };
+        let (_, record) = lane.encode(&beat, &[0.5; MAX_AXES], mix, &mut buf);
+        LinkPose::parse(record.try_into().unwrap()).vibration[0].amplitude
+    });
+    assert_eq!(amplitudes.collect::<Vec<_>>(), [0.025, 0.05], "the second seat has no level of its own");
+}

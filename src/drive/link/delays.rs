@@ -30,13 +30,15 @@ impl Delays {
 
     /// What 99 of 100 did not exceed; a guess on the safe side before there were enough.
     pub(crate) fn p99(&self) -> Duration {
+        if self.count < ENOUGH { AT_FIRST } else { self.most_of(99).unwrap_or(AT_FIRST) }
+    }
+
+    /// What so many of 100 did not exceed; none where there are none.
+    pub(crate) fn most_of(&self, percent: usize) -> Option<Duration> {
         let mut known = self.last;
         let known = &mut known[..self.count.min(KEPT)];
-        if known.len() < ENOUGH {
-            return AT_FIRST;
-        }
-        let at = known.len() * 99 / 100;
-        *known.select_nth_unstable(at).1
+        let at = (known.len() * percent / 100).min(known.len().checked_sub(1)?);
+        Some(*known.select_nth_unstable(at).1)
     }
 }
 

@@ -1,7 +1,5 @@
 //! What a unit says of itself; nothing is written, nothing moves, nothing is cleared.
 
-use std::time::Duration;
-
 use super::talk::{Answer, INTERNAL, Talk, TalkFault, internal_word};
 use crate::drive::link::LinkPort;
 use crate::wire::silvermax::register::{
@@ -39,8 +37,6 @@ pub(crate) struct UnitFacts {
     pub(crate) dry_brake: i32,
     /// Soft limits, the lower first (38, 39).
     pub(crate) soft_limits: [i32; 2],
-    /// How long its answers took to begin, the slowest.
-    pub(crate) slowest: Duration,
 }
 
 /// Reads a unit.
@@ -48,23 +44,13 @@ pub(crate) struct UnitFacts {
 /// # Errors
 /// A [`TalkFault`] where it does not answer.
 pub(crate) fn look<P: LinkPort>(talk: &mut Talk<P>, unit: u8) -> Result<UnitFacts, TalkFault> {
-    let mut slowest = Duration::ZERO;
     let revision = match talk.insist(unit, Request::Revision)? {
         Answer::Data(words) => Some(words),
         Answer::Ack | Answer::Nak(_) => None,
     };
-    let mut word = |request| {
-        let word = talk.word(unit, request);
-        slowest = slowest.max(talk.moment().delay());
-        word
-    };
-    let poll = Poll(word(Request::Poll)?);
-    let io = Io(word(Request::IoStates)?);
-    let mut value = |register| {
-        let value = talk.register(unit, register);
-        slowest = slowest.max(talk.moment().delay());
-        value
-    };
+    let poll = Poll(talk.word(unit, Request::Poll)?);
+    let io = Io(talk.word(unit, Request::IoStates)?);
+    let mut value = |register| talk.register(unit, register);
     Ok(UnitFacts {
         unit,
         revision,
@@ -79,6 +65,5 @@ pub(crate) fn look<P: LinkPort>(talk: &mut Talk<P>, unit: u8) -> Result<UnitFact
         error_limits: value(ERROR_LIMITS)?,
         dry_brake: value(DRY_BRAKE)?,
         soft_limits: [value(SOFT_LIMIT_LOW)?, value(SOFT_LIMIT_HIGH)?],
-        slowest,
     })
 }

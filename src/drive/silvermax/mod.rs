@@ -18,11 +18,7 @@ mod talk;
 mod tests;
 
 pub(crate) use home::{Homing, home};
-pub(crate) use look::look;
-pub(crate) use set_up::{HomeError, SeatUnits};
+pub(crate) use look::{UnitFacts, look};
+pub(crate) use set_up::{HomeError, SeatUnits, UnitSettings, kill_names};
 pub(crate) use stream::{LaneUnits, Stream, lead};
-pub(crate) use talk::Talk;
-
-#[expect(unused_imports, reason = "for preflight")]
-pub(crate) use look::UnitFacts;
-pub(crate) use talk::TalkFault;
+pub(crate) use talk::{Talk, TalkFault};

@@ -25,6 +25,21 @@ pub(crate) struct SeatUnits<'a> {
     pub(crate) units: &'a [u8],
 }
 
+/// What homing leaves in the registers of a unit that can be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct UnitSettings {
+    /// Its number.
+    pub(crate) unit: u8,
+    /// Torque limits, hold and moving a word each (206, 207).
+    pub(crate) torque: i32,
+    /// Error limits, moving and holding a word each (208).
+    pub(crate) error_limits: i32,
+    /// With what a dry queue brakes (19).
+    pub(crate) dry_brake: i32,
+    /// Soft limits, the lower first (38, 39).
+    pub(crate) soft_limits: [i32; 2],
+}
+
 /// Why a seat is not home, and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -161,6 +176,21 @@ pub(super) struct UnitAxis<'a> {
 }
 
 impl<'a> SeatUnits<'a> {
+    /// What homing leaves in its units.
+    ///
+    /// # Errors
+    /// [`HomeError::Counts`], [`HomeError::ErrorLimit`] where no unit can be set so.
+    pub(crate) fn settings(&self) -> Result<Vec<UnitSettings>, HomeError> {
+        let settings = |axis: &UnitAxis<'_>| UnitSettings {
+            unit: axis.unit,
+            torque: axis.torque_words(None),
+            error_limits: axis.error_words(),
+            dry_brake: axis.brake().cast_signed(),
+            soft_limits: axis.soft_limits(),
+        };
+        Ok(self.axes()?.iter().map(settings).collect())
+    }
+
     /// Its axes.
     pub(super) fn axes(&self) -> Result<Vec<UnitAxis<'a>>, HomeError> {
         let pairs = self.seat.own().iter().zip(self.units).enumerate();
@@ -336,7 +366,7 @@ impl UnitAxis<'_> {
 }
 
 /// The conditions of register 211 by name: the bits that killed stand in its upper word.
-pub(super) fn kill_names(register: i32) -> String {
+pub(crate) fn kill_names(register: i32) -> String {
     let bits = u16::try_from(register.cast_unsigned() >> 16).unwrap_or_default();
     let names: Vec<_> = Io(bits).names().map(|name| if name == "not hot" { "heat" } else { name }).collect();
     if names.is_empty() { "what it does not say".to_owned() } else { names.join(", ") }

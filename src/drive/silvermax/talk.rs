@@ -101,6 +101,11 @@ impl<P: LinkPort> Talk<P> {
         self.delays.p99()
     }
 
+    /// What nine of ten answers took to begin at the most; none where there were none.
+    pub(crate) fn usual_delay(&self) -> Option<Duration> {
+        self.delays.most_of(90)
+    }
+
     /// When the last exchange was.
     pub(crate) const fn moment(&self) -> Moment {
         self.moment

@@ -7,7 +7,7 @@ use super::super::axis::Subject;
 use super::super::pieces::Pieces;
 use crate::cue::Vibration;
 use crate::drive::Shaker;
-use crate::motion::{AxisState, Halt, Slot};
+use crate::motion::{AxisState, Halt, Limits, Slot};
 use crate::time::{ShowTime, nanos};
 use crate::timeline::Hint;
 
@@ -31,11 +31,18 @@ pub(super) struct WantedCourse {
 }
 
 impl WantedCourse {
-    /// Of an axis of a cue, with vibration at a level of its own where there is any, for slices of a period, poses a `tick` apart.
-    pub(super) fn of(subject: &Subject<'_>, tick: Duration, slice: Duration, shake: Option<f64>) -> Self {
-        let ends = Ends::of(subject);
+    /// Of an axis of a cue, with vibration at a level of its own where there is any, for slices of a period that begin `sooner` than
+    /// the cue's first row would have them, poses a `tick` apart.
+    pub(super) fn of(
+        subject: &Subject<'_>,
+        tick: Duration,
+        slice: Duration,
+        sooner: Duration,
+        shake: Option<f64>,
+    ) -> Self {
+        let ends = Ends::of(subject, slice);
         let slice = signed(slice);
-        let lead = i64::max(Ends::span(ends.before.as_ref()) / slice + 2, 3) * slice;
+        let lead = i64::max(Ends::span(ends.before.as_ref()) / slice + 2, 3) * slice + signed(sooner);
         let per_tick = tick.as_nanos().div_ceil(FINE.as_nanos()).max(1);
         let per_tick = usize::try_from(per_tick).unwrap_or(1);
         // Nothing that is told to a drive knows a finer time than the pose, but what it does is judged between poses as well.
@@ -72,6 +79,14 @@ impl WantedCourse {
     }
 }
 
+/// How an axis moves at the first row of the cue and at the last, and the show time of that, nanoseconds.
+pub(super) fn edges(subject: &Subject<'_>) -> (AxisState, AxisState, i64) {
+    let pieces = Pieces::new(subject.timeline, subject.axis, &subject.slot);
+    let [position, velocity, bend, _] = pieces.list()[0].cubic.0;
+    let first = AxisState { position, velocity, acceleration: 2.0 * bend };
+    (first, pieces.last_motion(), pieces.end())
+}
+
 /// The ways from rest and to rest.
 struct Ends {
     before: Option<Halt>,
@@ -80,18 +95,16 @@ struct Ends {
 }
 
 impl Ends {
-    fn of(subject: &Subject<'_>) -> Self {
-        let pieces = Pieces::new(subject.timeline, subject.axis, &subject.slot);
-        let first = pieces.list()[0].cubic.0;
+    fn of(subject: &Subject<'_>, slice: Duration) -> Self {
+        let (mut first, last, end) = edges(subject);
         // A way from rest is one to rest that is run backwards.
-        let first = AxisState { position: first[0], velocity: -first[1], acceleration: 2.0 * first[2] };
+        first.velocity = -first.velocity;
         let halt = |from: AxisState, slot: &Slot| {
-            let moves = from.velocity != 0.0 || from.acceleration != 0.0;
+            let moves = from.velocity.abs() > standing(slot.limits, slice);
             let inside = || Halt::inside(from, slot.limits, &SHARES);
             moves.then(|| inside().unwrap_or_else(|| Halt::full(from, slot.limits)))
         };
-        let after = halt(pieces.last_motion(), &subject.slot);
-        Self { before: halt(first, &subject.slot), after, end: pieces.end() }
+        Self { before: halt(first, &subject.slot), after: halt(last, &subject.slot), end }
     }
 
     /// How long a way to rest takes, nanoseconds.
@@ -136,6 +149,12 @@ impl Sampler<'_> {
         let amplitude = if inside { amplitude * slot.scale().0 * shake } else { 0.0 };
         place + self.swing.after(Duration::from_nanos(step.unsigned_abs()), hz, amplitude)
     }
+}
+
+/// The speed, strokes a second, below which an axis that is led stands as well as rests: to stop there within a slice takes a fiftieth
+/// of its acceleration.
+pub(super) fn standing(limits: Limits, slice: Duration) -> f64 {
+    0.02 * limits.acceleration * slice.as_secs_f64()
 }
 
 /// Nanoseconds, to be reckoned with.

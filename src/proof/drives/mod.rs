@@ -11,18 +11,22 @@ use std::time::Duration;
 
 use super::axis::Subject;
 use super::violation::{DriveBreach, OnDrive, OverLimit};
-use super::{Breach, Found, Quantity, SLACK, Terms, Violation, Worst, placed, subjects};
+use super::{Breach, Found, Quantity, SLACK, Terms, Violation, Worst, on_threads, placed, subjects};
+use crate::config::drive::MAX_DEVIATION_MM;
 use crate::cue::{FAULTS_TOLD, Vibration};
 use crate::drive::{Lag, Middle, Middles, Shaker};
 use crate::motion::SeatAxis;
 use crate::time::ShowTime;
 use crate::timeline::{Figure, Timeline};
 use crate::wire::sixpack2::greatest_divider;
-use course::WantedCourse;
+use course::{WantedCourse, edges, standing};
+
+/// Slices fall on a cue as its play begins, and a trim moves them: the course is run with so many beginnings, evenly over a slice.
+const PHASES: u32 = 4;
 
 /// A way to play to serial drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct DriveTerms {
+pub struct DriveTerms {
     /// Which family, and what of its settings counts.
     pub(crate) family: DrivenBy,
     /// From one segment or target of an axis to the next.
@@ -31,6 +35,14 @@ pub(crate) struct DriveTerms {
     pub(crate) max_deviation: f64,
     /// Level of vibration, on top of that of the terms, 0 to 1.
     pub(crate) shake: f64,
+}
+
+impl DriveTerms {
+    /// SilverMax units that are told a segment each `period`, with vibration.
+    #[must_use]
+    pub fn silvermax(period: Duration) -> Self {
+        Self { family: DrivenBy::SilverMax, period, max_deviation: MAX_DEVIATION_MM, shake: 1.0 }
+    }
 }
 
 /// A family of serial drives.
@@ -85,7 +97,7 @@ pub(crate) enum Roughness {
 
 /// What drives execute of a cue, one entry for each axis on each different seat, and what of it may not be.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct DriveProof {
+pub struct DriveProof {
     /// One entry for each axis on each different seat.
     pub(crate) axes: Vec<DriveAxisProof>,
     /// What is broken, in order of show time; the first [`FAULTS_TOLD`].
@@ -95,13 +107,23 @@ pub(crate) struct DriveProof {
 }
 
 /// Proves a cue for serial drives. Takes time in proportion to its length.
+///
+/// What passes at a level passes at each below it: a fit is linear in the poses, and the level draws these towards one that is inside
+/// the stroke, so places, speeds, accelerations, steps of them and the distance from the cue shrink with it. The way of a brake
+/// shrinks by its square. What is rounded to counts and ticks stays as it is, and so does not grow. The ends of the stroke, where
+/// a fit is held, draw away from it.
 #[must_use]
-pub(crate) fn prove_driven(timeline: &Timeline, terms: &Terms, link: &DriveTerms) -> DriveProof {
+pub fn prove_driven(timeline: &Timeline, terms: &Terms, link: &DriveTerms) -> DriveProof {
     let mut found = Vec::new();
-    let axes: Vec<_> = subjects(timeline, terms)
-        .iter()
-        .filter_map(|subject| Driven { subject, terms, link }.prove(&mut found))
-        .collect();
+    let prove = |subject: &Subject<'_>, found: &mut Vec<Found>| Driven { subject, terms, link }.prove(found);
+    let axes = on_threads(&subjects(timeline, terms), &mut found, prove).into_iter().flatten().collect();
+    // What no cue has a part in is told once, whichever axes it is met on.
+    let mut told = Vec::new();
+    found.retain(|one| {
+        let is_new = one.axis.is_some() || !told.contains(&one.breach);
+        told.extend((one.axis.is_none() && is_new).then(|| one.breach.clone()));
+        is_new
+    });
     found.sort_by_key(|one| one.at);
     let more = found.len().saturating_sub(FAULTS_TOLD) as u64;
     found.truncate(FAULTS_TOLD);
@@ -137,6 +159,27 @@ pub(crate) fn rate_that_fits(
     }
 }
 
+/// Where a cue begins or ends in motion, for axes that are led ahead of it by slices of a `period`: those stand there, as they have
+/// nothing else to be led to.
+#[must_use]
+pub(crate) fn in_motion(timeline: &Timeline, terms: &Terms, period: Duration) -> Vec<Violation> {
+    let of_axis = |subject: &Subject<'_>| {
+        let (first, last, end) = edges(subject);
+        let (axis, moves) = (subject.axis, standing(subject.slot.limits, period));
+        let found = |edge, row, at, velocity: f64| {
+            let (hz, at) = (period.as_secs_f64().recip(), ShowTime::from_nanos(at));
+            let on = OnDrive { unit: subject.geometry().unit, seat: subject.seat(), hz, at };
+            let speed = velocity.abs() * subject.geometry().stroke();
+            let breach = Breach::Drive(DriveBreach::InMotion { on, edge, row, speed });
+            let found = Found { at, axis: Some(axis), column: format!("a{}", axis + 1), breach };
+            (velocity.abs() > moves).then_some(found)
+        };
+        [found("begins", "first", 0, first.velocity), found("ends", "last", end, last.velocity)]
+    };
+    let found = subjects(timeline, terms).iter().flat_map(of_axis).flatten().collect::<Vec<_>>();
+    found.into_iter().map(|one| placed(timeline, one)).collect()
+}
+
 /// One axis on its way to a drive.
 struct Driven<'a> {
     subject: &'a Subject<'a>,
@@ -148,18 +191,31 @@ impl Driven<'_> {
     fn prove(&self, found: &mut Vec<Found>) -> Option<DriveAxisProof> {
         // An axis that never vibrates costs no swing.
         let shake = self.is_shaken().then_some(self.link.shake);
-        let course = WantedCourse::of(self.subject, self.terms.rate.period(), self.link.period, shake);
-        let most = match self.link.family {
-            DrivenBy::SilverMax => silvermax::execute(self, &course, found)?,
-            DrivenBy::SixPack { clock_divider, propdiv, jump } => {
-                let axis = self.subject.geometry();
-                let jump = jump.unwrap_or(axis.max_acceleration * self.link.period.as_secs_f64());
-                sixpack::execute(self, &course, self.lag(clock_divider, propdiv, jump, found)?, jump)
-            }
-        };
+        let (mut most, begun): (Option<MostExecuted>, _) = (None, found.len());
+        for phase in 0..PHASES {
+            let sooner = self.link.period * phase / PHASES;
+            let (tick, slice) = (self.terms.rate.period(), self.link.period);
+            let executed =
+                self.execute(&WantedCourse::of(self.subject, tick, slice, sooner, shake), found)?;
+            // What leaves the stroke by one of them mostly does by all.
+            found.truncate(begun + 1);
+            most = Some(most.map_or(executed, |most| most.and(executed)));
+        }
+        let most = most?;
         self.judge(&most, found);
         self.too_quick(found);
         Some(self.executed(&most))
+    }
+
+    fn execute(&self, course: &WantedCourse, found: &mut Vec<Found>) -> Option<MostExecuted> {
+        match self.link.family {
+            DrivenBy::SilverMax => silvermax::execute(self, course, found),
+            DrivenBy::SixPack { clock_divider, propdiv, jump } => {
+                let axis = self.subject.geometry();
+                let jump = jump.unwrap_or(axis.max_acceleration * self.link.period.as_secs_f64());
+                Some(sixpack::execute(self, course, self.lag(clock_divider, propdiv, jump, found)?, jump))
+            }
+        }
     }
 
     /// What the axis does in the middle of each slice, of poses as a play would push them, each in the unit that `scale` makes of strokes.
@@ -280,12 +336,14 @@ impl Driven<'_> {
         }
     }
 
-    /// Notes once what no cue has a part in.
+    /// Notes what no cue has a part in.
     fn of_seat(&self, breach: DriveBreach, found: &mut Vec<Found>) {
-        let breach = Breach::Drive(breach);
-        if found.iter().all(|one| one.breach != breach) {
-            found.push(Found { at: ShowTime::ZERO, axis: None, column: String::new(), breach });
-        }
+        found.push(Found {
+            at: ShowTime::ZERO,
+            axis: None,
+            column: String::new(),
+            breach: Breach::Drive(breach),
+        });
     }
 
     fn found(&self, at: ShowTime, breach: DriveBreach) -> Found {
@@ -295,6 +353,7 @@ impl Driven<'_> {
 }
 
 /// The most that was met of one axis, in its unit.
+#[derive(Debug, Clone, Copy)]
 struct MostExecuted {
     deviation: Worst,
     /// Places; the limit is the end of the stroke.
@@ -313,6 +372,26 @@ impl MostExecuted {
             lowest: Worst { value: place, ..below(axis.low) },
             highest: Worst { value: place, ..below(axis.high) },
             velocity: below(velocity),
+            roughness,
+        }
+    }
+
+    /// What is the most of both.
+    fn and(self, other: Self) -> Self {
+        let larger = |one: Worst, other: Worst| if other.value > one.value { other } else { one };
+        let roughness = match (self.roughness, other.roughness) {
+            (
+                Roughness::Segments { acceleration: a, jerk: j },
+                Roughness::Segments { acceleration, jerk },
+            ) => Roughness::Segments { acceleration: larger(a, acceleration), jerk: larger(j, jerk) },
+            (Roughness::Jumps(one), Roughness::Jumps(other)) => Roughness::Jumps(larger(one, other)),
+            (one, _) => one,
+        };
+        Self {
+            deviation: larger(self.deviation, other.deviation),
+            lowest: if other.lowest.value < self.lowest.value { other.lowest } else { self.lowest },
+            highest: larger(self.highest, other.highest),
+            velocity: larger(self.velocity, other.velocity),
             roughness,
         }
     }

@@ -72,8 +72,8 @@ fn segments_of_the_bench_ride_are_as_far_beside_it_and_as_rough_as_the_table_say
         (31.0, 0.04, 1_530.0),
         (25.0, 0.08, 1_850.0),
         (20.0, 0.18, 2_200.0),
-        (15.0, 0.44, 2_510.0),
-        (10.0, 0.65, 1_980.0),
+        (15.0, 0.485, 2_530.0),
+        (10.0, 1.55, 1_980.0),
     ];
     for (hz, deviation, step) in table {
         let proof = prove(&ride, seat(4_000.0), &silvermax(hz));
@@ -140,11 +140,32 @@ fn a_seat_whose_turns_no_silvermax_counts_is_refused() {
 fn a_cue_beside_which_the_drive_would_be_too_far_is_refused_with_the_level_that_fits() {
     let ride = bench_ride();
     let said = messages(&prove(&ride, seat(4_000.0), &silvermax(10.0)));
-    assert!(said[0].contains("0.65 mm beside the cue at 00:03.300, 0.50 are allowed"), "{said:?}");
-    assert!(said[0].contains("it fits at level 77%"), "{said:?}");
+    assert!(said[0].contains("1.55 mm beside the cue at 00:06.150, 0.50 are allowed"), "{said:?}");
+    assert!(said[0].contains("it fits at level 32%"), "{said:?}");
     let digest = Digest::of(ride.cue());
-    let lower = Terms::of_seat(Arc::new(seat(4_000.0)), 3, digest, Rate::from_hz(100.0), 0.77);
+    let lower = Terms::of_seat(Arc::new(seat(4_000.0)), 3, digest, Rate::from_hz(100.0), 0.32);
     assert!(prove_driven(&ride, &lower, &silvermax(10.0)).violations.is_empty());
+}
+
+#[test]
+fn what_passes_at_a_level_passes_below_it_and_is_no_farther_beside_the_cue() {
+    let ride = bench_ride();
+    let at = |seat: SeatType, level: f64, link: &DriveTerms| {
+        let terms = Terms::of_seat(Arc::new(seat), 3, Digest::of(ride.cue()), Rate::from_hz(100.0), level);
+        let proof = prove_driven(&ride, &terms, link);
+        assert!(messages(&proof).is_empty(), "{level}: {:?}", messages(&proof));
+        most(&proof, |axis| axis.deviation.value)
+    };
+    // What is whole, counts, ticks and propdiv, does not shrink with the level.
+    for (counts, link, whole) in
+        [(4_000.0, silvermax(20.0), 0.002), (3_200.0, sixpack(7.5, Some(12), Some(45.0)), 0.02)]
+    {
+        let full = at(seat(counts), 1.0, &link);
+        for level in [0.9, 0.75, 0.5, 0.3, 0.1, 0.0] {
+            let met = at(seat(counts), level, &link);
+            assert!(met <= full * level + whole, "{level}: {met} of {full}");
+        }
+    }
 }
 
 #[test]

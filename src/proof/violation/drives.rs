@@ -81,17 +81,48 @@ pub(crate) enum DriveBreach {
     /// A vibration that a link is too slow for.
     #[error(
         "vibration at {hz:.1} Hz at {} is too quick for drives at {:.1} Hz, which swing at {most:.1} Hz at the most; set the level of \
-         vibration to 0, or raise the rate of the link",
+         vibration of such seats to 0, or raise the rate of the link",
         on.at, on.hz
     )]
     TooQuick { on: OnDrive, hz: f64, most: f64 },
+    /// The cue begins or ends in motion, where a seat that is led ahead stands.
+    #[error(
+        "the cue {edge} at {} in motion, {speed:.1} {unit}/s, and drives are led ahead: there they would stand at its {row} row; let it          {} at rest", on.at, edge.trim_end_matches('s'), unit = on.unit.name()
+    )]
+    InMotion { on: OnDrive, edge: &'static str, row: &'static str, speed: f64 },
+}
+
+/// What drives on a link of a hall would do of a cue that they must not.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("link {link}, {controllers}: {breach}{remedy}")]
+pub(crate) struct LinkBreach {
+    pub(crate) link: String,
+    /// Their names.
+    pub(crate) controllers: String,
+    pub(crate) breach: DriveBreach,
+    /// What was proved to mend it; may be empty.
+    pub(crate) remedy: String,
 }
 
 impl DriveBreach {
     /// True if a link with a higher rate may mend it.
     #[must_use]
     pub(crate) const fn is_of_rate(&self) -> bool {
-        !matches!(self, Self::Counts { .. } | Self::TooFast { .. } | Self::NoRoomToBrake { .. })
+        !matches!(
+            self,
+            Self::Counts { .. } | Self::TooFast { .. } | Self::NoRoomToBrake { .. } | Self::InMotion { .. }
+        )
+    }
+
+    /// The part of its level at which it fits, as far as it goes by the level.
+    #[must_use]
+    pub(crate) fn part_that_fits(&self) -> Option<f64> {
+        match self {
+            Self::Motion { over, .. } | Self::Deviates { over, .. } | Self::Jumps { over, .. } => {
+                Some(over.limit / over.value)
+            }
+            _ => None,
+        }
     }
 }
 

@@ -57,6 +57,8 @@ pub(super) fn drive(way: HomeWay) -> SeatDrive {
         reverse: [false; MAX_AXES],
         homing,
         margin_mm: 1.0,
+        max_deviation_mm: 0.5,
+        vibration: 1.0,
         silvermax: Some(SilverMaxDrive {
             torque: Torque { hold: 0.6, moving: 1.0, full: 20_000 },
             gravity: 0,

@@ -71,6 +71,8 @@ pub(super) fn drive(way: HomeWay) -> SeatDrive {
         reverse: [false; MAX_AXES],
         homing,
         margin_mm: 1.0,
+        max_deviation_mm: 0.5,
+        vibration: 1.0,
         silvermax: None,
         sixpack2: Some(Sixpack2Drive {
             clock_divider: 3,

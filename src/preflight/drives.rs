@@ -1,0 +1,261 @@
+//! Seats on serial links: what was read of their port and their units, held against the configuration.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::{Check, Notes};
+use crate::config::drive::DriveFamily;
+use crate::config::drive_controller::Motors;
+use crate::config::{Controller, Drives, Link};
+use crate::drive::link::TalkCounts;
+use crate::drive::rates::{LinkLoad, short};
+use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
+use crate::sys::serial::SerialError;
+use crate::wire::silvermax::{Poll, StatusWord as _};
+
+/// Answers that begin so late are held back by an adapter, no unit waits so long.
+const HELD_BACK: Duration = Duration::from_millis(12);
+/// What answers may be later than was reckoned with, as a part of it.
+const LATER: f64 = 1.25;
+
+/// What was read of a link: its port, and each unit that was asked.
+#[derive(Debug)]
+pub(crate) struct LinkSurvey {
+    /// Why there was nothing to ask by.
+    pub(crate) opened: Result<(), SerialError>,
+    /// What nine of ten answers took to begin at the most; none where nobody answered.
+    pub(crate) delay: Option<Duration>,
+    /// What came over it.
+    pub(crate) counts: TalkCounts,
+    /// What units told, by their numbers.
+    pub(crate) units: BTreeMap<u8, Result<UnitFacts, TalkFault>>,
+}
+
+/// What is known of one controller on a link.
+#[derive(Debug)]
+pub(crate) struct DriveSubject<'a> {
+    /// What it should be.
+    pub(crate) controller: &'a Controller,
+    /// Its link.
+    pub(crate) link: &'a Link,
+    /// What that carries, by the configuration.
+    pub(crate) load: Option<LinkLoad>,
+    /// What was read.
+    pub(crate) survey: &'a LinkSurvey,
+}
+
+impl DriveSubject<'_> {
+    /// Its units that answered all questions.
+    pub(crate) fn facts(&self) -> impl Iterator<Item = &UnitFacts> {
+        self.units().iter().filter_map(|unit| self.survey.units.get(unit)?.as_ref().ok())
+    }
+
+    /// True if any of its units answered.
+    #[must_use]
+    pub(crate) fn answered(&self) -> bool {
+        self.facts().next().is_some()
+    }
+
+    fn units(&self) -> &[u8] {
+        match self.controller.drives().map(|drives| &drives.motors) {
+            Some(Motors::SilverMax(units)) => units,
+            _ => &[],
+        }
+    }
+
+    fn family(&self) -> Option<DriveFamily> {
+        self.controller.drives().map(|drives| drives.motors.family())
+    }
+
+    /// What homing leaves in its units; none where no unit can be set so, which homing tells.
+    fn settings(&self) -> Vec<UnitSettings> {
+        let Some(Drives { drive, motors: Motors::SilverMax(units), .. }) = self.controller.drives() else {
+            return Vec::new();
+        };
+        let of = |silvermax| SeatUnits { seat: &self.controller.seat, drive, silvermax, units }.settings();
+        drive.silvermax.as_ref().and_then(|silvermax| of(silvermax).ok()).unwrap_or_default()
+    }
+}
+
+/// What is found of one of them.
+pub(super) fn one(subject: &DriveSubject<'_>) -> Notes {
+    let mut notes = Notes::default();
+    if let Err(error) = &subject.survey.opened {
+        port(error, &mut notes);
+    } else if subject.family() == Some(DriveFamily::Sixpack2) {
+        let found = "SIXpack 2 units are not asked yet: nothing is known of this seat";
+        notes.add(Check::DrivesUnasked, found, "look at it with its own program");
+    } else {
+        answers(subject, &mut notes);
+        line(subject, &mut notes);
+        if subject.answered() {
+            rate(subject, &mut notes);
+            home(subject, &mut notes);
+            subject.facts().for_each(|unit| trouble(unit, &mut notes));
+            settings(subject, &mut notes);
+        }
+    }
+    notes
+}
+
+fn port(error: &SerialError, notes: &mut Notes) {
+    let check = match error {
+        SerialError::Missing(_) | SerialError::Vanished(_) => Check::PortMissing,
+        SerialError::Taken(_) => Check::PortTaken,
+        SerialError::Forbidden(_) => Check::PortForbidden,
+        _ => Check::PortUnfit,
+    };
+    told(check, &error.to_string(), notes);
+}
+
+/// A sentence whose remedy stands behind a semicolon.
+fn told(check: Check, words: &str, notes: &mut Notes) {
+    let (found, remedy) = words.split_once("; ").unwrap_or((words, ""));
+    notes.add(check, found, remedy);
+}
+
+/// Units that did not answer, or for which others did.
+fn answers(subject: &DriveSubject<'_>, notes: &mut Notes) {
+    for unit in subject.units() {
+        match subject.survey.units.get(unit) {
+            Some(Err(fault @ TalkFault::Foreign { .. })) => {
+                told(Check::DuplicateUnit, &fault.to_string(), notes)
+            }
+            Some(Err(fault)) => told(Check::NoAnswer, &fault.to_string(), notes),
+            None => told(Check::NoAnswer, &format!("unit {unit} was not asked"), notes),
+            Some(Ok(_)) => {}
+        }
+    }
+}
+
+/// What came that should not have.
+fn line(subject: &DriveSubject<'_>, notes: &mut Notes) {
+    let (link, TalkCounts { asked, answered, malformed, doubled, echo_differs, .. }) =
+        (&subject.link.name, subject.survey.counts);
+    if subject.link.has_echo && 2 * echo_differs > asked {
+        let found = format!("{echo_differs} of {asked} requests did not come back on link {link}");
+        notes.add(Check::EchoDiffers, found, "this adapter does not repeat what is sent: set echo = false");
+    } else if !subject.link.has_echo && 2 * malformed > asked && 2 * answered > asked {
+        let found = format!("{malformed} lines came back beside {answered} answers on link {link}");
+        notes.add(Check::EchoDiffers, found, "this adapter repeats what is sent: set echo = true");
+    } else if doubled > 0 {
+        let found = format!("{doubled} answers more than were asked for on link {link}");
+        notes.add(
+            Check::DuplicateUnit,
+            found,
+            "ask each unit alone on the line, and set IDT where two share a number",
+        );
+    }
+}
+
+/// How late answers are, and what that leaves of the rate.
+fn rate(subject: &DriveSubject<'_>, notes: &mut Notes) {
+    let (Some(load), Some(delay)) = (&subject.load, subject.survey.delay) else { return };
+    let hz = match load.period_for(subject.link.rate_hz) {
+        Ok(period) => period.as_secs_f64().recip(),
+        Err(slow) => {
+            told(Check::LinkTooSlow, &format!("link {}: {slow}", subject.link.name), notes);
+            return;
+        }
+    };
+    let measured = LinkLoad { answer_delay: delay, ..*load };
+    let (late, fits) = (1e3 * delay.as_secs_f64(), measured.rate_hz());
+    let reckoned = 1e3 * load.answer_delay.as_secs_f64();
+    let found = format!(
+        "answers take {late:.1} ms, {reckoned:.1} were reckoned with: {} Hz become {}",
+        short(hz),
+        short(fits.min(hz))
+    );
+    let alone = LinkLoad { share: 1.0, ..measured };
+    if delay >= HELD_BACK {
+        let remedy =
+            "if it is a USB adapter, install 60-kinocue-drives.rules, which has it hold nothing back";
+        notes.add(Check::AdapterSlow, found.clone(), remedy);
+    } else if late > LATER * reckoned && fits < hz {
+        notes.add(
+            Check::SlowReplies,
+            found.clone(),
+            "lower ADL of the units, or take a serial port of the machine",
+        );
+    }
+    if alone.rate_hz() < hz {
+        notes.add(
+            Check::LinkTooSlow,
+            found,
+            format!("set rate_hz = {}, or {}", short(fits), measured.remedy(hz)),
+        );
+    }
+}
+
+/// Whether the seat was homed, all of it at once: then the same number stands in each.
+fn home(subject: &DriveSubject<'_>, notes: &mut Notes) {
+    let canaries: Vec<(u8, i32)> = subject.facts().map(|unit| (unit.unit, unit.canary)).collect();
+    let lost: Vec<String> =
+        canaries.iter().filter(|(_, canary)| *canary == 0).map(|(unit, _)| unit.to_string()).collect();
+    let differ = canaries.windows(2).any(|pair| pair[0].1 != pair[1].1);
+    if lost.len() == canaries.len() {
+        let found = format!("units {} were not homed since they were switched on", lost.join(", "));
+        notes.add(Check::NotHome, found, "home it, seats empty");
+    } else if differ {
+        let found = if lost.is_empty() {
+            "its units were homed at different times (register 40)".to_owned()
+        } else {
+            format!("units {} were switched off since the seat was homed (register 40)", lost.join(", "))
+        };
+        notes.add(Check::Restarted, found, "home it, seats empty");
+    }
+}
+
+/// What a unit says is wrong.
+fn trouble(facts: &UnitFacts, notes: &mut Notes) {
+    let unit = facts.unit;
+    if facts.poll.has(Poll::KILLED) {
+        let cause = kill_names(facts.kill_cause);
+        let found = format!("unit {unit} was killed by {cause} (register 211)");
+        notes.add(Check::Killed, found, "look for what blocks or heats it, then home");
+    }
+    if facts.internal.is_hot() {
+        notes.add(
+            Check::DriveHot,
+            format!("unit {unit} is too hot"),
+            "let it cool, and look at what loads it",
+        );
+    }
+    let says = |names: [&'static str; 2]| -> Vec<&'static str> {
+        facts.internal.names().filter(|name| names.contains(name)).collect()
+    };
+    let errors = says(["moving error", "holding error"]);
+    if !errors.is_empty() && !facts.poll.has(Poll::KILLED) {
+        let found = format!("unit {unit} has had a {}", errors.join(" and a "));
+        notes.add(Check::DriveError, found, "look for what blocks it, then home");
+    }
+    let supply = says(["low voltage", "high voltage"]);
+    if !supply.is_empty() {
+        let found = format!("unit {unit} has met {}", supply.join(" and "));
+        notes.add(Check::Supply, found, "look at the supply; braking needs a clamp");
+    }
+}
+
+/// Registers that homing wrote, of a seat that is home.
+fn settings(subject: &DriveSubject<'_>, notes: &mut Notes) {
+    const REMEDY: &str =
+        "home it, which writes them; if they change by themselves another program is on the line";
+    let wanted = subject.settings();
+    for facts in subject.facts().filter(|unit| unit.canary != 0) {
+        let Some(wanted) = wanted.iter().find(|one| one.unit == facts.unit) else { continue };
+        let torque = [wanted.torque; 2];
+        for (check, held, found, wanted) in [
+            (Check::SoftLimits, "registers 38 and 39 hold", &facts.soft_limits[..], &wanted.soft_limits[..]),
+            (Check::ErrorLimits, "register 208 holds", &[facts.error_limits], &[wanted.error_limits]),
+            (Check::DriveTorque, "registers 206 and 207 hold", &facts.torque, &torque),
+            (Check::BrakeRate, "register 19 holds", &[facts.dry_brake], &[wanted.dry_brake]),
+        ] {
+            if found != wanted {
+                let list =
+                    |values: &[i32]| values.iter().map(i32::to_string).collect::<Vec<_>>().join(" and ");
+                let (unit, found, wanted) = (facts.unit, list(found), list(wanted));
+                notes.add(check, format!("unit {unit}: {held} {found}, homing writes {wanted}"), REMEDY);
+            }
+        }
+    }
+}

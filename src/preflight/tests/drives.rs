@@ -1,0 +1,198 @@
+//! Seats on serial links: one that passes, spoilt in one way after the other.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::super::{Check, DriveSubject, LinkSurvey, judge_driven};
+use crate::config::drive_controller::Motors;
+use crate::config::{self, Acceptance, Config};
+use crate::drive::link::TalkCounts;
+use crate::drive::rates::LinkLoad;
+use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts};
+use crate::sys::serial::SerialError;
+use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
+
+const COUNTS: TalkCounts =
+    TalkCounts { asked: 51, answered: 51, late: 0, doubled: 0, malformed: 0, foreign: 0, echo_differs: 0 };
+
+/// A seat that was homed, on units 16 to 18.
+struct Case {
+    hall: Config,
+    survey: LinkSurvey,
+}
+
+impl Case {
+    fn new() -> Self {
+        let hall = config::load(Path::new("tests/data/config/drives.toml")).unwrap();
+        let controller = &hall.controllers[0];
+        let drives = controller.drives().unwrap();
+        let Motors::SilverMax(units) = &drives.motors else { panic!("the first is one") };
+        let silvermax = drives.drive.silvermax.as_ref().unwrap();
+        let of = SeatUnits { seat: &controller.seat, drive: &drives.drive, silvermax, units };
+        let facts = of.settings().unwrap().into_iter().map(|set| UnitFacts {
+            unit: set.unit,
+            revision: None,
+            poll: Poll(0),
+            internal: Internal(Io::COOL),
+            io: Io(Io::COOL),
+            kill_cause: 0,
+            canary: 77,
+            position: 0,
+            target: 0,
+            torque: [set.torque; 2],
+            error_limits: set.error_limits,
+            dry_brake: set.dry_brake,
+            soft_limits: set.soft_limits,
+        });
+        let units = facts.map(|facts| (facts.unit, Ok(facts))).collect();
+        Self {
+            survey: LinkSurvey {
+                opened: Ok(()),
+                delay: Some(Duration::from_micros(300)),
+                counts: COUNTS,
+                units,
+            },
+            hall,
+        }
+    }
+
+    /// The same with something else about unit 17.
+    fn with(mut self, change: impl FnOnce(&mut UnitFacts)) -> Self {
+        change(self.survey.units.get_mut(&17).unwrap().as_mut().unwrap());
+        self
+    }
+
+    fn all(mut self, change: impl Fn(&mut UnitFacts)) -> Self {
+        self.survey.units.values_mut().for_each(|facts| change(facts.as_mut().unwrap()));
+        self
+    }
+
+    fn found(&self) -> Vec<(Check, String)> {
+        let link = self.hall.links.iter().find(|link| link.name == "stalls").unwrap();
+        let load = LinkLoad::of(link, &self.hall);
+        let subject =
+            DriveSubject { controller: &self.hall.controllers[0], link, load, survey: &self.survey };
+        let found = judge_driven(&[subject], &self.hall.show.accept_findings).remove(0);
+        found
+            .into_iter()
+            .inspect(|one| assert!(!one.remedy.is_empty(), "{one:?}"))
+            .map(|one| (one.check, one.found))
+            .collect()
+    }
+
+    /// Holds that just this is found, in these words.
+    fn assert_found(&self, check: Check, words: &str) {
+        let found = self.found();
+        let [(met, said)] = &found[..] else { panic!("{check}: {found:?}") };
+        assert!(*met == check && said.contains(words), "{check}: {found:?}");
+    }
+}
+
+#[test]
+fn a_seat_that_was_homed_passes() {
+    assert_eq!(Case::new().found(), []);
+}
+
+#[test]
+fn each_trouble_of_a_unit_is_told_by_its_number() {
+    let kill = |facts: &mut UnitFacts| {
+        (facts.poll, facts.kill_cause) = (Poll(Poll::KILLED), i32::from(Io::MOVING_ERROR) << 16);
+        facts.internal = Internal(Io::COOL | Io::MOVING_ERROR);
+    };
+    Case::new().with(kill).assert_found(Check::Killed, "unit 17 was killed by moving error");
+    let status = |word: u16| Case::new().with(|facts| facts.internal = Internal(word));
+    status(0).assert_found(Check::DriveHot, "unit 17 is too hot");
+    status(Io::COOL | Io::HOLDING_ERROR).assert_found(Check::DriveError, "unit 17 has had a holding error");
+    status(Io::COOL | 1 << 13).assert_found(Check::Supply, "unit 17 has met high voltage");
+    status(Io::COOL | 1 << 14).assert_found(Check::Supply, "unit 17 has met low voltage");
+}
+
+#[test]
+fn a_seat_that_is_not_home_and_one_of_whose_units_one_was_off_are_told_apart_and_cannot_be_accepted() {
+    let mut off = Case::new().all(|facts| (facts.canary, facts.soft_limits) = (0, [0, 0]));
+    off.assert_found(Check::NotHome, "units 16, 17, 18 were not homed");
+    Case::new().with(|facts| facts.canary = 0).assert_found(Check::Restarted, "units 17 were switched off");
+    Case::new().with(|facts| facts.canary = 78).assert_found(Check::Restarted, "at different times");
+    off.hall.show.accept_findings = vec![Acceptance { check: Check::NotHome, why: "so".to_owned() }];
+    assert_eq!(off.found().len(), 1);
+    assert!(!Check::NotHome.can_be_accepted() && Check::SoftLimits.can_be_accepted());
+}
+
+#[test]
+fn registers_that_homing_wrote_and_that_differ_are_told_with_both_values() {
+    Case::new().with(|facts| facts.soft_limits[1] += 1).assert_found(
+        Check::SoftLimits,
+        "unit 17: registers 38 and 39 hold -120800 and 801, homing writes -120800 and 800",
+    );
+    Case::new().with(|facts| facts.error_limits += 1).assert_found(Check::ErrorLimits, "register 208 holds");
+    Case::new()
+        .with(|facts| facts.torque[1] = 1)
+        .assert_found(Check::DriveTorque, "registers 206 and 207 hold");
+    Case::new()
+        .with(|facts| facts.dry_brake = 5)
+        .assert_found(Check::BrakeRate, "register 19 holds 5, homing");
+}
+
+#[test]
+fn who_does_not_answer_and_who_answers_for_another_is_told() {
+    let mut case = Case::new();
+    case.survey.units.insert(17, Err(TalkFault::Silent { unit: 17 }));
+    case.assert_found(Check::NoAnswer, "unit 17 does not answer");
+    case.survey.units.insert(17, Err(TalkFault::Foreign { unit: 17, by: 18 }));
+    case.assert_found(Check::DuplicateUnit, "unit 18 answered what unit 17 was asked");
+    let mut case = Case::new();
+    case.survey.counts.doubled = 3;
+    case.assert_found(Check::DuplicateUnit, "3 answers more than were asked for");
+}
+
+#[test]
+fn an_adapter_that_repeats_what_is_sent_has_to_be_known_for_it() {
+    let mut case = Case::new();
+    case.survey.counts.malformed = 51;
+    case.assert_found(Check::EchoDiffers, "51 lines came back beside 51 answers");
+    let mut case = Case::new();
+    case.hall.links.iter_mut().for_each(|link| link.has_echo = true);
+    assert_eq!(case.found(), []);
+    case.survey.counts.echo_differs = 40;
+    case.assert_found(Check::EchoDiffers, "40 of 51 requests did not come back");
+}
+
+#[test]
+fn late_answers_are_told_with_the_rate_that_they_leave() {
+    let late = |us| {
+        let mut case = Case::new();
+        case.survey.delay = Some(Duration::from_micros(us));
+        case
+    };
+    assert_eq!(late(310).found(), []);
+    late(2_000).assert_found(Check::SlowReplies, "take 2.0 ms, 0.3 were reckoned with: 29.98 Hz become 25.");
+    let found = late(16_000).found();
+    let checks: Vec<_> = found.iter().map(|(check, _)| *check).collect();
+    assert_eq!(checks, [Check::LinkTooSlow, Check::AdapterSlow], "{found:?}");
+    let mut asked = Case::new();
+    asked.hall.links.iter_mut().for_each(|link| link.rate_hz = Some(50.0));
+    asked.assert_found(Check::LinkTooSlow, "3 axes play at 29.98 Hz at 57600 baud, not at 50");
+}
+
+#[test]
+fn a_port_that_cannot_be_had_is_told_by_what_is_wrong_with_it() {
+    let port = || PathBuf::from("/dev/ttyUSB0");
+    for (error, check, words) in [
+        (SerialError::Missing(port()), Check::PortMissing, "there is no such port"),
+        (SerialError::Taken(port()), Check::PortTaken, "another program has it"),
+        (SerialError::Forbidden(port()), Check::PortForbidden, "not allowed to open it"),
+        (SerialError::NoLine(port()), Check::PortUnfit, "it is no serial line"),
+    ] {
+        let mut case = Case::new();
+        case.survey =
+            LinkSurvey { opened: Err(error), delay: None, counts: TalkCounts::default(), units: [].into() };
+        case.assert_found(check, words);
+    }
+}
+
+#[test]
+fn of_a_sixpack_it_is_told_that_nobody_asked() {
+    let mut case = Case::new();
+    case.hall.controllers.swap(0, 1);
+    case.assert_found(Check::DrivesUnasked, "SIXpack 2 units are not asked yet");
+}
