@@ -16,6 +16,9 @@ fn hall(folder: &Path, port: &Path, dialect: &str) -> String {
     let units = if dialect == "silvermax" { "units = [16, 17, 18]" } else { "unit = 1\nmotors = [0, 1, 2]" };
     let text = format!(
         r#"
+[show]
+bind = "127.0.0.1:0"
+
 [link.stalls]
 port = "{}"
 baud = {}
@@ -94,6 +97,51 @@ fn a_seat_on_silvermax_units_is_homed_and_homed_again() {
     let counts = sim.finish().report_of(0);
     for unit in counts["units"].as_array().expect("a list") {
         assert_eq!((&unit["kills"], &unit["position"]), (&0.into(), &0.into()), "{counts}");
+    }
+}
+
+/// Two seconds of a gentle ride, in mm.
+fn cue(folder: &Path) -> String {
+    let mut text = "# kinocue-csv: 1\n# units: mm\ntime_ms,a1,a2,a3\n".to_owned();
+    for row in 0..=100_u32 {
+        let up = 20.0 * (1.0 - (std::f64::consts::TAU * f64::from(row) / 100.0).cos());
+        text += &format!("{},{up:.3},{up:.3},{up:.3}\n", 20 * row);
+    }
+    let path = folder.join("gentle.csv");
+    fs::write(&path, text).expect("a file");
+    path.to_str().expect("text").to_owned()
+}
+
+#[test]
+fn a_cue_is_played_to_silvermax_units_that_are_home_with_an_ack_for_each_frame_and_to_no_others() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let sim = units(&port, "silvermax");
+    let (hall, cue) =
+        (hall(folder.path(), &port, "silvermax").replace("hall.toml", "fast.toml"), cue(folder.path()));
+    let text = fs::read_to_string(folder.path().join("hall.toml")).expect("it is there");
+    fs::write(&hall, text.replace("rate_hz = 5\n", "rate_hz = 20\n")).expect("a file");
+    let play = || kinocue(&["play", &cue, "--config", &hall, "--json"]);
+    let refused = play();
+    assert!(refused.stderr.contains("A1: does not tell that it is home"), "{}", refused.stderr);
+    assert_eq!(refused.code, Some(75));
+    assert_eq!(home(&hall).2, Some(0));
+    let played = play();
+    let report: serde_json::Value = serde_json::from_str(&played.stdout).expect("JSON");
+    assert_eq!(
+        (played.code, &report["result"]),
+        (Some(0), &"completed".into()),
+        "{} {report}",
+        played.stderr
+    );
+    let frames = &report["controllers"][0];
+    assert!(frames["sent"].as_u64() > Some(200) && frames["acked"] == frames["sent"], "{report}");
+    sim.signal(Signal::TERM);
+    for unit in sim.finish().report_of(0)["units"].as_array().expect("a list") {
+        // Homing is slower: 20 mm up and down in 2 s are 62.8 mm/s at the most.
+        let velocity = unit["executed"]["velocity_per_s"].as_f64().expect("a number") / 800.0;
+        assert!((velocity - 62.8).abs() < 0.5 && unit["dry"] == 0, "{velocity} mm/s: {unit}");
+        assert_eq!((&unit["kills"], &unit["position"]), (&0.into(), &0.into()), "{unit}");
     }
 }
 

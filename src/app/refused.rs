@@ -59,6 +59,13 @@ pub enum PlayError {
         .0.join(", ")
     )]
     Unplaced(Vec<String>),
+    /// Seats whose drives do not tell that they are home.
+    #[error(
+        "{}: does not tell that it is home; nothing was sent. `kinocue home` homes it once the seat is empty, and `kinocue preflight` \
+         says what else is wrong",
+        .0.join(", ")
+    )]
+    NotHome(Vec<String>),
     /// Seats with a rotary axis that do not tell where it is: a frame that is slow enough from anywhere there is not.
     #[error(
         "{}: has a rotary axis, and does not tell where all of its axes are; nothing was sent, as no frame is slow enough from \

@@ -219,6 +219,11 @@ impl PlayScript {
             return Err(PlayError::Moving(moving));
         }
         let untold: Vec<usize> = (0..self.lanes.len()).filter(|&lane| self.known(lane).is_none()).collect();
+        let on_link = |lane: usize| self.handle.config.controllers[lane].drives().is_some();
+        let not_home = self.names(|lane| untold.contains(&lane) && on_link(lane));
+        if !not_home.is_empty() {
+            return Err(PlayError::NotHome(not_home));
+        }
         let turns = |lane: usize| self.handle.config.controllers[lane].seat.rotary_axis().is_some();
         let unknown = self.names(|lane| untold.contains(&lane) && turns(lane));
         if !unknown.is_empty() {

@@ -204,7 +204,9 @@ pub(super) const fn exit_of(error: &PlayError) -> Exit {
         PlayError::Runtime(RuntimeError::Net(_) | RuntimeError::Thread(_)) => Exit::System,
         PlayError::Limits { .. } => Exit::CheckFailed,
         PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
-        PlayError::Unsure(_) | PlayError::Unplaced(_) | PlayError::UnknownTurn(_) => Exit::TryAgain,
+        PlayError::Unsure(_) | PlayError::Unplaced(_) | PlayError::NotHome(_) | PlayError::UnknownTurn(_) => {
+            Exit::TryAgain
+        }
         _ => Exit::BadCue,
     }
 }

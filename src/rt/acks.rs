@@ -226,33 +226,15 @@ impl AckLoop {
                 books.tracker_mut().on_stray(controller);
             }
         });
+        let mut records = Records { sent, last_sent, watch, observer, live };
         for (controller, event) in links.iter_mut().flat_map(LinkNews::take) {
-            if let Some(live) = live {
-                live.on_heard(controller);
-            }
-            if let StreamEvent::Confirmed { first, last, .. } = event {
-                let next = |frame: &FrameNo| (frame.since(last) < 0).then(|| frame.next());
-                let asked = |frame: &FrameNo| frame.asks(*ack_every);
-                for frame in std::iter::successors(Some(first), next).filter(asked) {
-                    let reply =
-                        Reply { controller, frame, code: ReplyCode::Running, error: 0, inputs: 0, at: began };
-                    books.on_reply(reply, &mut Records { sent, last_sent, watch, observer, live });
-                }
-            } else if let Some(watch) = watch {
-                watch.hear_link(observer, controller, &event, began);
-            }
+            records.hear_link(books, controller, &event, *ack_every, began);
         }
-        books.settle(began, &mut Records { sent, last_sent, watch, observer, live });
+        books.settle(began, &mut records);
         if let Some(live) = live {
             live.on_told(began);
         }
-        for controller in 0..receiver.lanes() {
-            let closed = receiver.port_closed(controller);
-            books.tracker_mut().on_port_closed(controller, closed);
-            if let Some(watch) = watch {
-                watch.on_closed(controller, closed);
-            }
-        }
+        note_closed(receiver, books.tracker_mut(), watch.as_ref());
         while let Ok(report) = ticks.pop() {
             lateness.saturating_record(report.late_ns);
         }
@@ -269,6 +251,17 @@ impl AckLoop {
     }
 }
 
+/// Notes how often ports were found closed so far.
+fn note_closed(receiver: &Receiver, tracker: &mut Tracker, watch: Option<&Watch>) {
+    for controller in 0..receiver.lanes() {
+        let closed = receiver.port_closed(controller);
+        tracker.on_port_closed(controller, closed);
+        if let Some(watch) = watch {
+            watch.on_closed(controller, closed);
+        }
+    }
+}
+
 /// What the tick thread told of its frames, and who wants to know what became of them.
 struct Records<'a> {
     sent: &'a mut Consumer<Sent>,
@@ -276,6 +269,32 @@ struct Records<'a> {
     watch: &'a mut Option<Watch>,
     live: &'a Option<Arc<Live>>,
     observer: &'a mut Observer,
+}
+
+impl Records<'_> {
+    /// Hears what a link tells of a controller: the frames that it confirms count as acked by now.
+    fn hear_link(
+        &mut self,
+        books: &mut Books,
+        controller: usize,
+        event: &StreamEvent,
+        ack_every: u32,
+        now: MonoTime,
+    ) {
+        if let Some(live) = self.live {
+            live.on_heard(controller);
+        }
+        if let StreamEvent::Confirmed { first, last, .. } = *event {
+            let next = |frame: &FrameNo| (frame.since(last) < 0).then(|| frame.next());
+            let asked = |frame: &FrameNo| frame.asks(ack_every);
+            for frame in std::iter::successors(Some(first), next).filter(asked) {
+                let code = ReplyCode::Running;
+                books.on_reply(Reply { controller, frame, code, error: 0, inputs: 0, at: now }, self);
+            }
+        } else if let Some(watch) = self.watch {
+            watch.hear_link(self.observer, controller, event, now);
+        }
+    }
 }
 
 impl Ledger for Records<'_> {

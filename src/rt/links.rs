@@ -9,7 +9,9 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer};
 
 use super::{FrameSink, Live};
-use crate::drive::link::{LaneWants, LedPose, LinkPort, LinkPose, RECORD_LEN, StreamEvent};
+use crate::drive::link::{
+    LaneWants, LedPose, LinkPort, LinkPose, RECORD_LEN, StreamEvent, lane_number as number,
+};
 use crate::drive::silvermax::Stream;
 use crate::net::{Delivery, SendFault, Sender};
 use crate::state::State;
@@ -170,8 +172,4 @@ impl LinkLoop {
             }
         }
     }
-}
-
-fn number(lane: usize) -> u16 {
-    u16::try_from(lane).unwrap_or(u16::MAX)
 }

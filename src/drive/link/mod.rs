@@ -10,7 +10,6 @@ mod line;
 mod peer;
 mod port;
 mod streaming;
-mod terms;
 #[cfg(test)]
 mod virtual_port;
 
@@ -20,8 +19,9 @@ pub(crate) use homing::Step;
 pub(crate) use line::LinkLine;
 pub(crate) use peer::{LaneWants, LinkPeer};
 pub(crate) use port::{LinkFault, LinkPort};
-pub(crate) use streaming::{Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent};
-pub(crate) use terms::StreamTerms;
+pub(crate) use streaming::{
+    Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent, StreamTerms, axis_number, lane_number,
+};
 #[cfg(test)]
 pub(crate) use virtual_port::VirtualPort;
 

@@ -9,6 +9,15 @@ use crate::time::MonoTime;
 use crate::wire::FrameNo;
 use crate::wire::silvermax::NakReason;
 
+/// How a link plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct StreamTerms {
+    /// From one segment of an axis to the next.
+    pub(crate) period: Duration,
+    /// From one pose to the next.
+    pub(crate) tick: Duration,
+}
+
 /// What happened to a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StreamEvent {
@@ -222,4 +231,14 @@ pub(crate) struct LinkFigures {
     pub(crate) events_lost: u64,
     /// Poses for lanes that could not take them.
     pub(crate) poses_skipped: u64,
+}
+
+/// A lane as events name it.
+pub(crate) fn lane_number(lane: usize) -> u16 {
+    u16::try_from(lane).unwrap_or(u16::MAX)
+}
+
+/// An axis as events name it.
+pub(crate) fn axis_number(axis: usize) -> u8 {
+    u8::try_from(axis).unwrap_or(u8::MAX)
 }

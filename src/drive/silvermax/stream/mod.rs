@@ -27,6 +27,7 @@ use super::set_up::{HomeError, SeatUnits};
 use super::talk::{Talk, TalkFault};
 use crate::drive::link::{
     AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms,
+    axis_number, lane_number as number,
 };
 use crate::time::MonoTime;
 use crate::wire::silvermax::Request;
@@ -387,12 +388,4 @@ impl Lane {
             }
         }
     }
-}
-
-fn number(lane: usize) -> u16 {
-    u16::try_from(lane).unwrap_or(u16::MAX)
-}
-
-fn axis_number(axis: usize) -> u8 {
-    u8::try_from(axis).unwrap_or(u8::MAX)
 }

@@ -26,6 +26,7 @@ use super::set_up::{HomeError, SeatMotors};
 use super::talk::Talk;
 use crate::drive::link::{
     AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms,
+    axis_number, lane_number as number,
 };
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{PiTarget, SixpackFrame, SixpackOrder};
@@ -287,12 +288,4 @@ impl<P: LinkPort> Stream<P> {
     fn tell(&mut self, event: StreamEvent) {
         self.figures.events_lost += u64::from(self.events.push(event).is_err());
     }
-}
-
-fn number(lane: usize) -> u16 {
-    u16::try_from(lane).unwrap_or(u16::MAX)
-}
-
-fn axis_number(axis: usize) -> u8 {
-    u8::try_from(axis).unwrap_or(u8::MAX)
 }

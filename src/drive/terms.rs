@@ -1,22 +1,14 @@
-//! How a link plays: on which grid, and how far ahead.
+//! How the links of a hall play: on which grid, and how far ahead.
 
 use std::time::Duration;
 
+use super::link::StreamTerms;
+use super::rates::LinkLoad;
+use super::silvermax;
 use crate::config::drive::DriveFamily;
 use crate::config::{Config, Link};
-use crate::drive::rates::LinkLoad;
-use crate::drive::silvermax;
 use crate::motion::MAX_LEAD;
 use crate::time::Rate;
-
-/// How a link plays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct StreamTerms {
-    /// From one segment of an axis to the next.
-    pub(crate) period: Duration,
-    /// From one pose to the next.
-    pub(crate) tick: Duration,
-}
 
 impl StreamTerms {
     /// Those of a link of a hall that has seats on it; none where it has none.
