@@ -73,12 +73,38 @@ fn units(port: &Path, dialect: &str) -> Guarded {
     sim
 }
 
+/// A hall with virtual units.
+struct Bench {
+    hall: String,
+    sim: Guarded,
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn of(dialect: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let port = folder.path().join("stalls");
+        let sim = units(&port, dialect);
+        Self { hall: hall(folder.path(), &port, dialect), sim, folder }
+    }
+}
+
+/// What the first unit says of itself once Ctrl-C has ended the search of its first axis.
+fn stopped_in_its_search(dialect: &str) -> serde_json::Value {
+    let Bench { hall, sim, folder: _folder } = Bench::of(dialect);
+    let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
+    let mut said = homing.stderr().lines().map(|line| line.expect("text"));
+    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    homing.signal(Signal::INT);
+    assert!(said.any(|line| line.ends_with("homing was stopped; the seat is not home")));
+    assert_eq!(homing.finish().code, Some(130));
+    sim.signal(Signal::TERM);
+    sim.finish().report_of(0)["units"][0].clone()
+}
+
 #[test]
 fn a_seat_on_silvermax_units_is_homed_and_homed_again() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let port = folder.path().join("stalls");
-    let sim = units(&port, "silvermax");
-    let hall = hall(folder.path(), &port, "silvermax");
+    let Bench { hall, sim, folder: _folder } = Bench::of("silvermax");
     for time in ["from anywhere", "from park"] {
         let (told, said, exit) = home(&hall);
         assert_eq!(exit, Some(0), "{time}: {said}");
@@ -147,18 +173,7 @@ fn a_cue_is_played_to_silvermax_units_that_are_home_with_an_ack_for_each_frame_a
 
 #[test]
 fn ctrl_c_brakes_the_axis_that_searches_and_the_seat_is_not_home() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let port = folder.path().join("stalls");
-    let sim = units(&port, "silvermax");
-    let hall = hall(folder.path(), &port, "silvermax");
-    let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
-    let mut said = homing.stderr().lines().map(|line| line.expect("text"));
-    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
-    homing.signal(Signal::INT);
-    assert!(said.any(|line| line.ends_with("homing was stopped; the seat is not home")));
-    assert_eq!(homing.finish().code, Some(130));
-    sim.signal(Signal::TERM);
-    let axis = sim.finish().report_of(0)["units"][0].clone();
+    let axis = stopped_in_its_search("silvermax");
     assert!(axis["executed"]["lowest"].as_f64() > Some(3_200.0), "it was braked before its switch: {axis}");
 }
 
@@ -173,10 +188,7 @@ fn a_port_that_is_not_there_is_told_with_what_to_do() {
 
 #[test]
 fn a_seat_on_a_sixpack_that_woke_is_switched_homed_and_homed_again() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let port = folder.path().join("stalls");
-    let sim = units(&port, "sixpack2");
-    let hall = hall(folder.path(), &port, "sixpack2");
+    let Bench { hall, sim, folder: _folder } = Bench::of("sixpack2");
     for time in ["as it woke", "from park"] {
         let (told, said, exit) = home(&hall);
         assert_eq!(exit, Some(0), "{time}: {said}");
@@ -205,28 +217,14 @@ fn a_seat_on_a_sixpack_that_woke_is_switched_homed_and_homed_again() {
 
 #[test]
 fn ctrl_c_ends_the_search_of_a_motor_that_would_go_on_for_ever() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let port = folder.path().join("stalls");
-    let sim = units(&port, "sixpack2");
-    let hall = hall(folder.path(), &port, "sixpack2");
-    let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
-    let mut said = homing.stderr().lines().map(|line| line.expect("text"));
-    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
-    homing.signal(Signal::INT);
-    assert!(said.any(|line| line.ends_with("homing was stopped; the seat is not home")));
-    assert_eq!(homing.finish().code, Some(130));
-    sim.signal(Signal::TERM);
-    let motor = sim.finish().report_of(0)["units"][0]["motors"][0].clone();
+    let motor = &stopped_in_its_search("sixpack2")["motors"][0];
     assert_eq!(motor["action"], 0, "{motor}");
     assert!(motor["executed"]["lowest"].as_f64() > Some(0.0), "it stands above its switch: {motor}");
 }
 
 #[test]
 fn a_sixpack_that_is_not_there_is_told_with_what_to_do() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let port = folder.path().join("stalls");
-    let sim = units(&port, "sixpack2");
-    let hall = hall(folder.path(), &port, "sixpack2");
+    let Bench { hall, sim, folder: _folder } = Bench::of("sixpack2");
     let text = fs::read_to_string(&hall).expect("a file").replace("unit = 1", "unit = 7");
     fs::write(&hall, text).expect("a file");
     let (told, said, exit) = home(&hall);
@@ -248,10 +246,7 @@ fn preflight(hall: &str) -> (serde_json::Value, Vec<String>, Option<i32>) {
 
 #[test]
 fn preflight_passes_a_seat_once_it_is_homed_and_takes_one_that_was_never_for_not_home() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let port = folder.path().join("stalls");
-    let sim = units(&port, "silvermax");
-    let hall = hall(folder.path(), &port, "silvermax");
+    let Bench { hall, sim, folder: _folder } = Bench::of("silvermax");
     let (told, fails, exit) = preflight(&hall);
     assert_eq!((fails, exit), (vec!["not-home".to_owned()], Some(1)), "{told}");
     let text = kinocue(&["preflight", "--config", &hall]);

@@ -25,7 +25,7 @@ pub(super) struct Helpers<'scope> {
     planner: ScopedJoinHandle<'scope, Vec<PlanError>>,
     /// Those of links, which go on until the ack thread has heard of them that all seats rest.
     links: Vec<ScopedJoinHandle<'scope, ()>>,
-    are_unheard: Arc<AtomicBool>,
+    acks_over: Arc<AtomicBool>,
 }
 
 impl<'scope> Helpers<'scope> {
@@ -54,21 +54,21 @@ impl<'scope> Helpers<'scope> {
             plans.run(over)
         });
         let planner = planner.inspect_err(|_| over.store(true, Ordering::Release))?;
-        let are_unheard = Arc::new(AtomicBool::new(false));
+        let acks_over = Arc::new(AtomicBool::new(false));
         let mut threads = Vec::new();
         for (index, link) in links.into_iter().enumerate() {
-            let unheard = Arc::clone(&are_unheard);
+            let over_too = Arc::clone(&acks_over);
             let thread = Builder::new().name(format!("link{index}")).spawn_scoped(scope, move || {
                 // As the ack thread: below the ticks, before all else.
                 let _ = realtime::request_below(priority);
-                link.run(&unheard);
+                link.run(&over_too);
             });
             let ends = |_: &io::Error| {
-                [over, &are_unheard].into_iter().for_each(|end| end.store(true, Ordering::Release))
+                [over, &acks_over].into_iter().for_each(|end| end.store(true, Ordering::Release))
             };
             threads.push(thread.inspect_err(ends)?);
         }
-        Ok(Self { over, acks, planner, links: threads, are_unheard })
+        Ok(Self { over, acks, planner, links: threads, acks_over })
     }
 
     /// The planner's thread, to be woken when there is something for it.
@@ -85,7 +85,7 @@ impl<'scope> Helpers<'scope> {
         self.planner.thread().unpark();
         let refusals = self.planner.join().expect("the planner does not panic");
         let mut accounts = self.acks.join().expect("the ack thread does not panic");
-        self.are_unheard.store(true, Ordering::Release);
+        self.acks_over.store(true, Ordering::Release);
         self.links.into_iter().for_each(|link| link.join().expect("the thread of a link does not panic"));
         let closed_at = Monotonic.now();
         accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);

@@ -20,7 +20,7 @@ pub(crate) use line::LinkLine;
 pub(crate) use peer::{LaneWants, LinkPeer};
 pub(crate) use port::{LinkFault, LinkPort};
 pub(crate) use streaming::{
-    Account, AxisFigures, BrakeReason, LinkFigures, StreamEvent, StreamTerms, axis_number, lane_number,
+    Account, AxisFigures, BrakeReason, LinkFigures, Stage, StreamEvent, StreamTerms, axis_number, lane_number,
 };
 #[cfg(test)]
 pub(crate) use virtual_port::VirtualPort;

@@ -18,6 +18,23 @@ pub(crate) struct StreamTerms {
     pub(crate) tick: Duration,
 }
 
+/// What a lane does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stage {
+    /// Brakes if it has to, and is looked at until it stands and its drives wait for poses.
+    Readying,
+    /// Stands, and waits for poses.
+    Ready,
+    /// Poses come.
+    Runs,
+    /// Goes to rest, where poses ended or by a brake.
+    Ends,
+    /// A unit does not answer.
+    Lost,
+    /// It has to be homed, or at least looked at, by a person.
+    Out,
+}
+
 /// What happened to a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StreamEvent {

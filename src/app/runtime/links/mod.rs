@@ -61,7 +61,7 @@ impl Links {
     ) -> Result<Self, RuntimeError> {
         let mut links = Self::default();
         let none = LinkLane { link: usize::MAX, lane: 0, lead: std::time::Duration::ZERO };
-        links.led = vec![none; config.controllers.len() - config.stations().len()];
+        links.led = vec![none; config.on_links().count()];
         for (link, port) in used(config).zip(ports) {
             links.add(config, link, lanes, watch, port, live).map_err(RuntimeError::Link)?;
         }
@@ -79,7 +79,7 @@ impl Links {
     ) -> Result<(), String> {
         let terms = StreamTerms::of(link, config)?.ok_or("no seat is on it")?;
         let on_it: Vec<_> = seats(config, link).collect();
-        let stations = config.stations().len();
+        let stations = config.controllers.len() - self.led.len();
         for (own, (lane, ..)) in (0..).zip(&on_it) {
             let lead = lanes[*lane].window.lead();
             self.led[*lane - stations] = LinkLane { link: self.poses.len(), lane: own, lead };

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::axis::{Axis, Kind};
 use super::clock::{after, seconds};
 use crate::drive::Segment;
-use crate::drive::link::{LedPose, LinkPose, StreamEvent};
+use crate::drive::link::{LedPose, LinkPose, Stage, StreamEvent};
 use crate::motion::{MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
@@ -18,23 +18,6 @@ const STRETCH: f64 = 0.01;
 const STANDS_MM: f64 = 0.1;
 /// Poses that differ by less, in strokes, stand still.
 const STILL: f64 = 1e-7;
-
-/// What a lane does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stage {
-    /// Brakes if it has to, and is then made ready: it knows where it stands, its queues are empty and wait.
-    Readying,
-    /// Stands, and waits for poses.
-    Ready,
-    /// Poses come.
-    Runs,
-    /// Poses have ended at rest, and what was made of them goes out.
-    Ends,
-    /// A unit does not answer.
-    Lost,
-    /// It has to be homed, or at least looked at, by a person.
-    Out,
-}
 
 /// The axes of one seat.
 #[derive(Debug)]

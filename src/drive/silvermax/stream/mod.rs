@@ -21,12 +21,12 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer};
 
 use self::axis::{Axis, AxisTerms, Doubt};
-use self::lane::{Lane, Stage};
+use self::lane::Lane;
 use self::polls::Question;
 use super::set_up::{HomeError, SeatUnits};
 use super::talk::{Talk, TalkFault};
 use crate::drive::link::{
-    AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms,
+    AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, Stage, StreamEvent, StreamTerms,
     axis_number, lane_number as number,
 };
 use crate::time::MonoTime;

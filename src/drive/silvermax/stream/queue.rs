@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use super::axis::{Axis, Doubt, Kind, QUEUE};
 use super::clock::after;
-use super::lane::Stage;
 use super::polls::Question;
 use super::{BrakeReason, Stream, StreamEvent, axis_number, number};
 use crate::drive::link::LinkPort;
+use crate::drive::link::Stage;
 use crate::drive::silvermax::talk::{Answer, TalkFault};
 use crate::drive::{Segment, TICK_NS};
 use crate::wire::silvermax::{NakReason, Request, register};

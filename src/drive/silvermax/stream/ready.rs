@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use super::Stream;
 use super::axis::Axis;
-use super::lane::Stage;
 use crate::drive::link::LinkPort;
+use crate::drive::link::Stage;
 use crate::drive::silvermax::talk::{Answer, TalkFault};
 use crate::wire::silvermax::Request;
 use crate::wire::silvermax::register::{QUEUE_SOURCE, TARGET};

@@ -1,10 +1,10 @@
 //! What is asked of units while they play, and what the answers mean.
 
 use super::axis::Doubt;
-use super::lane::Stage;
 use super::polls::Question;
 use super::{BrakeReason, LOST, PROBES, Stream, StreamEvent, axis_number, number};
 use crate::drive::link::LinkPort;
+use crate::drive::link::Stage;
 use crate::drive::silvermax::talk::{Answer, TalkFault, internal_word};
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{CANARY, KILL_CAUSE};

@@ -2,27 +2,10 @@
 
 use super::axis::Axis;
 use super::track::Track;
-use crate::drive::link::{LedPose, LinkPose, StreamTerms};
+use crate::drive::link::{LedPose, LinkPose, Stage, StreamTerms};
 use crate::motion::{Limits, MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
-
-/// What a lane does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stage {
-    /// Is looked at until its motors stand.
-    Readying,
-    /// Stands, and waits for poses.
-    Ready,
-    /// Poses come.
-    Runs,
-    /// Goes to rest, where poses ended or by a brake.
-    Ends,
-    /// Its unit does not answer.
-    Lost,
-    /// It has to be homed, or at least looked at, by a person.
-    Out,
-}
 
 /// The axes of one seat.
 #[derive(Debug)]

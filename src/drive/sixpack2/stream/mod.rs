@@ -19,13 +19,13 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer};
 
 use self::axis::Axis;
-use self::lane::{Lane, Stage};
+use self::lane::Lane;
 use self::track::Track;
 use super::find::waking_baud;
 use super::set_up::{HomeError, SeatMotors};
 use super::talk::Talk;
 use crate::drive::link::{
-    AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms,
+    AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, Stage, StreamEvent, StreamTerms,
     axis_number, lane_number as number,
 };
 use crate::time::MonoTime;

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use super::lane::{Lane, Stage};
+use super::lane::Lane;
 use super::{Stream, StreamEvent, TARGETS, Track, axis_number, number};
+use crate::drive::link::Stage;
 use crate::drive::link::{LinkFault, LinkPort};
 use crate::drive::sixpack2::find::{WHO, waking_baud, who};
 use crate::drive::sixpack2::look::where_is;
