@@ -31,6 +31,14 @@ pub(crate) struct LinkSurvey {
     pub(crate) units: BTreeMap<u8, Result<UnitFacts, TalkFault>>,
 }
 
+impl LinkSurvey {
+    /// Of a link by which nobody could be asked, for that reason.
+    pub(crate) fn silent(why: SerialError) -> Self {
+        let (counts, units) = (TalkCounts::default(), BTreeMap::new());
+        Self { opened: Err(why), delay: None, counts, units }
+    }
+}
+
 /// What is known of one controller on a link.
 #[derive(Debug)]
 pub(crate) struct DriveSubject<'a> {

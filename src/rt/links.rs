@@ -2,23 +2,28 @@
 //! ack thread.
 
 use std::fmt;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender as Tell};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use rtrb::{Consumer, Producer};
 
 use super::{FrameSink, Live};
 use crate::drive::link::{
-    LaneWants, LedPose, LinkPort, LinkPose, RECORD_LEN, StreamEvent, lane_number as number,
+    AxisFigures, LaneWants, LedPose, LinkFigures, LinkPort, LinkPose, RECORD_LEN, StreamEvent,
+    lane_number as number,
 };
 use crate::drive::silvermax::Stream;
 use crate::net::{Delivery, SendFault, Sender};
 use crate::state::State;
+use crate::sys::serial::SerialError;
 use crate::time::MonoTime;
 
 /// After a port was gone it is tried again so much later.
 const GONE: Duration = Duration::from_millis(100);
+/// How often it is told how a link stands.
+const TELL: Duration = Duration::from_millis(100);
 /// How long a link may take to bring its seats to rest once the play is over.
 const ENDS_WITHIN: Duration = Duration::from_secs(3);
 
@@ -99,6 +104,58 @@ impl LinkNews {
     }
 }
 
+/// What the control plane has the thread of a link do with its drives while their seats rest.
+pub(crate) type Errand = Box<dyn FnOnce(&mut Stream<Port>) + Send>;
+
+/// How a link stands.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LinkStanding {
+    /// Its exchanges.
+    pub(crate) figures: LinkFigures,
+    /// Why its port cannot be had, with what to do; none where it is open.
+    pub(crate) fault: Option<SerialError>,
+    /// The axes of each of its lanes.
+    pub(crate) lanes: Vec<Vec<AxisFigures>>,
+}
+
+/// The control plane's end of a link.
+#[derive(Debug, Clone)]
+pub(crate) struct LinkEnd {
+    /// Its name.
+    pub(crate) name: String,
+    /// The controllers of its lanes.
+    pub(crate) controllers: Vec<usize>,
+    errands: Tell<Errand>,
+    standing: Arc<Mutex<LinkStanding>>,
+}
+
+impl LinkEnd {
+    /// One, and what its thread has of it.
+    pub(crate) fn new(name: String, controllers: Vec<usize>) -> (Self, LinkTold) {
+        let (errands, asked) = std::sync::mpsc::channel();
+        let standing = Arc::<Mutex<LinkStanding>>::default();
+        let told = LinkTold { errands: asked, standing: Arc::clone(&standing) };
+        (Self { name, controllers, errands, standing }, told)
+    }
+
+    /// Has its thread do that once no lane moves. Where that thread is gone it is dropped.
+    pub(crate) fn ask(&self, errand: Errand) {
+        drop(self.errands.send(errand));
+    }
+
+    /// How it stood a tenth of a second ago at the most.
+    pub(crate) fn standing(&self) -> LinkStanding {
+        self.standing.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// What the thread of a link is asked, and where it tells how it stands.
+#[derive(Debug)]
+pub(crate) struct LinkTold {
+    errands: Receiver<Errand>,
+    standing: Arc<Mutex<LinkStanding>>,
+}
+
 /// The loop of a link's thread.
 pub(crate) struct LinkLoop {
     stream: Stream<Port>,
@@ -106,6 +163,8 @@ pub(crate) struct LinkLoop {
     live: Arc<Live>,
     /// The hall stops, or has: its seats were told to brake.
     stopped: bool,
+    told: LinkTold,
+    tell_at: MonoTime,
 }
 
 /// What was wanted of a lane, and done.
@@ -123,9 +182,15 @@ impl fmt::Debug for LinkLoop {
 }
 
 impl LinkLoop {
-    pub(crate) fn new(stream: Stream<Port>, wants: Vec<Arc<LaneWants>>, live: Arc<Live>) -> Self {
+    pub(crate) fn new(
+        stream: Stream<Port>,
+        wants: Vec<Arc<LaneWants>>,
+        live: Arc<Live>,
+        told: LinkTold,
+    ) -> Self {
         let lane = |wants| LaneOfLink { wants, located: 0, looks: 0 };
-        let mut link = Self { stream, lanes: wants.into_iter().map(lane).collect(), live, stopped: false };
+        let lanes = wants.into_iter().map(lane).collect();
+        let mut link = Self { stream, lanes, live, stopped: false, told, tell_at: MonoTime::default() };
         // Those that are home are made ready at once.
         (0..link.lanes.len()).for_each(|lane| link.stream.look(number(lane)));
         link
@@ -147,9 +212,40 @@ impl LinkLoop {
                 self.stream.look(number(index));
             }
         }
-        if told.and_then(|()| self.stream.round()).is_err() {
+        // Nothing moves, and nothing is about to.
+        if !self.live.is_moving()
+            && !self.stream.is_busy()
+            && let Ok(errand) = self.told.errands.try_recv()
+        {
+            errand(&mut self.stream);
+        }
+        let is_gone = told.and_then(|()| self.stream.round()).is_err();
+        let fault = if is_gone {
             let port = self.stream.port();
             port.sleep_until(port.now() + GONE);
+            port.mend().err()
+        } else {
+            None
+        };
+        self.tell(fault);
+    }
+
+    /// Tells how it stands where it is time to.
+    fn tell(&mut self, fault: Option<SerialError>) {
+        let now = self.now();
+        if now < self.tell_at {
+            return;
+        }
+        // Whoever looks is an ordinary thread: it is never waited for.
+        let Ok(mut standing) = self.told.standing.try_lock() else { return };
+        self.tell_at = now + TELL;
+        let Self { stream, lanes, .. } = self;
+        standing.figures = stream.figures();
+        standing.fault = fault;
+        standing.lanes.resize_with(lanes.len(), Vec::new);
+        for (lane, axes) in standing.lanes.iter_mut().enumerate() {
+            axes.clear();
+            axes.extend((0..).map_while(|axis| stream.axis(number(lane), axis)));
         }
     }
 

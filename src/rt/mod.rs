@@ -26,7 +26,7 @@ pub(crate) use film::FilmStart;
 pub use line::Line;
 pub(crate) use line::line;
 pub use links::Outlets;
-pub(crate) use links::{LinkLane, LinkLoop, LinkNews, Port};
+pub(crate) use links::{LinkEnd, LinkLane, LinkLoop, LinkNews, Port};
 pub use live::Live;
 pub(crate) use live::Times;
 pub use mail::{

@@ -36,8 +36,9 @@ use crate::time::MonoTime;
 pub(crate) const ARMED_FOR: Duration = Duration::from_mins(10);
 /// How long a pause lasts before the seats park.
 pub(crate) const PAUSED_FOR: Duration = Duration::from_mins(5);
-/// How long homing may take. Whoever homes gives up after a minute; this is for when no word of that comes.
-pub(crate) const HOMING_FOR: Duration = Duration::from_secs(65);
+/// How long homing may take. Whoever homes gives up after a minute, with drives after what the travel of each axis takes, the seats of a
+/// link one after the other; this is for when no word of that comes.
+pub(crate) const HOMING_FOR: Duration = Duration::from_mins(15);
 /// How long the seats may decelerate before frames end without word that they are at rest.
 pub(crate) const STOPPING_FOR: Duration = Duration::from_secs(5);
 /// How long parking may take: a stroke of 5 m at 50 mm/s, and then some.

@@ -1,18 +1,23 @@
-//! Register requests to the controllers of a hall while nothing moves: the same exchanges as `preflight` and `home` make,
-//! over the hall's own frame port.
+//! Requests to the controllers and drives of a hall while nothing moves: the same exchanges as `preflight` and `home` make, over the
+//! hall's own frame port and links.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::config::{Controller, Station};
-use crate::device::home::{HomeError, Progress, TIMEOUT, home, unsearched};
+use super::links;
+use crate::config::drive::homing::HomeWay;
+use crate::config::{Config, Controller};
+use crate::device::home::{TIMEOUT, home, unsearched};
 use crate::device::survey::{Survey, survey};
 use crate::device::{Link, Talk, Watch, peers};
 use crate::net::{Origin, SendFault};
-use crate::preflight::wanted;
-use crate::rt::Line;
+use crate::preflight::{LinkSurvey, wanted};
+use crate::rt::{Line, LinkEnd, Live};
+use crate::state::State;
 use crate::sys::clock::Monotonic;
+use crate::sys::serial::SerialError;
 use crate::time::Clock as _;
 use crate::wire::{Dialect, WriteRequest};
 
@@ -28,8 +33,8 @@ pub(crate) enum DeviceJob {
     Home {
         /// Which, counted from 0.
         lanes: Vec<usize>,
-        /// Set once no more of them is to begin, even if its order has to be repeated. Those that have begun go on by
-        /// themselves, and are watched until they are home.
+        /// Set once no more of them is to begin, even if its order has to be repeated. Controllers that have begun go on by
+        /// themselves, and are watched until they are home; drives are braked.
         called_off: Arc<AtomicBool>,
     },
 }
@@ -37,11 +42,24 @@ pub(crate) enum DeviceJob {
 /// What came of it.
 #[derive(Debug)]
 pub(crate) enum Finding {
-    /// What each controller told.
-    Surveyed(Vec<Survey>),
+    /// What each controller told, and each link.
+    Surveyed(Vec<Survey>, BTreeMap<String, LinkSurvey>),
     /// True if each of these controllers is home; where one would go there without a search, those alone that would, and
     /// no seat was moved.
-    Homed(Vec<(usize, Result<(), HomeError>)>),
+    Homed(Vec<(usize, Result<(), String>)>),
+}
+
+/// The ways to all devices of a hall.
+#[derive(Debug)]
+pub(crate) struct Devices<'d> {
+    /// To those on the network.
+    pub(crate) line: &'d mut Line,
+    /// To those on links.
+    pub(crate) links: &'d [LinkEnd],
+    /// Which they are.
+    pub(crate) config: &'d Arc<Config>,
+    /// What state the hall is in.
+    pub(crate) live: &'d Arc<Live>,
 }
 
 /// The line as a conversation has it: once that is called off, no order goes out.
@@ -67,56 +85,85 @@ impl Link for OverLine<'_> {
     }
 }
 
-/// Asks, and waits for what comes; `tell` hears in words how far it is.
-pub(crate) fn run_on_devices(
-    line: &mut Line,
-    controllers: &[Controller<Station>],
-    job: DeviceJob,
-    tell: &mut dyn FnMut(&str),
-) -> Finding {
-    if matches!(job, DeviceJob::Survey) {
-        // What the ack thread asks by itself is counted by the controllers too, and its answers are like those to preflight.
-        line.hush(true);
-        Monotonic.sleep_until(Monotonic.now() + SETTLE);
-    }
-    line.open(true);
-    let called_off = match &job {
-        DeviceJob::Survey => Arc::default(),
-        DeviceJob::Home { called_off, .. } => Arc::clone(called_off),
-    };
-    let mut talk = Talk::over(OverLine { line, called_off }, Monotonic, &peers(controllers));
-    let finding = match job {
-        DeviceJob::Survey => {
-            let wanted: Vec<_> = controllers.iter().map(wanted).collect();
-            Finding::Surveyed(survey(&mut talk, controllers, &wanted, tell))
+impl Devices<'_> {
+    /// Asks, and waits for what comes.
+    pub(crate) fn run(self, job: DeviceJob) -> Finding {
+        let Devices { line, links, config, live } = self;
+        let controllers = config.stations();
+        if matches!(job, DeviceJob::Survey) {
+            // What the ack thread asks by itself is counted by the controllers too, and its answers are like those to preflight.
+            line.hush(true);
+            Monotonic.sleep_until(Monotonic.now() + SETTLE);
         }
-        DeviceJob::Home { lanes, .. } => Finding::Homed(home_all(&mut talk, controllers, &lanes, tell)),
-    };
-    drop(talk);
-    line.open(false);
-    line.hush(false);
-    finding
+        line.open(true);
+        let called_off = match &job {
+            DeviceJob::Survey => Arc::default(),
+            DeviceJob::Home { called_off, .. } => Arc::clone(called_off),
+        };
+        let over = OverLine { line, called_off: Arc::clone(&called_off) };
+        let mut talk = Talk::over(over, Monotonic, &peers(&controllers));
+        let finding = match job {
+            DeviceJob::Survey => {
+                let told = links::survey(links, config);
+                let wanted: Vec<_> = controllers.iter().map(wanted).collect();
+                let surveys = survey(&mut talk, &controllers, &wanted, &mut |_| {});
+                let mut told: BTreeMap<_, _> = told.iter().collect();
+                for link in &config.links {
+                    // The thread of a link that told nothing has ended.
+                    let gone = || LinkSurvey::silent(SerialError::Vanished(link.port.clone()));
+                    told.entry(link.name.clone()).or_insert_with(gone);
+                }
+                Finding::Surveyed(surveys, told)
+            }
+            DeviceJob::Home { lanes, .. } => {
+                // A stop is heeded even where nobody calls it off.
+                let live = Arc::clone(live);
+                let goes_on: Arc<dyn Fn() -> bool + Send + Sync> =
+                    Arc::new(move || !called_off.load(Ordering::Acquire) && live.state() == State::Homing);
+                let on_links = || links::home(links, config, &lanes, &goes_on);
+                Finding::Homed(home_all(&mut talk, config, &lanes, on_links))
+            }
+        };
+        drop(talk);
+        line.open(false);
+        line.hush(false);
+        finding
+    }
 }
 
 /// Homes these, unless one of them would go to zero without a search: a seat may have several controllers.
 fn home_all(
     talk: &mut Talk<OverLine<'_>>,
-    controllers: &[Controller<Station>],
+    config: &Config,
     lanes: &[usize],
-    tell: &mut dyn FnMut(&str),
-) -> Vec<(usize, Result<(), HomeError>)> {
+    on_links: impl FnOnce() -> links::Homed,
+) -> Vec<(usize, Result<(), String>)> {
+    let stations = config.stations();
+    let (seats, others): (Vec<usize>, Vec<usize>) = lanes.iter().partition(|lane| **lane < stations.len());
     let seats: Vec<(usize, Dialect)> =
-        lanes.iter().map(|lane| (*lane, controllers[*lane].connection.dialect)).collect();
-    let would_not_search = unsearched(talk, &seats);
-    if !would_not_search.is_empty() {
-        return would_not_search.into_iter().map(|(lane, error)| (lane, Err(error))).collect();
+        seats.into_iter().map(|lane| (lane, stations[lane].connection.dialect)).collect();
+    let would_not_search = unsearched(talk, &seats).into_iter().map(|(lane, why)| (lane, why.to_string()));
+    let unsearched = others.iter().filter(|lane| is_unsearched(&config.controllers[**lane]));
+    let here = || "its home is where it stands; stop the service, and home it by `kinocue home`".to_owned();
+    let refused: Vec<_> = would_not_search.chain(unsearched.map(|lane| (*lane, here()))).collect();
+    if !refused.is_empty() {
+        return refused.into_iter().map(|(lane, why)| (lane, Err(why))).collect();
     }
-    let results = home(talk, &seats, TIMEOUT, &mut |lane, step| {
-        if matches!(step, Progress::Home { .. }) {
-            tell(&format!("{} is home", controllers[lane].name));
-        }
-    });
-    lanes.iter().copied().zip(results.into_iter().map(|one| one.map(drop))).collect()
+    let told = on_links();
+    let results = home(talk, &seats, TIMEOUT, &mut |_, _| {});
+    let results = results.into_iter().map(|one| one.map(drop).map_err(|error| error.to_string()));
+    let told: BTreeMap<_, _> = told.iter().collect();
+    let of_link = |lane: usize| {
+        let gone = || Err("the thread of its link has ended; start the service again".to_owned());
+        (lane, told.get(&lane).cloned().unwrap_or_else(gone))
+    };
+    let results = seats.iter().map(|(lane, _)| *lane).zip(results);
+    results.chain(others.iter().map(|lane| of_link(*lane))).collect()
+}
+
+/// True if a seat takes the place where it stands for its zero.
+fn is_unsearched(controller: &Controller) -> bool {
+    controller.drives().is_some_and(|drives| drives.drive.homing.way == HomeWay::Here)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ mod boot;
 mod device_job;
 mod links;
 
-pub(crate) use device_job::{DeviceJob, Finding, run_on_devices};
+pub(crate) use device_job::{DeviceJob, Devices, Finding};
 
 use std::collections::BTreeMap;
 use std::io;
@@ -29,8 +29,8 @@ use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    AckLoop, Command, Conductor, Desk, FilmLead, Line, LinkLoop, Live, Mail, MailEnds, NewsIn, Order,
-    Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line, mailboxes,
+    AckLoop, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds, NewsIn,
+    Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
@@ -137,6 +137,8 @@ pub struct RuntimeHandle {
     pub news: NewsIn,
     /// What the ack thread is told.
     pub orders: Producer<Order>,
+    /// The serial links that have seats.
+    pub(crate) links: Vec<LinkEnd>,
     /// What the system granted the tick thread.
     pub(crate) granted: RealTime,
 }
@@ -164,7 +166,7 @@ impl Runtime {
     ) -> Result<Self, RuntimeError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
-        let ports = links::open(&config)?;
+        let ports = links::open(&config, &purpose)?;
         let halves = boot::bind(&config)?;
         Self::over_all(config, purpose, numbers, signals, halves, ports)
     }
@@ -223,15 +225,16 @@ impl Runtime {
         let watched: Vec<_> = config.stations().iter().map(Watched::of).collect();
         let sink = Outlets::new(sender, watched.len(), links.poses, links.led);
         let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
+        let links::Links { loops, ends: links, news: heard, .. } = links;
         let acks = AckLoop::new(receiver, watched, ack_every, sent, ticks)
             .going_on(&firsts, ack_every)
-            .hearing(links.news);
+            .hearing(heard);
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let (leave, granted) = (Arc::default(), RealTime::NOTHING);
-        let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
+        let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, links, granted };
         let silent = manner.silent;
         let ticks = Ticks { engine, lanes, film, sink, mail };
-        Ok(Self { handle, line, silent, acks, watch, plans, links: links.loops, ticks })
+        Ok(Self { handle, line, silent, acks, watch, plans, links: loops, ticks })
     }
 
     /// The same with a film that shows may follow.

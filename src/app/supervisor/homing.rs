@@ -116,7 +116,6 @@ const fn tell(event: Event) -> Act {
 mod tests {
     use super::*;
     use crate::app::supervisor::testing::{hall, row, told};
-    use crate::device::home::HomeError;
 
     /// One under way, and the flag that calls it off.
     fn begun(hall: &mut HallContext) -> (Homing, Arc<AtomicBool>) {
@@ -172,7 +171,7 @@ mod tests {
             let (mut homing, called_off) = begun(&mut hall);
             told(&mut homing, &leaving, &hall);
             assert!(called_off.load(Ordering::Acquire));
-            let failed = Finding::Homed(vec![(0, Err(HomeError::Unsearched(1)))]);
+            let failed = Finding::Homed(vec![(0, Err("no search".to_owned()))]);
             assert!(homing.take(failed, &hall).is_empty());
             assert!(told(&mut homing, &SupervisorEvent::Round(&[row(hall.now)]), &hall).is_empty());
         }
@@ -182,7 +181,7 @@ mod tests {
     fn a_seat_that_does_not_home_is_named_and_is_trouble() {
         let mut hall = hall(State::Parked, "one");
         let (mut homing, _) = begun(&mut hall);
-        let acts = homing.take(Finding::Homed(vec![(1, Err(HomeError::Unsearched(1)))]), &hall);
+        let acts = homing.take(Finding::Homed(vec![(1, Err("no search".to_owned()))]), &hall);
         let [Act::Note(note), trouble] = &acts[..] else { panic!("{acts:?}") };
         assert!(note.starts_with("B1: "), "{note}");
         assert!(

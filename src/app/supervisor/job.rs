@@ -12,11 +12,12 @@ use super::preflighted::Preflighted;
 use super::seat_test::SeatTest;
 use super::shared_link::SharedLink;
 use super::show::{ProvedShow, no_cue, read};
-use crate::app::runtime::{DeviceJob, Finding, run_on_devices};
+use crate::app::runtime::{DeviceJob, Devices, Finding};
 use crate::config::Config;
 use crate::control::{Asked, Code, Problem};
 use crate::library::{CueId, Library};
 use crate::playlist::{EntryFilm, PlaylistId, Shelf};
+use crate::rt::{LinkEnd, Live};
 use crate::settings::{LoadedShow, SettingsFile};
 
 /// What is to be done.
@@ -71,6 +72,9 @@ pub(super) struct Tools {
     pub(super) config: Arc<Config>,
     pub(super) library: Library,
     pub(super) line: SharedLink,
+    /// The serial links that have seats.
+    pub(super) links: Vec<LinkEnd>,
+    pub(super) live: Arc<Live>,
     /// Where what is set is kept.
     pub(super) settings: PathBuf,
 }
@@ -91,8 +95,8 @@ impl Job {
 
     /// Does it.
     pub(super) fn run(self, tools: &Tools) -> JobResult {
-        let Tools { config, library, line, settings } = tools;
-        let on_devices = |job| run_on_devices(&mut line.hold(), &config.stations(), job, &mut |_| {});
+        let Tools { config, library, line, links, live, settings } = tools;
+        let on_devices = |job| Devices { line: &mut line.hold(), links, config, live }.run(job);
         match self {
             Self::Load(id) => JobResult::Loaded(read(library, config, &id, &EntryFilm::default())),
             Self::List(id) => {
@@ -117,11 +121,11 @@ impl Job {
             }
             Self::Test(only) => JobResult::Tested(SeatTest::make(config), only),
             Self::Preflight => {
-                let surveys = match on_devices(DeviceJob::Survey) {
-                    Finding::Surveyed(surveys) => surveys,
-                    Finding::Homed(_) => Vec::new(),
+                let (surveys, links) = match on_devices(DeviceJob::Survey) {
+                    Finding::Surveyed(surveys, links) => (surveys, links),
+                    Finding::Homed(_) => Default::default(),
                 };
-                JobResult::Preflighted(Box::new(Preflighted::of(config, &surveys)))
+                JobResult::Preflighted(Box::new(Preflighted::of(config, &surveys, &links)))
             }
             Self::Home(lanes, called_off) => {
                 JobResult::Homed(on_devices(DeviceJob::Home { lanes, called_off }))
@@ -129,7 +133,7 @@ impl Job {
             #[cfg(test)]
             Self::Held(held) => {
                 let _ = held.recv();
-                JobResult::Homed(Finding::Surveyed(Vec::new()))
+                JobResult::Homed(Finding::Homed(Vec::new()))
             }
         }
     }

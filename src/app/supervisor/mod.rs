@@ -165,6 +165,8 @@ impl Supervisor {
             config: Arc::clone(&hall.config),
             library,
             line: SharedLink::of(line),
+            links: runtime.links.clone(),
+            live: Arc::clone(&runtime.live),
             settings: ports.settings_file.folder().to_owned(),
         };
         let mut supervisor = Self {

@@ -1,10 +1,13 @@
 //! What preflight came to.
 
-use crate::config::Config;
+use std::collections::BTreeMap;
+
+use crate::config::{Config, Controller};
 use crate::control::{PreflightStatus, Severity, Warning};
 use crate::device::survey::Survey;
+use crate::drive::rates::LinkLoad;
 use crate::net::{Route, route};
-use crate::preflight::{self, Check, Subject, Terms, judge};
+use crate::preflight::{self, Check, DriveSubject, LinkSurvey, Subject, Terms, judge, judge_driven};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -19,8 +22,8 @@ pub(super) struct Preflighted {
 }
 
 impl Preflighted {
-    /// Judges what controllers told, for whatever cue is played.
-    pub(super) fn of(config: &Config, surveys: &[Survey]) -> Self {
+    /// Judges what controllers and links told, for whatever cue is played.
+    pub(super) fn of(config: &Config, surveys: &[Survey], links: &BTreeMap<String, LinkSurvey>) -> Self {
         let bind = *config.show.bind.ip();
         let way =
             |address| -> Result<Route, String> { route(bind, address).map_err(|error| error.to_string()) };
@@ -36,7 +39,9 @@ impl Preflighted {
             })
             .collect();
         let terms = Terms { frame_port: config.show.bind.port(), rate_hz: config.show.rate_hz, cue: None };
-        let found = judge(&subjects, &terms, &config.show.accept_findings);
+        let mut found = judge(&subjects, &terms, &config.show.accept_findings);
+        let on_links: Vec<_> = config.on_links().filter_map(|one| driven(config, one, links)).collect();
+        found.extend(judge_driven(&on_links, &config.show.accept_findings));
         let passed = found.iter().map(|found| !found.iter().any(preflight::Finding::fails)).collect();
         let mut findings = Vec::new();
         for (controller, found) in found.into_iter().enumerate() {
@@ -44,7 +49,8 @@ impl Preflighted {
             findings.extend(found.into_iter().filter_map(|one| Some((controller, told(name, one)?))));
         }
         findings.sort_by_key(|(_, warning)| std::cmp::Reverse(warning.severity));
-        let answered = subjects.iter().filter(|subject| subject.answered()).count();
+        let answered = subjects.iter().filter(|subject| subject.answered()).count()
+            + on_links.iter().filter(|subject| subject.answered()).count();
         Self { at: Monotonic.now(), answered, passed, findings }
     }
 
@@ -77,6 +83,17 @@ impl Preflighted {
         it.passed[controller] = false;
         it
     }
+}
+
+/// What is judged of a controller on a link.
+fn driven<'a>(
+    config: &'a Config,
+    controller: &'a Controller,
+    links: &'a BTreeMap<String, LinkSurvey>,
+) -> Option<DriveSubject<'a>> {
+    let name = &controller.drives()?.link;
+    let link = config.links.iter().find(|link| link.name == *name)?;
+    Some(DriveSubject { controller, link, load: LinkLoad::of(link, config), survey: links.get(name)? })
 }
 
 /// A finding as surfaces show it; `None` if all is well.

@@ -90,7 +90,7 @@ pub(super) fn reload(hall: &HallContext, path: &Path) -> Result<Arc<Config>, Pro
         let faults = faults.to_string().lines().map(str::to_owned).collect();
         Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
     })?;
-    config.playable().map_err(|error| {
+    config.streamed().map_err(|error| {
         Problem::new(
             Code::Check,
             error.to_string(),

@@ -201,6 +201,7 @@ fn runtime(config: &Arc<Config>) -> (RuntimeHandle, Consumer<TickCommand>, NewsO
         commands,
         news: news_end,
         orders: RingBuffer::new(16).0,
+        links: Vec::new(),
         granted: RealTime::NOTHING,
     };
     (runtime, commands_end, news)

@@ -9,13 +9,13 @@ use std::time::{Duration, Instant};
 
 use super::super::play::leave_on_signals;
 use super::super::targets::{Driven, Troubles};
-use super::super::token::chance;
 use super::super::{Exit, Failure, OrExit as _, print};
 use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
 use crate::config::link::LinkWiring;
 use crate::config::{Controller, Drives, Link};
+use crate::drive::link::canary;
 use crate::drive::link::{LinkLine, Step, TalkTerms};
 use crate::drive::{silvermax, sixpack2};
 
@@ -195,18 +195,19 @@ impl LinkTalk {
         let none = || Fault::Refused("it has no drives of that link".to_owned());
         let Drives { drive, motors, .. } = controller.drives().ok_or_else(none)?;
         let (seat, begun) = (&*controller.seat, Instant::now());
+        let goes_on = &|| !abort.load(Ordering::Relaxed);
         match (self, motors) {
             (Self::SilverMax(talk), Motors::SilverMax(units)) => {
                 let silvermax = drive.silvermax.as_ref().ok_or_else(none)?;
                 let canary = canary()
                     .map_err(|error| Fault::Refused(format!("the system gives no chance: {error}")))?;
                 let seat = silvermax::SeatUnits { seat, drive, silvermax, units };
-                silvermax::home(talk, seat, silvermax::Homing { canary, abort, told })?;
+                silvermax::home(talk, seat, silvermax::Homing { canary, goes_on, told })?;
             }
             (Self::Sixpack2(talk, period), Motors::Sixpack2 { unit, motors }) => {
                 let (sixpack2, unit, period) = (drive.sixpack2.as_ref().ok_or_else(none)?, *unit, *period);
                 let seat = sixpack2::SeatMotors { seat, drive, sixpack2, unit, motors, period };
-                sixpack2::home(talk, seat, sixpack2::Homing { abort, told })?;
+                sixpack2::home(talk, seat, sixpack2::Homing { goes_on, told })?;
             }
             _ => return Err(none()),
         }
@@ -234,13 +235,4 @@ impl From<sixpack2::HomeError> for Fault {
             _ => Self::Refused(error.to_string()),
         }
     }
-}
-
-/// A number that stands in no register by itself.
-fn canary() -> std::io::Result<i32> {
-    // 0 is what a unit has after a reset.
-    Ok(match i32::from_le_bytes(chance()?) {
-        0 => 1,
-        number => number,
-    })
 }

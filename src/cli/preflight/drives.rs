@@ -6,7 +6,7 @@ use std::thread;
 use super::super::targets::Driven;
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Link};
-use crate::drive::link::{LinkLine, TalkCounts, TalkTerms};
+use crate::drive::link::{LinkLine, TalkTerms};
 use crate::drive::silvermax::{Talk, TalkFault, look};
 use crate::preflight::{DriveSubject, LinkSurvey};
 
@@ -42,10 +42,7 @@ fn units_on(driven: &Driven, link: &Link) -> Option<Vec<u8>> {
 fn look_at(link: &Link, units: &[u8]) -> LinkSurvey {
     let line = match LinkLine::open(link) {
         Ok(line) => line,
-        Err(error) => {
-            let (counts, units) = (TalkCounts::default(), BTreeMap::new());
-            return LinkSurvey { opened: Err(error), delay: None, counts, units };
-        }
+        Err(error) => return LinkSurvey::silent(error),
     };
     let mut talk = Talk::new(line, TalkTerms::of(link));
     let mut told = BTreeMap::new();

@@ -13,10 +13,10 @@ use crate::time::{Clock as _, MonoTime};
 /// How long the driver may take for a message: its buffer holds more than any.
 const HAND_OVER: Duration = Duration::from_millis(50);
 
-/// A line that is open.
+/// A line. One that fails is closed, so that its name is free for what is plugged in next, and can be opened again.
 #[derive(Debug)]
 pub(crate) struct LinkLine {
-    port: SerialPort,
+    port: Option<SerialPort>,
     path: PathBuf,
     settings: SerialSettings,
 }
@@ -27,11 +27,33 @@ impl LinkLine {
     /// # Errors
     /// A [`SerialError`] that says what to do.
     pub(crate) fn open(link: &Link) -> Result<Self, SerialError> {
+        let mut line = Self::closed(link);
+        line.open_again()?;
+        Ok(line)
+    }
+
+    /// The line of a link as long as its port cannot be had.
+    pub(crate) fn closed(link: &Link) -> Self {
         let stop_bits = if link.stop_bits == 2 { StopBits::Two } else { StopBits::One };
         let is_rs485 = link.wiring == LinkWiring::Rs485;
         let settings = SerialSettings { baud: link.baud, stop_bits, is_rs485 };
-        let port = SerialPort::open(&link.port, settings)?;
-        Ok(Self { port, path: link.port.clone(), settings })
+        Self { port: None, path: link.port.clone(), settings }
+    }
+
+    fn open_again(&mut self) -> Result<(), SerialError> {
+        if self.port.is_none() {
+            self.port = Some(SerialPort::open(&self.path, self.settings)?);
+        }
+        Ok(())
+    }
+
+    /// Does something with the port, which is closed where that fails.
+    fn with<T>(&mut self, does: impl FnOnce(&mut SerialPort) -> Option<T>) -> Result<T, LinkFault> {
+        let done = self.port.as_mut().and_then(does);
+        if done.is_none() {
+            self.port = None;
+        }
+        done.ok_or(LinkFault)
     }
 }
 
@@ -41,30 +63,39 @@ impl LinkPort for LinkLine {
     }
 
     fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
-        let taken = self.port.line().write(octets, self.now() + HAND_OVER).map_err(|_| LinkFault)?;
-        if taken == octets.len() { Ok(()) } else { Err(LinkFault) }
+        let deadline = self.now() + HAND_OVER;
+        self.with(|port| {
+            let taken = port.line().write(octets, deadline).ok()?;
+            (taken == octets.len()).then_some(())
+        })
     }
 
     fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault> {
-        self.port.line().read(buf, deadline).map_err(|_| LinkFault)
+        self.with(|port| port.line().read(buf, deadline).ok())
     }
 
     fn flush(&mut self) -> usize {
         let (mut octets, mut dropped) = ([0; 64], 0);
         // A port that is gone is found by whoever asks next.
-        while let Ok(count @ 1..) = self.port.line().read(&mut octets, MonoTime::default()) {
+        while let Ok(count @ 1..) = self.receive(&mut octets, MonoTime::default()) {
             dropped += count;
         }
         dropped
     }
 
     fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
-        self.port.send_break(span).map_err(|_| LinkFault)
+        self.with(|port| port.send_break(span).ok())
     }
 
     fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
         self.settings.baud = baud;
-        self.port.set(&self.path, self.settings).map_err(|_| LinkFault)
+        let Self { port, path, settings } = self;
+        let set = port.as_mut().map(|port| port.set(path, *settings));
+        set.and_then(Result::ok).ok_or(LinkFault)
+    }
+
+    fn mend(&mut self) -> Result<(), SerialError> {
+        self.open_again()
     }
 
     fn sleep_until(&mut self, at: MonoTime) {

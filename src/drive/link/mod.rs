@@ -15,7 +15,7 @@ mod virtual_port;
 
 pub(crate) use delays::Delays;
 pub(crate) use exchange::{Moment, TalkCounts, TalkTerms};
-pub(crate) use homing::Step;
+pub(crate) use homing::{Step, canary};
 pub(crate) use line::LinkLine;
 pub(crate) use peer::{LaneWants, LinkPeer};
 pub(crate) use port::{LinkFault, LinkPort};

@@ -212,7 +212,8 @@ impl LinkPeer {
                 continuity: Continuity::Mark,
                 homed: self.homed,
             },
-            rests: rests.is_some(),
+            // Whoever does not know its zero is led nowhere.
+            rests: rests.is_some() || !self.homed,
             sways: false,
             at_park: rests.is_some_and(|reading| self.is_at_park(&reading)),
             leads_more_axes: false,

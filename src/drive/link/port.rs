@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::sys::serial::SerialError;
 use crate::time::MonoTime;
 
 /// The host's end of a serial line.
@@ -37,6 +38,14 @@ pub(crate) trait LinkPort {
     /// A [`LinkFault`] where the port is gone, or cannot make that rate.
     fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault>;
 
+    /// Tries to have it again where it is gone.
+    ///
+    /// # Errors
+    /// Why it cannot be had, with what to do.
+    fn mend(&mut self) -> Result<(), SerialError> {
+        Ok(())
+    }
+
     /// Returns then; at once where that is past.
     fn sleep_until(&mut self, at: MonoTime);
 }
@@ -52,6 +61,10 @@ impl<P: LinkPort + ?Sized> LinkPort for Box<P> {
 
     fn now(&self) -> MonoTime {
         (**self).now()
+    }
+
+    fn mend(&mut self) -> Result<(), SerialError> {
+        (**self).mend()
     }
 
     fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {

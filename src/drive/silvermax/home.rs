@@ -4,7 +4,6 @@
 //! where the drive itself noted the edge: the edge is where it was, whatever the motor ran past it. Then all go slowly to
 //! park, and only inside the stroke are the soft limits switched on: a target outside them would jump to them.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::set_up::{HomeError, SeatUnits, UnitAxis, write, write_once};
@@ -32,8 +31,8 @@ const LOOKS: Duration = Duration::from_millis(10);
 pub(crate) struct Homing<'a> {
     /// What is written into register 40 of each unit at the end: not 0, and no number that others would write.
     pub(crate) canary: i32,
-    /// Set by whoever wants it to end: the axes are braked before anything else is asked.
-    pub(crate) abort: &'a AtomicBool,
+    /// False once somebody wants it to end: the axes are braked before anything else is asked.
+    pub(crate) goes_on: &'a dyn Fn() -> bool,
     /// Is told each step.
     pub(crate) told: &'a mut dyn FnMut(Step),
 }
@@ -248,7 +247,7 @@ fn shift_all<P: LinkPort>(talk: &mut Talk<P>, group: &[Numbered<'_>], register: 
 }
 
 fn goes_on(around: &Homing<'_>) -> Result<(), HomeError> {
-    if around.abort.load(Ordering::Relaxed) { Err(HomeError::Aborted) } else { Ok(()) }
+    if (around.goes_on)() { Ok(()) } else { Err(HomeError::Aborted) }
 }
 
 impl UnitAxis<'_> {

@@ -3,7 +3,6 @@
 //! Each motor in turn searches by itself, and knows no end of that: whoever leads it ends a search that takes too long. Then its counter is
 //! set, so that the lower end of the stroke is at 1,000,000, and all go slowly to park.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::find::{WHO, find};
@@ -34,8 +33,8 @@ const PARKED_MM: f64 = 0.1;
 
 /// Around a homing.
 pub(crate) struct Homing<'a> {
-    /// Set by whoever wants it to end: the motors are stopped before anything else is asked.
-    pub(crate) abort: &'a AtomicBool,
+    /// False once somebody wants it to end: the axes are braked before anything else is asked.
+    pub(crate) goes_on: &'a dyn Fn() -> bool,
     /// Is told each step.
     pub(crate) told: &'a mut dyn FnMut(Step),
 }
@@ -132,7 +131,7 @@ fn park<P: LinkPort>(
 }
 
 fn goes_on(around: &Homing<'_>) -> Result<(), HomeError> {
-    if around.abort.load(Ordering::Relaxed) { Err(HomeError::Aborted) } else { Ok(()) }
+    if (around.goes_on)() { Ok(()) } else { Err(HomeError::Aborted) }
 }
 
 /// Whether a motor searches.

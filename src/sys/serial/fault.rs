@@ -2,13 +2,14 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use rustix::io::Errno;
 
 use crate::plain;
 
 /// Why a line cannot be opened, and what to do.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum SerialError {
     /// Nothing is there.
@@ -68,7 +69,7 @@ pub(crate) enum SerialError {
         /// The port.
         path: PathBuf,
         /// What it says.
-        source: io::Error,
+        source: Arc<io::Error>,
     },
 }
 
@@ -81,7 +82,7 @@ impl SerialError {
             Errno::ACCESS | Errno::PERM => Self::Forbidden(path),
             Errno::NOTTY | Errno::ISDIR => Self::NoLine(path),
             Errno::NODEV | Errno::NXIO | Errno::IO => Self::Vanished(path),
-            errno => Self::System { path, source: errno.into() },
+            errno => Self::System { path, source: Arc::new(errno.into()) },
         }
     }
 }

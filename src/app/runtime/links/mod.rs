@@ -1,16 +1,20 @@
 //! The serial links of a hall: their ports are opened, and each gets a loop and its ends of the rings between.
 
+mod errands;
+
+pub(super) use errands::{Homed, home, survey};
+
 use std::sync::Arc;
 
 use rtrb::{Producer, RingBuffer};
 
-use super::RuntimeError;
+use super::{Purpose, RuntimeError};
 use crate::config::drive_controller::Motors;
 use crate::config::{Config, Controller, Drives, Link};
 use crate::drive::Lane;
 use crate::drive::link::{LedPose, LinkLine, StreamTerms, TalkTerms};
 use crate::drive::silvermax::{LaneUnits, SeatUnits, Stream, Talk};
-use crate::rt::{LinkLane, LinkLoop, LinkNews, Live, Port, Watch};
+use crate::rt::{LinkEnd, LinkLane, LinkLoop, LinkNews, Live, Port, Watch};
 
 /// Poses of a lane that wait for the thread of its link: a tenth of a second at 1 kHz.
 const POSES: usize = 128;
@@ -27,13 +31,19 @@ pub(super) struct Links {
     pub(super) news: Vec<LinkNews>,
     /// What becomes their threads.
     pub(super) loops: Vec<LinkLoop>,
+    /// The control plane's ends.
+    pub(super) ends: Vec<LinkEnd>,
 }
 
-/// Opens the ports of those links of a hall that have seats on them.
-pub(super) fn open(config: &Config) -> Result<Vec<Port>, RuntimeError> {
-    let port = |link: &Link| match LinkLine::open(link) {
-        Ok(line) => Ok(Box::new(line) as Port),
-        Err(error) => Err(RuntimeError::Link(format!("[link.{}]: {error}", link.name))),
+/// Opens the ports of those links of a hall that have seats on them. A hall that lives on lives with one that is not plugged in: its
+/// seats are lost as long.
+pub(super) fn open(config: &Config, purpose: &Purpose) -> Result<Vec<Port>, RuntimeError> {
+    let port = |link: &Link| match (LinkLine::open(link), purpose) {
+        (Ok(line), _) => Ok(Box::new(line) as Port),
+        (Err(_), Purpose::Hall { .. }) => Ok(Box::new(LinkLine::closed(link)) as Port),
+        (Err(error), Purpose::Play { .. }) => {
+            Err(RuntimeError::Link(format!("[link.{}]: {error}", link.name)))
+        }
     };
     used(config).map(port).collect()
 }
@@ -94,7 +104,10 @@ impl Links {
         let wants = on_it.iter().filter_map(|(lane, ..)| watch.wants(*lane)).collect();
         self.poses.push(poses);
         self.news.push(LinkNews { events, controllers: on_it.iter().map(|(lane, ..)| *lane).collect() });
-        self.loops.push(LinkLoop::new(stream, wants, Arc::clone(live)));
+        let controllers = on_it.iter().map(|(lane, ..)| *lane).collect();
+        let (end, told) = LinkEnd::new(link.name.clone(), controllers);
+        self.loops.push(LinkLoop::new(stream, wants, Arc::clone(live), told));
+        self.ends.push(end);
         Ok(())
     }
 }

@@ -4,7 +4,6 @@
 
 use std::cell::Cell;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
@@ -213,7 +212,7 @@ fn hall(lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline)) {
     let line = SharedLine(Arc::new(Mutex::new(port)));
     let link = config.links.first().expect("there is a link");
     let seat = unit_of(&config.controllers[0], config.controllers[0].drives().unwrap()).unwrap().seat;
-    let homing = Homing { canary: 7_311, abort: &AtomicBool::new(false), told: &mut |_| {} };
+    let homing = Homing { canary: 7_311, goes_on: &|| true, told: &mut |_| {} };
     home(&mut Talk::new(line.clone(), TalkTerms::of(link)), seat, homing).expect("it finds its zero");
     line.lock().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
     NOW.set(line.lock().now());

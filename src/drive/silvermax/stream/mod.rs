@@ -208,7 +208,6 @@ impl<P: LinkPort> Stream<P> {
     }
 
     /// The conversation, for other procedures while no lane runs.
-    #[cfg(test)]
     pub(crate) const fn talk(&mut self) -> &mut Talk<P> {
         &mut self.talk
     }

@@ -1,6 +1,5 @@
 //! A line with virtual units, a seat on them, and whoever plays to it.
 
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -83,7 +82,7 @@ pub(super) fn home_as(
     let silvermax = drive.silvermax.clone().unwrap();
     let of = SeatUnits { seat: &seat, drive, silvermax: &silvermax, units };
     let mut told = |step| steps.push(step);
-    let around = Homing { canary: CANARY, abort: &AtomicBool::new(false), told: &mut told };
+    let around = Homing { canary: CANARY, goes_on: &|| true, told: &mut told };
     (home(talk, of, around), steps)
 }
 

@@ -129,7 +129,11 @@ fn a_homing_is_stopped_between_two_looks() {
     let of = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16] };
     let abort = AtomicBool::new(false);
     let mut told = |step| abort.store(matches!(step, Step::Searching(_)), Ordering::Relaxed);
-    let homed = home(&mut talk, of, Homing { canary: CANARY, abort: &abort, told: &mut told });
+    let homed = home(
+        &mut talk,
+        of,
+        Homing { canary: CANARY, goes_on: &|| !abort.load(Ordering::Relaxed), told: &mut told },
+    );
     assert_eq!(homed, Err(HomeError::Aborted));
     let last = talk.port().sent.last().unwrap().1.clone();
     assert_eq!(last, b"@16 3 2319282\r");

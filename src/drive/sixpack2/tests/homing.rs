@@ -94,7 +94,7 @@ fn a_search_is_made_with_less_current_and_a_show_with_all_of_it() {
         SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors: &[0], period: PERIOD };
     let abort = AtomicBool::new(false);
     let mut told = |step| abort.store(matches!(step, Step::Searching(_)), Ordering::Relaxed);
-    let homed = home(&mut talk, of, Homing { abort: &abort, told: &mut told });
+    let homed = home(&mut talk, of, Homing { goes_on: &|| !abort.load(Ordering::Relaxed), told: &mut told });
     assert_eq!(homed, Err(HomeError::Aborted));
     let written = motor(&mut talk, 0).written;
     assert_eq!(written.currents.map(|it| [it.stand, it.run, it.ramp]), Some([2, 3, 3]));
