@@ -2,6 +2,8 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "numbers of ticks")]
 
+mod chance;
+
 use std::cell::Cell;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard};
@@ -204,6 +206,14 @@ fn read(text: &str) -> Config {
 
 /// Opens a hall whose seat was homed, with a cue on it.
 fn hall(lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline)) {
+    hall_over(|line| Box::new(line), lead);
+}
+
+/// The same, where its play has the line by a port of this kind.
+fn hall_over(
+    over: impl FnOnce(SharedLine) -> Port,
+    lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline),
+) {
     NOW.set(MonoTime::from_nanos(3_000_000_000));
     let config = Arc::new(read(HALL));
     let setups = [16, 17, 18].map(|unit| UnitSetup { place: 12_000, ..UnitSetup::new(unit) });
@@ -228,7 +238,7 @@ fn hall(lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline)) {
         &Numbers::new(),
         &Arc::default(),
         network,
-        vec![Box::new(line.clone())],
+        vec![over(line.clone())],
     )
     .expect("it opens");
     let origin = NOW.get() + Duration::from_millis(20);
