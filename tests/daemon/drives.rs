@@ -89,6 +89,12 @@ fn drives_beside_controllers_are_homed_played_stopped_read_and_parked_by_the_sam
 
     hall.play("night");
     hall.wait(|status| of_lift(status)["positions_mm"][0].as_f64() > Some(5.0));
+    hall.done(&["pause"]);
+    let paused = hall.wait(|status| status["state"] == "paused" && status["since_s"].as_f64() > Some(1.5));
+    let controllers = paused["controllers"].as_array().expect("a list");
+    assert!(controllers.iter().all(|one| one["health"] == "ok"), "nobody was moved: {controllers:?}");
+    hall.done(&["resume"]);
+    hall.comes_to("playing");
     hall.done(&["stop"]);
     hall.comes_to("stopped");
     hall.wait(|status| of_lift(status)["health"] == "rejoining");

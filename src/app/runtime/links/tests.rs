@@ -295,6 +295,9 @@ fn a_cue_is_executed_within_an_eighth_of_a_millimetre_its_lead_after_the_ticks()
                     worst = worst.max((place - 150.0 * wanted).abs());
                 }
             }
+            if rode && hall.state() == State::Parked {
+                assert!(hall.places_mm().iter().all(|place| place.abs() < 0.05), "{:?}", hall.places_mm());
+            }
         });
         assert_eq!(hall.state(), State::Parked);
         assert!(rode && worst < 0.12, "{worst} mm");
@@ -318,6 +321,8 @@ fn a_stop_brakes_the_drives_at_once_and_no_pose_that_was_under_way_moves_them_on
         hall.run(2.0, |_| {});
         assert_eq!(hall.places_mm(), places);
         assert_eq!(hall.state(), State::Stopped);
+        let reading = hall.reading().expect("it is read where it stands");
+        assert!(reading.rests && (150.0 * reading.pose[0] - places[0]).abs() < 0.1, "{reading:?} {places:?}");
         assert_gentle(hall);
     });
 }
