@@ -81,6 +81,7 @@ mod text_port;
 mod capture;
 mod doctor;
 mod latency;
+mod plot;
 mod sim;
 
 #[cfg(feature = "harness")]

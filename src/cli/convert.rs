@@ -170,6 +170,13 @@ fn failure(error: impl Into<anyhow::Error>, exit: Exit, path: &Path) -> Failure 
     Failure { exit, error: error.into().context(path.display().to_string()) }
 }
 
+/// Writes a whole file in the same way.
+pub(super) fn write_whole(output: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let part = Part::create(output).or_exit(Exit::Io)?;
+    (&part.file).write_all(bytes).map_err(|error| failure(error, Exit::Io, output))?;
+    part.rename().map_err(|error| failure(error, Exit::Io, output))
+}
+
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

@@ -28,6 +28,7 @@ mod latency;
 mod load;
 mod man;
 mod play;
+mod plot;
 mod preflight;
 mod print;
 mod prove;
@@ -76,6 +77,7 @@ enum Command {
     Sim(sim::Args),
     Check(check::Args),
     Info(info::Args),
+    Plot(plot::Args),
     Convert(convert::Args),
     Fit(fit::Args),
     Decode(decode::Args),
@@ -153,6 +155,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Sim(args) => sim::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Plot(args) => plot::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Decode(args) => decode::run(&args),

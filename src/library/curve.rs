@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::config::Config;
 use crate::cue::Unit;
 use crate::motion::{SeatType, Slot};
-use crate::timeline::{Cubic, Timeline};
+use crate::timeline::{Stretches, Timeline};
 
 /// The most stretches that a curve is asked in.
 pub(crate) const MAX_POINTS: usize = 4000;
@@ -54,11 +54,11 @@ pub(crate) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) ->
         timeline.unit(axis).slot(seat, axis - first, Some(axis))
     };
     let length_s = timeline.duration().as_secs_f64();
-    let span = length_s / count(points);
+    let stretches = Stretches { from: 0.0, span: length_s / count(points), count: points };
     CurveData {
         length_s,
-        t_s: (0..points).map(|stretch| (count(stretch) + 0.5) * span).collect(),
-        axes: (0..timeline.axes()).map(|axis| axis_curve(timeline, axis, &slot(axis), points)).collect(),
+        t_s: (0..points).map(|stretch| stretches.start(stretch) + 0.5 * stretches.span).collect(),
+        axes: (0..timeline.axes()).map(|axis| axis_curve(timeline, axis, &slot(axis), &stretches)).collect(),
     }
 }
 
@@ -68,54 +68,14 @@ pub(crate) fn needs_hall(timeline: &Timeline) -> bool {
     (0..timeline.axes()).any(|axis| timeline.unit(axis) != Unit::Fraction)
 }
 
-fn axis_curve(timeline: &Timeline, axis: usize, slot: &Slot, points: usize) -> AxisCurve {
-    let times = timeline.cue().times();
-    let span = timeline.duration().as_secs_f64() / count(points);
-    let mut ends = vec![(f64::INFINITY, f64::NEG_INFINITY); points];
-    for row in 0..times.len() - 1 {
-        let piece = Piece {
-            cubic: timeline.cubic(row, axis),
-            from: times[row].as_secs_f64(),
-            until: times[row + 1].as_secs_f64(),
-        };
-        let (first, last) = (stretch(piece.from, span, points), stretch(piece.until, span, points));
-        for (index, ends) in ends[first..=last].iter_mut().enumerate() {
-            let start = count(first + index) * span;
-            let (low, high) = piece.ends(start, start + span);
-            *ends = (ends.0.min(low), ends.1.max(high));
-        }
-    }
+fn axis_curve(timeline: &Timeline, axis: usize, slot: &Slot, stretches: &Stretches) -> AxisCurve {
+    let ends = timeline.envelope(axis, stretches);
     let part = |value: f64| slot.place(value);
     AxisCurve {
         name: format!("a{}", axis + 1),
         min: ends.iter().map(|(low, _)| part(*low)).collect(),
         max: ends.iter().map(|(_, high)| part(*high)).collect(),
     }
-}
-
-/// The curve of an axis from a row to the next, with their times in s.
-struct Piece {
-    cubic: Cubic,
-    from: f64,
-    until: f64,
-}
-
-impl Piece {
-    /// The least and greatest value between two times, as far as they are its own.
-    fn ends(&self, start: f64, end: f64) -> (f64, f64) {
-        let part = |time: f64| ((time - self.from) / (self.until - self.from)).clamp(0.0, 1.0);
-        let (start, end) = (part(start), part(end));
-        let within = self.cubic.still().filter(|u| (start..=end).contains(u));
-        let values = within.chain([start, end]).map(|u| self.cubic.at(u));
-        values
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-    }
-}
-
-/// The stretch that a time falls into.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to MAX_POINTS")]
-fn stretch(time: f64, span: f64, points: usize) -> usize {
-    ((time / span) as usize).min(points - 1)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "at most MAX_POINTS")]

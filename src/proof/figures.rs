@@ -36,10 +36,22 @@ pub fn figures(timeline: &Timeline, rate: Rate, seats: &[SeatAxis]) -> Vec<AxisF
 
 fn of_axis(timeline: &Timeline, axis: usize, on: &SeatAxis, stencils: &Stencils) -> AxisFigures {
     let slot = timeline.unit(axis).slot(&on.seat, on.index, Some(axis));
-    let stroke = on.geometry().stroke();
     let pieces = Pieces::new(timeline, axis, &slot);
+    of_pieces(timeline, axis, on, stencils, &pieces)
+}
+
+/// The same of an axis whose pieces are known.
+pub(super) fn of_pieces(
+    timeline: &Timeline,
+    axis: usize,
+    on: &SeatAxis,
+    stencils: &Stencils,
+    pieces: &Pieces,
+) -> AxisFigures {
+    let slot = timeline.unit(axis).slot(&on.seat, on.index, Some(axis));
+    let stroke = on.geometry().stroke();
     let most = |stencils: &[Stencil], order| {
-        let swept = sweep(&pieces, stencils, order, f64::INFINITY);
+        let swept = sweep(pieces, stencils, order, f64::INFINITY);
         let at = ShowTime::from_nanos(swept.at);
         let line = timeline.cue().line(timeline.row_before(at));
         Figure { value: swept.worst * stroke, at, line }

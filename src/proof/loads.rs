@@ -63,8 +63,8 @@ impl Loads {
     }
 }
 
-/// The greatest size of each stretch over all stencils.
-fn fill(pieces: &Pieces, stencils: &[Stencil], order: usize, light: f64, span: i64) -> Vec<f32> {
+/// The greatest size of each stretch of `span` nanoseconds over all stencils; what is below `light` may be told as anything up to that.
+pub(super) fn fill(pieces: &Pieces, stencils: &[Stencil], order: usize, light: f64, span: i64) -> Vec<f32> {
     let stretches = usize::try_from(pieces.end() / span).unwrap_or(0) + 1;
     let mut peaks = Peaks { span, most: vec![0.0; stretches] };
     let mut passed_over = vec![0.0_f32; stretches];

@@ -18,6 +18,7 @@ mod pieces;
 mod shake;
 mod smooth;
 mod stencil;
+mod strain;
 mod sweep;
 mod terms;
 #[cfg(test)]
@@ -35,6 +36,7 @@ pub use figures::figures;
 pub(crate) use fit::{Fitted, Manner, fit};
 pub(crate) use links::{LinkPlay, LinksProof, prove_in, prove_links};
 pub(crate) use loads::Loads;
+pub(crate) use strain::{AxisStrain, strains};
 pub(crate) use terms::LimitedEffect;
 pub use terms::Terms;
 pub(crate) use violation::{Breach, Quantity, Violation};

@@ -3,12 +3,14 @@
 
 mod cubic;
 mod curve;
+mod envelope;
 mod extremes;
 mod figures;
 mod fit;
 mod spline;
 
 pub(crate) use cubic::Cubic;
+pub(crate) use envelope::Stretches;
 pub(crate) use extremes::{AxisExtremes, Extreme};
 pub(crate) use figures::{EffectUse, Figure, LevelUse};
 pub(crate) use fit::{HELD_BACK, Held};

@@ -1,0 +1,161 @@
+//! `kinocue plot`.
+
+use std::io::{self, IsTerminal as _};
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+
+use super::load::{self, SeatArgs};
+use super::{Exit, Failure, OrExit as _, convert, figures, print};
+use crate::cue::Source;
+use crate::motion::SeatAxis;
+use crate::plot::{self, Columns, Picture, Subject, Theme};
+use crate::proof::Digest;
+use crate::time::{Rate, ShowTime, parse_time};
+use crate::timeline::Timeline;
+
+/// How far to each side of `--at` is shown.
+const AROUND: ShowTime = ShowTime::from_millis(5_000);
+/// Characters of a line where nobody says how wide it is.
+const WIDTH: u16 = 100;
+/// Columns of a file, shared out among the axes: what keeps it under 500 kB.
+const FILE_COLUMNS: usize = 7_200;
+/// The greatest width of a terminal that is used, characters.
+const WIDEST: u16 = 240;
+
+/// Draws a cue: where it goes, and what that asks of a seat.
+///
+/// On a terminal in braille; with -o as a page or an SVG that stand alone. Speed, acceleration and jerk are those of `kinocue
+/// info` and `kinocue check`, as parts of their limits.
+#[derive(Debug, clap::Args)]
+#[command(after_help = load::after_help(&[
+    "kinocue plot cues/coaster.csv",
+    "kinocue plot cues/storm.mcap -o storm.html",
+    "kinocue plot cues/coaster.csv --at 00:32.5 --theme print -o jerk.svg",
+    "kinocue plot cues/voyage.csv --config hall.toml --from 0:10 --to 0:20",
+]))]
+pub(super) struct Args {
+    /// The cue, CSV or MCAP.
+    cue: PathBuf,
+
+    #[command(flatten)]
+    seat: SeatArgs,
+
+    /// Begin here: SS, MM:SS or HH:MM:SS.
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    from: Option<ShowTime>,
+
+    /// End here.
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    to: Option<ShowTime>,
+
+    /// Show five seconds to either side of this.
+    #[arg(long, value_name = "TIME", value_parser = parse_time, conflicts_with_all = ["from", "to"])]
+    at: Option<ShowTime>,
+
+    /// The file to write; its name ends in .html or .svg.
+    #[arg(short, long, value_name = "OUT", conflicts_with = "json")]
+    output: Option<PathBuf>,
+
+    /// What the file is to be looked at on.
+    #[arg(long, value_enum, default_value_t, requires = "output")]
+    theme: Theme,
+
+    /// Overwrite OUT if it exists.
+    #[arg(long, requires = "output")]
+    force: bool,
+
+    /// Print the picture as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a picture is written as.
+#[derive(Debug, Clone, Copy)]
+enum Format {
+    Page,
+    Svg,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let file = args.output.as_deref().map(|path| Ok::<_, Failure>((path, format(path)?))).transpose()?;
+    if let Some((path, _)) = file {
+        convert::refuse_to_replace(path, args.force)?;
+    }
+    let hall = args.seat.config.as_deref().map(load::config).transpose()?;
+    let judge = args.seat.judge(hall)?;
+    let timeline = Timeline::new(load::cue(&args.cue, &Source::Native)?);
+    let seats = judge.seats(timeline.axes());
+    let (from, until) = args.window(timeline.duration())?;
+    let most = match file {
+        Some(_) => (FILE_COLUMNS / timeline.axes()).clamp(600, 1_200),
+        None => 2 * plot::cells(usize::from(width())) - 1,
+    };
+    let facts = facts(&timeline, &seats, judge.rate_hz);
+    let subject = Subject { timeline: &timeline, seats: &seats, rate: Rate::from_hz(judge.rate_hz), facts };
+    let mut picture = plot::of_cue(subject, Columns::over(from, until, most));
+    let faults = judge.stroke(&timeline).faults;
+    picture.facts.extend(faults.iter().map(|fault| fault.to_string().trim().to_owned()));
+    tell(&picture, file, args)?;
+    // Drawn all the same; but no seat can play what leaves its stroke.
+    Ok(faults.first().map_or(Exit::Done, load::cue_exit))
+}
+
+impl Args {
+    /// What is shown of a cue that lasts so long.
+    fn window(&self, end: ShowTime) -> Result<(ShowTime, ShowTime), Failure> {
+        let (from, until) = match self.at {
+            Some(at) => (
+                at.since(AROUND).max(ShowTime::ZERO),
+                ShowTime::from_nanos(at.as_nanos() + AROUND.as_nanos()),
+            ),
+            None => (self.from.unwrap_or(ShowTime::ZERO), self.to.unwrap_or(end)),
+        };
+        let until = until.min(end);
+        if from >= until {
+            let error = anyhow!("nothing to show from {from} to {until}; the cue is {end} long");
+            return Err(error).or_exit(Exit::Usage);
+        }
+        Ok((from, until))
+    }
+}
+
+fn format(path: &Path) -> Result<Format, Failure> {
+    match path.extension().and_then(|end| end.to_str()) {
+        Some("html") => Ok(Format::Page),
+        Some("svg") => Ok(Format::Svg),
+        _ => Err(anyhow!("{}: its name has to end in .html or .svg", path.display())).or_exit(Exit::Usage),
+    }
+}
+
+/// What the picture holds for.
+fn facts(timeline: &Timeline, seats: &[SeatAxis], rate_hz: f64) -> Vec<String> {
+    let cue = timeline.cue();
+    vec![
+        format!("{}, {}, {} rows", cue.path().display(), timeline.duration(), cue.rows()),
+        format!("seat {} at {rate_hz} frames a second, level 100 %", figures::seat_names(seats)),
+        format!("digest {}, kinocue {}", Digest::of(cue), env!("CARGO_PKG_VERSION")),
+    ]
+}
+
+fn tell(picture: &Picture, file: Option<(&Path, Format)>, args: &Args) -> Result<(), Failure> {
+    match file {
+        Some((path, format)) => {
+            let text = match format {
+                Format::Page => plot::page(picture, args.theme),
+                Format::Svg => plot::svg(picture, args.theme),
+            };
+            convert::write_whole(path, text.as_bytes())?;
+            print::out(&format!("{}\n", picture.sentence))
+        }
+        None if args.json => print::json(picture),
+        None => print::out(&plot::braille(picture)),
+    }
+}
+
+/// How wide the terminal is, characters.
+fn width() -> u16 {
+    let stdout = io::stdout();
+    let known = stdout.is_terminal().then(|| rustix::termios::tcgetwinsize(&stdout).ok()).flatten();
+    known.map(|size| size.ws_col).filter(|width| *width > 0).unwrap_or(WIDTH).min(WIDEST)
+}

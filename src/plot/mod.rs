@@ -1,0 +1,166 @@
+//! Pictures of motion over time: a [`Picture`] into braille for a terminal, into SVG, and into a page. Control thread; pure.
+//!
+//! The picture knows neither cue nor recording: bands over columns of time, lanes of what is on, flags and marks. What is drawn of
+//! a cue is made in `of_cue`; asked, sent and measured positions, lateness and states of a recording are more bands and lanes.
+
+mod braille;
+mod of_cue;
+mod page;
+mod path;
+mod scale;
+mod svg;
+#[cfg(test)]
+mod tests;
+mod text;
+mod theme;
+
+pub(crate) use braille::{braille, cells};
+pub(crate) use of_cue::{Columns, Subject, of_cue};
+pub(crate) use page::page;
+pub(crate) use svg::svg;
+pub(crate) use theme::Theme;
+
+use serde::Serialize;
+
+/// What is drawn: everything on one time axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Picture {
+    /// What it is of; from anywhere, and escaped by whoever draws it.
+    pub(crate) title: String,
+    /// What a person has to know first.
+    pub(crate) sentence: String,
+    /// What it holds for: digests, seat, rate, version.
+    pub(crate) facts: Vec<String>,
+    /// The time axis.
+    pub(crate) time: TimeAxis,
+    /// What has a scale, from the top down.
+    pub(crate) panels: Vec<Panel>,
+    /// What is on or off.
+    pub(crate) lanes: Vec<Lane>,
+    /// Named instants.
+    pub(crate) flags: Vec<Flag>,
+    /// The figures as words, a row each.
+    pub(crate) table: Vec<[String; 6]>,
+}
+
+/// Columns of time, all equally long.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct TimeAxis {
+    /// Show time at which the first column begins, s.
+    pub(crate) from_s: f64,
+    /// Show time at which the last column ends, s.
+    pub(crate) until_s: f64,
+    /// How many there are, at least one.
+    pub(crate) columns: usize,
+}
+
+impl TimeAxis {
+    /// Where a show time is, as a part of the axis; `None` outside.
+    #[must_use]
+    pub(crate) fn part(&self, at_s: f64) -> Option<f64> {
+        let part = (at_s - self.from_s) / (self.until_s - self.from_s);
+        (0.0..=1.0).contains(&part).then_some(part)
+    }
+}
+
+/// What a panel's scale means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Scale {
+    /// Places in a range that is drawn whole.
+    Range,
+    /// Parts of a limit, % of it; 100 is a line, and what is over it is hatched.
+    Limit,
+}
+
+/// Bands over one scale.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Panel {
+    /// What it shows.
+    pub(crate) name: String,
+    /// What is worst in it, in words.
+    pub(crate) note: String,
+    /// When and where in the file that is; empty where nothing is worst.
+    pub(crate) place: String,
+    /// The unit of its scale.
+    pub(crate) unit: &'static str,
+    /// What the scale means.
+    pub(crate) scale: Scale,
+    /// The lower end.
+    pub(crate) low: f64,
+    /// The upper end, above the lower one.
+    pub(crate) high: f64,
+    /// What is drawn.
+    pub(crate) bands: Vec<Band>,
+    /// The worst instants.
+    pub(crate) marks: Vec<Mark>,
+}
+
+impl Panel {
+    /// Where a value is on the scale, 0 at its lower end and 1 at the upper one; held at the ends.
+    #[must_use]
+    pub(crate) fn part(&self, value: f64) -> f64 {
+        ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0)
+    }
+}
+
+/// One curve: what it is at least and at most in each column.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Band {
+    /// What stands at its end.
+    pub(crate) name: String,
+    /// How it is drawn: the colour of that number, dashed from the seventh on.
+    pub(crate) style: usize,
+    /// Least and greatest of each column, in the panel's unit; `None` where nothing is known.
+    pub(crate) columns: Vec<Option<[f32; 2]>>,
+}
+
+impl Band {
+    /// The last place that is known of it.
+    #[must_use]
+    pub(crate) fn last(&self) -> Option<[f32; 2]> {
+        self.columns.iter().rev().find_map(|column| *column)
+    }
+}
+
+/// An instant of a band that is to be seen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Mark {
+    /// When, show time in s.
+    pub(crate) at_s: f64,
+    /// Where, in the panel's unit.
+    pub(crate) value: f64,
+    /// The style of its band.
+    pub(crate) style: usize,
+    /// What it is, with its place in the file.
+    pub(crate) words: String,
+}
+
+/// What is on over time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Lane {
+    /// What it is.
+    pub(crate) name: String,
+    /// How much of it there is, in words.
+    pub(crate) note: String,
+    /// The most of each column.
+    pub(crate) columns: Vec<Shade>,
+}
+
+/// How much something is on in a column.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub(crate) struct Shade {
+    /// How high, 0 to 1; 0 is off.
+    pub(crate) height: f32,
+    /// How dark, 0 to 1.
+    pub(crate) tone: f32,
+}
+
+/// A named instant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Flag {
+    /// When, show time in s.
+    pub(crate) at_s: f64,
+    /// Its name; from anywhere.
+    pub(crate) name: String,
+}

@@ -1,0 +1,91 @@
+'use strict';
+// Shows a part of the picture larger: what is drawn is stretched, what has a time of its own is put where that is.
+const steps = [.001, .002, .005, .01, .02, .05, .1, .2, .5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400];
+const main = document.querySelector('main');
+const from = Number(main.dataset.from), length = Number(main.dataset.until) - from, columns = Number(main.dataset.columns);
+let view = [0, 1];
+
+const clock = (at, step) => {
+  const places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), units = Math.round(at * 10 ** places), whole = Math.floor(units / 10 ** places);
+  const two = (n) => String(n).padStart(2, '0');
+  const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  const part = places ? `.${String(units % 10 ** places).padStart(places, '0')}` : '';
+  return `${h ? `${two(h)}:` : ''}${two(m)}:${two(s)}${part}`;
+};
+
+function ticks() {
+  const [begin, end] = view.map((part) => from + part * length);
+  const most = Math.max(2, document.querySelector('.times').clientWidth / 90);
+  const step = steps.find((one) => one >= (end - begin) / most) ?? 28800;
+  for (const box of document.querySelectorAll('.ticks')) {
+    const all = [];
+    for (let n = Math.ceil(begin / step - 1e-9); n * step <= end + 1e-9; n++) {
+      const tick = document.createElement('i');
+      tick.className = 'tick';
+      tick.dataset.at = (n * step - from) / length;
+      if (box.classList.contains('times')) tick.append(Object.assign(document.createElement('span'), { textContent: clock(n * step, step) }));
+      all.push(tick);
+    }
+    box.replaceChildren(...all);
+  }
+}
+
+function draw() {
+  const [begin, end] = view;
+  ticks();
+  for (const svg of document.querySelectorAll('svg')) svg.setAttribute('viewBox', `${begin * columns} 0 ${(end - begin) * columns} ${svg.dataset.high}`);
+  for (const one of document.querySelectorAll('[data-at]')) {
+    const at = (Number(one.dataset.at) - begin) / (end - begin);
+    one.hidden = at < -1e-9 || at > 1 + 1e-9;
+    one.style.left = `${100 * at}%`;
+  }
+}
+
+/** Shows the part between two places, never less than eight columns of it. */
+function show(begin, end) {
+  const span = Math.min(1, Math.max(end - begin, 8 / columns));
+  const first = Math.min(Math.max((begin + end - span) / 2, 0), 1 - span);
+  view = [first, first + span];
+  draw();
+}
+
+const move = (by) => show(view[0] + by * (view[1] - view[0]), view[1] + by * (view[1] - view[0]));
+const zoom = (by, about = .5) => {
+  const span = view[1] - view[0], at = view[0] + about * span;
+  show(at - by * about * span, at + by * (1 - about) * span);
+};
+const does = { in: () => zoom(.5), out: () => zoom(2), back: () => move(-.5), on: () => move(.5), whole: () => show(0, 1) };
+for (const button of document.querySelectorAll('.tools button')) button.addEventListener('click', does[button.dataset.does]);
+document.querySelector('.tools').hidden = false;
+
+for (const box of document.querySelectorAll('.drag')) {
+  const part = (event) => {
+    const { left, width } = box.getBoundingClientRect();
+    return Math.min(Math.max((event.clientX - left) / width, 0), 1);
+  };
+  let start = null;
+  const chosen = Object.assign(document.createElement('div'), { className: 'chosen', hidden: true });
+  box.append(chosen);
+  box.addEventListener('pointerdown', (event) => { start = part(event); box.setPointerCapture(event.pointerId); });
+  box.addEventListener('pointermove', (event) => {
+    if (start === null) return;
+    const [low, high] = [start, part(event)].sort((a, b) => a - b);
+    Object.assign(chosen.style, { left: `${100 * low}%`, width: `${100 * (high - low)}%` });
+    chosen.hidden = false;
+  });
+  box.addEventListener('pointerup', (event) => {
+    const [low, high] = [start, part(event)].sort((a, b) => a - b), span = view[1] - view[0];
+    start = null;
+    chosen.hidden = true;
+    if (high - low > .01) show(view[0] + low * span, view[0] + high * span);
+  });
+  box.addEventListener('pointercancel', () => { start = null; chosen.hidden = true; });
+  box.addEventListener('dblclick', does.whole);
+  box.addEventListener('wheel', (event) => {
+    if (!event.ctrlKey) return;
+    event.preventDefault();
+    zoom(event.deltaY > 0 ? 1.25 : .8, part(event));
+  }, { passive: false });
+}
+addEventListener('resize', draw);
+draw();

@@ -1,0 +1,167 @@
+//! A picture as a page that stands alone: as wide as its window, with figures as text; its script only shows parts larger. It may
+//! load nothing, from anywhere.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use sha2::{Digest as _, Sha256};
+
+use super::path::{self, HEIGHT};
+use super::svg::names;
+use super::text::{clock, number, safe};
+use super::theme::{Theme, classes};
+use super::{Lane, Panel, Picture, Scale, TimeAxis, scale};
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// The picture as a page.
+#[must_use]
+pub(crate) fn page(picture: &Picture, theme: Theme) -> String {
+    let time = &picture.time;
+    let title = safe(&picture.title);
+    let facts: String = picture.facts.iter().map(|fact| format!("<p>{}</p>", safe(fact))).collect();
+    format!(
+        "<!doctype html>\n<html lang=\"en\" class=\"plot\">\n<head><meta charset=\"utf-8\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{}'\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>{}\n{STYLE}</style></head>\n\
+         <body><main data-from=\"{}\" data-until=\"{}\" data-columns=\"{}\">\n<h1>{title}</h1>\n<p class=\"sentence\">{}</p>\n{TOOLS}\n\
+         {}{}{}{}\n{}<footer>{facts}</footer></main>\n<script>{SCRIPT}</script></body></html>\n",
+        STANDARD.encode(Sha256::digest(SCRIPT)),
+        theme.css(),
+        time.from_s,
+        time.until_s,
+        time.columns,
+        safe(&picture.sentence),
+        flags(picture),
+        picture.panels.iter().map(|panel| section(panel, time)).collect::<String>(),
+        picture.lanes.iter().map(|one| lane(one, time)).collect::<String>(),
+        times(time),
+        table(picture),
+    )
+}
+
+const TOOLS: &str = "<div class=\"tools\" hidden><button data-does=\"in\" aria-label=\"Larger\">+</button>\
+<button data-does=\"out\" aria-label=\"Smaller\">−</button><button data-does=\"back\" aria-label=\"Earlier\">←</button>\
+<button data-does=\"on\" aria-label=\"Later\">→</button><button data-does=\"whole\">Whole</button>\
+<span>Drag over a stretch of time to see it larger.</span></div>";
+
+fn at(time: &TimeAxis, at_s: f64) -> String {
+    let part = time.part(at_s).unwrap_or_default();
+    format!("data-at=\"{part:.6}\" style=\"left:{:.3}%", 100.0 * part)
+}
+
+fn percent(panel: &Panel, value: f64) -> f64 {
+    100.0 * (1.0 - panel.part(value))
+}
+
+fn head(name: &str, note: &str) -> String {
+    format!("<h2>{} <span>{}</span></h2>", safe(name), safe(note))
+}
+
+fn section(panel: &Panel, time: &TimeAxis) -> String {
+    let (class, high) = if panel.scale == Scale::Range { ("high", 220.0) } else { ("low", 130.0) };
+    let note = if panel.place.is_empty() {
+        panel.note.clone()
+    } else {
+        format!("{} · {}", panel.note, panel.place)
+    };
+    let mut out = format!(
+        "<section>{}<div class=\"box drag {class}\">",
+        head(&format!("{}, {}", panel.name, panel.unit), &note)
+    );
+    for tick in scale::of_values(panel.low, panel.high, 4.0).at {
+        out += &format!(
+            "<div class=\"y\" style=\"top:{:.2}%\"><span>{}</span></div>",
+            percent(panel, tick),
+            number(tick)
+        );
+    }
+    if panel.scale == Scale::Limit {
+        let limit = percent(panel, 100.0);
+        out += &format!(
+            "<div class=\"over\" style=\"height:{limit:.2}%\"></div><div class=\"y limit\" style=\"top:{limit:.2}%\"></div>"
+        );
+    }
+    out += "<div class=\"clip ticks\"></div>";
+    let range = if panel.scale == Scale::Range { " range" } else { "" };
+    let paths = panel.bands.iter().map(|band| {
+        format!("<path class=\"curve{range} {}\" d=\"{}\"/>", classes(band.style), path::band(panel, band))
+    });
+    out += &drawn(time, f64::from(HEIGHT), &format!("{}: {note}", panel.name), &paths.collect::<String>());
+    for mark in &panel.marks {
+        out += &format!(
+            "<i class=\"mark {}\" {};top:{:.2}%\" title=\"{}\"></i>",
+            classes(mark.style),
+            at(time, mark.at_s),
+            percent(panel, mark.value),
+            safe(&mark.words)
+        );
+    }
+    for (style, name, y) in names(panel, high, 14.0) {
+        out +=
+            &format!("<span class=\"name {}\" style=\"top:{y:.0}px\">{}</span>", classes(style), safe(name));
+    }
+    out + "</div></section>\n"
+}
+
+fn drawn(time: &TimeAxis, high: f64, label: &str, paths: &str) -> String {
+    format!(
+        "<div class=\"clip\"><svg role=\"img\" aria-label=\"{}\" preserveAspectRatio=\"none\" viewBox=\"0 0 {} {high}\" \
+         data-high=\"{high}\">{paths}</svg></div>",
+        safe(label),
+        time.columns
+    )
+}
+
+fn lane(lane: &Lane, time: &TimeAxis) -> String {
+    let paths = path::lane(lane)
+        .into_iter()
+        .map(|(tone, path)| format!("<path class=\"lane t{tone}\" d=\"{path}\"/>"));
+    let drawn = drawn(time, 16.0, &format!("{}: {}", lane.name, lane.note), &paths.collect::<String>());
+    format!(
+        "<section>{}<div class=\"box drag strip\">{drawn}</div></section>\n",
+        head(&lane.name, &lane.note)
+    )
+}
+
+fn flags(picture: &Picture) -> String {
+    if picture.flags.is_empty() {
+        return String::new();
+    }
+    let flag = |(row, flag): (usize, &super::Flag)| {
+        let late = if picture.time.part(flag.at_s).is_some_and(|part| part > 0.6) { " late" } else { "" };
+        format!(
+            "<i class=\"flag{late}\" {}\" title=\"{name}, {time}\"><span style=\"top:{}px\">{name}</span></i>",
+            at(&picture.time, flag.at_s),
+            20 * (row % 3),
+            name = safe(&flag.name),
+            time = clock(flag.at_s, 0.0)
+        )
+    };
+    let flags: String = picture.flags.iter().enumerate().map(flag).collect();
+    format!("<section><h2>Markers</h2><div class=\"box flags\">{flags}</div></section>\n")
+}
+
+/// Ticks as they are without the script.
+fn times(time: &TimeAxis) -> String {
+    let ticks = scale::of_time(time.from_s, time.until_s, 10.0);
+    let tick = |tick: &f64| {
+        let place = at(time, *tick);
+        format!("<i class=\"tick\" {place}\"><span>{}</span></i>", clock(*tick, ticks.step))
+    };
+    format!("<div class=\"box times ticks\">{}</div>", ticks.at.iter().map(tick).collect::<String>())
+}
+
+fn table(picture: &Picture) -> String {
+    if picture.table.is_empty() {
+        return String::new();
+    }
+    let row = |row: &[String; 6]| {
+        let cells: String = row.iter().map(|cell| format!("<td>{}</td>", safe(cell))).collect();
+        format!("<tr>{cells}</tr>\n")
+    };
+    let rows: String = picture.table.iter().map(row).collect();
+    format!(
+        "<section class=\"scrolls\"><h2>Most of each axis</h2><table><tr><th>axis<th>what<th>most<th>of limit<th>at<th>in the file</tr>\n{rows}</table></section>\n"
+    )
+}

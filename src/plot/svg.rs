@@ -1,0 +1,240 @@
+//! A picture as an SVG of a fixed size that stands alone.
+
+use super::path::{self, HEIGHT};
+use super::text::{clock, number, safe};
+use super::theme::{Theme, classes};
+use super::{Lane, Panel, Picture, Scale, TimeAxis, scale};
+
+/// The whole, px.
+const WIDTH: f64 = 1200.0;
+/// Where the time axis begins and how long it is, px.
+const LEFT: f64 = 56.0;
+const LENGTH: f64 = 1084.0;
+/// Texts below each other, px.
+const LINE: f64 = 20.0;
+/// Names at the ends of lines are at least so far apart, px.
+const APART: f64 = 14.0;
+
+const TEXT: &str = "text{font:13px system-ui,'DejaVu Sans','Noto Sans',sans-serif;fill:var(--text)}.big{font-size:20px;font-weight:650}\
+.head{font-weight:650}.quiet{fill:var(--quiet)}.grid{stroke:var(--edge);stroke-width:1}.limit{stroke:var(--text);stroke-width:1.2}\
+.flag{stroke:var(--text);stroke-dasharray:1 3}.mark{fill:var(--ground);stroke:var(--line);stroke-width:2}.ground{fill:var(--ground)}\
+.hatch{stroke:var(--over);stroke-width:2}.name.late{text-anchor:end}";
+
+/// The picture as an SVG.
+#[must_use]
+pub(crate) fn svg(picture: &Picture, theme: Theme) -> String {
+    let mut body = String::new();
+    let mut y = 2.0 * LINE;
+    body += &words(LEFT, 30.0, "big", &safe(&picture.title));
+    y += 14.0;
+    body += &words(LEFT, y, "", &safe(&picture.sentence));
+    y += LINE;
+    let (flags, depth) = flags(picture, y);
+    let top = y;
+    y += depth;
+    for panel in &picture.panels {
+        body += &drawn(panel, &picture.time, &mut y);
+    }
+    for one in &picture.lanes {
+        body += &lane(one, picture.time.columns, &mut y);
+    }
+    body += &format!("<path class=\"flag\" d=\"{}\"/>", flag_lines(picture, top, y));
+    body += &flags;
+    body += &times(&picture.time, y + 6.0);
+    y += 2.0 * LINE;
+    for fact in &picture.facts {
+        y += 18.0;
+        body += &words(LEFT, y, "quiet", &safe(fact));
+    }
+    let rows: String = picture.table.iter().map(|row| safe(&row.join(" ")) + "\n").collect();
+    let (title, sentence, height) = (safe(&picture.title), safe(&picture.sentence), y + 16.0);
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" role=\"img\" width=\"{WIDTH}\" height=\"{height}\" \
+         viewBox=\"0 0 {WIDTH} {height}\"><title>{title}</title><desc>{sentence}\n{rows}</desc><style>{TEXT}{}</style>\
+         <defs>{HATCH}</defs><rect class=\"ground\" width=\"100%\" height=\"100%\"/>{body}</svg>\n",
+        theme.css(),
+    )
+}
+
+/// Lines across what is over a limit.
+const HATCH: &str = "<pattern id=\"over\" width=\"8\" height=\"8\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
+<path class=\"hatch\" d=\"M0 0v8\"/></pattern>";
+
+fn words(x: f64, y: f64, class: &str, safe: &str) -> String {
+    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" class=\"{class}\">{safe}</text>")
+}
+
+/// A panel under its heading; `y` is moved behind it.
+fn drawn(panel: &Panel, time: &TimeAxis, y: &mut f64) -> String {
+    let high = if panel.scale == Scale::Range { 190.0 } else { 110.0 };
+    *y += 18.0;
+    let note = [&*panel.note, &panel.place]
+        .into_iter()
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join(" · ");
+    let mut out = format!(
+        "<text x=\"{LEFT}\" y=\"{:.1}\"><tspan class=\"head\">{}, {}</tspan> <tspan class=\"quiet\" dx=\"8\">{}</tspan></text>",
+        *y,
+        safe(&panel.name),
+        panel.unit,
+        safe(&note)
+    );
+    *y += 8.0;
+    let top = *y;
+    let at = |value: f64| top + high * (1.0 - panel.part(value));
+    let ticks = scale::of_values(
+        panel.low,
+        if panel.scale == Scale::Limit { panel.high.max(100.0) } else { panel.high },
+        4.0,
+    );
+    for tick in ticks.at.iter().chain((panel.scale == Scale::Range).then_some(&panel.high)) {
+        let y = at(*tick);
+        out += &format!("<path class=\"grid\" d=\"M{LEFT} {y:.1}h{LENGTH}\"/>");
+        out += &format!(
+            "<text class=\"quiet\" text-anchor=\"end\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            LEFT - 6.0,
+            y + 4.0,
+            number(*tick)
+        );
+    }
+    if panel.scale == Scale::Limit {
+        let limit = at(100.0);
+        out += &format!(
+            "<rect fill=\"url(#over)\" x=\"{LEFT}\" y=\"{top:.1}\" width=\"{LENGTH}\" height=\"{:.1}\"/>\
+             <path class=\"limit\" d=\"M{LEFT} {limit:.1}h{LENGTH}\"/>",
+            limit - top
+        );
+    }
+    out += &curves(panel, time, top, high);
+    *y += high + 8.0;
+    out
+}
+
+#[expect(clippy::cast_precision_loss, reason = "some thousand columns")]
+fn across(columns: usize) -> f64 {
+    LENGTH / columns as f64
+}
+
+/// Lines, their marks, and their names at their ends.
+fn curves(panel: &Panel, time: &TimeAxis, top: f64, high: f64) -> String {
+    let scale = (across(time.columns), high / f64::from(HEIGHT));
+    let mut out =
+        format!("<g transform=\"translate({LEFT} {top:.1}) scale({:.5} {:.5})\">", scale.0, scale.1);
+    let range = if panel.scale == Scale::Range { " range" } else { "" };
+    for band in &panel.bands {
+        let (class, path) = (classes(band.style), path::band(panel, band));
+        out += &format!(
+            "<path class=\"curve{range} {class}\" d=\"{path}\"><title>{}</title></path>",
+            safe(&band.name)
+        );
+    }
+    out += "</g>";
+    for mark in &panel.marks {
+        let x = LEFT + LENGTH * time.part(mark.at_s).unwrap_or_default();
+        let y = top + high * (1.0 - panel.part(mark.value));
+        let class = classes(mark.style);
+        out += &format!(
+            "<circle class=\"mark {class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\"><title>{}</title></circle>",
+            safe(&mark.words)
+        );
+    }
+    for (style, name, y) in names(panel, high, APART) {
+        out += &format!(
+            "<text class=\"name {}\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            classes(style),
+            LEFT + LENGTH + 8.0,
+            top + y + 4.0,
+            safe(name)
+        );
+    }
+    out
+}
+
+/// The names of bands, each as near to the end of its line as the others leave room: style, name, px from the top.
+pub(super) fn names(panel: &Panel, high: f64, apart: f64) -> Vec<(usize, &str, f64)> {
+    let mut names: Vec<_> = panel
+        .bands
+        .iter()
+        .filter_map(|band| {
+            let [least, most] = band.last()?.map(f64::from);
+            let end = if panel.scale == Scale::Limit { most } else { f64::midpoint(least, most) };
+            Some((band.style, band.name.as_str(), high * (1.0 - panel.part(end))))
+        })
+        .collect();
+    names.sort_by(|one, other| one.2.total_cmp(&other.2));
+    // Upwards from the ground, then downwards from the top: what is pushed out at one end is pushed back from it.
+    let mut room = high;
+    for name in names.iter_mut().rev() {
+        name.2 = name.2.min(room);
+        room = name.2 - apart;
+    }
+    let mut room = 0.0_f64;
+    for name in &mut names {
+        name.2 = name.2.max(room);
+        room = name.2 + apart;
+    }
+    names
+}
+
+fn lane(lane: &Lane, columns: usize, y: &mut f64) -> String {
+    *y += 16.0;
+    let mut out = format!(
+        "<text x=\"{LEFT}\" y=\"{:.1}\"><tspan class=\"head\">{}</tspan> <tspan class=\"quiet\" dx=\"8\">{}</tspan></text>",
+        *y,
+        safe(&lane.name),
+        safe(&lane.note)
+    );
+    *y += 5.0;
+    out += &format!("<path class=\"grid\" d=\"M{LEFT} {:.1}h{LENGTH}\"/>", *y + 13.0);
+    out += &format!(
+        "<g class=\"lane\" transform=\"translate({LEFT} {:.1}) scale({:.5} .8)\">",
+        *y,
+        across(columns)
+    );
+    for (tone, path) in path::lane(lane) {
+        out += &format!("<path class=\"t{tone}\" d=\"{path}\"/>");
+    }
+    *y += 18.0;
+    out + "</g>"
+}
+
+/// The names of flags in rows that do not run into each other, and how deep they are.
+fn flags(picture: &Picture, y: f64) -> (String, f64) {
+    const ROWS: usize = 4;
+    let mut ends = [f64::NEG_INFINITY; ROWS];
+    let mut out = String::new();
+    let mut depth = 0.0_f64;
+    for flag in &picture.flags {
+        let x = LEFT + LENGTH * picture.time.part(flag.at_s).unwrap_or_default();
+        let name: String = flag.name.chars().take(40).collect();
+        let width = 8.0 * f64::from(u16::try_from(name.chars().count()).unwrap_or(40)) + 10.0;
+        // One that no row has room for is told by its line alone, and by its title.
+        let begin = if x + width > WIDTH { x - width } else { x };
+        let Some(row) = ends.iter().position(|end| *end <= begin) else { continue };
+        ends[row] = begin + width;
+        let down = LINE * f64::from(u8::try_from(row).unwrap_or(0) + 1);
+        depth = depth.max(down);
+        let (class, x) = if begin < x { ("name late", x - 4.0) } else { ("name", x + 4.0) };
+        out += &words(x, y + down - 6.0, class, &safe(&name));
+    }
+    (out, depth)
+}
+
+fn flag_lines(picture: &Picture, top: f64, bottom: f64) -> String {
+    let x = |at_s: f64| LEFT + LENGTH * picture.time.part(at_s).unwrap_or_default();
+    picture.flags.iter().map(|flag| format!("M{:.1} {top:.1}V{bottom:.1}", x(flag.at_s))).collect()
+}
+
+fn times(time: &TimeAxis, y: f64) -> String {
+    let ticks = scale::of_time(time.from_s, time.until_s, 12.0);
+    let tick = |at: &f64| {
+        let x = LEFT + LENGTH * time.part(*at).unwrap_or_default();
+        format!(
+            "<path class=\"grid\" d=\"M{x:.1} {y:.1}v6\"/><text class=\"quiet\" text-anchor=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>",
+            y + 20.0,
+            clock(*at, ticks.step)
+        )
+    };
+    ticks.at.iter().map(tick).collect()
+}
