@@ -46,6 +46,14 @@ impl Reading {
     pub const fn at_rest(pose: Pose, at: MonoTime) -> Self {
         Self { pose, slots: u16::MAX, at, rests: true, moves: false, sways: 0.0, by: Source::Registers }
     }
+
+    /// True if another tells of a place that is off this one by more than that, strokes, in a slot that both tell of.
+    #[must_use]
+    pub(crate) fn differs(&self, other: &Self, by: f64) -> bool {
+        let both = self.slots & other.slots;
+        (self.pose.iter().zip(&other.pose).enumerate())
+            .any(|(slot, (one, other))| both & (1 << slot) != 0 && (one - other).abs() > by)
+    }
 }
 
 /// The newest ack of a lane and the newest reading of its seat.

@@ -56,6 +56,8 @@ pub enum Fall {
     PutBack,
     /// It was found, but what was read of it is not of now.
     Stale,
+    /// Its drives were told to stop, ahead of where poses have led it.
+    Stopped,
 }
 
 /// A frame that the kernel took.

@@ -267,6 +267,17 @@ pub(super) fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
     judge(played)
 }
 
+/// Who was silent, and what to look at: a drive on a link has no parameters of a controller.
+fn silence(played: &Played) -> anyhow::Error {
+    let mut silent = played.report.controllers.iter().filter(|one| played.silent.contains(&one.name));
+    let what = if silent.all(|one| one.address.starts_with("link:")) {
+        "power and cable, and ask `kinocue preflight` how its drives stand"
+    } else {
+        "power, cable, PA15 and PA20 to PA24"
+    };
+    anyhow!("{} acked nothing, or was lost at the end; check {what}", played.silent.join(", "))
+}
+
 /// How the program ends after a play.
 pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
     let refused: Vec<&str> = played
@@ -287,10 +298,7 @@ pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
         .or_exit(Exit::Refused);
     }
     if !played.silent.is_empty() {
-        let who = played.silent.join(", ");
-        let why =
-            anyhow!("{who} acked nothing, or was lost at the end; check power, cable, PA15 and PA20 to PA24");
-        return Err(why).or_exit(Exit::Unavailable);
+        return Err(silence(played)).or_exit(Exit::Unavailable);
     }
     if !played.off_park.is_empty() {
         let who = played.off_park.join(", ");

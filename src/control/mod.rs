@@ -21,7 +21,7 @@ pub(crate) use places::{Place, Places, network};
 pub use problem::{Code, Problem};
 pub use status::{ControllerStatus, JournalLine, Status};
 pub(crate) use status::{
-    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, PlaylistStatus,
-    PreflightStatus, RealTimeStatus, ShowStatus, TestRow, TestStatus, Warning,
+    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, LinkAxisStatus,
+    LinkStatus, PlaylistStatus, PreflightStatus, RealTimeStatus, ShowStatus, TestRow, TestStatus, Warning,
 };
 pub use who::{Surface, Who};

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::events::{EngineEvent, Unplanned};
 use super::lane::LaneMotion;
-use super::phase::{Following, Phase, Rest, hold_frames};
+use super::phase::{Following, Phase, Rest};
 use super::playhead::FramePace;
 use super::replan::{Goal, Planned, Replan};
 use super::{Directive, Ending, Engine};
@@ -84,7 +84,7 @@ impl Engine {
         if self.lanes.all.iter().any(LaneMotion::is_left_behind) {
             self.come_down(Rest::Ended);
         } else if !self.lanes.all.iter().any(LaneMotion::is_awaited) {
-            let frames = hold_frames(self.show.rate);
+            let frames = self.hold_frames();
             self.phase.carry(|course| Phase::Closing(course, frames));
         }
     }
@@ -244,8 +244,9 @@ impl Engine {
             Goal::Home | Goal::Park => self.playhead.skip(to, ShowTime::ZERO),
         }
         let stays = course.settled() <= course.start && !self.lanes.all.iter().any(LaneMotion::is_missing);
+        let holds = self.hold_frames();
         self.enter(match goal {
-            Goal::Home | Goal::Park if stays => Phase::Closing(course, hold_frames(self.show.rate)),
+            Goal::Home | Goal::Park if stays => Phase::Closing(course, holds),
             Goal::Home | Goal::Park => Phase::Parking(course),
             Goal::Again | Goal::Cue | Goal::Lanes => Phase::Following(Following::on(course)),
         });

@@ -17,9 +17,9 @@ impl Engine {
         if matches!(self.phase, Phase::Holding(_)) {
             self.give_up_replans();
             // Lanes that have been told so are left alone.
-            let is_told = self.sends_nothing();
+            let (is_told, frames) = (self.sends_nothing(), self.hold_frames());
             if let Phase::Holding(holding) = &mut self.phase {
-                holding.frames = if is_told { holding.frames } else { hold_frames(self.show.rate) };
+                holding.frames = if is_told { holding.frames } else { frames };
                 holding.why = why;
             }
             return;
@@ -51,7 +51,7 @@ impl Engine {
         self.stamps.break_off();
         self.lanes.halt();
         self.seek_at_rest();
-        self.rest(why, hold_frames(self.show.rate));
+        self.rest(why, self.hold_frames());
     }
 
     /// At rest, and no frame says so: the seats have not moved.
@@ -60,7 +60,14 @@ impl Engine {
         self.rest(Rest::Stopped, 0);
     }
 
-    fn rest(&mut self, why: Rest, frames: u8) {
+    /// Hold frames that end a motion of all lanes: by the last of them a seat that is led ahead is where its poses lead.
+    pub(super) fn hold_frames(&self) -> u16 {
+        let lead = self.lanes.all.iter().map(|lane| lane.window.lead()).max().unwrap_or_default();
+        let ahead = lead.as_nanos().div_ceil(self.show.rate.period().as_nanos().max(1));
+        u16::from(hold_frames(self.show.rate)).saturating_add(u16::try_from(ahead).unwrap_or(u16::MAX))
+    }
+
+    fn rest(&mut self, why: Rest, frames: u16) {
         self.enter(Phase::Holding(Holding { why, next: None, frames }));
     }
 
@@ -78,7 +85,7 @@ impl Engine {
         if let Phase::Braking(why) = self.phase
             && !self.lanes.all.iter().any(LaneMotion::is_braking)
         {
-            self.rest(why, hold_frames(self.show.rate));
+            self.rest(why, self.hold_frames());
         }
     }
 

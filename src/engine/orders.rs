@@ -63,8 +63,12 @@ impl Engine {
     /// Nothing goes to lanes any more that are led ahead: their seats are stopped where they are, by whoever leads them there, and not by
     /// poses that they would reach a while later.
     pub(crate) fn cut_led_ahead(&mut self) {
-        let is_led_ahead = |motion: &&mut LaneMotion| !motion.window.lead().is_zero();
-        self.lanes.all.iter_mut().filter(is_led_ahead).for_each(LaneMotion::cut);
+        let is_led_ahead = |motion: &LaneMotion| motion.is_there() && !motion.window.lead().is_zero();
+        for lane in 0..self.lanes.all.len() {
+            if !self.sends_nothing() && is_led_ahead(&self.lanes.all[lane]) {
+                self.lanes.fall_out(lane, Fall::Stopped);
+            }
+        }
     }
 
     /// The seat of that lane, which was cut off, vibrates on about that pose: slow frames lead it there, without vibration. It is looked at

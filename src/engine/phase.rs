@@ -51,7 +51,7 @@ pub(super) enum Phase {
     Holding(Holding),
     Parking(Box<Course>),
     /// At the end of the way to park, with so many frames to go that say so.
-    Closing(Box<Course>, u8),
+    Closing(Box<Course>, u16),
     Done,
 }
 
@@ -99,7 +99,7 @@ pub(super) struct Holding {
     pub(super) next: Option<Replan>,
     /// Hold frames that are yet to be sent. Where the show is to go on soon each tick sends one. Else they end with the rest's first
     /// tenth of a second: one that came later would take a seat back that somebody has moved by hand meanwhile.
-    pub(super) frames: u8,
+    pub(super) frames: u16,
 }
 
 impl Phase {

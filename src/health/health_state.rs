@@ -58,6 +58,8 @@ pub enum Why {
     Moved(usize),
     /// It is not known where the frames to this controller have led its seat.
     Unsure(usize),
+    /// The drives of this controller were stopped ahead of where poses have led its seat.
+    CutShort(usize),
     /// The seat of this controller is elsewhere than acked frames have led it.
     Astray(usize),
     /// One of these was so three times within a minute.
@@ -138,6 +140,7 @@ impl Why {
             | Self::Silent(controller)
             | Self::Moved(controller)
             | Self::Unsure(controller)
+            | Self::CutShort(controller)
             | Self::Astray(controller)
             | Self::Unsteady(controller)
             | Self::Unread(controller)

@@ -228,9 +228,10 @@ impl Member {
             Fall::Gap => Why::Unsure(self.controller),
             Fall::Astray => Why::Astray(self.controller),
             Fall::PutBack | Fall::Stale => Why::NotSeenYet,
+            Fall::Stopped => Why::CutShort(self.controller),
         };
         (self.unsure, self.seen, self.reading) = (Some(why), None, false);
-        if why == Why::NotSeenYet {
+        if matches!(why, Why::NotSeenYet | Why::CutShort(_)) {
             return;
         }
         let [last, before] = self.falls;

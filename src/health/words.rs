@@ -65,6 +65,7 @@ impl Why {
                 "this IMAX answers as its manual has it and no other that is known: take it out, and send a capture \
                  (`kinocue decode --dialect imax`) to whoever looks after this program",
             ),
+            Self::CutShort(_) => Some("wait until it was read"),
             Self::MoreAxes { .. } => Some(
                 "set PA02 to the axes of the seat, or give the seat a type with as many; with the seats parked or stopped, clear",
             ),
@@ -115,6 +116,7 @@ impl Why {
             Self::Unsure(_) => {
                 "frames to it, or its acks, were missing for over 50 ms: where it is has to be read"
             }
+            Self::CutShort(_) => "its drives were stopped: where it stands is read",
             Self::Astray(_) => {
                 "it acks frames and is elsewhere than they have led it: it homes by itself or is jogged (PA96 to PA98), or its \
                  filters delay it too much"
@@ -137,7 +139,7 @@ impl Why {
             Self::OtherMaster(_) => {
                 "it got more datagrams (DP34) than were sent from here: another machine sends to it"
             }
-            Self::NotHome(_) => "it was reset: it is not home (DPF0)",
+            Self::NotHome(_) => "it is not home: it was reset, or was never homed",
             Self::Other(_) => "another controller or another work mode (PA00) than before",
             Self::Gap(_) => {
                 "it was silent for so long that it may have rebooted, and it counts no packets (DP34) that would tell"

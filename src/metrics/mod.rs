@@ -13,6 +13,7 @@ use crate::control::{self, Status};
 
 mod controllers;
 mod film;
+mod links;
 mod shows;
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ pub(crate) fn render(status: &Status) -> String {
 fn families(status: &Status) -> Vec<Family> {
     let mut families = shows::families(status);
     families.extend(controllers::families(&status.controllers));
+    families.extend(links::families(&status.links));
     families.extend(status.film.iter().flat_map(film::families));
     families
 }

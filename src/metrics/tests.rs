@@ -3,8 +3,9 @@ use std::collections::BTreeMap;
 use super::*;
 use crate::control::model::FrameCounts;
 use crate::control::{
-    ControllerStatus, FilmDisagreement, FilmSourceStatus, FilmStatus, Health, Histogram, Levels, Percentiles,
-    PreflightStatus, RealTimeStatus, Severity, ShowStatus, Times, Warning,
+    ControllerStatus, FilmDisagreement, FilmSourceStatus, FilmStatus, Health, Histogram, Levels,
+    LinkAxisStatus, LinkStatus, Percentiles, PreflightStatus, RealTimeStatus, Severity, ShowStatus, Times,
+    Warning,
 };
 use crate::state::{PlayMode, State};
 
@@ -137,6 +138,7 @@ fn playing() -> Status {
             refusals: vec![],
         },
         controllers: vec![controller("A1", Some("A")), controller("B1", None)],
+        links: vec![link()],
         preflight: Some(PreflightStatus { passed: true, age_s: 300.0, answered: 2, findings: vec![] }),
         warnings: vec![warning("A1"), warning("B1")],
         journal: vec![],
@@ -155,10 +157,50 @@ fn booting() -> Status {
         ack_latency: Times::default(),
         realtime: RealTimeStatus::default(),
         controllers: vec![],
+        links: vec![],
         preflight: None,
         warnings: vec![],
         ..playing()
     }
+}
+
+/// One with an axis that had trouble.
+fn link() -> LinkStatus {
+    let axis = LinkAxisStatus {
+        controller: "L1".to_owned(),
+        axis: 2,
+        made: 90,
+        acked: 80,
+        dry: 1,
+        error_mm: 2.5,
+        ..<_>::default()
+    };
+    let (name, port) = ("stalls".to_owned(), "/dev/ttyUSB0".to_owned());
+    LinkStatus {
+        name,
+        port,
+        asked: 700,
+        answered: 690,
+        delay_p99_us: 1_500.0,
+        axes: vec![axis],
+        ..<_>::default()
+    }
+}
+
+#[test]
+fn each_link_and_each_axis_on_it_has_its_figures() {
+    let page = render(&playing());
+    for line in [
+        "kinocue_link_up{link=\"stalls\"} 1.0",
+        "kinocue_link_answer_delay_seconds{link=\"stalls\"} 0.0015",
+        "kinocue_link_exchanges_total{link=\"stalls\",result=\"answered\"} 690",
+        "kinocue_axis_segments_total{link=\"stalls\",controller=\"L1\",axis=\"a2\",result=\"acked\"} 80",
+        "kinocue_axis_queue_dry_total{link=\"stalls\",controller=\"L1\",axis=\"a2\"} 1",
+        "kinocue_axis_error_meters{link=\"stalls\",controller=\"L1\",axis=\"a2\"} 0.0025",
+    ] {
+        assert!(page.lines().any(|one| one == line), "{line}: {page}");
+    }
+    assert!(!render(&booting()).contains("kinocue_link"), "a hall without links has none of it");
 }
 
 fn page(status: &Status) -> Page {

@@ -14,6 +14,7 @@ use super::live::Live;
 use super::mail::{Alarm, Sent};
 use super::standby::Standby;
 use super::table::{Row, Turns};
+use crate::belief::Reading;
 use crate::config::Controller;
 use crate::drive::link::LaneWants;
 use crate::drive::{EvidenceList, Lane, MOST_EVIDENCE, Need, Peer, Rounds, Whereabouts};
@@ -30,6 +31,8 @@ const CHANGES_KEPT: usize = 1_000;
 
 /// So often effects are switched off at a controller that gets no more frames: a datagram may be lost, and nobody answers.
 const DARKENED: u8 = 3;
+/// A seat at rest that is so far from where it was, strokes, was moved.
+const MOVED: f64 = 0.002;
 /// A controller that was not seen for so long after the hall was cleared holds up nobody.
 const SILENT_AFTER: Duration = Duration::from_secs(3);
 
@@ -49,6 +52,8 @@ pub(crate) struct Watch {
     live: Arc<Live>,
     /// Since when a reading of all seats was asked for that was sent last.
     wanted: MonoTime,
+    /// Where each seat was read first in the pause that is under way.
+    paused_at: Vec<Option<Reading>>,
     /// When the last status report of each came that was taken up.
     reported: Vec<MonoTime>,
     /// Events of the observer that were heard.
@@ -97,6 +102,7 @@ impl Watch {
             notices: Vec::with_capacity(4 * (controllers.len() + groups) + 4),
             changes: Vec::with_capacity(CHANGES_KEPT),
             wanted: MonoTime::default(),
+            paused_at: vec![None; controllers.len()],
             reported: vec![MonoTime::default(); controllers.len()],
             heard: 0,
             lit: vec![0; controllers.len()],
@@ -207,14 +213,24 @@ impl Watch {
         }
     }
 
-    /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.
+    /// The next motion begins where the last one left the seats. That somebody has moved one since is worth a word: off park, or in a
+    /// pause off where it was read first.
     fn mind_rest(&mut self, controller: usize, place: &Whereabouts) {
-        let is_set =
-            matches!(self.state, State::Parked | State::Armed | State::Paused) && !self.live.is_moving();
+        let is_set = matches!(self.state, State::Parked | State::Armed | State::Paused);
         let stands = self.stands(controller);
-        let is_to_rest = is_set && self.standby.is_some() && stands.may_move();
-        let rests = place.reading.is_some_and(|reading| reading.rests);
-        if is_to_rest && rests && place.is_off_park && stands != HealthState::Rejoining {
+        if !is_set || self.standby.is_none() || self.live.is_moving() {
+            self.paused_at[controller] = None;
+            return;
+        }
+        let Some(reading) = place.reading.filter(|reading| reading.rests && stands.may_move()) else {
+            return;
+        };
+        let is_off = if self.state == State::Paused {
+            self.paused_at[controller].get_or_insert(reading).differs(&reading, MOVED)
+        } else {
+            place.is_off_park
+        };
+        if is_off && stands != HealthState::Rejoining {
             self.health.on_moved(controller);
         }
     }

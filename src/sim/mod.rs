@@ -12,7 +12,7 @@
 //! thread of normal priority; once it runs, a motion frame costs it no allocation. What the manuals leave open is
 //! [`Invented`], and can be played the other way.
 
-mod chance;
+pub(crate) mod chance;
 mod command;
 mod controller;
 mod counts;

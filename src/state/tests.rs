@@ -409,7 +409,7 @@ fn the_first_thing_that_went_wrong_is_the_one_named() {
 #[test]
 fn homing_and_parking_that_take_too_long_are_faults() {
     let mut homing = hall(State::Homing);
-    homing.tick(s(65));
+    homing.tick(s(900));
     assert_eq!((homing.state(), homing.cause()), (State::Fault, Cause::Trouble(Trouble::HomingTime)));
     let mut parking = hall(State::Parking);
     parking.tick(s(120));

@@ -22,6 +22,7 @@ mod serving;
 mod wav;
 
 mod begin;
+mod drives;
 mod film;
 mod hall;
 mod lasting;

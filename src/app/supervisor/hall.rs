@@ -16,7 +16,7 @@ use crate::control::{Code, Problem};
 use crate::engine::Unplanned;
 use crate::health::Groups;
 use crate::osc::Counts;
-use crate::rt::{Desk, Live, Loaded, Row, Times};
+use crate::rt::{Desk, LinkEnd, Live, Loaded, Row, Times};
 use crate::state::{Cause, State, Whose};
 use crate::sys::realtime::RealTime;
 use crate::time::{MonoTime, ShowTime};
@@ -50,6 +50,8 @@ pub(super) struct HallContext {
     pub(super) player: Option<PlayerLink>,
     /// What has come to the port for OSC, if there is one.
     pub(super) osc: Option<Arc<Counts>>,
+    /// The serial links that have seats.
+    pub(super) links: Vec<LinkEnd>,
     /// The slow work that is under way.
     pub(super) job: Option<&'static str>,
     pub(super) now: MonoTime,
@@ -118,6 +120,7 @@ impl HallContext {
             film: None,
             player: None,
             osc: None,
+            links: runtime.links.clone(),
             job: None,
             now,
         }

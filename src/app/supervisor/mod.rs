@@ -16,6 +16,7 @@ mod hall_settings;
 mod homing;
 mod job;
 mod lasting;
+mod links;
 mod list;
 mod perform;
 mod player;

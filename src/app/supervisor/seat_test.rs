@@ -6,12 +6,15 @@ use crate::config::{Config, cue_axes};
 use crate::control::model::us;
 use crate::control::{Code, Problem, TestRow, TestStatus};
 use crate::cue::CueBuilder;
+use crate::motion::{AxisGeometry, AxisUnit};
 use crate::rt::Row;
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
 
 /// How far an axis moves from park, of its stroke.
 const REACH: f64 = 0.2;
+/// How far an axis that turns does, degrees: a fifth of a whole turn would throw what lies on it.
+const TURN_DEG: f64 = 20.0;
 /// How long one axis takes, there, a rest, and back, ms.
 const AXIS_MS: u32 = 6_000;
 /// How long an effect is given, half of it on, ms.
@@ -43,11 +46,13 @@ fn script(config: &Config) -> (Vec<TestPart>, CueBuilder) {
     let axes = cue_axes(&config.controllers);
     let effects: Vec<String> = config.effects.iter().map(|effect| effect.name.clone()).collect();
     let park: Vec<f64> = (0..axes).map(|axis| park_of(config, axis)).collect();
-    let away = |park: f64| if park + REACH <= 1.0 { park + REACH } else { park - REACH };
+    let reach: Vec<f64> = (0..axes).map(|axis| reach_of(config, axis)).collect();
+    let away = |park: f64, reach: f64| if park + reach <= 1.0 { park + reach } else { park - reach };
     let mut cue = CueBuilder::new("test", axes).curved("test of empty seats", effects.clone());
     let time = |ms: u32| ShowTime::from_millis(i64::from(ms));
     let mut row = |at_ms: u32, moved: Option<usize>, on: Option<usize>| {
-        let place = |(axis, park): (usize, &f64)| if moved == Some(axis) { away(*park) } else { *park };
+        let place =
+            |(axis, park): (usize, &f64)| if moved == Some(axis) { away(*park, reach[axis]) } else { *park };
         cue.row(time(at_ms), park.iter().enumerate().map(place), on);
     };
     let (mut parts, mut at) = (Vec::new(), LEAD_MS);
@@ -78,10 +83,21 @@ fn script(config: &Config) -> (Vec<TestPart>, CueBuilder) {
     (parts, cue)
 }
 
-/// Where an axis of the cue rests: that of the first seat that takes it.
+/// The first seat that takes an axis of the cue says what it is.
+fn geometry_of(config: &Config, axis: usize) -> Option<&AxisGeometry> {
+    let taker = config.controllers.iter().find(|one| one.takes(axis))?;
+    taker.seat.each.get(axis - taker.axis_offset)
+}
+
+/// Where it rests.
 fn park_of(config: &Config, axis: usize) -> f64 {
-    let taker = config.controllers.iter().find(|one| one.takes(axis));
-    taker.map_or(0.0, |one| one.seat.each[axis - one.axis_offset].park)
+    geometry_of(config, axis).map_or(0.0, |axis| axis.park)
+}
+
+/// How far it moves, of its range: the same way for a short range of turns as for a stroke.
+fn reach_of(config: &Config, axis: usize) -> f64 {
+    let turns = geometry_of(config, axis).filter(|axis| axis.unit == AxisUnit::Degree);
+    turns.map_or(REACH, |axis| REACH.min(TURN_DEG / axis.stroke()))
 }
 
 impl SeatTest {
@@ -152,5 +168,29 @@ fn row_of(controller: &str, part: &str, then: &Row, now: &Row) -> TestRow {
         p99_us: now.ack_ns.map(|ack| us(ack.p99)),
         // What was asked in the last moment may still be on its way.
         passed: asked > 0 && acked + now.counts.in_flight() >= asked && now.standing.may_move(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turntable_turns_by_twenty_degrees_and_other_axes_by_a_fifth_of_their_stroke() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("hall.toml");
+        let text = "[seat.s]\naxes = 2\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 10000\n\
+            max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n\
+            [seat.s.axis2]\nunit = \"deg\"\nrange = [-180, 180]\npulses_per_rev = 36000\n\
+            max_velocity_deg_s = 60\nmax_acceleration_deg_s2 = 120\nmax_jerk_deg_s3 = 600\npark = 0\n\
+            [[controller]]\nname = \"A1\"\nseat = \"s\"\naddress = \"127.0.0.1:9\"\n";
+        std::fs::write(&file, text).unwrap();
+        let (_, cue) = script(&crate::config::load(&file).unwrap());
+        let cue = cue.build().unwrap();
+        let reach = |axis: usize, park: f64| {
+            (0..cue.rows()).map(|row| (cue.row(row)[axis] - park).abs()).fold(0.0, f64::max)
+        };
+        assert!((reach(0, 0.0) - 0.2).abs() < 1e-9);
+        assert!((360.0 * reach(1, 0.5) - 20.0).abs() < 1e-9);
     }
 }

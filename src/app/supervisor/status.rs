@@ -4,7 +4,7 @@ use jiff::Zoned;
 
 use super::features::Features;
 use super::hall::HallContext;
-use super::{belts, film};
+use super::{belts, film, links};
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
@@ -86,6 +86,7 @@ impl StatusParts<'_> {
                 refusals: hall.granted.refusals.clone(),
             },
             controllers: self.controllers(table),
+            links: links::status(hall),
             preflight: preflighted.as_ref().map(|it| it.status(now, |lane| hall.settings.is_on(lane))),
             warnings,
             test: features.seats.test.as_ref().map(|test| test.status.clone()),

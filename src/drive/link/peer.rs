@@ -153,7 +153,9 @@ impl LinkPeer {
             let before = told.filter(|told| at.since(told.at) <= APART);
             let stays = before.map(|told| told.stays).filter(|(stay, _)| (place - stay).abs() <= STILL);
             let moved = before.is_some_and(|told| told.moved || stays.is_none());
-            *told = Some(Told { place, at, stays: stays.unwrap_or((place, at)), moved });
+            // Where it stood before all poses were over says nothing of whether it rests.
+            let stays = stays.filter(|(_, since)| *since > self.sent).unwrap_or((place, at));
+            *told = Some(Told { place, at, stays, moved });
         }
         let reading = self.reading();
         let slot = self.first_slot + axis;
@@ -182,7 +184,7 @@ impl LinkPeer {
             reading.pose[slot] = told.place;
             reading.slots |= 1 << slot;
             reading.at = reading.at.min(told.at);
-            let rests = told.stays.1 >= self.sent && told.at.since(told.stays.1) >= REST;
+            let rests = told.at.since(told.stays.1) >= REST;
             reading.rests &= rests;
             reading.moves |= told.moved && !rests;
         }

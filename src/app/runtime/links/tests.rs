@@ -2,6 +2,8 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "numbers of ticks")]
 
+mod chance;
+
 use std::cell::Cell;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard};
@@ -204,6 +206,14 @@ fn read(text: &str) -> Config {
 
 /// Opens a hall whose seat was homed, with a cue on it.
 fn hall(lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline)) {
+    hall_over(|line| Box::new(line), lead);
+}
+
+/// The same, where its play has the line by a port of this kind.
+fn hall_over(
+    over: impl FnOnce(SharedLine) -> Port,
+    lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline),
+) {
     NOW.set(MonoTime::from_nanos(3_000_000_000));
     let config = Arc::new(read(HALL));
     let setups = [16, 17, 18].map(|unit| UnitSetup { place: 12_000, ..UnitSetup::new(unit) });
@@ -228,7 +238,7 @@ fn hall(lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline)) {
         &Numbers::new(),
         &Arc::default(),
         network,
-        vec![Box::new(line.clone())],
+        vec![over(line.clone())],
     )
     .expect("it opens");
     let origin = NOW.get() + Duration::from_millis(20);
@@ -285,6 +295,9 @@ fn a_cue_is_executed_within_an_eighth_of_a_millimetre_its_lead_after_the_ticks()
                     worst = worst.max((place - 150.0 * wanted).abs());
                 }
             }
+            if rode && hall.state() == State::Parked {
+                assert!(hall.places_mm().iter().all(|place| place.abs() < 0.05), "{:?}", hall.places_mm());
+            }
         });
         assert_eq!(hall.state(), State::Parked);
         assert!(rode && worst < 0.12, "{worst} mm");
@@ -308,6 +321,8 @@ fn a_stop_brakes_the_drives_at_once_and_no_pose_that_was_under_way_moves_them_on
         hall.run(2.0, |_| {});
         assert_eq!(hall.places_mm(), places);
         assert_eq!(hall.state(), State::Stopped);
+        let reading = hall.reading().expect("it is read where it stands");
+        assert!(reading.rests && (150.0 * reading.pose[0] - places[0]).abs() < 0.1, "{reading:?} {places:?}");
         assert_gentle(hall);
     });
 }
@@ -324,6 +339,21 @@ fn a_line_that_is_cut_brings_the_seat_to_rest_within_the_lead_and_puts_its_lane_
         hall.run(1.0, |_| {});
         assert_eq!(hall.places_mm(), places);
         assert!(!hall.loops.ticks.engine.lane(0).gets_a_frame(), "no pose goes to it");
+        assert_gentle(hall);
+    });
+}
+
+#[test]
+fn a_seat_that_braked_since_its_thread_was_held_up_is_found_at_rest_and_joins_again() {
+    hall(|hall, show, _| {
+        hall.go(show);
+        hall.run(5.0, |_| {});
+        for held_ms in [150, 180, 210, 240] {
+            let held_until = hall.line.lock().now + Duration::from_millis(held_ms);
+            hall.line.lock().sleep_until(held_until);
+            hall.run(3.0, |_| {});
+            assert!(hall.loops.ticks.engine.lane(0).gets_a_frame(), "held up for {held_ms} ms");
+        }
         assert_gentle(hall);
     });
 }

@@ -1,0 +1,78 @@
+//! Figures of each serial link, and of each axis on it.
+
+use super::{Family, Labels, Values, flag};
+use crate::control::{LinkAxisStatus, LinkStatus};
+
+pub(super) fn families(links: &[LinkStatus]) -> Vec<Family> {
+    if links.is_empty() {
+        return Vec::new();
+    }
+    let up = links.iter().map(|link| (of(link), flag(link.fault.is_none())));
+    let delay = links.iter().map(|link| (of(link), link.delay_p99_us / 1e6));
+    vec![
+        Family { name: "link_up", help: "1 where its port is open", values: Values::Gauges(up.collect()) },
+        Family {
+            name: "link_answer_delay_seconds",
+            help: "99 of 100 answers begin no later after the request",
+            values: Values::Gauges(delay.collect()),
+        },
+        Family {
+            name: "link_exchanges",
+            help: "Requests to drives, and what came of them; stray: what came that answers nothing",
+            values: Values::Counters(links.iter().flat_map(exchanges).collect()),
+        },
+        Family {
+            name: "axis_segments",
+            help: "Segments of motion made for an axis, and what became of them",
+            values: Values::Counters(axes(links).flat_map(segments).collect()),
+        },
+        Family {
+            name: "axis_queue_dry",
+            help: "How often the queue of an axis ran dry in motion",
+            values: Values::Counters(axes(links).map(|(link, axis)| (at(link, axis), axis.dry)).collect()),
+        },
+        Family {
+            name: "axis_error_meters",
+            help: "How far the motor was beside its target when both were read last",
+            values: Values::Gauges(
+                axes(links).map(|(link, axis)| (at(link, axis), axis.error_mm / 1e3)).collect(),
+            ),
+        },
+    ]
+}
+
+fn axes(links: &[LinkStatus]) -> impl Iterator<Item = (&LinkStatus, &LinkAxisStatus)> {
+    links.iter().flat_map(|link| link.axes.iter().map(move |axis| (link, axis)))
+}
+
+fn exchanges(link: &LinkStatus) -> Vec<(Labels, u64)> {
+    let counts =
+        [("asked", link.asked), ("answered", link.answered), ("late", link.late), ("stray", link.stray)];
+    counts.map(|(result, count)| (and(of(link), result), count)).into()
+}
+
+fn segments((link, axis): (&LinkStatus, &LinkAxisStatus)) -> Vec<(Labels, u64)> {
+    let counts = [
+        ("made", axis.made),
+        ("acked", axis.acked),
+        ("refused", axis.refused),
+        ("in_doubt", axis.in_doubt),
+        ("skipped", axis.skipped),
+    ];
+    counts.map(|(result, count)| (and(at(link, axis), result), count)).into()
+}
+
+fn of(link: &LinkStatus) -> Labels {
+    vec![("link", link.name.clone())]
+}
+
+fn at(link: &LinkStatus, axis: &LinkAxisStatus) -> Labels {
+    let mut labels = of(link);
+    labels.extend([("controller", axis.controller.clone()), ("axis", format!("a{}", axis.axis))]);
+    labels
+}
+
+fn and(mut labels: Labels, result: &str) -> Labels {
+    labels.push(("result", result.to_owned()));
+    labels
+}
