@@ -135,7 +135,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn the_greatest_of_a_picture_is_that_of_info_to_the_last_digit(
+    fn the_greatest_of_a_picture_and_its_mark_are_that_of_info(
         seed in 0_usize..1000,
         swing in 0.001_f64..1.0,
         columns in 1_usize..300,
@@ -151,7 +151,8 @@ proptest! {
                 (figures.jerk.value, limits.max_jerk),
             ];
             for (panel, (value, limit)) in picture.panels[1..].iter().zip(told) {
-                prop_assert_eq!(most(&panel.bands[axis]), 100.0 * (value / limit) as f32);
+                let told = f64::from(most(&panel.bands[axis])) / 100.0;
+                prop_assert!((told * limit / value - 1.0).abs() < 2e-7, "single precision: {told}");
                 let mark = panel.marks.iter().find(|mark| mark.style == axis).unwrap();
                 prop_assert_eq!(mark.value, 100.0 * value / limit);
             }
