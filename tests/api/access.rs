@@ -53,6 +53,7 @@ fn without_a_token_there_is_nothing_but_the_page_and_whether_it_is_well() {
         assert!(reply.value().get("state").is_none(), "nothing of the hall: {}", reply.text());
     }
     assert_eq!(hall.port().post("/api/v1/show/stop").problem(), problem(401, "token"));
+    hall.is_well();
     for path in ["/", "/console.js", "/healthz", "/api/v1/openapi.json"] {
         assert_eq!(hall.port().get(path).status, 200, "{path}");
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use kinocue::harness::api::{self, Running, Setup, StopSocket};
 use kinocue::harness::config::{self, ApiToken};
@@ -22,7 +22,7 @@ use kinocue::harness::state::{PlayMode, State};
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 
-use crate::client::To;
+use crate::client::{PATIENCE, To};
 
 /// One token for each role.
 pub const TOKENS: [(&str, Role); 3] =
@@ -44,6 +44,7 @@ pub struct Hall {
     _stop: StopSocket,
     ends: Arc<AtomicBool>,
     supervisor: Option<JoinHandle<()>>,
+    begun: Instant,
 }
 
 impl Hall {
@@ -91,6 +92,7 @@ impl Hall {
             _stop: stop,
             ends,
             supervisor: Some(supervisor),
+            begun: Instant::now(),
         }
     }
 
@@ -111,6 +113,13 @@ impl Hall {
 
     pub fn address(&self) -> SocketAddr {
         self.running.as_ref().unwrap().addresses()[0]
+    }
+
+    /// Waits until it was seen to tick.
+    pub fn is_well(&self) {
+        while self.socket().get("/healthz").status != 200 {
+            assert!(self.begun.elapsed() < PATIENCE, "it never ticks");
+        }
     }
 
     /// What was asked so far.

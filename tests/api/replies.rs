@@ -169,6 +169,7 @@ fn the_service_says_whether_it_is_well_and_ready_and_gives_its_figures() {
     assert_eq!(hall.socket().get("/readyz").problem(), problem(503, "state"));
     hall.socket().post("/api/v1/show/park");
     assert_eq!(hall.socket().get("/readyz").state(), "parked");
+    hall.is_well();
     assert_eq!(hall.socket().get("/healthz").state(), "parked");
     let figures = hall.socket().get("/metrics");
     assert!(figures.header("content-type").unwrap().starts_with("application/openmetrics-text"));
