@@ -108,8 +108,9 @@ pub(crate) struct Belief {
     asks: bool,
     gap: bool,
     period: Duration,
-    /// How long before the seat executes them its frames are made: they may be confirmed so much later.
+    /// How long before the seat executes them its frames are made, and how much later they may be confirmed.
     lead: Duration,
+    acked_after: Duration,
     tally: Tally,
 }
 
@@ -143,6 +144,7 @@ impl Belief {
             gap: false,
             period,
             lead: window.lead(),
+            acked_after: window.acked_after(),
             tally: Tally::default(),
         }
     }
@@ -271,7 +273,7 @@ impl Belief {
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
         let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
         let is_missed =
-            |since| told.since(since) > GAP + self.lead || now.since(since) > GAP_UNTOLD + self.lead;
+            |since| told.since(since) > GAP + self.acked_after || now.since(since) > GAP_UNTOLD + self.acked_after;
         let unheard = || self.spans.waiting_since(self.acked).is_some_and(is_missed);
         refused || (self.asks && unheard())
     }
@@ -288,7 +290,7 @@ impl Belief {
     #[must_use]
     pub(crate) fn start(&self, now: MonoTime) -> Option<KnownPose> {
         // Where no acks are asked for nobody reads either.
-        let within = if self.asks { BEGINS + self.period + self.lead } else { FRESH };
+        let within = if self.asks { BEGINS + self.period + self.acked_after } else { FRESH };
         self.pose(now).filter(|_| self.is_recent(now, within))
     }
 

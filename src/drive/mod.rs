@@ -21,6 +21,7 @@ mod segments;
 pub(crate) mod silvermax;
 #[cfg_attr(not(test), expect(dead_code, reason = "a look is for preflight"))]
 pub(crate) mod sixpack2;
+mod stream;
 mod terms;
 
 pub use lane::Lane;
@@ -28,6 +29,7 @@ pub(crate) use lane::Stamped;
 pub use lanes::Manner;
 pub(crate) use lanes::lanes;
 pub(crate) use rounds::Rounds;
+pub(crate) use stream::{LinkStream, motors_of, units_of};
 pub(crate) use segments::{
     DriveCourse, DriveUnits, Knots, LOOP, Lag, Middle, Middles, Motor, Segment, SegmentFit, Shaker, TICK_NS,
     TargetMaker,

@@ -111,7 +111,6 @@ impl LinkPeer {
     pub(crate) fn hear(&mut self, event: &StreamEvent, now: MonoTime, out: &mut EvidenceList) {
         match *event {
             StreamEvent::Confirmed { .. }
-            | StreamEvent::Sent { .. }
             | StreamEvent::Rests { .. }
             | StreamEvent::Moves { .. } => {}
             StreamEvent::Read { axis, position, at, .. } => {

@@ -135,7 +135,7 @@ fn goes_on(around: &Homing<'_>) -> Result<(), HomeError> {
 }
 
 /// Whether a motor searches.
-const fn searches(told: PositionTold) -> bool {
+pub(super) const fn searches(told: PositionTold) -> bool {
     matches!(told.action, action::SEARCH..=action::LAST_SEARCH | action::MECHANICAL)
 }
 

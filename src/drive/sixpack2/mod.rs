@@ -21,11 +21,8 @@ mod tests;
 pub(crate) use find::FindError;
 pub(crate) use home::{Homing, home};
 pub(crate) use set_up::{HomeError, SeatMotors};
+pub(crate) use stream::{LEAD, Stream, asked_every};
 pub(crate) use talk::Talk;
 
-#[cfg_attr(not(test), expect(unused_imports, reason = "for preflight, and the thread of a link"))]
-pub(crate) use {
-    find::find,
-    look::look,
-    stream::{Stream, lead},
-};
+#[cfg_attr(not(test), expect(unused_imports, reason = "for preflight"))]
+pub(crate) use {find::find, look::look};

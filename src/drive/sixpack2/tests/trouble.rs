@@ -89,13 +89,17 @@ fn at_the_rate_of_a_unit_that_restarted_nothing_is_played() {
 }
 
 #[test]
-fn a_seat_that_is_not_home_is_told_so_and_never_led() {
-    let mut talk = talk_to(&[unit_with(1, shaft())]);
-    crate::drive::sixpack2::find(&mut talk, &[1]).unwrap();
+fn a_seat_that_is_not_home_is_told_so_at_each_look_and_never_led() {
+    let talk = talk_to(&[unit_with(1, shaft())]);
     let (mut stream, _poses, mut events, _) = Play::stream_over(talk, 1).unwrap();
-    (0..500).for_each(|_| stream.round().unwrap());
-    let told = std::iter::from_fn(|| events.pop().ok()).map(|event| format!("{event:?}"));
-    assert_eq!(told.collect::<Vec<_>>(), ["Restarted { lane: 0, axis: 0 }"]);
+    // As it woke: told by its flag, which is gone then; and by its counters.
+    for look in 0..2 {
+        stream.look(0);
+        (0..500).for_each(|_| stream.round().unwrap());
+        let told = std::iter::from_fn(|| events.pop().ok()).map(|event| format!("{event:?}"));
+        let told: Vec<_> = told.filter(|event| !event.starts_with("Read")).collect();
+        assert_eq!(told, ["Homed { lane: 0, homed: false }"], "{look}");
+    }
     let sent = stream.talk().port().sent.clone();
     assert!(!stream.is_ready(0) && sent.iter().all(|(_, octets)| octets[1] != 0x24), "{sent:?}");
 }
