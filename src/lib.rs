@@ -53,6 +53,7 @@ mod engine;
 mod film;
 mod limiter;
 mod plan;
+mod record;
 mod rt;
 mod state;
 

@@ -1,9 +1,12 @@
 //! One play in the foreground: from a cue and a configuration to the report.
 
+use std::io;
+use std::path::Path;
 use std::sync::Arc;
 use std::thread::{self, Builder};
 use std::time::Duration;
 
+use super::recording::{self, PlayRecording};
 use super::refused::PlayError;
 use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeError};
 use super::script::{PlayHandle, PlayScript, off_park};
@@ -15,7 +18,9 @@ use crate::engine::{Ending, Show};
 use crate::film::chase::ChaseRules;
 use crate::film::point::PublishedPoint;
 use crate::proof::{self, Digest, Proof, Terms};
-use crate::time::Rate;
+use crate::record::About as Recorded;
+use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::time::{Clock as _, Rate};
 use crate::timeline::Timeline;
 
 /// A play that fits: cue, controllers and the first move are proved, and the frame port is open; nothing was sent yet.
@@ -25,6 +30,7 @@ pub struct Play {
     staged: StagedShow,
     /// True if nothing may move.
     holds: bool,
+    recording: Option<PlayRecording>,
 }
 
 impl Play {
@@ -87,7 +93,28 @@ impl Play {
         let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default())?;
         let desk = runtime.control().desk;
         staged.mixes.iter().enumerate().for_each(|(lane, mix)| desk.set(lane, *mix));
-        Ok(Self { runtime, staged, holds: false })
+        Ok(Self { runtime, staged, holds: false, recording: None })
+    }
+
+    /// The same play, recorded to a file that is not there yet.
+    ///
+    /// # Errors
+    /// Where the file cannot be begun.
+    pub(crate) fn recorded(mut self, path: &Path) -> io::Result<Self> {
+        let Self { runtime, staged, .. } = &mut self;
+        let (config, cue) = (Arc::clone(runtime.config()), staged.timeline.cue());
+        let about = Recorded {
+            hall: config.show.name.clone(),
+            cue: cue.path().display().to_string(),
+            title: cue.title().unwrap_or_default().to_owned(),
+            cue_sha256: Digest::of(cue).to_string(),
+            rate_hz: staged.show.rate.hz(),
+            clocks: (Monotonic.now(), wall_now_ns()),
+        };
+        let seats = recording::seats(&config, &staged.lanes);
+        let (tap, recording) = PlayRecording::start(path, &about, seats, staged.show.rate)?;
+        runtime.record(tap);
+        Ok(Self { recording: Some(recording), ..self })
     }
 
     /// What it is led and watched by.
@@ -113,11 +140,21 @@ impl Play {
     /// # Panics
     /// If one of its threads panicked.
     pub fn run(mut self, lead: impl FnOnce(PlayHandle) -> bool + Send) -> Result<Played, PlayError> {
+        let Some(recording) = self.recording.take() else { return self.run_through(lead) };
+        let mut played = self.run_through(lead);
+        let trouble = recording.finish(played.as_ref().ok().map(|played| &played.report)).err();
+        if let Ok(played) = &mut played {
+            played.notes.extend(trouble);
+        }
+        played
+    }
+
+    fn run_through(mut self, lead: impl FnOnce(PlayHandle) -> bool + Send) -> Result<Played, PlayError> {
         let silent = self.runtime.is_silent();
         if !silent {
             self.look_for_others()?;
         }
-        let Self { runtime, staged, holds } = self;
+        let Self { runtime, staged, holds, .. } = self;
         let config = Arc::clone(runtime.config());
         let (cue, rate) = (staged.timeline.cue().path().display().to_string(), staged.show.rate);
         let (lanes, live) = (staged.lanes.clone(), runtime.control().live);

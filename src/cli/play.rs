@@ -96,6 +96,9 @@ pub(super) struct Args {
     /// The film's timecode at which the cue begins, HH:MM:SS:FF [default: 00:00:00:00].
     #[arg(long, value_name = "TIMECODE", requires = "chase")]
     tc_start: Option<String>,
+    /// Record the play to an MCAP file that is not there yet: 20 times a second where each seat was asked to be, and was sent.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
     /// Print the report as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -117,7 +120,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.stream.no_acks };
     let film = film(args)?;
-    play(config, timeline, show, manner, film.as_ref(), args.json)
+    play(config, timeline, show, manner, film.as_ref(), args)
 }
 
 /// Begins to listen to the film that leads, if one does.
@@ -140,7 +143,7 @@ fn play(
     show: Show,
     manner: Manner,
     film: Option<&FilmReader>,
-    json: bool,
+    args: &Args,
 ) -> Result<Exit, Failure> {
     let cue = timeline.cue().path().to_path_buf();
     let length = timeline.duration();
@@ -158,7 +161,10 @@ fn play(
         Some(film) => Play::chasing(config, timeline, show, manner, film.point()),
         None => Play::new(config, timeline, show, manner),
     };
-    let play = play.map_err(|error| refused(error, &cue))?;
+    let mut play = play.map_err(|error| refused(error, &cue))?;
+    if let Some(file) = &args.record {
+        play = play.recorded(file).with_context(|| file.display().to_string()).or_exit(Exit::Io)?;
+    }
     let control = play.control();
     let ctrl_c =
         leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
@@ -167,7 +173,7 @@ fn play(
     let progress = Progress::start(said, for_ever);
     let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();
-    tell(&played?, json)
+    tell(&played?, args.json)
 }
 
 fn uses_effects(timeline: &Timeline) -> bool {

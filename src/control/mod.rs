@@ -4,6 +4,7 @@
 
 mod ask;
 mod handle;
+mod links;
 pub(crate) mod model;
 mod places;
 mod problem;
@@ -15,13 +16,14 @@ pub(crate) use ask::Levels;
 pub use ask::{Command, LevelsChange};
 pub(crate) use handle::{Asked, FRESH, Posted, overtaken};
 pub use handle::{Desired, Handle, Inbox, StatusSource, handle};
+pub(crate) use links::{LinkAxisStatus, LinkStatus};
 pub use model::Health;
 pub(crate) use model::{Histogram, Percentiles, Severity, Then, Times};
 pub(crate) use places::{Place, Places, network};
 pub use problem::{Code, Problem};
 pub use status::{ControllerStatus, JournalLine, Status};
 pub(crate) use status::{
-    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, LinkAxisStatus,
-    LinkStatus, PlaylistStatus, PreflightStatus, RealTimeStatus, ShowStatus, TestRow, TestStatus, Warning,
+    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, PlaylistStatus,
+    PreflightStatus, RealTimeStatus, ShowStatus, TestRow, TestStatus, Warning,
 };
 pub use who::{Surface, Who};

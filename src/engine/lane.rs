@@ -68,6 +68,8 @@ pub struct LaneMotion {
     brake: Brake,
     /// Whatever is asked of it, what is sent keeps the limits.
     limiter: Limiter,
+    /// What was asked of it last, before the limiter.
+    asked: Pose,
 }
 
 impl LaneMotion {
@@ -91,6 +93,7 @@ impl LaneMotion {
             brake: Brake::new(&window, &nowhere.states()),
             trail: nowhere,
             limiter: Limiter::new(&window, rate),
+            asked: [0.0; MAX_AXES],
             window,
         }
     }
@@ -143,6 +146,18 @@ impl LaneMotion {
     #[must_use]
     pub const fn pose(&self) -> &Pose {
         self.trail.pose()
+    }
+
+    /// The present level of its motion, 0 to 1.
+    #[must_use]
+    pub(crate) fn level(&self) -> f64 {
+        self.window.level()
+    }
+
+    /// What was asked of it for its last frame, before the limiter saw it.
+    #[must_use]
+    pub(crate) const fn asked(&self) -> &Pose {
+        &self.asked
     }
 
     /// Begins to come to rest from however it moves on its course.
@@ -339,6 +354,7 @@ impl LaneMotion {
             return None;
         };
         self.trail.push(Duration::from_millis(u64::from(leg.lasts_ms)), leg.to);
+        self.asked = leg.to;
         (self.mode, self.ahead) = (LaneMode::Blind(since_ms + leg.lasts_ms), leg.ticks);
         Some(leg.lasts_ms)
     }
@@ -349,8 +365,9 @@ impl LaneMotion {
     /// their ends, and from there to rest.
     fn send(&mut self, index: u64, time: Duration, mut pose: Pose, on_cue: bool) -> bool {
         let proved = self.mode == LaneMode::Following && self.fader.is_still();
-        let asked = if proved { Provenance::Proved } else { Provenance::Anyhow };
-        let is_at_fault = self.limiter.admit(&mut pose, index, asked) == Admitted::Fault;
+        let provenance = if proved { Provenance::Proved } else { Provenance::Anyhow };
+        self.asked = pose;
+        let is_at_fault = self.limiter.admit(&mut pose, index, provenance) == Admitted::Fault;
         self.trail.push(time, pose);
         let step = VIBRATION_RATE * time.as_secs_f64();
         self.vibration += (self.wanted.vibration - self.vibration).clamp(-step, step);

@@ -88,6 +88,9 @@ pub mod preflight {
 pub mod proof {
     pub use crate::proof::{Digest, DriveTerms, Proof, Terms, figures, prove, prove_driven};
 }
+pub mod record {
+    pub use crate::record::{Asked, FrameKind, RecordedSeat, Tap, TickHead, tap};
+}
 pub mod rt {
     pub use crate::rt::{
         Accounts, AckLoop, Alarm, Answer, Command, Conductor, Desk, Ended, FilmLead, FrameSink, Line, Live,

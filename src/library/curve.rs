@@ -139,10 +139,11 @@ mod tests {
             let cue = timeline(&text);
             let curve = draw(&cue, None, points);
             let span = cue.duration().as_secs_f64() / count(points);
+            let stretches = Stretches { from: 0.0, span, count: points };
             for step in 0..=500 {
                 let at = cue.duration().as_secs_f64() * f64::from(step) / 500.0;
                 let value = cue.sample(ShowTime::from_secs_f64(at), &mut Hint::default())[0];
-                let stretch = (0..points - 1).take_while(|&next| count(next + 1) * span <= at).count();
+                let stretch = stretches.holding(at);
                 prop_assert!(curve.axes[0].min[stretch] - 1e-6 <= value, "{at}");
                 prop_assert!(curve.axes[0].max[stretch] + 1e-6 >= value, "{at}");
             }

@@ -34,7 +34,7 @@ pub(crate) fn braille(picture: &Picture) -> String {
             Scale::Limit => lines.extend(measured(panel, cells)),
         }
     }
-    lines.extend(picture.lanes.iter().map(|one| lane(one, cells)));
+    lines.extend(picture.lanes.iter().flat_map(|one| lane(one, cells)));
     lines.push(times(picture, cells));
     for flag in &picture.flags {
         lines.push(format!("{:BEFORE$}{} {}", "", clock(flag.at_s, 0.0), plain::escaped(&flag.name, 200)));
@@ -76,15 +76,19 @@ fn measured(panel: &Panel, cells: usize) -> Vec<String> {
     all
 }
 
-fn lane(lane: &Lane, cells: usize) -> String {
-    let name: String = lane.name.chars().take(BEFORE - 1).collect();
-    let mut line = format!("{:<BEFORE$}", plain::escaped(&name, 40));
+/// A line, and one more for a name that has no place before it.
+fn lane(lane: &Lane, cells: usize) -> Vec<String> {
+    let name = plain::escaped(&lane.name, 80);
+    let fits = name.chars().count() < BEFORE;
+    let (before, note) = if fits { (name.as_ref(), lane.note.as_str()) } else { ("", "") };
+    let mut line = format!("{before:<BEFORE$}");
     for cell in 0..cells {
         let shades = lane.columns.iter().skip(ACROSS * cell).take(ACROSS);
         let height = shades.fold(0.0_f32, |most, shade| most.max(shade.height));
         line.push(if height <= 0.0 { '·' } else { '▬' });
     }
-    format!("{line} {}", lane.note)
+    let own = (!fits).then(|| format!("{name}: {}", lane.note));
+    own.into_iter().chain([format!("{line} {note}")]).collect()
 }
 
 /// The times under the curves, each where it is.

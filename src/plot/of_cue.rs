@@ -235,7 +235,7 @@ impl View<'_> {
         let runs = shakes.iter().map(|(at, vibration)| (*at, shade(vibration)));
         Lane {
             name: format!("vibration {names}"),
-            note: format!("up to {swing:.2} {}, {} Hz; darker is faster", geometry.unit.name(), number(hz)),
+            note: format!("up to {swing:.2} {}, {} Hz; fuller is faster", geometry.unit.name(), number(hz)),
             columns: self.filled(runs),
         }
     }

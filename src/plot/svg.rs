@@ -88,7 +88,7 @@ fn drawn(panel: &Panel, time: &TimeAxis, y: &mut f64) -> String {
         if panel.scale == Scale::Limit { panel.high.max(100.0) } else { panel.high },
         4.0,
     );
-    for tick in ticks.at.iter().chain((panel.scale == Scale::Range).then_some(&panel.high)) {
+    for tick in &ticks.at {
         let y = at(*tick);
         out += &format!("<path class=\"grid\" d=\"M{LEFT} {y:.1}h{LENGTH}\"/>");
         out += &format!(

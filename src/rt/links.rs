@@ -16,6 +16,7 @@ use crate::drive::link::{
 };
 use crate::drive::LinkStream;
 use crate::net::{Delivery, SendFault, Sender};
+use crate::record::{Asked, Tap, TickHead};
 use crate::state::State;
 use crate::sys::serial::SerialError;
 use crate::time::MonoTime;
@@ -38,6 +39,7 @@ pub struct Outlets {
     stations: usize,
     poses: Vec<Producer<LedPose>>,
     led: Vec<LinkLane>,
+    tap: Option<Tap>,
 }
 
 /// Where the poses of a lane go.
@@ -59,7 +61,7 @@ impl Outlets {
         poses: Vec<Producer<LedPose>>,
         led: Vec<LinkLane>,
     ) -> Self {
-        Self { sender, stations, poses, led }
+        Self { sender, stations, poses, led, tap: None }
     }
 }
 
@@ -68,10 +70,13 @@ impl Outlets {
     pub(crate) const fn sender(&self) -> &Sender {
         &self.sender
     }
-}
 
-impl FrameSink for Outlets {
-    fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery {
+    /// Has whatever leaves copied to `tap`.
+    pub(crate) fn record(&mut self, tap: Tap) {
+        self.tap = Some(tap);
+    }
+
+    fn hand_over(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery {
         let Some(led) = lane.checked_sub(self.stations) else { return self.sender.send(lane, datagram) };
         let failed = Delivery::Failed(SendFault::of(libc::EAGAIN));
         let Some(LinkLane { link, lane, lead }) = self.led.get(led).copied() else { return failed };
@@ -83,6 +88,28 @@ impl FrameSink for Outlets {
         });
         let is_taken = pose.is_some_and(|pose| self.poses[link].push(pose).is_ok());
         if is_taken { Delivery::Sent } else { failed }
+    }
+}
+
+impl FrameSink for Outlets {
+    fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery {
+        let delivery = self.hand_over(lane, datagram, at);
+        if let Some(tap) = &mut self.tap {
+            tap.frame(lane, datagram, at, delivery);
+        }
+        delivery
+    }
+
+    fn asked(&mut self, asked: Asked) {
+        if let Some(tap) = &mut self.tap {
+            tap.asked(asked);
+        }
+    }
+
+    fn tick_over(&mut self, head: &TickHead) {
+        if let Some(tap) = &mut self.tap {
+            tap.tick(head);
+        }
     }
 }
 
@@ -267,5 +294,47 @@ impl LinkLoop {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::{SocketAddrV4, UdpSocket};
+
+    use super::*;
+    use crate::motion::{SeatType, Slot, Window};
+    use crate::net::Ports;
+    use crate::record::{Chunk, FrameKind, RecordedSeat, tap};
+    use crate::time::{Rate, ShowTime};
+    use crate::wire::VibrationPort;
+
+    #[test]
+    fn what_is_recorded_is_what_the_controller_received_octet_by_octet() {
+        let peer = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address: SocketAddrV4 = peer.local_addr().unwrap().to_string().parse().unwrap();
+        let (sender, _receiver) = Ports::open("127.0.0.1:0".parse().unwrap(), &[address]).unwrap().split();
+        let window = Window::new(vec![Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0); 6]);
+        let seat = RecordedSeat::new("A1", &window, FrameKind::Datagram(VibrationPort::Two));
+        let (tap, mut ring) = tap(&[seat], Rate::from_hz(100.0));
+        let mut outlets = Outlets::new(sender, 1, Vec::new(), Vec::new());
+        outlets.record(tap);
+        let (mut received, mut recorded) = (Vec::new(), Vec::new());
+        for (tick, octets) in [[1_u8; 38].as_slice(), &[2; 50], &[3; 70]].into_iter().enumerate() {
+            let (at, index) = (MonoTime::from_nanos(5), tick as u64);
+            assert_eq!(outlets.send(0, octets, at), Delivery::Sent);
+            let (film, state) = (ShowTime::ZERO, State::Parked);
+            outlets.tick_over(&TickHead { index, deadline: at, late_ns: 0, missed: 0, film, state });
+            let mut buf = [0; 100];
+            let len = peer.recv(&mut buf).unwrap();
+            received.push(buf[..len].to_vec());
+        }
+        let mut octets = vec![0; ring.slots()];
+        ring.pop_entire_slice(&mut octets).unwrap();
+        let mut rest = octets.as_slice();
+        while let Some((chunk, behind)) = Chunk::parse(rest) {
+            recorded.extend(chunk.frames().map(|frame| frame.datagram.to_vec()));
+            rest = behind;
+        }
+        assert_eq!(recorded, received);
     }
 }

@@ -51,6 +51,7 @@ use crate::drive::{Lane, Stamped};
 use crate::engine::{Ending, Engine, EngineEvent, Step};
 use crate::motion::Pose;
 use crate::net::{Delivery, Sender};
+use crate::record::{Asked, TickHead};
 use crate::state::{Refusal, State, Transition, Why};
 use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};
 use crate::wire::MAX_LEN;
@@ -59,6 +60,12 @@ use crate::wire::MAX_LEN;
 pub trait FrameSink {
     /// Hands one lane's datagram to the kernel, `at` being now; never blocks.
     fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery;
+
+    /// The next frame comes of that; for whoever records.
+    fn asked(&mut self, _asked: Asked) {}
+
+    /// A tick is over, whether frames left or not; for whoever records.
+    fn tick_over(&mut self, _head: &TickHead) {}
 }
 
 impl FrameSink for Sender {
@@ -141,16 +148,19 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         self.places.look(&mut self.engine, &self.mail, now, moving);
         let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving);
         let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
-        match step {
+        let late_ns = match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
             Step::Send if self.conductor.machine().may_send_motion() => {
                 ticked.missed += tick.missed;
                 ticked.ticks += 1;
-                self.send(tick);
+                self.send(tick)
             }
-            Step::Send | Step::Quiet | Step::Over => {}
-        }
+            Step::Send | Step::Quiet | Step::Over => nanos(tick.late),
+        };
         self.conductor.watch(&mut self.engine, now);
+        let Tick { index, deadline, missed, .. } = tick;
+        let (film, state) = (self.engine.playhead().at(), self.conductor.machine().state());
+        self.sink.tick_over(&TickHead { index, deadline, late_ns, missed, film, state });
         self.hand_on();
         self.mail.beat();
         // A hall goes on when its show is over; one that is told to leave has ended its engine once nothing moves.
@@ -238,7 +248,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         Ok(())
     }
 
-    fn send(&mut self, tick: Tick) {
+    /// Sends to every lane that gets a frame; says how long after its deadline the first left, nanoseconds.
+    fn send(&mut self, tick: Tick) -> u64 {
         let mut buf = [0; MAX_LEN];
         let mut first = None;
         let Self { lanes, places, engine, mail, sink, clock, .. } = self;
@@ -252,13 +263,15 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             let (stamped, datagram) = lane.encode(&beat, pose, motion.mix(), &mut buf);
             first.get_or_insert(at);
             let (lasts_ms, at_most_ms) = (beat.lasts_ms, beat.at_most_ms());
+            let (slots, level) = (lane.window.slots().len(), motion.level());
+            sink.asked(Asked { pose: *motion.asked(), slots, level, clamps: motion.clamps().clamps });
             let sent = Outgoing { index, stamped, pose, lasts_ms, at_most_ms, at };
             sent.hand_over(datagram, places, mail, sink);
             mail.clamps(index, motion.clamps().clamps);
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
-        let report = TickReport { late_ns, missed: tick.missed };
-        self.mail.report(report);
+        self.mail.report(TickReport { late_ns, missed: tick.missed });
+        late_ns
     }
 
     fn hand_on(&mut self) {

@@ -5,7 +5,7 @@ use std::num::NonZeroU64;
 use std::{fmt, fs, io};
 
 use rustix::mm::{MlockAllFlags, mlockall};
-use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use rustix::process::{Resource, Rlimit, getrlimit, setpriority_process, setrlimit};
 use rustix::thread::set_current_timer_slack;
 
 /// The priority asked for: above every ordinary program, with room for an operator to put something above it.
@@ -80,6 +80,13 @@ pub fn request() -> RealTime {
 /// If the kernel refuses; giving up priority needs no right, so that is not to be expected.
 pub fn normal_priority() -> io::Result<()> {
     set_scheduler(libc::SCHED_OTHER, 0)
+}
+
+/// Has the calling thread stand back behind the ordinary ones of the machine. Where the kernel refuses, it is one of them.
+pub(crate) fn stand_back() {
+    let _ = normal_priority();
+    // On Linux a nice value is of a thread, although POSIX has one for the process.
+    let _ = setpriority_process(None, 10);
 }
 
 /// Gives the calling thread real-time service below a thread of that priority, so that what it watches over does not hang on how

@@ -14,9 +14,10 @@ use kinocue::harness::belief::Reading;
 use kinocue::harness::config::from_to_args;
 use kinocue::harness::drive::{Lane, Manner};
 use kinocue::harness::engine::{Mix, Show};
-use kinocue::harness::motion::{MAX_AXES, Pose};
+use kinocue::harness::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
 use kinocue::harness::net::{Delivery, DrainGrid, Ports, Sender};
 use kinocue::harness::observe::Watched;
+use kinocue::harness::record::{Asked, FrameKind, RecordedSeat, Tap, TickHead, tap};
 use kinocue::harness::rt::{
     Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News,
     Places, PlanLoop, Planning, Spinning, TickLoop, mailboxes,
@@ -25,7 +26,7 @@ use kinocue::harness::state::Transition;
 use kinocue::harness::sys::clock::Monotonic;
 use kinocue::harness::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::harness::timeline::Timeline;
-use kinocue::wire::{MAX_LEN, MotionReply, MotionRequest, ReplyCode, Timing};
+use kinocue::wire::{MAX_LEN, MotionReply, MotionRequest, ReplyCode, Timing, VibrationPort};
 use rtrb::Producer;
 
 use super::counting::Calls;
@@ -99,16 +100,27 @@ impl Pace {
     }
 }
 
-/// The sockets, which tell how much they have sent.
+/// The sockets, which tell how much they have sent, and a recorder's tap.
 struct Counted<'a> {
     sender: Sender,
     pace: &'a Pace,
+    tap: Tap,
 }
 
 impl FrameSink for Counted<'_> {
     fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery {
         self.pace.sent.fetch_add(1, Ordering::AcqRel);
-        FrameSink::send(&mut self.sender, lane, datagram, at)
+        let delivery = FrameSink::send(&mut self.sender, lane, datagram, at);
+        self.tap.frame(lane, datagram, at, delivery);
+        delivery
+    }
+
+    fn asked(&mut self, asked: Asked) {
+        self.tap.asked(asked);
+    }
+
+    fn tick_over(&mut self, head: &TickHead) {
+        self.tap.tick(head);
     }
 }
 
@@ -252,6 +264,13 @@ fn staged(addresses: &[SocketAddrV4; CONTROLLERS]) -> (StagedShow, Vec<Watched>)
     (staged, config.stations().iter().map(Watched::of).collect())
 }
 
+/// A seat of so many axes, as it is recorded.
+fn recorded_seat(axes: usize) -> RecordedSeat {
+    let seat = SeatType::bench3(axes);
+    let window = Window::new((0..axes).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect());
+    RecordedSeat::new("A1", &window, FrameKind::Datagram(VibrationPort::Two))
+}
+
 /// What came of a play.
 pub(crate) struct Outcome {
     pub(crate) ended: Ended,
@@ -331,6 +350,9 @@ fn play_to(
         (0..CONTROLLERS).for_each(|lane| clock.read(lane, [0.0; MAX_AXES]));
         let spinning = Spinning::new(&clock, spin, PERIOD);
         let places = Places::new(&lanes, rate);
+        let seats = [6, 3].map(recorded_seat);
+        // Nobody empties it: after two seconds each tick is dropped, which allocates nothing either.
+        let (tap, _recorder) = tap(&seats, rate);
         let mut tick_loop = TickLoop {
             clock: &spinning,
             grid: TickGrid::new(origin, rate),
@@ -338,7 +360,7 @@ fn play_to(
             conductor: Conductor::of_a_play(origin, attended),
             lanes,
             places,
-            sink: Counted { sender, pace },
+            sink: Counted { sender, pace, tap },
             mail,
             desk,
             leave: &pace.leave,

@@ -17,6 +17,7 @@ mod frames;
 mod keyboard;
 mod loss;
 mod motion;
+mod recording;
 mod report;
 mod stopping;
 mod turntable;

@@ -25,7 +25,7 @@ const ROWS: &[Row] = &[
     ("bool fields in one struct", counts::bools_of_one_struct, Less, 8.0, 3.0),
     ("enums with the words of the hall's state", counts::encodings_of_state, Less, 1.0, 1.0),
     ("compositions", counts::compositions, Less, 1.0, 1.0),
-    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 164.0, 30.0),
+    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 168.0, 30.0),
     ("uses of one type name", counts::uses_of_one_type_name, Less, 13.0, 2.0),
     ("polled said-once flags", counts::flags_told_once, Less, 9.0, 0.0),
     ("polling sleeps in the supervisor", counts::sleeps_of_the_supervisor, Less, 0.0, 0.0),
@@ -34,8 +34,8 @@ const ROWS: &[Row] = &[
     // By this count 49 where the target of 170 was set, of what were 192 then, lists of public fields among them.
     // Two more for one more command in the list of commands.
     // Six more for two families of drives that are simulated and decoded side by side, most of them rows of tables.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 65.0, 43.0),
-    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 15.0, 2.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 68.0, 43.0),
+    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 14.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
     // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 1,040 for films
@@ -46,10 +46,12 @@ const ROWS: &[Row] = &[
     // be over; 1,020 for a player that the service starts, keeps and leads with the seats, and for films in playlists and in the demo;
     // 155 for how far seats are from their film, its timecode, a source that a person chooses, and seats that are left where nobody knows.
     // 290 for one list of controllers and lanes that are led ahead; 300 for the reel of a day and the film's figures; 4,550 for the messages of two
-    // families of drives, read and written, and virtual units of both; 2,200 for the host's end of a SilverMax line, and 180 for homing by it.
-    ("lines of code", counts::lines_of_code, Less, 73_140.0, 39_800.0),
-    // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts.
-    ("public items and fields", counts::public_items, Less, 1_179.0, 400.0),
+    // families of drives, read and written, and virtual units of both; 2,200 for the host's end of a SilverMax line, and 180 for homing by it;
+    // 2,510 for drives in the service and in its status, pictures of cues and recordings of plays.
+    ("lines of code", counts::lines_of_code, Less, 75_650.0, 39_800.0),
+    // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
+    // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
+    ("public items and fields", counts::public_items, Less, 1_216.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 52.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 466.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.6, 3.0),

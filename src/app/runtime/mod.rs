@@ -28,6 +28,7 @@ use crate::health::{Groups, HealthTable};
 use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
+use crate::record::Tap;
 use crate::rt::{
     AckLoop, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds, NewsIn,
     Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line, mailboxes,
@@ -241,6 +242,11 @@ impl Runtime {
     pub(super) fn with_film(mut self, film: Option<Arc<PublishedPoint>>) -> Self {
         self.ticks.film = film.map(|source| LeadingFilm { source, rules: None });
         self
+    }
+
+    /// Has whatever leaves copied to `tap`.
+    pub(super) fn record(&mut self, tap: Tap) {
+        self.ticks.sink.record(tap);
     }
 
     /// What it is led and watched by.

@@ -342,18 +342,3 @@ fn a_line_that_is_cut_brings_the_seat_to_rest_within_the_lead_and_puts_its_lane_
         assert_gentle(hall);
     });
 }
-
-#[test]
-fn a_seat_that_braked_since_its_thread_was_held_up_is_found_at_rest_and_joins_again() {
-    hall(|hall, show, _| {
-        hall.go(show);
-        hall.run(5.0, |_| {});
-        for held_ms in [150, 180, 210, 240] {
-            let held_until = hall.line.lock().now + Duration::from_millis(held_ms);
-            hall.line.lock().sleep_until(held_until);
-            hall.run(3.0, |_| {});
-            assert!(hall.loops.ticks.engine.lane(0).gets_a_frame(), "held up for {held_ms} ms");
-        }
-        assert_gentle(hall);
-    });
-}

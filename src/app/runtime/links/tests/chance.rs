@@ -230,7 +230,7 @@ impl Fate {
             // Nobody runs the thread of the link meanwhile; the adapter holds back what it has.
             7 if index == 0 => port.sleep_until(at + span / 2),
             7 => (port.line.faults.late, port.line.faults.late_by) = (0.05, span / 8),
-            8 if self.chance.bits() % 8 == 0 => {
+            8 if self.chance.bits().is_multiple_of(8) => {
                 act(Action::Reset);
                 self.resets += 1;
             }
@@ -318,6 +318,7 @@ fn setting(name: &str) -> Option<u64> {
 }
 
 /// As many plays as there are faults to be, or enough of them for a quick look.
+#[expect(clippy::print_stdout, reason = "the figures are for who asks to see them")]
 fn plays(failing: Failing) {
     let (faults, mut seed) = (setting("KINOCUE_FAULTS").unwrap_or(60), setting("KINOCUE_SEED").unwrap_or(1));
     let (first, mut sum) = (seed, Sum::default());

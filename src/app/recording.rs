@@ -1,0 +1,94 @@
+//! A play that is recorded: the thread behind the tap, and the file that it leaves.
+
+use std::error::Error as _;
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+use std::thread::{Builder, JoinHandle};
+
+use mcap::{McapError, McapResult};
+
+use super::Report;
+use crate::config::{Config, Connection};
+use crate::drive::Lane;
+use crate::record::{About, FrameKind, RecordedSeat, Recorder, Recording, SAMPLE_HZ, Sampled, Tap, tap};
+use crate::sys::clock::Monotonic;
+use crate::sys::realtime;
+use crate::time::Rate;
+
+type FileRecorder = Recorder<BufWriter<File>>;
+
+/// What a play is recorded by.
+#[derive(Debug)]
+pub(super) struct PlayRecording {
+    path: PathBuf,
+    /// Its name until it is whole.
+    part: PathBuf,
+    thread: JoinHandle<McapResult<FileRecorder>>,
+}
+
+impl PlayRecording {
+    /// Begins a file, and has a thread write to it what comes through the tap.
+    ///
+    /// # Errors
+    /// Where there is such a file, or what an earlier recording to it left, and where the system refuses.
+    pub(super) fn start(
+        path: &Path,
+        about: &About,
+        seats: Vec<RecordedSeat>,
+        rate: Rate,
+    ) -> io::Result<(Tap, Self)> {
+        if path.try_exists()? {
+            return Err(io::ErrorKind::AlreadyExists.into());
+        }
+        let part = path.with_extension("part.mcap");
+        let out = BufWriter::new(File::create_new(&part)?);
+        let (tap, ring) = tap(&seats, rate);
+        let file = Recording::begin(out, about, &seats).map_err(in_io)?;
+        let recorder = Recorder::new(ring, Sampled::new(seats, SAMPLE_HZ), file);
+        let thread = Builder::new().name("recorder".to_owned()).spawn(move || {
+            realtime::stand_back();
+            recorder.run(&Monotonic)
+        })?;
+        Ok((tap, Self { path: path.to_owned(), part, thread }))
+    }
+
+    /// Ends the file, the tick thread having ended, with the report if there is one.
+    ///
+    /// # Errors
+    /// Why there is no whole file, in a sentence; what was written until then stays.
+    pub(super) fn finish(self, report: Option<&Report>) -> Result<(), String> {
+        let Self { path, part, thread } = self;
+        let finish = || {
+            let recorder = thread.join().map_err(|_| io::Error::other("its thread panicked"))?;
+            let report = report.map(serde_json::to_vec).transpose()?;
+            let out = recorder.and_then(|recorder| recorder.finish(report.as_deref())).map_err(in_io)?;
+            out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+            fs::rename(&part, &path)
+        };
+        finish().map_err(|error| {
+            let part = part.display();
+            format!("the recording ended early: {error}; what there is of it is in {part}")
+        })
+    }
+}
+
+fn in_io(error: McapError) -> io::Error {
+    match error {
+        McapError::Io(error) => error,
+        // It words a write that failed inside a record as one that cannot be parsed; below it is what the system said.
+        other => io::Error::other(other.source().map_or_else(|| other.to_string(), ToString::to_string)),
+    }
+}
+
+/// The seats of lanes, in their order.
+pub(super) fn seats(config: &Config, lanes: &[Lane]) -> Vec<RecordedSeat> {
+    let frames = |connection: &Connection| match connection {
+        Connection::Udp(station) => FrameKind::Datagram(station.vibration_port),
+        Connection::Link(_) => FrameKind::Pose,
+    };
+    let controllers = config.controllers.iter().zip(lanes);
+    controllers
+        .map(|(one, lane)| RecordedSeat::new(&one.name, &lane.window, frames(&one.connection)))
+        .collect()
+}

@@ -1,0 +1,160 @@
+//! Many ticks into few samples. Of each window the worst is kept, so that nothing that lasted a tick is smoothed away.
+
+use serde::Serialize;
+
+use super::chunk::{Chunk, Handed, SentFrame};
+use super::{RecordedSeat, TickHead};
+use crate::state::State;
+use crate::time::MonoTime;
+
+/// A seat in a window: its frame in which asked and sent differ most, the last of these, and sums of all its frames.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(crate) struct SeatSample {
+    /// Show time of that frame, seconds.
+    pub(crate) film_s: f64,
+    /// Where each axis was asked to be, mm, or degrees where it turns.
+    pub(crate) asked_mm: Vec<f64>,
+    /// Where it was sent.
+    pub(crate) sent_mm: Vec<f64>,
+    /// The level of motion, 0 to 1.
+    pub(crate) level: f64,
+    /// Frames that the kernel took.
+    pub(crate) sent: u32,
+    /// Frames that it did not take.
+    pub(crate) unsent: u32,
+    /// How often the limiter held the seat back.
+    pub(crate) clamps: u64,
+}
+
+/// All ticks of a window.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub(crate) struct TickSample {
+    /// Show time of the last, seconds.
+    pub(crate) film_s: f64,
+    /// Its lateness, µs.
+    pub(crate) late_us: f64,
+    /// The greatest.
+    pub(crate) late_max_us: f64,
+    /// How many there were.
+    pub(crate) ticks: u32,
+    /// How many were slept through.
+    pub(crate) missed: u64,
+    /// How many were not recorded.
+    pub(crate) dropped: u64,
+}
+
+/// Something to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Message {
+    /// Of the seat of a lane.
+    Seat(usize, SeatSample),
+    /// Of the ticks.
+    Tick(TickSample),
+    /// The hall's state, from now on.
+    State(State),
+}
+
+/// A window of a seat that is not over.
+#[derive(Debug, Clone, Default)]
+struct SeatWindow {
+    /// The worst so far, and how far asked and sent differ in it.
+    worst: Option<(MonoTime, f64)>,
+    sample: SeatSample,
+    /// Clamps until the window before.
+    clamps: u64,
+}
+
+/// The fold of ticks into samples.
+#[derive(Debug)]
+pub(crate) struct Sampled {
+    seats: Vec<RecordedSeat>,
+    windows: Vec<SeatWindow>,
+    tick: TickSample,
+    state: Option<State>,
+    hz: u32,
+    /// The last tick, of the window that is not over.
+    last: Option<TickHead>,
+}
+
+impl Sampled {
+    /// A fold into so many samples a second.
+    pub(crate) fn new(seats: Vec<RecordedSeat>, hz: u32) -> Self {
+        let windows = vec![SeatWindow::default(); seats.len()];
+        Self { seats, windows, tick: TickSample::default(), state: None, hz, last: None }
+    }
+
+    /// Takes a tick, and tells what is over by it.
+    pub(crate) fn take(&mut self, chunk: &Chunk<'_>, tell: &mut impl FnMut(MonoTime, Message)) {
+        let head = chunk.head;
+        if self.last.is_some_and(|last| self.window(last.deadline) != self.window(head.deadline)) {
+            self.close(tell);
+        }
+        if self.state.replace(head.state) != Some(head.state) {
+            tell(head.deadline, Message::State(head.state));
+        }
+        self.tick = TickSample {
+            film_s: head.film.as_secs_f64(),
+            late_us: micros(head.late_ns),
+            late_max_us: micros(head.late_ns).max(self.tick.late_max_us),
+            ticks: self.tick.ticks + 1,
+            missed: self.tick.missed + head.missed,
+            dropped: self.tick.dropped + u64::from(chunk.dropped),
+        };
+        self.last = Some(head);
+        for frame in chunk.frames() {
+            self.frame(&head, &frame);
+        }
+    }
+
+    /// Tells of the window that is not over.
+    pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
+        let Some(last) = self.last.take() else { return };
+        tell(last.deadline, Message::Tick(std::mem::take(&mut self.tick)));
+        for (lane, window) in self.windows.iter_mut().enumerate() {
+            let sample = std::mem::take(&mut window.sample);
+            if let Some((at, _)) = window.worst.take() {
+                tell(at, Message::Seat(lane, sample));
+            }
+        }
+    }
+
+    fn window(&self, at: MonoTime) -> u128 {
+        u128::from(at.as_nanos()) * u128::from(self.hz) / 1_000_000_000
+    }
+
+    fn frame(&mut self, head: &TickHead, frame: &SentFrame<'_>) {
+        let (Some(seat), Some(window)) = (self.seats.get(frame.lane), self.windows.get_mut(frame.lane))
+        else {
+            return;
+        };
+        let SeatWindow { worst, sample, clamps } = window;
+        let is_taken = frame.handed != Handed::Refused;
+        sample.sent += u32::from(is_taken);
+        sample.unsent += u32::from(!is_taken);
+        let (asked, sent) = (seat.asked(&frame.asked), seat.sent(frame));
+        if !asked.is_empty() {
+            sample.clamps += frame.asked.clamps.saturating_sub(std::mem::replace(clamps, frame.asked.clamps));
+        }
+        let apart = asked.iter().zip(&sent).map(|(asked, sent)| (asked - sent).abs()).fold(0.0, f64::max);
+        if worst.is_none_or(|(_, most)| apart >= most) {
+            *worst = Some((head.deadline, apart));
+            sample.film_s = head.film.as_secs_f64();
+            sample.level = rounded(frame.asked.level);
+            (sample.asked_mm, sample.sent_mm) = (round(asked), round(sent));
+        }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "less than an hour")]
+fn micros(ns: u64) -> f64 {
+    ns as f64 / 1e3
+}
+
+/// To a ten-thousandth: a pulse of the finest axis is longer, and a line is shorter for it.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+fn round(values: Vec<f64>) -> Vec<f64> {
+    values.into_iter().map(rounded).collect()
+}

@@ -1,0 +1,57 @@
+//! The tick thread's end: copies what leaves into a ring, and waits for nobody.
+
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use super::chunk::{ChunkWriter, Handed, SentFrame};
+use super::{Asked, RecordedSeat, TickHead};
+use crate::net::Delivery;
+use crate::time::{MonoTime, Rate};
+
+/// Seconds of ticks that the ring holds: a disk may take so long.
+const HELD_S: f64 = 2.0;
+
+/// Copies what leaves. Never waits, never allocates: a tick that finds no room is lost as a whole, and the next says so.
+#[derive(Debug)]
+pub struct Tap {
+    ring: Producer<u8>,
+    chunk: ChunkWriter,
+    asked: Asked,
+    /// Ticks lost since the last that found room.
+    dropped: u32,
+}
+
+/// A tap of the lanes of these seats, in their order, and the end from which its chunks are read.
+#[must_use]
+pub fn tap(seats: &[RecordedSeat], rate: Rate) -> (Tap, Consumer<u8>) {
+    let frames = seats.iter().map(RecordedSeat::longest_frame).sum();
+    let chunk = ChunkWriter::with_room(frames);
+    let chunks = (rate.hz() * HELD_S).ceil().max(2.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "two thousand at the most")]
+    let (ring, end) = RingBuffer::new(chunk.room() * chunks as usize);
+    (Tap { ring, chunk, asked: Asked::NOTHING, dropped: 0 }, end)
+}
+
+impl Tap {
+    /// The next frame comes of that.
+    #[inline]
+    pub fn asked(&mut self, asked: Asked) {
+        self.asked = asked;
+    }
+
+    /// That left, or was to.
+    #[inline]
+    pub fn frame(&mut self, lane: usize, datagram: &[u8], at: MonoTime, delivery: Delivery) {
+        let asked = std::mem::replace(&mut self.asked, Asked::NOTHING);
+        let handed = Handed::from(delivery);
+        self.chunk.frame(&SentFrame { lane, at, handed, asked, datagram });
+    }
+
+    /// A tick is over.
+    #[inline]
+    pub fn tick(&mut self, head: &TickHead) {
+        let chunk = self.chunk.close(head, self.dropped);
+        let is_posted = chunk.is_some_and(|chunk| self.ring.push_entire_slice(chunk).is_ok());
+        self.dropped = if is_posted { 0 } else { self.dropped.saturating_add(1) };
+        self.chunk.clear();
+    }
+}

@@ -1,0 +1,275 @@
+//! From frames to the file that is read back.
+
+use std::io::{self, Cursor, Seek, Write};
+
+use mcap::MessageStream;
+use proptest::prelude::*;
+use serde_json::Value;
+
+use super::chunk::{ChunkWriter, Handed, SentFrame};
+use super::*;
+use crate::motion::{MAX_AXES, SeatType, Slot, Window};
+use crate::net::{Delivery, SendFault};
+use crate::state::{PlayMode, State};
+use crate::time::{MonoTime, Rate, ShowTime};
+use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, VibrationPort};
+
+const MS: u64 = 1_000_000;
+const PLAYING: State = State::Playing(PlayMode::Following);
+
+fn window() -> Window {
+    let seat = SeatType::bench3(3);
+    Window::new((0..3).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect())
+}
+
+fn seat() -> RecordedSeat {
+    RecordedSeat::new("A1", &window(), FrameKind::Datagram(VibrationPort::Two))
+}
+
+fn head(ms: u64) -> TickHead {
+    let film = ShowTime::from_millis(ms.cast_signed());
+    let deadline = MonoTime::from_nanos(ms * MS);
+    TickHead { index: ms, deadline, late_ns: 1_000 * ms, missed: 0, film, state: PLAYING }
+}
+
+fn asked(place: f64) -> Asked {
+    Asked { pose: [place; MAX_AXES], slots: 3, level: 1.0, clamps: 0 }
+}
+
+/// A frame that sends all axes to that fraction of the stroke.
+fn frame(place: f64, buf: &mut [u8; MAX_LEN]) -> &[u8] {
+    let positions = [0, 1, 2].map(|slot| window().slots()[slot].pulses(place));
+    let motion = Motion {
+        timing: Timing::Relative,
+        channel: 0,
+        accept: Code(0xffff),
+        reply: Code::NONE,
+        frame: FrameNo(1),
+        time_ms: 10,
+        positions: &positions,
+        outputs: 0,
+        analogue: Analogue::default(),
+        vibration: None,
+    };
+    motion.emit(buf)
+}
+
+fn about() -> About {
+    About {
+        hall: "hall".to_owned(),
+        cue: "ride.csv".to_owned(),
+        title: String::new(),
+        cue_sha256: "00".to_owned(),
+        rate_hz: 100.0,
+        clocks: (MonoTime::from_nanos(0), 1_000_000 * MS),
+    }
+}
+
+/// What a play of these ticks, each of a place asked for and one sent, comes to as a file; ticks 10 ms apart.
+fn recorded(ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
+    let seats = [seat()];
+    let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
+    let file = Recording::begin(Cursor::new(Vec::new()), &about(), &seats).unwrap();
+    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    for (tick, (wanted, sent)) in (0_u64..).zip(ticks) {
+        let mut buf = [0; MAX_LEN];
+        tap.asked(asked(wanted));
+        tap.frame(0, frame(sent, &mut buf), MonoTime::from_nanos(tick * 10 * MS), Delivery::Sent);
+        tap.tick(&head(tick * 10));
+        recorder.take().unwrap();
+    }
+    recorder.finish(Some(b"{}")).unwrap().into_inner()
+}
+
+fn messages(file: &[u8]) -> Vec<(String, u64, Value)> {
+    let message = |message: mcap::Message<'_>| {
+        let value = serde_json::from_slice(&message.data).unwrap();
+        (message.channel.topic.clone(), message.log_time, value)
+    };
+    MessageStream::new(file).unwrap().map(|one| message(one.unwrap())).collect()
+}
+
+#[test]
+fn a_sample_is_the_worst_of_its_window_and_its_counts_are_of_all() {
+    // For one tick of the second window the seat was asked for 15 mm more than it was sent.
+    let file = recorded((0..10).map(|tick| (if tick == 7 { 0.6 } else { 0.5 }, 0.5)));
+    let all = messages(&file);
+    let seats: Vec<_> = all.iter().filter(|(topic, ..)| topic == "/seat/A1").collect();
+    assert_eq!(seats.len(), 2);
+    let (_, at, sample) = seats[1];
+    assert_eq!(*at, (1_000_000 + 70) * MS, "it is of the tick in which they differed");
+    assert_eq!((&sample["film_s"], &sample["sent"]), (&Value::from(0.07), &Value::from(5)));
+    assert_eq!((&sample["asked_mm"][2], &sample["sent_mm"][2]), (&Value::from(90.0), &Value::from(75.0)));
+    let ticks: Vec<_> = all.iter().filter(|(topic, ..)| topic == "/tick").collect();
+    assert_eq!((ticks.len(), &ticks[1].2["ticks"], &ticks[1].2["late_max_us"]), (2, &5.into(), &90.0.into()));
+    let states: Vec<_> = all.iter().filter(|(topic, ..)| topic == "/hall").collect();
+    assert_eq!(states.len(), 1, "a state is told when it changes");
+}
+
+#[test]
+fn a_file_says_what_it_is_of_first_and_what_it_came_to_last() {
+    let file = recorded((0..10).map(|_| (0.5, 0.5)));
+    let summary = mcap::Summary::read(&file).unwrap().unwrap();
+    let names: Vec<_> = summary.metadata_indexes.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!((names, summary.attachment_indexes.len()), (vec!["kinocue", "kinocue.end"], 1));
+    let end = mcap::read::metadata(&file, &summary.metadata_indexes[1]).unwrap().metadata;
+    assert_eq!([&end["ticks"], &end["frames"], &end["dropped"]], ["10", "10", "0"]);
+}
+
+#[test]
+fn of_a_tick_that_finds_no_room_nothing_is_kept_and_the_next_says_so() {
+    let (mut tap, mut ring) = tap(&[seat()], Rate::from_hz(1.0));
+    let mut buf = [0; MAX_LEN];
+    let octets = frame(0.5, &mut buf);
+    for tick in 0..5 {
+        tap.frame(0, octets, MonoTime::from_nanos(tick), Delivery::Sent);
+        tap.tick(&head(tick));
+    }
+    let mut held = vec![0; ring.slots()];
+    ring.pop_entire_slice(&mut held).unwrap();
+    let (first, rest) = Chunk::parse(&held).unwrap();
+    let (second, rest) = Chunk::parse(rest).unwrap();
+    assert_eq!(([first.head, second.head], rest.len()), ([head(0), head(1)], 0));
+    tap.tick(&head(5));
+    let mut held = vec![0; ring.slots()];
+    ring.pop_entire_slice(&mut held).unwrap();
+    let (next, _) = Chunk::parse(&held).unwrap();
+    assert_eq!((next.head.index, next.dropped, next.frames().count()), (5, 3, 0));
+}
+
+#[test]
+fn what_the_kernel_did_not_take_is_counted_apart() {
+    let mut fold = Sampled::new(vec![seat()], SAMPLE_HZ);
+    let (mut tap, mut ring) = tap(&[seat(), seat(), seat()], Rate::from_hz(100.0));
+    let mut buf = [0; MAX_LEN];
+    let octets = frame(0.5, &mut buf);
+    for delivery in
+        [Delivery::Sent, Delivery::SentAfterRefusal, Delivery::Failed(SendFault::of(libc::EAGAIN))]
+    {
+        tap.asked(asked(0.5));
+        tap.frame(0, octets, MonoTime::from_nanos(0), delivery);
+    }
+    tap.tick(&head(0));
+    let mut held = vec![0; ring.slots()];
+    ring.pop_entire_slice(&mut held).unwrap();
+    let mut samples = Vec::new();
+    fold.take(&Chunk::parse(&held).unwrap().0, &mut |_, message| samples.push(message));
+    fold.close(&mut |_, message| samples.push(message));
+    let counts = samples.iter().find_map(|message| match message {
+        Message::Seat(0, sample) => Some((sample.sent, sample.unsent)),
+        _ => None,
+    });
+    assert_eq!(counts, Some((2, 1)));
+}
+
+/// A disk that takes so many octets and no more.
+struct Full(Cursor<Vec<u8>>, usize);
+
+impl Write for Full {
+    fn write(&mut self, octets: &[u8]) -> io::Result<usize> {
+        self.1 = self.1.checked_sub(octets.len()).ok_or(io::ErrorKind::StorageFull)?;
+        self.0.write(octets)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Full {
+    fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
+        self.0.seek(to)
+    }
+}
+
+#[test]
+fn a_disk_that_is_full_ends_the_recording_and_not_the_ticks() {
+    let seats = [seat()];
+    let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
+    let file = Recording::begin(Full(Cursor::default(), 4_000), &about(), &seats).unwrap();
+    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    let ended = (0..1_000).find_map(|tick| {
+        let mut buf = [0; MAX_LEN];
+        tap.asked(asked(0.5));
+        tap.frame(0, frame(0.5, &mut buf), MonoTime::from_nanos(tick), Delivery::Sent);
+        tap.tick(&head(10 * tick));
+        recorder.take().and_then(|()| recorder.flush()).err()
+    });
+    assert!(ended.is_some());
+    drop(recorder);
+    // Nobody reads any more: ticks go on to be dropped.
+    (0..1_000).for_each(|tick| tap.tick(&head(tick)));
+}
+
+#[test]
+fn what_was_flushed_is_read_of_a_file_whose_writer_was_killed() {
+    let on_disk = tempfile::NamedTempFile::new().unwrap();
+    let seats = [seat()];
+    let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
+    let out = io::BufWriter::new(on_disk.reopen().unwrap());
+    let file = Recording::begin(out, &about(), &seats).unwrap();
+    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    for tick in 0..100 {
+        tap.tick(&head(10 * tick));
+    }
+    recorder.take().unwrap();
+    recorder.flush().unwrap();
+    let file = std::fs::read(on_disk.path()).unwrap();
+    let stream = MessageStream::new_with_options(&file, mcap::read::Options::IgnoreEndMagic.into()).unwrap();
+    // Twenty windows of 50 ms, of which the last is not over, and one state.
+    assert_eq!(stream.map_while(Result::ok).count(), 19 + 1);
+}
+
+#[test]
+fn schemas_keep_to_what_viewers_draw() {
+    let file = recorded((0..10).map(|_| (0.5, 0.5)));
+    let summary = mcap::Summary::read(&file).unwrap().unwrap();
+    assert_eq!(summary.schemas.len(), 3);
+    let all = messages(&file);
+    for channel in summary.channels.values() {
+        let schema: Value = serde_json::from_slice(&channel.schema.as_ref().unwrap().data).unwrap();
+        assert_eq!(schema["type"], "object");
+        let properties = schema["properties"].as_object().unwrap();
+        for kind in properties.values() {
+            assert!(kind["type"].is_string(), "{kind}");
+            assert!(kind["type"] != "array" || kind["items"]["type"] == "number", "{kind}");
+        }
+        let named: Vec<&String> = properties.keys().collect();
+        for (_, _, value) in all.iter().filter(|(topic, ..)| *topic == channel.topic) {
+            let fields: Vec<&String> = value.as_object().unwrap().keys().collect();
+            assert_eq!(fields, named, "what is written is what the schema has");
+            assert!(value.as_object().unwrap().values().all(|field| !field.is_null()));
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_frame_reads_as_it_was_written(
+        lane in 0_usize..64,
+        at in any::<u64>(),
+        slots in 0_usize..=MAX_AXES,
+        place in -2.0_f64..2.0,
+        clamps in any::<u32>(),
+        datagram in prop::collection::vec(any::<u8>(), 0..300),
+    ) {
+        let mut pose = [0.0; MAX_AXES];
+        pose[..slots].fill(place);
+        let asked = Asked { pose, slots, level: 0.5, clamps: clamps.into() };
+        let at = MonoTime::from_nanos(at);
+        let written = SentFrame { lane, at, handed: Handed::Refused, asked, datagram: &datagram };
+        let mut chunk = ChunkWriter::with_room(1_000);
+        chunk.frame(&written);
+        let octets = chunk.close(&head(7), 3).expect("there is room");
+        let (read, rest) = Chunk::parse(octets).expect("it is whole");
+        prop_assert_eq!((read.head, read.dropped, rest.len()), (head(7), 3, 0));
+        prop_assert_eq!(read.frames().collect::<Vec<_>>(), [written]);
+    }
+
+    #[test]
+    fn no_octets_panic(octets in prop::collection::vec(any::<u8>(), 0..300)) {
+        if let Some((chunk, _)) = Chunk::parse(&octets) {
+            chunk.frames().count();
+        }
+    }
+}
