@@ -151,8 +151,7 @@ fn a_port_that_is_not_there_is_named_with_what_to_do_and_its_seat_is_back_once_i
             one["id"] == "link" && one["text"].as_str().is_some_and(|it| it.contains("[link.stalls]"))
         })
     };
-    let missing = hall.wait(is_missing);
-    assert_eq!(of_lift(&missing)["health"], "lost");
+    hall.wait(|status| is_missing(status) && of_lift(status)["health"] == "lost");
     // The others go on without it.
     hall.done(&["disable", "L1"]);
     hall.comes_to("parked");
