@@ -272,8 +272,9 @@ impl Belief {
     /// frame counts, so that a frame is missed after 40 to 50 ms.
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
         let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
-        let is_missed =
-            |since| told.since(since) > GAP + self.acked_after || now.since(since) > GAP_UNTOLD + self.acked_after;
+        let is_missed = |since| {
+            told.since(since) > GAP + self.acked_after || now.since(since) > GAP_UNTOLD + self.acked_after
+        };
         let unheard = || self.spans.waiting_since(self.acked).is_some_and(is_missed);
         refused || (self.asks && unheard())
     }

@@ -5,9 +5,9 @@ use std::time::Duration;
 use super::Lane;
 use super::lane::Codec;
 use super::link::StreamTerms;
+use super::mbox::{MotionCodec, Wiring};
 use super::rates::LinkLoad;
 use super::sixpack2;
-use super::mbox::{MotionCodec, Wiring};
 use crate::config::drive::DriveFamily;
 use crate::config::{Config, Connection, Controller, Drives, FanOut, FansOut as _};
 use crate::motion::{SeatType, Slot, Window};
@@ -74,7 +74,7 @@ fn lead(config: &Config, controller: &Controller) -> (Duration, Duration) {
         let (seats, axes) = (u32::try_from(on_it.count()).ok()?, LinkLoad::of(link, config)?.axes);
         let later = match drives.motors.family() {
             DriveFamily::SilverMax => Duration::ZERO,
-            DriveFamily::Sixpack2 => sixpack2::asked_every(terms.period, seats, axes),
+            DriveFamily::Sixpack2 => sixpack2::read_every(terms.period, seats, axes),
         };
         Some((terms.lead(drives.motors.family()), later))
     };

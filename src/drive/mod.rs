@@ -29,11 +29,11 @@ pub(crate) use lane::Stamped;
 pub use lanes::Manner;
 pub(crate) use lanes::lanes;
 pub(crate) use rounds::Rounds;
-pub(crate) use stream::{LinkStream, motors_of, units_of};
 pub(crate) use segments::{
     DriveCourse, DriveUnits, Knots, LOOP, Lag, Middle, Middles, Motor, Segment, SegmentFit, Shaker, TICK_NS,
     TargetMaker,
 };
+pub(crate) use stream::{LinkStream, motors_of, units_of};
 
 use std::sync::Arc;
 

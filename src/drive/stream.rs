@@ -51,7 +51,8 @@ impl<P: LinkPort> LinkStream<P> {
             let stream = sixpack2::Stream::new(talk, terms, &lanes, poses, events);
             return stream.map(Self::Sixpack2).map_err(|error| error.to_string());
         }
-        let lanes = seats.iter().map(|seat| Some(silvermax::LaneUnits { seat: units_of(seat)?, canary: None }));
+        let lanes =
+            seats.iter().map(|seat| Some(silvermax::LaneUnits { seat: units_of(seat)?, canary: None }));
         let lanes = lanes.collect::<Option<Vec<_>>>();
         let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, silvermax::Talk::new(port, talk));
         let stream = silvermax::Stream::new(talk, terms, &lanes, poses, events);
@@ -122,8 +123,7 @@ impl<P: LinkPort> LinkStream<P> {
             Self::SilverMax(stream) => {
                 let seat = units_of(controller).ok_or(NO_DRIVES)?;
                 let canary = canary().map_err(|error| format!("the system gives no chance: {error}"))?;
-                let homed =
-                    silvermax::home(stream.talk(), seat, silvermax::Homing { canary, goes_on, told });
+                let homed = silvermax::home(stream.talk(), seat, silvermax::Homing { canary, goes_on, told });
                 homed.map(|()| stream.rejoin(lane, canary)).map_err(|error| error.to_string())
             }
             Self::Sixpack2(stream) => {

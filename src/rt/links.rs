@@ -10,11 +10,11 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer};
 
 use super::{FrameSink, Live};
+use crate::drive::LinkStream;
 use crate::drive::link::{
     AxisFigures, LaneWants, LedPose, LinkFigures, LinkPort, LinkPose, RECORD_LEN, StreamEvent,
     lane_number as number,
 };
-use crate::drive::LinkStream;
 use crate::net::{Delivery, SendFault, Sender};
 use crate::record::{Asked, Tap, TickHead};
 use crate::state::State;

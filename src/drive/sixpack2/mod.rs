@@ -21,7 +21,7 @@ mod tests;
 pub(crate) use find::FindError;
 pub(crate) use home::{Homing, home};
 pub(crate) use set_up::{HomeError, SeatMotors};
-pub(crate) use stream::{LEAD, Stream, asked_every};
+pub(crate) use stream::{LEAD, Stream, read_every};
 pub(crate) use talk::Talk;
 
 #[cfg_attr(not(test), expect(unused_imports, reason = "for preflight"))]

@@ -5,10 +5,10 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::super::*;
+use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive::{SeatDrive, SilverMaxDrive, Torque};
 use crate::cue::Vibration;
-use crate::config::drive::DriveFamily;
 use crate::drive::link::*;
 use crate::motion::{AxisGeometry, MAX_AXES, SeatType};
 use crate::sim::serial::{LineFaults, SerialLine};
@@ -203,7 +203,8 @@ impl Play {
             }
             let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
             let pose = LinkPose { frame: FrameNo(self.ticks), lasts_ms: 10, axes, vibration };
-            let _ = self.poses.push(LedPose { lane: 0, at: due + self.terms.lead(DriveFamily::SilverMax), pose });
+            let _ =
+                self.poses.push(LedPose { lane: 0, at: due + self.terms.lead(DriveFamily::SilverMax), pose });
             self.ticks += 1;
         }
     }

@@ -46,10 +46,11 @@ const UNDERSTOOD: u32 = 5;
 /// tick until it can be interpolated, a question that makes a slice late; the rest is for ticks that are missed.
 pub(crate) const LEAD: Lead = Lead { periods: 4, ticks: 4 };
 
-/// The longest from one question to a seat until the next, where so many seats with so many axes in all are on a link.
+/// The longest from one reading of a seat until the next, where so many seats with so many axes in all are on a link: each has its turn
+/// once for each of them, and who it is may be asked in one.
 #[must_use]
-pub(crate) fn asked_every(period: Duration, seats: u32, axes: u32) -> Duration {
-    period * (TARGETS.div_ceil(axes.max(1)) + 1) * seats
+pub(crate) fn read_every(period: Duration, seats: u32, axes: u32) -> Duration {
+    period * (TARGETS.div_ceil(axes.max(1)) + 1) * 2 * seats
 }
 
 /// A play on one link.
@@ -91,17 +92,7 @@ impl<P: LinkPort> Stream<P> {
         };
         let lanes = lanes.iter().map(lane).collect::<Result<_, HomeError>>()?;
         let figures = LinkFigures::default();
-        Ok(Self {
-            talk,
-            terms,
-            lanes,
-            poses,
-            events,
-            figures,
-            next_slice: now,
-            targets: 0,
-            next_asked: 0,
-        })
+        Ok(Self { talk, terms, lanes, poses, events, figures, next_slice: now, targets: 0, next_asked: 0 })
     }
 
     /// Takes what poses came, and does what is due next: the targets of a slice, or one question. Nothing due: waits a millisecond.

@@ -137,8 +137,8 @@ impl<P: LinkPort> Stream<P> {
             let (lane, axis) = (number(index), axis_number(a));
             return self.put_out(index, StreamEvent::OffCourse { lane, axis, by_mm });
         }
-        self.lanes[index].next_axis = a;
-        self.locate(number(index));
+        // It is asked again next.
+        (self.next_asked, self.lanes[index].next_axis) = (index, a);
         Ok(())
     }
 
@@ -208,8 +208,6 @@ impl<P: LinkPort> Stream<P> {
             Err(TalkFault::Link(fault)) => Err(fault),
             Err(TalkFault::Silent { .. }) => {
                 let since = *lane.failing_since.get_or_insert(now);
-                // Soon again: what is silent is asked first.
-                self.targets = TARGETS;
                 if now.since(since) > LOST.max(self.terms.period * 10) {
                     self.lose(index);
                 }

@@ -5,8 +5,8 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::bench::*;
-use crate::cue::Vibration;
 use crate::config::drive::DriveFamily;
+use crate::cue::Vibration;
 use crate::drive::link::{LedPose, LinkPose, StreamEvent, StreamTerms};
 use crate::drive::sixpack2::*;
 use crate::motion::MAX_AXES;
@@ -150,7 +150,8 @@ impl Play {
             for lane in 0..self.seats {
                 let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
                 let pose = LinkPose { frame: FrameNo(self.ticks), lasts_ms: 10, axes, vibration };
-                let _ = self.poses.push(LedPose { lane, at: due + self.terms.lead(DriveFamily::Sixpack2), pose });
+                let _ =
+                    self.poses.push(LedPose { lane, at: due + self.terms.lead(DriveFamily::Sixpack2), pose });
             }
             self.ticks += 1;
         }

@@ -5,7 +5,7 @@ use super::play::*;
 use std::time::Duration;
 
 use crate::drive::link::{BrakeReason, StreamEvent};
-use crate::drive::sixpack2::asked_every;
+use crate::drive::sixpack2::read_every;
 
 #[test]
 fn a_ride_is_executed_within_a_fifth_of_a_millimetre_by_axes_that_do_not_wait_for_each_other() {
@@ -40,7 +40,7 @@ fn frames_are_confirmed_once_they_are_executed_and_a_motor_was_read_where_they_l
             assert_eq!(first.0, std::mem::replace(&mut next[usize::from(*lane)], last.0 + 1));
             assert!(*at >= executed, "{last:?} {at:?}");
             let (seats, every) = (u32::from(play.seats), play.terms.period);
-            let latest = play.origin + TICK * first.0 + asked_every(every, seats, 3 * seats);
+            let latest = play.origin + TICK * first.0 + read_every(every, seats, 3 * seats);
             assert!(*at < latest + Duration::from_millis(15), "{first:?} {:?}", at.since(latest));
         }
         assert!(next.iter().all(|next| *next > 990), "{next:?}: what it braked from is not executed");

@@ -5,6 +5,7 @@ use super::play::*;
 use crate::drive::link::LinkFault;
 use crate::sim::serial::LineFaults;
 use crate::sim::sixpack2::SixpackFault;
+use crate::wire::sixpack2::{ReferenceSearch, SixpackOrder, action};
 
 fn riding(seconds: f64) -> Play {
     let mut play = Play::over(&[wired(1, false)], BAUD);
@@ -107,16 +108,19 @@ fn a_seat_that_is_not_home_is_told_so_at_each_look_and_never_led() {
 #[test]
 fn a_motor_that_searches_by_a_damaged_question_is_ended_and_out() {
     let mut play = riding(10.0);
-    let now = play.now();
-    let search =
-        crate::wire::sixpack2::SixpackCommand::ReferenceSearch(crate::wire::sixpack2::ReferenceSearch {
-            motor: 1,
-        });
-    play.line().send_break(now);
-    play.line().send(&search.frame(1).octets(), now);
-    play.play(0.2, 0);
-    let action = play.bus().units()[0].motors[1].action();
-    assert!(play.has("OffCourse { lane: 0, axis: 1") && action == 0, "{action} {:?}", play.rare());
+    let search = SixpackOrder::Search(ReferenceSearch { motor: 1 });
+    // Not amidst the frames of a slice.
+    let does = |play: &mut Play| play.bus().units()[0].motors[1].action();
+    while does(&mut play) < action::SEARCH {
+        let now = play.now();
+        play.line().send_break(now);
+        play.line().send(&search.frame(1).octets(), now);
+        play.play(0.01, 0);
+    }
+    // Each of three motors has its turn by then, and this one a second.
+    play.play(0.3, 0);
+    let action = does(&mut play);
+    assert!(play.has("OffCourse { lane: 0, axis: 1") && action == action::IDLE, "{action} {:?}", play.rare());
 }
 
 #[test]
