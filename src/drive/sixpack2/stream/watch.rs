@@ -271,7 +271,7 @@ impl<P: LinkPort> Stream<P> {
         }
         let lane = &mut self.lanes[index];
         let was_lost = lane.stage == Stage::Lost;
-        lane.failing_since = None;
+        (lane.failing_since, lane.not_before) = (None, now);
         lane.make_ready();
         if was_lost {
             self.tell(StreamEvent::Back { lane: number(index) });

@@ -19,7 +19,7 @@ const HALL: &str = "[show]\nrate_hz = 100\n[link.stalls]\nport = \"/dev/ttyUSB0\
 type SixHall<'h, 'l> = Hall<'h, 'l, SixpackBus>;
 
 /// The level at which the ride fits a link of this rate.
-const LEVEL: f64 = 0.5;
+const LEVEL: f64 = 0.4;
 
 /// Opens a hall whose seat was homed, with a cue on it.
 fn hall(lead: impl FnOnce(&mut SixHall<'_, '_>, StagedShow, &Timeline)) {
@@ -95,7 +95,7 @@ fn a_cue_is_executed_within_a_fifth_of_a_millimetre_its_lead_after_the_ticks() {
             };
             let (now, before): (Vec<f64>, Vec<f64>) = (at(show_ns), at(show_ns - 2_000_000));
             for (place, (now, before)) in hall.mm().into_iter().zip(now.into_iter().zip(before)) {
-                rode |= now > 0.25;
+                rode |= now > 0.2;
                 worst = worst.max(150.0 * now.min(before) - place).max(place - 150.0 * now.max(before));
             }
         });
