@@ -106,7 +106,7 @@ fn evening(dialect: &str) -> Vec<Value> {
     assert_eq!((&lift["health"], &lift["lost"]), (&"ok".into(), &0.into()), "{lift}");
     let axes = parked["links"][0]["axes"].as_array().expect("a list");
     assert_eq!(axes.len(), 3);
-    assert!(axes.iter().all(|axis| axis["sent"].as_u64() > Some(20) && axis["refused"] == 0), "{axes:?}");
+    assert!(axes.iter().all(|axis| axis["made"].as_u64() > Some(20) && axis["refused"] == 0), "{axes:?}");
 
     hall.play("night");
     hall.wait(|status| of_lift(status)["positions_mm"][0].as_f64() > Some(5.0));

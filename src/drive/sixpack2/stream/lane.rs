@@ -34,6 +34,8 @@ pub(super) struct Lane {
     pub(super) failing_since: Option<MonoTime>,
     /// Until then nothing is asked of it that is not urgent.
     pub(super) not_before: MonoTime,
+    /// Who it is was its last question.
+    pub(super) asked_who: bool,
     /// Who it is was asked last; none where that is to be found out.
     pub(super) known: Option<MonoTime>,
 }
@@ -54,6 +56,7 @@ impl Lane {
             heard: now,
             failing_since: None,
             not_before: now,
+            asked_who: false,
             known: Some(now),
         }
     }

@@ -30,9 +30,11 @@ const OUTSIDE_MM: f64 = 0.5;
 const LOST_ZERO_MM: f64 = 10.0;
 
 impl<P: LinkPort> Stream<P> {
-    /// True if a question does not make the next slice later than it has to.
+    /// True if a question does not make the next slice later than it has to; while all stand there is one after each slice.
     pub(super) fn has_time(&self) -> bool {
-        !self.lanes.iter().any(|lane| lane.is_led()) || self.targets >= TARGETS
+        let is_led = self.lanes.iter().any(|lane| lane.is_led());
+        let plays = self.lanes.iter().any(Lane::plays);
+        !is_led || self.targets >= TARGETS || (self.targets > 0 && !plays)
     }
 
     /// Asks what is due; false where nothing is.
@@ -59,10 +61,13 @@ impl<P: LinkPort> Stream<P> {
     fn ask(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
         self.next_asked = (index + 1) % self.lanes.len();
         let lane = &mut self.lanes[index];
-        if lane.known.is_none_or(|at| now.since(at) >= IDENTITY) {
+        let axis = lane.next_axis;
+        // Once for all of its motors: whoever wants to know again and again keeps none of them from being read.
+        if axis == 0 && !lane.asked_who && lane.known.is_none_or(|at| now.since(at) >= IDENTITY) {
+            lane.asked_who = true;
             return self.ask_who(index, now);
         }
-        let axis = lane.next_axis;
+        lane.asked_who = false;
         lane.next_axis = (axis + 1) % lane.axes.len();
         if let Some(told) = self.place_of(index, axis)? {
             self.judge(index, axis, told)?;

@@ -113,7 +113,7 @@ fn a_stop_brakes_the_motors_at_once_and_no_pose_that_was_under_way_moves_them_on
         hall.go(show);
         hall.run(6.0, |_| {});
         let before = hall.mm();
-        hall.run(0.02, |_| {});
+        hall.run(0.1, |_| {});
         assert_ne!(hall.mm(), before, "it moves");
         hall.runtime.desk.stop();
         // 203 mm/s and 3000 mm/s²: at rest after 68 ms, and two slices and the lag of its motors.
@@ -161,7 +161,7 @@ fn a_unit_that_is_restarted_in_a_play_stands_and_is_not_led_again_until_it_is_ho
     hall(|hall, show, _| {
         hall.go(show);
         hall.run(6.0, |_| {});
-        let now = NOW.get();
+        let now = hall.line.lock().now();
         hall.line.lock().line.bus_mut().suffer(None, SixpackFault::Reset, now);
         hall.run(0.1, |_| {});
         hall.assert_rests();
