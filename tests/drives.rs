@@ -315,6 +315,22 @@ fn preflight_passes_a_seat_once_it_is_homed_and_takes_one_that_was_never_for_not
 }
 
 #[test]
+fn preflight_passes_a_seat_on_a_sixpack_once_it_is_homed_and_leaves_one_as_it_woke() {
+    let Bench { hall, sim, folder: _folder } = Bench::of("sixpack2");
+    for _ in 0..2 {
+        let (told, fails, exit) = preflight(&hall);
+        assert_eq!((fails, exit), (vec!["not-home".to_owned()], Some(1)), "as it woke: {told}");
+    }
+    assert_eq!(home(&hall).2, Some(0));
+    let (told, fails, exit) = preflight(&hall);
+    assert_eq!((fails, exit), (vec![], Some(0)), "{told}");
+    let place = told["controllers"][0]["registers"]["1.motor2"].as_i64().expect("it was read");
+    assert!((place - 1_000_000).abs() <= 20, "{told}");
+    sim.signal(Signal::TERM);
+    assert_eq!(sim.finish().code, Some(0));
+}
+
+#[test]
 fn preflight_tells_a_unit_that_is_not_there_and_an_adapter_that_repeats_what_is_sent() {
     let folder = tempfile::tempdir().expect("a folder");
     let port = folder.path().join("stalls");

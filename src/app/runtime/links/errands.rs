@@ -1,13 +1,11 @@
 //! What the control plane has the threads of links do while seats rest: homing, and all that preflight asks.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use crate::config::drive_controller::Motors;
 use crate::config::{Config, Controller};
+use crate::drive::LinkStream;
 use crate::drive::link::{StreamTerms, lane_number};
-use crate::drive::{LinkStream, silvermax};
 use crate::preflight::LinkSurvey;
 use crate::rt::{LinkEnd, Port};
 
@@ -59,24 +57,17 @@ fn home_seat(
 pub(in super::super) fn survey(links: &[LinkEnd], config: &Arc<Config>) -> Receiver<(String, LinkSurvey)> {
     let (tell, told) = channel();
     for link in links {
-        let units = link.controllers.iter().filter_map(|lane| config.controllers[*lane].drives());
-        let units: Vec<u8> = units
-            .flat_map(|drives| match &drives.motors {
-                Motors::SilverMax(units) => units.clone(),
-                Motors::Sixpack2 { .. } => Vec::new(),
-            })
-            .collect();
-        let (tell, end) = (tell.clone(), link.clone());
+        let lanes = link.controllers.clone();
+        let (tell, end, config) = (tell.clone(), link.clone(), Arc::clone(config));
         link.ask(Box::new(move |stream| {
-            let opened = end.standing().fault.map_or(Ok(()), Err);
-            let (mut told, mut delay) = (BTreeMap::new(), None);
-            if let LinkStream::SilverMax(stream) = stream {
-                let talk = stream.talk();
-                told.extend(units.iter().map(|unit| (*unit, silvermax::look(talk, *unit))));
-                delay = talk.usual_delay();
-            }
-            let (counts, units) = (stream.figures().talk, told);
-            drop(tell.send((end.name.clone(), LinkSurvey { opened, delay, counts, units })));
+            let drives = lanes.iter().filter_map(|lane| config.controllers[*lane].drives());
+            let motors: Vec<_> = drives.map(|drives| &drives.motors).collect();
+            let survey = match stream {
+                LinkStream::SilverMax(stream) => LinkSurvey::of_units(stream.talk(), &motors),
+                LinkStream::Sixpack2(stream) => LinkSurvey::of_sixpacks(stream.talk(), &motors),
+            };
+            let fault = end.standing().fault;
+            drop(tell.send((end.name.clone(), LinkSurvey { fault, ..survey })));
         }));
     }
     told

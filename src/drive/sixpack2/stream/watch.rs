@@ -7,8 +7,7 @@ use super::{Stream, StreamEvent, TARGETS, Track, axis_number, number};
 use crate::drive::link::Stage;
 use crate::drive::link::{LinkFault, LinkPort};
 use crate::drive::sixpack2::find::{WHO, waking_baud, who};
-use crate::drive::sixpack2::home::searches;
-use crate::drive::sixpack2::look::where_is;
+use crate::drive::sixpack2::look::{OUTSIDE_MM, searches, where_is};
 use crate::drive::sixpack2::talk::TalkFault;
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackReply, UnitTold, action};
@@ -25,8 +24,7 @@ const PROBES: Duration = Duration::from_millis(250);
 const OFF_COURSE_MM: f64 = 0.5;
 /// When exactly a unit reads its counter is not known to better than this, seconds: its loop, and when that falls.
 const READING: f64 = 0.004;
-/// How far outside its stroke a seat that is home may stand, mm; what is farther than the other is no place of it at all.
-const OUTSIDE_MM: f64 = 0.5;
+/// What is so far outside the stroke is no place of the seat at all, mm.
 const LOST_ZERO_MM: f64 = 10.0;
 
 impl<P: LinkPort> Stream<P> {
@@ -116,7 +114,7 @@ impl<P: LinkPort> Stream<P> {
         axis.run(sent);
         let (by_mm, mm_s) = axis.beside(told.position);
         axis.figures.error_mm = by_mm;
-        let searches = searches(told);
+        let searches = searches(told.action);
         let is_off = by_mm.abs() > OFF_COURSE_MM + mm_s * READING;
         if !is_off {
             axis.figures.off_course_mm = axis.figures.off_course_mm.max(by_mm.abs());
@@ -172,7 +170,7 @@ impl<P: LinkPort> Stream<P> {
             axis.stood_at = is_idle.then_some(told.position);
             lane.not_before = now + LOOKS;
             // Nobody has it search: a search has no end by itself.
-            return if searches(told) { self.stop_motors(index) } else { Ok(()) };
+            return if searches(told.action) { self.stop_motors(index) } else { Ok(()) };
         }
         let (low, high) = axis.scale.reach(OUTSIDE_MM);
         if !(low..=high).contains(&f64::from(told.position)) {
