@@ -14,7 +14,6 @@ use crate::config::{Controller, Drives, Link};
 
 /// A play on one link. A variant for each family, matched and never boxed.
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "one for each link, made once")]
 pub(crate) enum LinkStream<P> {
     /// SilverMax units.
     SilverMax(silvermax::Stream<P>),

@@ -105,7 +105,11 @@ impl DriveSubject<'_> {
     /// True if any of its units answered.
     #[must_use]
     pub(crate) fn answered(&self) -> bool {
-        self.sixpack().is_some() || self.facts().next().is_some()
+        let Some(Motors::Sixpack2 { unit, .. }) = self.controller.drives().map(|drives| &drives.motors)
+        else {
+            return self.facts().next().is_some();
+        };
+        matches!(self.survey.sixpacks.get(unit), Some(Ok(_)))
     }
 
     fn units(&self) -> &[u8] {
