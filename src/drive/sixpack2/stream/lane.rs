@@ -31,7 +31,8 @@ pub(super) struct Lane {
     /// The last pose, and when it came.
     last: Option<LinkPose>,
     heard: MonoTime,
-    pub(super) failing_since: Option<MonoTime>,
+    /// Its last question was not answered.
+    pub(super) is_failing: bool,
     /// Until then nothing is asked of it that is not urgent.
     pub(super) not_before: MonoTime,
     /// Who it is was its last question.
@@ -54,7 +55,7 @@ impl Lane {
             next_axis: 0,
             last: None,
             heard: now,
-            failing_since: None,
+            is_failing: false,
             not_before: now,
             asked_who: false,
             known: Some(now),

@@ -16,8 +16,6 @@ use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackRepl
 const IDENTITY: Duration = Duration::from_secs(10);
 /// From one look whether a motor still moves to the next.
 const LOOKS: Duration = Duration::from_millis(20);
-/// A unit that does not answer for so long is lost, or for ten periods.
-const LOST: Duration = Duration::from_millis(250);
 /// How often a unit that is lost is asked.
 const PROBES: Duration = Duration::from_millis(250);
 /// How far a motor may be from where its targets lead, mm.
@@ -28,11 +26,11 @@ const READING: f64 = 0.004;
 const LOST_ZERO_MM: f64 = 10.0;
 
 impl<P: LinkPort> Stream<P> {
-    /// True if a question does not make the next slice later than it has to; while all stand there is one after each slice.
-    pub(super) fn has_time(&self) -> bool {
+    /// True if a question does not make the next slice later than it has to: there is one after each slice that leaves room for it.
+    pub(super) fn has_time(&self, now: MonoTime) -> bool {
         let is_led = self.lanes.iter().any(|lane| lane.is_led());
-        let plays = self.lanes.iter().any(Lane::plays);
-        !is_led || self.targets >= TARGETS || (self.targets > 0 && !plays)
+        let has_room = !self.lanes.iter().any(Lane::plays) || now + self.talk.question() <= self.next_slice;
+        !is_led || self.targets >= TARGETS || (self.targets > 0 && has_room)
     }
 
     /// Asks what is due; false where nothing is.
@@ -41,15 +39,17 @@ impl<P: LinkPort> Stream<P> {
         for step in 0..count {
             let index = (self.next_asked + step) % count;
             let lane = &self.lanes[index];
-            let is_due = lane.not_before <= now;
+            let (is_due, targets) = (lane.not_before <= now, std::mem::take(&mut self.targets));
             match lane.stage {
                 Stage::Lost if is_due => self.probe(index, now)?,
                 Stage::Out if is_due && lane.known.is_none() => self.probe(index, now)?,
                 Stage::Readying if is_due => self.look_at(index, now)?,
                 Stage::Ready | Stage::Runs | Stage::Ends => self.ask(index, now)?,
-                _ => continue,
+                _ => {
+                    self.targets = targets;
+                    continue;
+                }
             }
-            self.targets = 0;
             return Ok(true);
         }
         Ok(false)
@@ -202,17 +202,20 @@ impl<P: LinkPort> Stream<P> {
         index: usize,
         answer: Result<SixpackReply, TalkFault>,
     ) -> Result<Option<SixpackReply>, LinkFault> {
-        let (now, lane) = (self.talk.now(), &mut self.lanes[index]);
+        let lane = &mut self.lanes[index];
         match answer {
             Ok(reply) => {
-                lane.failing_since = None;
+                lane.is_failing = false;
                 Ok(Some(reply))
             }
             Err(TalkFault::Link(fault)) => Err(fault),
             Err(TalkFault::Silent { .. }) => {
-                let since = *lane.failing_since.get_or_insert(now);
-                if now.since(since) > LOST.max(self.terms.period * 10) {
+                // One answer may be lost. Whoever hears no targets stands, and would make up for all of them at once by the next that it
+                // hears: so it is asked again next, and told none without an answer.
+                if std::mem::replace(&mut lane.is_failing, true) {
                     self.lose(index);
+                } else {
+                    (self.next_asked, self.targets) = (index, TARGETS);
                 }
                 Ok(None)
             }
@@ -274,7 +277,7 @@ impl<P: LinkPort> Stream<P> {
         }
         let lane = &mut self.lanes[index];
         let was_lost = lane.stage == Stage::Lost;
-        (lane.failing_since, lane.not_before) = (None, now);
+        (lane.is_failing, lane.not_before) = (false, now);
         lane.make_ready();
         if was_lost {
             self.tell(StreamEvent::Back { lane: number(index) });

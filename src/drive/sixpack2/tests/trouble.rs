@@ -2,6 +2,8 @@
 
 use super::bench::*;
 use super::play::*;
+use std::time::Duration;
+
 use crate::drive::link::LinkFault;
 use crate::sim::serial::LineFaults;
 use crate::sim::sixpack2::SixpackFault;
@@ -129,7 +131,7 @@ fn octets_that_are_damaged_lead_no_axis_out_of_its_stroke() {
         LineFaults { lost: 0.000_5, ..LineFaults::default() },
         LineFaults { doubled: 0.000_5, ..LineFaults::default() },
         LineFaults { flipped: 0.000_5, ..LineFaults::default() },
-        LineFaults { answer_lost: 0.1, ..LineFaults::default() },
+        LineFaults { answer_lost: 0.02, ..LineFaults::default() },
     ]
     .into_iter()
     .enumerate()
@@ -143,8 +145,37 @@ fn octets_that_are_damaged_lead_no_axis_out_of_its_stroke() {
         play.play(40.0, 0);
         play.assert_inside();
         if index != 2 {
-            let through = play.rare();
-            assert!(through.is_empty(), "{index}: {through:?}");
+            // Two answers in a row may be lost.
+            let is_loss = |event: &&String| event.starts_with("Lost") || event.starts_with("Back");
+            let other = play.rare().into_iter().find(|event| !is_loss(&event));
+            assert_eq!(other, None, "{index}");
+        }
+    }
+}
+
+/// The greatest jump of speed after a cut of so long in a ride, mm/s, at one of ten moments, and what was told.
+fn jump_after(cut: Duration, phase: u32) -> (f64, Play) {
+    let mut play = riding(8.0 + 0.173 * f64::from(phase));
+    play.bus_mut().forget();
+    play.line().faults.unplugged = true;
+    play.play(cut.as_secs_f64(), 0);
+    play.line().faults.unplugged = false;
+    play.play(1.5, 0);
+    play.assert_inside();
+    let motors = play.bus().units()[0].motors[..3].iter();
+    (motors.map(|motor| motor.shaft.executed().jump / MM).fold(0.0, f64::max), play)
+}
+
+#[test]
+fn what_was_not_heard_while_a_line_was_cut_is_not_made_up_for_at_once() {
+    for ms in [60, 100, 240, 400] {
+        for phase in [0, 3, 6] {
+            let (jump, play) = jump_after(Duration::from_millis(ms), phase);
+            assert!(
+                jump <= 32.0 && play.has("Lost") && play.has("Back"),
+                "{ms} ms: {jump} mm/s {:?}",
+                play.rare()
+            );
         }
     }
 }
