@@ -135,7 +135,7 @@ checks! {
     BrokenReplies "broken-replies" Answers Warn
         "Datagrams came from the controller's address that are no messages: a broken cable or switch, or another device.";
     DrivesUnasked "drives-unasked" Answers Fail
-        "Drives of this family are not asked yet, and of a seat that nobody asked nothing is known.";
+        "Drives on a CAN bus are not asked yet, and of a seat that nobody asked nothing is known.";
 
     Address "address" Identity Fail
         "The controller takes itself for another address or port than the one it was reached at (PA10 to PA14): its \

@@ -466,9 +466,13 @@ fn a_seat_with_axes_that_no_cue_can_have_is_checked_without_them() {
 fn nothing_that_plays_takes_a_hall_with_drives_that_it_cannot_lead() {
     let folder = tempfile::tempdir().expect("a folder");
     let socket = folder.path().join("control.sock").display().to_string();
-    let serve = ["serve", "--config", DRIVES, "--socket", &socket, "--state", &socket];
+    let on_can = include_str!("data/config/drives.toml")
+        .replace("/dev/serial/by-id/usb-FTDI_FT232R_A50285BI-if00-port0", "can0")
+        .replace("rs485", "can");
+    let on_can = write(folder.path(), "can.toml", &on_can);
+    let serve = ["serve", "--config", &on_can, "--socket", &socket, "--state", &socket];
     for (args, names) in [
-        (&["play", CUE, "--config", DRIVES][..], "D2 on"),
+        (&["play", CUE, "--config", &on_can][..], "D2 on"),
         (&["latency", "--config", DRIVES], "D1, D2 on"),
         (&serve, "D2 on"),
     ] {

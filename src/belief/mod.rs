@@ -108,8 +108,9 @@ pub(crate) struct Belief {
     asks: bool,
     gap: bool,
     period: Duration,
-    /// How long before the seat executes them its frames are made: they may be confirmed so much later.
+    /// How long before the seat executes them its frames are made, and how much later they may be confirmed.
     lead: Duration,
+    acked_after: Duration,
     tally: Tally,
 }
 
@@ -130,7 +131,7 @@ impl Belief {
             own: window.own(),
             within: 0,
             known: Known::Nothing,
-            spans: Spans::default(),
+            spans: Spans::over(GAP + window.acked_after()),
             history: History::at([0.0; MAX_AXES]),
             acked: None,
             shaking: Shaking::default(),
@@ -143,6 +144,7 @@ impl Belief {
             gap: false,
             period,
             lead: window.lead(),
+            acked_after: window.acked_after(),
             tally: Tally::default(),
         }
     }
@@ -232,7 +234,7 @@ impl Belief {
         let mut pose = *self.spans.last();
         slots_in(told).for_each(|slot| pose[slot] = reading.pose[slot]);
         self.within = told | if agrees { self.within } else { 0 };
-        self.spans = Spans::at(pose);
+        self.spans.restart_at(pose);
         self.sways = if sways { reading.sways } else { 0.0 };
         self.known = Known::Measured(reading.at, reading.by);
         self.gap &= self.within != self.own || sways;
@@ -261,17 +263,17 @@ impl Belief {
         }
         (self.within, self.known) = (0, Known::Contradicted(now));
         // However many acks come yet, it is not where they say; nor at rest where it stands between two frames of its queue.
-        self.spans = Spans::at(*self.spans.last());
+        self.spans.restart_at(*self.spans.last());
         self.busy_until = self.busy_until.max(self.busy_at_most);
         Found::Astray
     }
 
     /// That the ack thread is slow is no gap at first: what an ack may still be read for is not missing. Of a span the oldest
-    /// frame counts, so that a frame is missed after 40 to 50 ms.
+    /// frame counts, so that a frame is missed after 40 to 50 ms, where acks come at once.
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
         let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
-        let is_missed =
-            |since| told.since(since) > GAP + self.lead || now.since(since) > GAP_UNTOLD + self.lead;
+        let later = self.acked_after + self.spans.slack();
+        let is_missed = |since| told.since(since) > GAP + later || now.since(since) > GAP_UNTOLD + later;
         let unheard = || self.spans.waiting_since(self.acked).is_some_and(is_missed);
         refused || (self.asks && unheard())
     }
@@ -288,7 +290,7 @@ impl Belief {
     #[must_use]
     pub(crate) fn start(&self, now: MonoTime) -> Option<KnownPose> {
         // Where no acks are asked for nobody reads either.
-        let within = if self.asks { BEGINS + self.period + self.lead } else { FRESH };
+        let within = if self.asks { BEGINS + self.period + self.acked_after } else { FRESH };
         self.pose(now).filter(|_| self.is_recent(now, within))
     }
 
@@ -443,7 +445,7 @@ impl Belief {
     /// The seat may have been moved unseen: what was known of it is known no more.
     pub(crate) fn forget(&mut self) {
         (self.known, self.within, self.sways) = (Known::Nothing, 0, 0.0);
-        self.spans = Spans::at(*self.spans.last());
+        self.spans.restart_at(*self.spans.last());
     }
 
     /// Notes that a frame was not sent.

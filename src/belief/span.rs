@@ -6,10 +6,10 @@ use crate::motion::{MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
-/// The ticks whose frames are kept together. What is acked within a span is told apart from the rest of it only once the next
-/// span is: shorter ones would tell more precisely, and cost more.
-const SPAN: Duration = Duration::from_millis(10);
-/// More than a gap's worth; once they are used up the last one takes all that follows.
+/// The ticks whose frames are kept together at the least. What is acked within a span is told apart from the rest of it only once the
+/// next span is: shorter ones would tell more precisely, and cost more.
+pub(super) const SPAN: Duration = Duration::from_millis(10);
+/// Once they are used up the last one takes all that follows.
 const SPANS: usize = 8;
 
 /// The frames of one span, and where they lead.
@@ -58,24 +58,33 @@ impl Reach {
 #[derive(Debug, Clone)]
 pub(super) struct Spans {
     spans: [Span; SPANS],
+    /// How long each is.
+    length: Duration,
     /// How many hold frames; the first also holds the place that they began at.
     count: usize,
     last: Pose,
     newest: FrameNo,
 }
 
-impl Default for Spans {
-    fn default() -> Self {
-        Self::at([0.0; MAX_AXES])
-    }
-}
-
 impl Spans {
+    /// No frame yet; spans that are long enough for frames that are open for so long.
+    #[expect(clippy::cast_possible_truncation, reason = "a handful")]
+    pub(super) fn over(open: Duration) -> Self {
+        let (at, last) = (MonoTime::from_nanos(0), [0.0; MAX_AXES]);
+        let empty = Span { first: FrameNo::FIRST, at, asked: None, reach: Reach::at(last) };
+        // The one that is being filled may have just begun.
+        let length = SPAN.max(open / (SPANS as u32 - 1));
+        Self { spans: [empty; SPANS], length, count: 0, last, newest: FrameNo::FIRST }
+    }
+
     /// No frame since the axes were there.
-    pub(super) const fn at(pose: Pose) -> Self {
-        let (at, reach) = (MonoTime::from_nanos(0), Reach::at(pose));
-        let empty = Span { first: FrameNo::FIRST, at, asked: None, reach };
-        Self { spans: [empty; SPANS], count: 0, last: pose, newest: FrameNo::FIRST }
+    pub(super) const fn restart_at(&mut self, pose: Pose) {
+        (self.count, self.last) = (0, pose);
+    }
+
+    /// How much older than a frame its span may be, beyond the least.
+    pub(super) fn slack(&self) -> Duration {
+        self.length.saturating_sub(SPAN)
     }
 
     /// Where the newest frame leads.
@@ -92,7 +101,7 @@ impl Spans {
     #[inline]
     pub(super) fn push(&mut self, frame: FrameNo, asked: bool, pose: &Pose, at: MonoTime) {
         let is_full = self.count == SPANS;
-        if self.count == 0 || (!is_full && at.since(self.spans[self.count - 1].at) >= SPAN) {
+        if self.count == 0 || (!is_full && at.since(self.spans[self.count - 1].at) >= self.length) {
             let span = &mut self.spans[self.count];
             (span.first, span.at, span.asked) = (frame, at, None);
             // What is on its way to the first frame's pose is still between that and the one before.

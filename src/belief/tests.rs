@@ -27,7 +27,11 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Self { belief: Belief::new(&window(), PERIOD, true), evidence: LaneEvidence::default(), next: 1 }
+        Self::of(&window())
+    }
+
+    fn of(window: &Window) -> Self {
+        Self { belief: Belief::new(window, PERIOD, true), evidence: LaneEvidence::default(), next: 1 }
     }
 
     /// One that was read at rest there at 0 ms.
@@ -427,4 +431,27 @@ fn a_seat_that_vibrates_on_may_be_anywhere_in_its_swing_and_no_motion_begins_bef
         (bench.belief.vibrates_about(ms(1_100)), bench.belief.known()),
         (None, Known::Confirmed(ms(1_100)))
     );
+}
+
+#[test]
+fn frames_that_may_be_confirmed_late_and_many_at_once_are_missed_only_when_they_are_overdue() {
+    let (lead, later) = (200, 400);
+    let window = window().led_ahead(Duration::from_millis(lead)).acked_later(Duration::from_millis(later));
+    let mut bench = Bench::of(&window);
+    bench.read(0.5, 0, true);
+    let mut frames = 0;
+    let mut ride = |bench: &mut Bench, tick: u64, acks: bool| {
+        let now = 10 * tick;
+        bench.send(0.5, 10, now);
+        frames += 1;
+        // Every 400 ms all that was executed by then: the first of them waited for 600 ms.
+        if acks && now % later == 0 && now > lead {
+            bench.ack(u32::try_from((now - lead) / 10).unwrap());
+        }
+        bench.look(now)
+    };
+    assert!((1..=300).all(|tick| ride(&mut bench, tick, true) == Found::Nothing));
+    let gap = (301..=500).find(|tick| ride(&mut bench, *tick, false) == Found::Gap).expect("it is noticed");
+    // The oldest that was not acked was sent at 2610 ms at the latest.
+    assert!((3_200..=3_360).contains(&(10 * gap)), "{gap}");
 }

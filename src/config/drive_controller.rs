@@ -54,6 +54,11 @@ impl Motors {
             Self::Sixpack2 { .. } => DriveFamily::Sixpack2,
         }
     }
+
+    /// The numbers of SilverMax units, axis by axis; none of others.
+    pub(crate) fn units(&self) -> &[u8] {
+        if let Self::SilverMax(units) = self { units } else { &[] }
+    }
 }
 
 /// A controller, and the places of what is judged with its neighbours.

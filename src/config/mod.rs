@@ -256,14 +256,15 @@ impl Config {
         if names.is_empty() { Ok(()) } else { Err(DrivesUnplayed(names.join(", "))) }
     }
 
-    /// Whether this program can play the hall in the foreground: of drives it plays SilverMax units.
+    /// Whether this program can play the hall: it opens no CAN bus.
     ///
     /// # Errors
     /// [`DrivesUnplayed`] with the names of those that it cannot.
     pub(crate) fn streamed(&self) -> Result<(), DrivesUnplayed> {
-        let is_other = |one: &&Controller| {
-            one.drives().is_some_and(|drives| drives.motors.family() != drive::DriveFamily::SilverMax)
+        let is_bus = |name: &str| {
+            self.links.iter().any(|link| link.name == name && link.wiring == link::LinkWiring::Can)
         };
+        let is_other = |one: &&Controller| one.drives().is_some_and(|drives| is_bus(&drives.link));
         let names: Vec<_> = self.controllers.iter().filter(is_other).map(|one| one.name.as_str()).collect();
         if names.is_empty() { Ok(()) } else { Err(DrivesUnplayed(names.join(", "))) }
     }
@@ -291,7 +292,7 @@ impl Config {
 /// A hall that has seats with serial drives.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "drives are not played yet: {0} on serial links; `kinocue check` and `info` read such a hall, to play the rest of it take \
+    "drives are not played yet: {0} on links; `kinocue check` and `info` read such a hall, to play the rest of it take \
      those controllers out of the file"
 )]
 pub(crate) struct DrivesUnplayed(String);

@@ -6,6 +6,9 @@ use super::Lane;
 use super::lane::Codec;
 use super::link::StreamTerms;
 use super::mbox::{MotionCodec, Wiring};
+use super::rates::LinkLoad;
+use super::sixpack2;
+use crate::config::drive::DriveFamily;
 use crate::config::{Config, Connection, Controller, Drives, FanOut, FansOut as _};
 use crate::motion::{SeatType, Slot, Window};
 use crate::timeline::Timeline;
@@ -41,7 +44,8 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         FanOut::Shared => shared(config, controller, slots, timeline, manner.level),
     };
     let vibrates = window.moving().filter_map(|(_, slot)| slot.axis).any(|axis| timeline.vibrates(axis));
-    let window = window.led_ahead(lead(config, controller));
+    let (lead, later) = lead(config, controller);
+    let window = window.led_ahead(lead).acked_later(later);
     let codec = match &controller.connection {
         Connection::Udp(station) => Codec::Mbox(MotionCodec {
             channel,
@@ -61,12 +65,18 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
     }
 }
 
-/// How long before its seat is there its poses have to come.
-fn lead(config: &Config, controller: &Controller) -> Duration {
+/// How long before its seat is there its poses have to come, and how much later it may be known that it was.
+fn lead(config: &Config, controller: &Controller) -> (Duration, Duration) {
     let lead = |drives: &Drives| {
         let link = config.links.iter().find(|link| link.name == drives.link)?;
         let terms = StreamTerms::of(link, config).ok().flatten()?;
-        Some(terms.lead(drives.motors.family()))
+        let on_it = config.named().filter_map(Controller::drives).filter(|one| one.link == link.name);
+        let (seats, axes) = (u32::try_from(on_it.count()).ok()?, LinkLoad::of(link, config)?.axes);
+        let later = match drives.motors.family() {
+            DriveFamily::SilverMax => Duration::ZERO,
+            DriveFamily::Sixpack2 => sixpack2::read_every(terms.period, seats, axes),
+        };
+        Some((terms.lead(drives.motors.family()), later))
     };
     controller.drives().and_then(lead).unwrap_or_default()
 }

@@ -21,6 +21,7 @@ mod segments;
 pub(crate) mod silvermax;
 #[cfg_attr(not(test), expect(dead_code, reason = "a look is for preflight"))]
 pub(crate) mod sixpack2;
+mod stream;
 mod terms;
 
 pub use lane::Lane;
@@ -32,6 +33,7 @@ pub(crate) use segments::{
     DriveCourse, DriveUnits, Knots, LOOP, Lag, Middle, Middles, Motor, Segment, SegmentFit, Shaker, TICK_NS,
     TargetMaker,
 };
+pub(crate) use stream::{LinkStream, motors_of, units_of};
 
 use std::sync::Arc;
 

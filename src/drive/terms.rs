@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::link::StreamTerms;
 use super::rates::LinkLoad;
-use super::silvermax;
+use super::{silvermax, sixpack2};
 use crate::config::drive::DriveFamily;
 use crate::config::{Config, Link};
 use crate::motion::MAX_LEAD;
@@ -22,7 +22,8 @@ impl StreamTerms {
         let terms = Self { period, tick: Rate::from_hz(config.show.rate_hz).period() };
         let (lead, most) = (terms.lead(load.family), MAX_LEAD);
         if lead > most {
-            let least_hz = 6.0 / most.saturating_sub(2 * terms.tick).as_secs_f64();
+            let Lead { periods, ticks } = Lead::of(load.family);
+            let least_hz = f64::from(periods) / most.saturating_sub(ticks * terms.tick).as_secs_f64();
             let (lead, most, remedy) = (lead.as_millis(), most.as_millis(), load.remedy(least_hz));
             return Err(fault(format!("its seats would follow {lead} ms ahead, over {most} ms; {remedy}")));
         }
@@ -31,9 +32,25 @@ impl StreamTerms {
 
     /// How long before a seat is there its poses have to come.
     pub(crate) fn lead(self, family: DriveFamily) -> Duration {
+        let Lead { periods, ticks } = Lead::of(family);
+        periods * self.period + ticks * self.tick
+    }
+}
+
+/// How long before a seat is there its poses have to come: so many periods of its link, and so many ticks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lead {
+    /// Periods.
+    pub(crate) periods: u32,
+    /// Ticks.
+    pub(crate) ticks: u32,
+}
+
+impl Lead {
+    const fn of(family: DriveFamily) -> Self {
         match family {
-            // Those of a SIXpack 2 are not played yet.
-            DriveFamily::SilverMax | DriveFamily::Sixpack2 => silvermax::lead(self),
+            DriveFamily::SilverMax => silvermax::LEAD,
+            DriveFamily::Sixpack2 => sixpack2::LEAD,
         }
     }
 }

@@ -137,6 +137,7 @@ pub(crate) const MAX_LEAD: Duration = Duration::from_millis(320);
 pub struct Window {
     slots: Vec<Slot>,
     lead: Duration,
+    acked_after: Duration,
 }
 
 impl Window {
@@ -147,13 +148,20 @@ impl Window {
     #[must_use]
     pub fn new(slots: Vec<Slot>) -> Self {
         assert!(slots.len() <= MAX_AXES, "a frame has at most {MAX_AXES} slots");
-        Self { slots, lead: Duration::ZERO }
+        Self { slots, lead: Duration::ZERO, acked_after: Duration::ZERO }
     }
 
     /// The same window of a controller that executes poses so long after they are made, [`MAX_LEAD`] at the most.
     #[must_use]
     pub fn led_ahead(self, lead: Duration) -> Self {
-        Self { lead: lead.min(MAX_LEAD), ..self }
+        let lead = lead.min(MAX_LEAD);
+        Self { lead, acked_after: lead, ..self }
+    }
+
+    /// The same window of a controller that is asked only now and then whether it has executed what it got: acks come so much later yet.
+    #[must_use]
+    pub(crate) fn acked_later(self, by: Duration) -> Self {
+        Self { acked_after: self.acked_after + by, ..self }
     }
 
     /// How long before its controller executes them its poses are made: what it gets now is what the cue says so much later, and a
@@ -163,10 +171,16 @@ impl Window {
         self.lead
     }
 
+    /// How much later than those of a controller that executes frames as they come its acks may come.
+    #[must_use]
+    pub(crate) const fn acked_after(&self) -> Duration {
+        self.acked_after
+    }
+
     /// The same window with motion at `level`, 0 to 1.
     #[must_use]
     pub(crate) fn at_level(&self, level: f64) -> Self {
-        Self { slots: self.slots.iter().map(|slot| slot.at_level(level)).collect(), lead: self.lead }
+        Self { slots: self.slots.iter().map(|slot| slot.at_level(level)).collect(), ..*self }
     }
 
     /// The level of its slots; 1 where it has none.

@@ -4,38 +4,76 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use super::{Check, Notes};
-use crate::config::drive::DriveFamily;
 use crate::config::drive_controller::Motors;
+use crate::config::link::LinkWiring;
 use crate::config::{Controller, Drives, Link};
-use crate::drive::link::TalkCounts;
+use crate::drive::link::{LinkPort, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
+use crate::drive::{motors_of, silvermax, sixpack2};
 use crate::sys::serial::SerialError;
 use crate::wire::silvermax::{Poll, StatusWord as _};
 
 /// Answers that begin so late are held back by an adapter, no unit waits so long.
 const HELD_BACK: Duration = Duration::from_millis(12);
+const HOME: &str = "home it, seats empty";
 /// What answers may be later than was reckoned with, as a part of it.
 const LATER: f64 = 1.25;
 
 /// What was read of a link: its port, and each unit that was asked.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct LinkSurvey {
     /// Why there was nothing to ask by.
-    pub(crate) opened: Result<(), SerialError>,
+    pub(crate) fault: Option<SerialError>,
     /// What nine of ten answers took to begin at the most; none where nobody answered.
     pub(crate) delay: Option<Duration>,
     /// What came over it.
     pub(crate) counts: TalkCounts,
-    /// What units told, by their numbers.
+    /// What SilverMax units told, by their numbers.
     pub(crate) units: BTreeMap<u8, Result<UnitFacts, TalkFault>>,
+    /// What SIXpack 2 units told; none of one that waits as it woke.
+    pub(crate) sixpacks: BTreeMap<u8, Result<Option<sixpack2::UnitFacts>, sixpack2::TalkFault>>,
 }
 
 impl LinkSurvey {
     /// Of a link by which nobody could be asked, for that reason.
     pub(crate) fn silent(why: SerialError) -> Self {
-        let (counts, units) = (TalkCounts::default(), BTreeMap::new());
-        Self { opened: Err(why), delay: None, counts, units }
+        Self { fault: Some(why), ..Self::default() }
+    }
+}
+
+impl LinkSurvey {
+    /// What the SilverMax units among those motors tell; nobody is asked any more once the port is gone.
+    pub(crate) fn of_units<P: LinkPort>(talk: &mut silvermax::Talk<P>, motors: &[&Motors]) -> Self {
+        let mut units = BTreeMap::new();
+        for unit in motors.iter().flat_map(|motors| motors.units()) {
+            let facts = silvermax::look(talk, *unit);
+            let is_gone = matches!(facts, Err(TalkFault::Link(_)));
+            units.insert(*unit, facts);
+            if is_gone {
+                break;
+            }
+        }
+        Self { delay: talk.usual_delay(), counts: talk.counts(), units, ..Self::default() }
+    }
+
+    /// The same of SIXpack 2 units.
+    pub(crate) fn of_sixpacks<P: LinkPort>(talk: &mut sixpack2::Talk<P>, motors: &[&Motors]) -> Self {
+        let mut asked = BTreeMap::<u8, Vec<u8>>::new();
+        for motors in motors {
+            let Motors::Sixpack2 { unit, motors } = motors else { continue };
+            asked.entry(*unit).or_default().extend(motors);
+        }
+        let mut sixpacks = BTreeMap::new();
+        for (unit, motors) in asked {
+            let facts = sixpack2::look_for(talk, unit, &motors);
+            let is_gone = matches!(facts, Err(sixpack2::TalkFault::Link(_)));
+            sixpacks.insert(unit, facts);
+            if is_gone {
+                break;
+            }
+        }
+        Self { delay: talk.usual_delay(), counts: talk.counts(), sixpacks, ..Self::default() }
     }
 }
 
@@ -58,21 +96,24 @@ impl DriveSubject<'_> {
         self.units().iter().filter_map(|unit| self.survey.units.get(unit)?.as_ref().ok())
     }
 
+    /// Its SIXpack 2, if that answered all questions.
+    pub(crate) fn sixpack(&self) -> Option<&sixpack2::UnitFacts> {
+        let Motors::Sixpack2 { unit, .. } = self.controller.drives()?.motors else { return None };
+        self.survey.sixpacks.get(&unit)?.as_ref().ok()?.as_ref()
+    }
+
     /// True if any of its units answered.
     #[must_use]
     pub(crate) fn answered(&self) -> bool {
-        self.facts().next().is_some()
+        let Some(Motors::Sixpack2 { unit, .. }) = self.controller.drives().map(|drives| &drives.motors)
+        else {
+            return self.facts().next().is_some();
+        };
+        matches!(self.survey.sixpacks.get(unit), Some(Ok(_)))
     }
 
     fn units(&self) -> &[u8] {
-        match self.controller.drives().map(|drives| &drives.motors) {
-            Some(Motors::SilverMax(units)) => units,
-            _ => &[],
-        }
-    }
-
-    fn family(&self) -> Option<DriveFamily> {
-        self.controller.drives().map(|drives| drives.motors.family())
+        self.controller.drives().map_or(&[], |drives| drives.motors.units())
     }
 
     /// What homing leaves in its units; none where no unit can be set so, which homing tells.
@@ -88,11 +129,17 @@ impl DriveSubject<'_> {
 /// What is found of one of them.
 pub(super) fn one(subject: &DriveSubject<'_>) -> Notes {
     let mut notes = Notes::default();
-    if let Err(error) = &subject.survey.opened {
+    if subject.link.wiring == LinkWiring::Can {
+        let found = format!("link {} is a CAN bus, which is not opened yet", subject.link.name);
+        notes.add(
+            Check::DrivesUnasked,
+            found,
+            "put its units on a serial line, or look at them with their own program",
+        );
+    } else if let Some(error) = &subject.survey.fault {
         port(error, &mut notes);
-    } else if subject.family() == Some(DriveFamily::Sixpack2) {
-        let found = "SIXpack 2 units are not asked yet: nothing is known of this seat";
-        notes.add(Check::DrivesUnasked, found, "look at it with its own program");
+    } else if let Some(Motors::Sixpack2 { unit, .. }) = subject.controller.drives().map(|one| &one.motors) {
+        sixpack(subject, *unit, &mut notes);
     } else {
         answers(subject, &mut notes);
         line(subject, &mut notes);
@@ -120,6 +167,38 @@ fn port(error: &SerialError, notes: &mut Notes) {
 fn told(check: Check, words: &str, notes: &mut Notes) {
     let (found, remedy) = words.split_once("; ").unwrap_or((words, ""));
     notes.add(check, found, remedy);
+}
+
+/// A SIXpack 2, of which no setting can be read.
+fn sixpack(subject: &DriveSubject<'_>, unit: u8, notes: &mut Notes) {
+    line(subject, notes);
+    let facts = match subject.survey.sixpacks.get(&unit) {
+        None => return told(Check::NoAnswer, &format!("unit {unit} was not asked; ask again"), notes),
+        Some(Err(fault)) => return told(Check::NoAnswer, &fault.to_string(), notes),
+        Some(Ok(None)) => {
+            let found = format!("unit {unit} answers as it woke: it was not homed since it was switched on");
+            notes.add(Check::NotHome, found, HOME);
+            return;
+        }
+        Some(Ok(Some(facts))) => facts,
+    };
+    rate(subject, notes);
+    let period = subject.load.and_then(|load| load.period_for(subject.link.rate_hz).ok());
+    let seat = motors_of(subject.controller, period.unwrap_or(Duration::from_millis(20)));
+    let lost = seat.map(|seat| seat.strangers(facts)).unwrap_or_default();
+    if facts.was_reset {
+        let found = format!("unit {unit} was reset since somebody asked last: it has no settings");
+        notes.add(Check::NotHome, found, HOME);
+    } else if !lost.is_empty() {
+        let lost: Vec<String> = lost.iter().map(u8::to_string).collect();
+        let found = format!("motors {} of unit {unit} count no place of this seat", lost.join(", "));
+        notes.add(Check::NotHome, found, HOME);
+    }
+    for motor in facts.motors.iter().filter(|motor| motor.searches()) {
+        let found =
+            format!("motor {} of unit {unit} looks for its zero, and nobody has it do so", motor.motor);
+        notes.add(Check::DriveError, found, HOME);
+    }
 }
 
 /// Units that did not answer, or for which others did.
@@ -203,14 +282,14 @@ fn home(subject: &DriveSubject<'_>, notes: &mut Notes) {
     let differ = canaries.windows(2).any(|pair| pair[0].1 != pair[1].1);
     if lost.len() == canaries.len() {
         let found = format!("units {} were not homed since they were switched on", lost.join(", "));
-        notes.add(Check::NotHome, found, "home it, seats empty");
+        notes.add(Check::NotHome, found, HOME);
     } else if differ {
         let found = if lost.is_empty() {
             "its units were homed at different times (register 40)".to_owned()
         } else {
             format!("units {} were switched off since the seat was homed (register 40)", lost.join(", "))
         };
-        notes.add(Check::Restarted, found, "home it, seats empty");
+        notes.add(Check::Restarted, found, HOME);
     }
 }
 

@@ -10,11 +10,11 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer};
 
 use super::{FrameSink, Live};
+use crate::drive::LinkStream;
 use crate::drive::link::{
     AxisFigures, LaneWants, LedPose, LinkFigures, LinkPort, LinkPose, RECORD_LEN, StreamEvent,
     lane_number as number,
 };
-use crate::drive::silvermax::Stream;
 use crate::net::{Delivery, SendFault, Sender};
 use crate::record::{Asked, Tap, TickHead};
 use crate::state::State;
@@ -132,7 +132,7 @@ impl LinkNews {
 }
 
 /// What the control plane has the thread of a link do with its drives while their seats rest.
-pub(crate) type Errand = Box<dyn FnOnce(&mut Stream<Port>) + Send>;
+pub(crate) type Errand = Box<dyn FnOnce(&mut LinkStream<Port>) + Send>;
 
 /// How a link stands.
 #[derive(Debug, Clone, Default)]
@@ -185,7 +185,7 @@ pub(crate) struct LinkTold {
 
 /// The loop of a link's thread.
 pub(crate) struct LinkLoop {
-    stream: Stream<Port>,
+    stream: LinkStream<Port>,
     lanes: Vec<LaneOfLink>,
     live: Arc<Live>,
     /// The hall stops, or has: its seats were told to brake.
@@ -210,7 +210,7 @@ impl fmt::Debug for LinkLoop {
 
 impl LinkLoop {
     pub(crate) fn new(
-        stream: Stream<Port>,
+        stream: LinkStream<Port>,
         wants: Vec<Arc<LaneWants>>,
         live: Arc<Live>,
         told: LinkTold,
@@ -229,7 +229,7 @@ impl LinkLoop {
         let is_new = stops && !self.stopped;
         self.stopped = stops;
         // Where the port is gone there is nobody to be told; the drives brake by themselves.
-        let told = if is_new { self.stream.stop(None) } else { Ok(()) };
+        let told = if is_new { self.stream.stop() } else { Ok(()) };
         for (index, lane) in self.lanes.iter_mut().enumerate() {
             let (located, looks) = (lane.wants.located(), lane.wants.looks());
             if std::mem::replace(&mut lane.located, located) != located {

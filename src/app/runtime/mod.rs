@@ -210,7 +210,7 @@ impl Runtime {
         let groups = Groups::of(&config.controllers);
         let ack_every = manner.ack_every(&config);
         let health = HealthTable::new(groups, config.show.loss_policy, ack_every, rate.period())
-            .led_ahead(lanes.iter().map(|lane| lane.window.lead()));
+            .led_ahead(lanes.iter().map(|lane| lane.window.acked_after()));
         let live_end = Arc::clone(&live);
         let watch =
             |health| Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, live_end);

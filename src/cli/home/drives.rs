@@ -14,10 +14,10 @@ use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
 use crate::config::link::LinkWiring;
-use crate::config::{Controller, Drives, Link};
+use crate::config::{Controller, Link};
 use crate::drive::link::canary;
 use crate::drive::link::{LinkLine, Step, TalkTerms};
-use crate::drive::{silvermax, sixpack2};
+use crate::drive::{motors_of, silvermax, sixpack2, units_of};
 
 /// How the homing of a seat went: how long it took, or why it is not home.
 pub(super) type Homed = Result<Duration, String>;
@@ -193,23 +193,18 @@ impl LinkTalk {
             return Err(Fault::Refused("not begun, as you asked for the end".to_owned()));
         }
         let none = || Fault::Refused("it has no drives of that link".to_owned());
-        let Drives { drive, motors, .. } = controller.drives().ok_or_else(none)?;
-        let (seat, begun) = (&*controller.seat, Instant::now());
-        let goes_on = &|| !abort.load(Ordering::Relaxed);
-        match (self, motors) {
-            (Self::SilverMax(talk), Motors::SilverMax(units)) => {
-                let silvermax = drive.silvermax.as_ref().ok_or_else(none)?;
+        let (begun, goes_on) = (Instant::now(), &|| !abort.load(Ordering::Relaxed));
+        match self {
+            Self::SilverMax(talk) => {
                 let canary = canary()
                     .map_err(|error| Fault::Refused(format!("the system gives no chance: {error}")))?;
-                let seat = silvermax::SeatUnits { seat, drive, silvermax, units };
+                let seat = units_of(controller).ok_or_else(none)?;
                 silvermax::home(talk, seat, silvermax::Homing { canary, goes_on, told })?;
             }
-            (Self::Sixpack2(talk, period), Motors::Sixpack2 { unit, motors }) => {
-                let (sixpack2, unit, period) = (drive.sixpack2.as_ref().ok_or_else(none)?, *unit, *period);
-                let seat = sixpack2::SeatMotors { seat, drive, sixpack2, unit, motors, period };
+            Self::Sixpack2(talk, period) => {
+                let seat = motors_of(controller, *period).ok_or_else(none)?;
                 sixpack2::home(talk, seat, sixpack2::Homing { goes_on, told })?;
             }
-            _ => return Err(none()),
         }
         Ok(begun.elapsed())
     }

@@ -1,21 +1,21 @@
 //! Looks at the seats on serial links: all links at once, the units of each one after the other. Reads only.
 
-use std::collections::BTreeMap;
 use std::thread;
 
 use super::super::targets::Driven;
+use crate::config::drive::DriveFamily;
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Link};
 use crate::drive::link::{LinkLine, TalkTerms};
-use crate::drive::silvermax::{Talk, TalkFault, look};
+use crate::drive::{silvermax, sixpack2};
 use crate::preflight::{DriveSubject, LinkSurvey};
 
 /// What was read of the links that somebody is on, in the order of the links; none where nobody is.
 pub(super) fn look_at_all(driven: &Driven) -> Vec<Option<LinkSurvey>> {
     thread::scope(|scope| {
         let look = |link| {
-            let units = units_on(driven, link);
-            units.map(|units| scope.spawn(move || look_at(link, &units)))
+            let motors = motors_on(driven, link);
+            motors.map(|motors| scope.spawn(move || look_at(link, &motors)))
         };
         let looks: Vec<_> = driven.links.iter().map(look).collect();
         let join =
@@ -24,37 +24,24 @@ pub(super) fn look_at_all(driven: &Driven) -> Vec<Option<LinkSurvey>> {
     })
 }
 
-/// The units on a link that are meant, which are none of a SIXpack 2; none where nobody on it is meant.
-fn units_on(driven: &Driven, link: &Link) -> Option<Vec<u8>> {
+/// What is meant on a link; none where nothing is.
+fn motors_on<'a>(driven: &'a Driven, link: &Link) -> Option<Vec<&'a Motors>> {
     let drives = driven.controllers.iter().filter_map(|one| one.drives());
-    let mut on_it = drives.filter(|drives| drives.link == link.name).peekable();
-    on_it.peek()?;
-    Some(
-        on_it
-            .flat_map(|drives| match &drives.motors {
-                Motors::SilverMax(units) => units.clone(),
-                Motors::Sixpack2 { .. } => Vec::new(),
-            })
-            .collect(),
-    )
+    let on_it: Vec<_> =
+        drives.filter(|drives| drives.link == link.name).map(|drives| &drives.motors).collect();
+    (!on_it.is_empty()).then_some(on_it)
 }
 
-fn look_at(link: &Link, units: &[u8]) -> LinkSurvey {
-    let line = match LinkLine::open(link) {
-        Ok(line) => line,
+fn look_at(link: &Link, motors: &[&Motors]) -> LinkSurvey {
+    let (line, terms) = match LinkLine::open(link) {
+        Ok(line) => (line, TalkTerms::of(link)),
         Err(error) => return LinkSurvey::silent(error),
     };
-    let mut talk = Talk::new(line, TalkTerms::of(link));
-    let mut told = BTreeMap::new();
-    for &unit in units {
-        let facts = look(&mut talk, unit);
-        let is_gone = matches!(facts, Err(TalkFault::Link(_)));
-        told.insert(unit, facts);
-        if is_gone {
-            break;
-        }
+    if link.family == Some(DriveFamily::Sixpack2) {
+        LinkSurvey::of_sixpacks(&mut sixpack2::Talk::new(line, terms), motors)
+    } else {
+        LinkSurvey::of_units(&mut silvermax::Talk::new(line, terms), motors)
     }
-    LinkSurvey { opened: Ok(()), delay: talk.usual_delay(), counts: talk.counts(), units: told }
 }
 
 /// What is judged: the controllers with what was read of their links.

@@ -7,6 +7,7 @@ use comfy_table::{LineStyle, Table, TableStyle};
 use serde::Serialize;
 
 use crate::drive::silvermax::UnitFacts;
+use crate::drive::sixpack2;
 use crate::preflight::{Check, DriveSubject, Family, Finding, Severity, Subject, round_trip};
 
 /// A line under the header, and no other lines.
@@ -171,7 +172,11 @@ impl ControllerReport {
             address: controller.address(),
             answered: subject.answered(),
             round_trip_us: None,
-            registers: subject.facts().flat_map(registers).collect(),
+            registers: subject
+                .facts()
+                .flat_map(registers)
+                .chain(subject.sixpack().into_iter().flat_map(positions))
+                .collect(),
             findings: findings.into_iter().map(FindingReport::new).collect(),
         }
     }
@@ -245,6 +250,11 @@ fn registers(facts: &UnitFacts) -> [(String, i32); 10] {
         (211, facts.kill_cause),
     ]
     .map(|(register, value)| (format!("{}.{register}", facts.unit), value))
+}
+
+/// Where the motors of a SIXpack 2 are, by unit and motor: of its settings none can be read.
+fn positions(facts: &sixpack2::UnitFacts) -> impl Iterator<Item = (String, i32)> {
+    facts.motors.iter().map(|told| (format!("{}.motor{}", facts.unit, told.motor), told.position))
 }
 
 /// One finding and all controllers that have it.

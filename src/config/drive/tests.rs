@@ -96,7 +96,7 @@ fn a_hall_mixes_families_and_only_the_reading_of_it_takes_drives_so_far() {
     assert_eq!(names(hall.on_links().collect()), "A1");
     assert_eq!(hall.untaken_axes(6), [0; 0]);
     let refused = hall.playable().unwrap_err().to_string();
-    assert!(refused.starts_with("drives are not played yet: A1 on serial links"), "{refused}");
+    assert!(refused.starts_with("drives are not played yet: A1 on links"), "{refused}");
     let by_udp = hall.controllers[..1].to_vec();
     assert_eq!(Config { controllers: by_udp, ..hall }.playable(), Ok(()));
 }

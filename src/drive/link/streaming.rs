@@ -38,7 +38,8 @@ pub(crate) enum Stage {
 /// What happened to a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum StreamEvent {
-    /// All axes have taken the segments of these frames, or stand where they lead.
+    /// All axes have taken the segments of these frames, or stand where they lead; of drives that confirm nothing one was read where the
+    /// last of them leads.
     Confirmed {
         /// The lane.
         lane: u16,
@@ -64,13 +65,6 @@ pub(crate) enum StreamEvent {
         lane: u16,
         /// They are.
         homed: bool,
-    },
-    /// What leads it up to that frame was sent to drives that confirm nothing.
-    Sent {
-        /// The lane.
-        lane: u16,
-        /// The last frame that is covered.
-        frame: FrameNo,
     },
     /// It is at rest, or will be then.
     Rests {
@@ -155,7 +149,6 @@ impl StreamEvent {
     pub(crate) const fn lane(&self) -> u16 {
         match *self {
             Self::Confirmed { lane, .. }
-            | Self::Sent { lane, .. }
             | Self::Read { lane, .. }
             | Self::Homed { lane, .. }
             | Self::Rests { lane, .. }

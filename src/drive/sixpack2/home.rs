@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use super::find::{WHO, find};
-use super::look::position;
+use super::look::{position, searches};
 use super::set_up::{HomeError, MotorAxis, Purpose, SeatMotors};
 use super::talk::Talk;
 use crate::config::drive::homing::HomeWay;
@@ -134,11 +134,6 @@ fn goes_on(around: &Homing<'_>) -> Result<(), HomeError> {
     if (around.goes_on)() { Ok(()) } else { Err(HomeError::Aborted) }
 }
 
-/// Whether a motor searches.
-const fn searches(told: PositionTold) -> bool {
-    matches!(told.action, action::SEARCH..=action::LAST_SEARCH | action::MECHANICAL)
-}
-
 impl MotorAxis<'_> {
     fn park_mm(&self) -> f64 {
         self.axis.place(self.axis.park)
@@ -223,7 +218,7 @@ impl MotorAxis<'_> {
         let order = SixpackOrder::Search(ReferenceSearch { motor });
         // Where something else was made of the order, a counter that happens to be at 0 looks like a zero that was found.
         let begins = talk.now() + Duration::from_secs_f64(BEGINS);
-        while !searches(self.write(talk, order)?) {
+        while !searches(self.write(talk, order)?.action) {
             if talk.now() > begins {
                 return Err(HomeError::NoSearch { unit, motor });
             }

@@ -1,10 +1,13 @@
 //! What a unit says of itself; nothing is written and nothing moves. Asking clears its reset flag, and the stop flag of a motor.
 
-use super::find::WHO;
+use super::find::{WHO, waking_baud, who};
+use super::set_up::{MotorAxis, SeatMotors};
 use super::talk::{ANSWER, Talk, TalkFault};
 use crate::drive::link::LinkPort;
-use crate::wire::sixpack2::{InputQuery, PositionQuery, PositionTold, SixpackOrder, SixpackReply};
+use crate::wire::sixpack2::{InputQuery, PositionQuery, PositionTold, SixpackOrder, SixpackReply, action};
 
+/// How far outside its stroke a seat that is home may stand, mm.
+pub(super) const OUTSIDE_MM: f64 = 0.5;
 /// The input that is the supply, and its units a volt (manual, page 43).
 const SUPPLY: u8 = 7;
 const UNITS_A_VOLT: f64 = 22.0;
@@ -64,6 +67,52 @@ pub(crate) fn look<P: LinkPort>(talk: &mut Talk<P>, unit: u8, motors: &[u8]) -> 
         volts: f64::from(supply.value) / UNITS_A_VOLT,
         motors,
     })
+}
+
+/// Reads a unit and some of its motors, at the rate of the line; none of one that answers as it woke, which somebody has to home.
+///
+/// # Errors
+/// A [`TalkFault`] where it answers at neither rate.
+pub(crate) fn look_for<P: LinkPort>(
+    talk: &mut Talk<P>,
+    unit: u8,
+    motors: &[u8],
+) -> Result<Option<UnitFacts>, TalkFault> {
+    let looked = look(talk, unit, motors).map(Some);
+    let (baud, waking) = (talk.baud(), waking_baud());
+    if baud == waking || !matches!(looked, Err(TalkFault::Silent { .. })) {
+        return looked;
+    }
+    talk.set_baud(waking)?;
+    let told = who(talk, unit);
+    talk.set_baud(baud)?;
+    if told?.is_some() { Ok(None) } else { looked }
+}
+
+impl SeatMotors<'_> {
+    /// Its motors that count no place of the seat: they were never homed, or were restarted.
+    pub(crate) fn strangers(&self, facts: &UnitFacts) -> Vec<u8> {
+        // Where no axis can be set, homing tells why.
+        let axes = self.axes().unwrap_or_default();
+        let told = |motor: u8| facts.motors.iter().find(|told| told.motor == motor);
+        let is_stranger = |axis: &&MotorAxis<'_>| {
+            let (low, high) = axis.scale.reach(OUTSIDE_MM);
+            !told(axis.motor).is_some_and(|told| (low..=high).contains(&f64::from(told.position)))
+        };
+        axes.iter().filter(is_stranger).map(|axis| axis.motor).collect()
+    }
+}
+
+impl MotorFacts {
+    /// True while it looks for its zero.
+    pub(crate) const fn searches(&self) -> bool {
+        searches(self.action)
+    }
+}
+
+/// True where a motor that does this looks for its zero.
+pub(super) const fn searches(does: u8) -> bool {
+    matches!(does, action::SEARCH..=action::LAST_SEARCH | action::MECHANICAL)
 }
 
 /// Where a motor is.

@@ -19,13 +19,12 @@ mod talk;
 mod tests;
 
 pub(crate) use find::FindError;
+#[cfg(test)]
+pub(crate) use find::find;
 pub(crate) use home::{Homing, home};
+#[cfg(test)]
+pub(crate) use look::MotorFacts;
+pub(crate) use look::{UnitFacts, look_for};
 pub(crate) use set_up::{HomeError, SeatMotors};
-pub(crate) use talk::Talk;
-
-#[cfg_attr(not(test), expect(unused_imports, reason = "for preflight, and the thread of a link"))]
-pub(crate) use {
-    find::find,
-    look::look,
-    stream::{Stream, lead},
-};
+pub(crate) use stream::{LEAD, Stream, read_every};
+pub(crate) use talk::{Talk, TalkFault};

@@ -87,6 +87,11 @@ impl<P: LinkPort> Talk<P> {
         self.delays.p99()
     }
 
+    /// What nine of ten answers took to begin at the most; none where none came.
+    pub(crate) fn usual_delay(&self) -> Option<Duration> {
+        self.delays.most_of(90)
+    }
+
     /// When the last question was asked and answered.
     pub(crate) const fn moment(&self) -> Moment {
         self.moment

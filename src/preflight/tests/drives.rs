@@ -5,12 +5,15 @@ use std::time::Duration;
 
 use super::super::{Check, DriveSubject, LinkSurvey, judge_driven};
 use crate::config::drive_controller::Motors;
+use crate::config::link::LinkWiring;
 use crate::config::{self, Acceptance, Config};
 use crate::drive::link::TalkCounts;
 use crate::drive::rates::LinkLoad;
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts};
+use crate::drive::sixpack2::{self, MotorFacts};
 use crate::sys::serial::SerialError;
 use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
+use crate::wire::sixpack2::action;
 
 const COUNTS: TalkCounts =
     TalkCounts { asked: 51, answered: 51, late: 0, doubled: 0, malformed: 0, foreign: 0, echo_differs: 0 };
@@ -47,10 +50,10 @@ impl Case {
         let units = facts.map(|facts| (facts.unit, Ok(facts))).collect();
         Self {
             survey: LinkSurvey {
-                opened: Ok(()),
                 delay: Some(Duration::from_micros(300)),
                 counts: COUNTS,
                 units,
+                ..LinkSurvey::default()
             },
             hall,
         }
@@ -68,7 +71,8 @@ impl Case {
     }
 
     fn found(&self) -> Vec<(Check, String)> {
-        let link = self.hall.links.iter().find(|link| link.name == "stalls").unwrap();
+        let name = &self.hall.controllers[0].drives().unwrap().link;
+        let link = self.hall.links.iter().find(|link| link.name == *name).unwrap();
         let load = LinkLoad::of(link, &self.hall);
         let subject =
             DriveSubject { controller: &self.hall.controllers[0], link, load, survey: &self.survey };
@@ -184,15 +188,62 @@ fn a_port_that_cannot_be_had_is_told_by_what_is_wrong_with_it() {
         (SerialError::NoLine(port()), Check::PortUnfit, "it is no serial line"),
     ] {
         let mut case = Case::new();
-        case.survey =
-            LinkSurvey { opened: Err(error), delay: None, counts: TalkCounts::default(), units: [].into() };
+        case.survey = LinkSurvey::silent(error);
         case.assert_found(check, words);
     }
 }
 
-#[test]
-fn of_a_sixpack_it_is_told_that_nobody_asked() {
+/// A seat that was homed, on a SIXpack 2.
+fn sixpack() -> Case {
     let mut case = Case::new();
     case.hall.controllers.swap(0, 1);
-    case.assert_found(Check::DrivesUnasked, "SIXpack 2 units are not asked yet");
+    let motors = [0, 1, 2].map(|motor| MotorFacts {
+        motor,
+        position: 1_000_000,
+        action: action::PI,
+        was_stopped: false,
+    });
+    let facts = sixpack2::UnitFacts {
+        unit: 1,
+        firmware: 0x94,
+        was_reset: false,
+        celsius: 30,
+        serial: 1_001,
+        volts: 24.0,
+        motors: motors.into(),
+    };
+    case.survey.units.clear();
+    case.survey.sixpacks.insert(1, Ok(Some(facts)));
+    case
+}
+
+#[test]
+fn a_sixpack_is_home_where_each_of_its_motors_counts_a_place_of_the_seat() {
+    assert_eq!(sixpack().found(), []);
+    let with = |change: fn(&mut sixpack2::UnitFacts)| {
+        let mut case = sixpack();
+        let facts = case.survey.sixpacks.get_mut(&1).unwrap();
+        change(facts.as_mut().unwrap().as_mut().unwrap());
+        case
+    };
+    with(|unit| unit.was_reset = true).assert_found(Check::NotHome, "unit 1 was reset since");
+    with(|unit| unit.motors[1].position = 0)
+        .assert_found(Check::NotHome, "motors 1 of unit 1 count no place");
+    with(|unit| unit.motors[2].action = action::SEARCH)
+        .assert_found(Check::DriveError, "motor 2 of unit 1 looks for its zero");
+    let mut woke = sixpack();
+    woke.survey.sixpacks.insert(1, Ok(None));
+    woke.assert_found(Check::NotHome, "unit 1 answers as it woke");
+    let silent = sixpack2::TalkFault::Silent { unit: 1, baud: 56_818 };
+    woke.survey.sixpacks.insert(1, Err(silent));
+    woke.assert_found(Check::NoAnswer, "unit 1 does not answer at 56818 baud");
+    woke.survey.sixpacks.clear();
+    woke.assert_found(Check::NoAnswer, "unit 1 was not asked");
+}
+
+#[test]
+fn of_a_seat_on_a_can_bus_it_is_told_that_nobody_asked() {
+    let mut case = sixpack();
+    case.hall.links.iter_mut().for_each(|link| link.wiring = LinkWiring::Can);
+    case.assert_found(Check::DrivesUnasked, "is a CAN bus, which is not opened yet");
 }

@@ -9,11 +9,9 @@ use std::sync::Arc;
 use rtrb::{Producer, RingBuffer};
 
 use super::{Purpose, RuntimeError};
-use crate::config::drive_controller::Motors;
-use crate::config::{Config, Controller, Drives, Link};
-use crate::drive::Lane;
-use crate::drive::link::{LedPose, LinkLine, StreamTerms, TalkTerms};
-use crate::drive::silvermax::{LaneUnits, SeatUnits, Stream, Talk};
+use crate::config::{Config, Controller, Link};
+use crate::drive::link::{LedPose, LinkLine, StreamTerms};
+use crate::drive::{Lane, LinkStream};
 use crate::rt::{LinkEnd, LinkLane, LinkLoop, LinkNews, Live, Port, Watch};
 
 /// Poses of a lane that wait for the thread of its link: a tenth of a second at 1 kHz.
@@ -54,10 +52,9 @@ fn used(config: &Config) -> impl Iterator<Item = &Link> {
 }
 
 /// The seats on a link, each with its lane.
-fn seats<'c>(config: &'c Config, link: &Link) -> impl Iterator<Item = (usize, &'c Controller, &'c Drives)> {
+fn seats<'c>(config: &'c Config, link: &Link) -> impl Iterator<Item = (usize, &'c Controller)> {
     let all = config.controllers.iter().enumerate();
-    let seats = all.filter_map(|(lane, one)| one.drives().map(|drives| (lane, one, drives)));
-    seats.filter(|(.., drives)| drives.link == link.name)
+    all.filter(|(_, one)| one.drives().is_some_and(|drives| drives.link == link.name))
 }
 
 impl Links {
@@ -94,12 +91,10 @@ impl Links {
             let lead = lanes[*lane].window.lead();
             self.led[*lane - stations] = LinkLane { link: self.poses.len(), lane: own, lead };
         }
-        let units = on_it.iter().map(|(_, controller, drives)| unit_of(controller, drives));
-        let units = units.collect::<Result<Vec<_>, _>>()?;
+        let seats: Vec<&Controller> = on_it.iter().map(|(_, controller)| *controller).collect();
         let (poses, from_tick) = RingBuffer::new(POSES * on_it.len());
         let (to_acks, events) = RingBuffer::new(EVENTS);
-        let talk = Talk::new(port, TalkTerms::of(link));
-        let stream = Stream::new(talk, terms, &units, from_tick, to_acks);
+        let stream = LinkStream::new(port, (link, terms), &seats, from_tick, to_acks);
         let stream = stream.map_err(|error| format!("[link.{}]: {error}", link.name))?;
         let wants = on_it.iter().filter_map(|(lane, ..)| watch.wants(*lane)).collect();
         self.poses.push(poses);
@@ -110,15 +105,6 @@ impl Links {
         self.ends.push(end);
         Ok(())
     }
-}
-
-/// What moves a seat; whether it is home is found out by the thread of its link.
-fn unit_of<'c>(controller: &'c Controller, drives: &'c Drives) -> Result<LaneUnits<'c>, String> {
-    let (Motors::SilverMax(units), Some(silvermax)) = (&drives.motors, &drives.drive.silvermax) else {
-        return Err(format!("{}: SIXpack 2 units are not played yet", controller.name));
-    };
-    let seat = SeatUnits { seat: &controller.seat, drive: &drives.drive, silvermax, units };
-    Ok(LaneUnits { seat, canary: None })
 }
 
 #[cfg(test)]

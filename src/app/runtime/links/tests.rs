@@ -3,6 +3,7 @@
 #![expect(clippy::cast_possible_truncation, reason = "numbers of ticks")]
 
 mod chance;
+mod sixpack;
 
 use std::cell::Cell;
 use std::path::Path;
@@ -14,13 +15,13 @@ use crate::app::StagedShow;
 use crate::app::runtime::{Loops, Numbers, Purpose, Runtime, RuntimeHandle};
 use crate::belief::Reading;
 use crate::cue::{self, Source};
-use crate::drive::Manner;
-use crate::drive::link::{LinkFault, LinkPort, VirtualPort};
-use crate::drive::silvermax::{Homing, home};
+use crate::drive::link::{LinkFault, LinkPort, TalkTerms, VirtualPort};
+use crate::drive::silvermax::{Homing, Talk, home};
+use crate::drive::{Manner, units_of};
 use crate::engine::{Mix, Show};
 use crate::net::{Delivery, DrainGrid, Network, Origin};
 use crate::rt::{Command, Ticked};
-use crate::sim::serial::{LineFaults, SerialLine};
+use crate::sim::serial::{Bus, LineFaults, SerialLine};
 use crate::sim::silvermax::{SilverBus, Unit, UnitSetup};
 use crate::state::{Event, Finding, Readiness, State, Transition};
 use crate::time::{Clock, MonoTime, Rate, ShowTime};
@@ -82,16 +83,27 @@ impl Clock for Jumps {
 }
 
 /// The line, which its loop has and the test looks at.
-#[derive(Clone)]
-struct SharedLine(Arc<Mutex<VirtualPort<SilverBus>>>);
+struct SharedLine<B = SilverBus>(Arc<Mutex<VirtualPort<B>>>);
 
-impl SharedLine {
-    fn lock(&self) -> MutexGuard<'_, VirtualPort<SilverBus>> {
+impl<B> Clone for SharedLine<B> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<B: Bus> SharedLine<B> {
+    /// A line without faults, of octets of so many bits.
+    fn new(bus: B, bits: u32) -> Self {
+        let port = VirtualPort::new(SerialLine::new(bus, bits, LineFaults::default(), 7), NOW.get());
+        Self(Arc::new(Mutex::new(port)))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, VirtualPort<B>> {
         self.0.lock().expect("nobody panics with it")
     }
 }
 
-impl LinkPort for SharedLine {
+impl<B: Bus> LinkPort for SharedLine<B> {
     fn now(&self) -> MonoTime {
         self.lock().now()
     }
@@ -122,8 +134,8 @@ impl LinkPort for SharedLine {
 }
 
 /// A hall of one seat, as a script leads it.
-struct Hall<'h, 'l> {
-    line: SharedLine,
+struct Hall<'h, 'l, B = SilverBus> {
+    line: SharedLine<B>,
     runtime: RuntimeHandle,
     loops: &'h mut Loops<'l, Jumps>,
     drains: DrainGrid,
@@ -133,7 +145,7 @@ struct Hall<'h, 'l> {
     next_tick: MonoTime,
 }
 
-impl Hall<'_, '_> {
+impl<B: Bus> Hall<'_, '_, B> {
     /// All loops, for so long.
     fn run(&mut self, seconds: f64, mut each: impl FnMut(&mut Self)) {
         let until = NOW.get() + Duration::from_secs_f64(seconds);
@@ -186,7 +198,9 @@ impl Hall<'_, '_> {
             Command::Request(Transition::Go),
         ]);
     }
+}
 
+impl Hall<'_, '_> {
     fn units<T>(&self, of: impl Fn(&Unit) -> T) -> Vec<T> {
         self.line.lock().line.bus().units().iter().map(of).collect()
     }
@@ -217,35 +231,37 @@ fn hall_over(
     NOW.set(MonoTime::from_nanos(3_000_000_000));
     let config = Arc::new(read(HALL));
     let setups = [16, 17, 18].map(|unit| UnitSetup { place: 12_000, ..UnitSetup::new(unit) });
-    let bus = SilverBus::new(&setups, BAUD, NOW.get());
-    let port = VirtualPort::new(SerialLine::new(bus, 11, LineFaults::default(), 7), NOW.get());
-    let line = SharedLine(Arc::new(Mutex::new(port)));
-    let link = config.links.first().expect("there is a link");
-    let seat = unit_of(&config.controllers[0], config.controllers[0].drives().unwrap()).unwrap().seat;
+    let line = SharedLine::new(SilverBus::new(&setups, BAUD, NOW.get()), 11);
+    let seat = units_of(&config.controllers[0]).expect("it has units");
     let homing = Homing { canary: 7_311, goes_on: &|| true, told: &mut |_| {} };
-    home(&mut Talk::new(line.clone(), TalkTerms::of(link)), seat, homing).expect("it finds its zero");
+    home(&mut Talk::new(line.clone(), TalkTerms::of(&config.links[0])), seat, homing)
+        .expect("it finds its zero");
     line.lock().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
+    let port = over(line.clone());
+    homed((config, 1.0), line, port, lead);
+}
+
+/// Opens a hall whose seat was homed over a line, which its play has by a port, with a cue on it at a level.
+fn homed<B: Bus>(
+    (config, level): (Arc<Config>, f64),
+    line: SharedLine<B>,
+    port: Port,
+    lead: impl FnOnce(&mut Hall<'_, '_, B>, StagedShow, &Timeline),
+) {
     NOW.set(line.lock().now());
     let cue = cue::load(Path::new("cues/bench-ride.csv"), &Source::Native).expect("it ships");
     let show = Show { rate: Rate::from_hz(100.0), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
-    let manner = Manner { level: 1.0, silent: false };
+    let manner = Manner { level, silent: false };
     let staged = StagedShow::new(&config, Timeline::new(cue.clone()), show, manner).expect("there is a way");
     let purpose = Purpose::Play { silent: false, film: None };
     let network = crate::net::over(Arc::new(Nobody));
-    let runtime = Runtime::over_all(
-        Arc::clone(&config),
-        purpose,
-        &Numbers::new(),
-        &Arc::default(),
-        network,
-        vec![over(line.clone())],
-    )
-    .expect("it opens");
+    let runtime = Runtime::over_all(config, purpose, &Numbers::new(), &Arc::default(), network, vec![port])
+        .expect("it opens");
     let origin = NOW.get() + Duration::from_millis(20);
     runtime.stepped(&Jumps, origin, |runtime, _, loops| {
         let desk = Arc::clone(&runtime.desk);
         // Thirty segments a second have no room for its vibration.
-        desk.set(0, Mix { vibration: 0.0, ..Mix::FULL });
+        desk.set(0, Mix { motion: level, vibration: 0.0, ..Mix::FULL });
         let mut hall = Hall {
             line,
             runtime,

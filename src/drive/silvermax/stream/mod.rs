@@ -29,6 +29,7 @@ use crate::drive::link::{
     AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, Stage, StreamEvent, StreamTerms,
     axis_number, lane_number as number,
 };
+use crate::drive::terms::Lead;
 use crate::time::MonoTime;
 use crate::wire::silvermax::Request;
 
@@ -55,10 +56,7 @@ pub(crate) struct LaneUnits<'a> {
 /// How long before the seat is to be there its poses have to come: two slices and a half and two ticks until a segment is made of
 /// them, two segments and a half that wait, and a round of exchanges, which is less than a period. With half a segment less that
 /// waits, what is in doubt is not found out in time.
-#[must_use]
-pub(crate) fn lead(terms: StreamTerms) -> Duration {
-    terms.period * 6 + 2 * terms.tick
-}
+pub(crate) const LEAD: Lead = Lead { periods: 6, ticks: 2 };
 
 /// What is to be done next of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

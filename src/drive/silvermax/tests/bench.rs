@@ -5,6 +5,7 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::super::*;
+use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive::{SeatDrive, SilverMaxDrive, Torque};
 use crate::cue::Vibration;
@@ -181,7 +182,7 @@ impl Play {
     /// Begins to play a course, from now on.
     pub(super) fn begin(&mut self, course: fn(f64, usize) -> f64) {
         (self.course, self.ticks, self.begin) = (course, 0, self.now());
-        self.origin = self.begin + lead(self.terms);
+        self.origin = self.begin + self.terms.lead(DriveFamily::SilverMax);
     }
 
     /// Ticks of so many seconds; `missed` of them, at the beginning, are slept through.
@@ -202,7 +203,8 @@ impl Play {
             }
             let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
             let pose = LinkPose { frame: FrameNo(self.ticks), lasts_ms: 10, axes, vibration };
-            let _ = self.poses.push(LedPose { lane: 0, at: due + lead(self.terms), pose });
+            let _ =
+                self.poses.push(LedPose { lane: 0, at: due + self.terms.lead(DriveFamily::SilverMax), pose });
             self.ticks += 1;
         }
     }

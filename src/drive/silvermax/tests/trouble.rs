@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use super::bench::*;
+use crate::config::drive::DriveFamily;
 use crate::drive::link::*;
-use crate::drive::silvermax::*;
 use crate::sim::serial::LineFaults;
 use crate::sim::silvermax::Action;
 
@@ -115,7 +115,7 @@ fn unplugged_in_mid_course_it_is_at_rest_within_the_lead_and_comes_back_where_it
     play.play(10.0, 0);
     play.line().faults.unplugged = true;
     let brake = 0.1;
-    play.play(lead(play.terms).as_secs_f64() + brake, 0);
+    play.play(play.terms.lead(DriveFamily::SilverMax).as_secs_f64() + brake, 0);
     let rest = [0, 1, 2].map(|axis| play.place(axis));
     play.play(1.0, 0);
     assert_eq!([0, 1, 2].map(|axis| play.place(axis)), rest);

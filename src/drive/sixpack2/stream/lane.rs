@@ -1,11 +1,16 @@
 //! The axes of one seat: they share a unit, follow one track, and stop together.
 
+use std::time::Duration;
+
 use super::axis::Axis;
 use super::track::Track;
 use crate::drive::link::{LedPose, LinkPose, Stage, StreamTerms};
 use crate::motion::{Limits, MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
+
+/// A seat stands where it is led from so near, mm.
+const STANDS_MM: f64 = 0.1;
 
 /// The axes of one seat.
 #[derive(Debug)]
@@ -17,16 +22,22 @@ pub(super) struct Lane {
     terms: StreamTerms,
     /// Told last.
     pub(super) moves: bool,
-    pub(super) sent: Option<FrameNo>,
-    /// Whether it is where its first pose is was told.
-    pub(super) is_elsewhere: bool,
-    /// When the last pose came, and for how long.
+    /// Its units were seen to be home, and have been since.
+    pub(super) is_home: bool,
+    /// The first frame of which it is not known that it is executed.
+    pub(super) unconfirmed: FrameNo,
+    /// The axis that is asked next.
+    pub(super) next_axis: usize,
+    /// The last pose, and when it came.
+    last: Option<LinkPose>,
     heard: MonoTime,
-    lasts_ms: u32,
-    pub(super) failing_since: Option<MonoTime>,
+    /// Its last question was not answered.
+    pub(super) is_failing: bool,
     /// Until then nothing is asked of it that is not urgent.
     pub(super) not_before: MonoTime,
-    /// Who it is was asked last.
+    /// Who it is was its last question.
+    pub(super) asked_who: bool,
+    /// Who it is was asked last; none where that is to be found out.
     pub(super) known: Option<MonoTime>,
 }
 
@@ -35,17 +46,19 @@ impl Lane {
         Self {
             unit,
             axes,
-            stage: Stage::Readying,
+            stage: Stage::Out,
             track: Track::at_rest(terms.tick, [0.0; MAX_AXES], now),
             terms,
             moves: true,
-            sent: None,
-            is_elsewhere: false,
+            is_home: false,
+            unconfirmed: FrameNo::FIRST,
+            next_axis: 0,
+            last: None,
             heard: now,
-            lasts_ms: 0,
-            failing_since: None,
+            is_failing: false,
             not_before: now,
-            known: None,
+            asked_who: false,
+            known: Some(now),
         }
     }
 
@@ -76,12 +89,23 @@ impl Lane {
             *place += axis.shaker.after(self.terms.tick, swing.hz, swing.amplitude);
         }
         self.track.push(led, places);
-        (self.heard, self.lasts_ms) = (now, led.pose.lasts_ms);
+        self.hear(led, now);
+    }
+
+    /// Hears a pose, whether it leads it or not.
+    pub(super) const fn hear(&mut self, led: &LedPose, now: MonoTime) {
+        (self.last, self.heard) = (Some(led.pose), now);
+    }
+
+    /// True if a pose that comes now is the first of a motion: one that was cut off while it moved is over before another begins.
+    pub(super) fn may_begin(&self, now: MonoTime) -> bool {
+        self.is_left_alone(now) || self.last.is_some_and(|last| self.off(&last, STANDS_MM).is_none())
     }
 
     /// True if no pose came for so long that none will.
     pub(super) fn is_left_alone(&self, now: MonoTime) -> bool {
-        let lasts = std::time::Duration::from_millis(self.lasts_ms.into()).max(self.terms.tick);
+        let lasts = self.last.map_or(0, |pose| pose.lasts_ms);
+        let lasts = Duration::from_millis(lasts.into()).max(self.terms.tick);
         now.since(self.heard) > (3 * lasts).max(self.terms.period)
     }
 
@@ -93,6 +117,18 @@ impl Lane {
     /// True if its last poses differ.
     pub(super) fn ends_moving(&self) -> bool {
         self.track.ends_moving(self.axes.len())
+    }
+
+    /// Whether a motor that was read where it is led at an instant confirms frames that nothing did before: the first and the last.
+    pub(super) fn confirm(&mut self, at: MonoTime) -> Option<(FrameNo, FrameNo)> {
+        let last = self.track.frame(at).filter(|last| last.since(self.unconfirmed) >= 0)?;
+        Some((std::mem::replace(&mut self.unconfirmed, last.next()), last))
+    }
+
+    /// Nothing leads it any more.
+    pub(super) fn let_go(&mut self, stage: Stage, now: MonoTime) {
+        self.stage = stage;
+        self.track = Track::at_rest(self.terms.tick, self.places(), now);
     }
 
     /// Brakes from where it is by now.

@@ -2,12 +2,13 @@
 //!
 //! ```text
 //!  poses --ring--> Lane: Track --Axis: TargetMaker--> frames behind one break, each slice
-//!  events <--ring-- sent, rests, moves, lost, ...  <---- a question in ten targets
+//!  events <--ring-- confirmed, rests, moves, lost, ...  <---- a question in ten targets
 //! ```
 //!
 //! Each target is that of the instant at which it arrives: axes need not wait for each other, and a slice that a question made late is
 //! late in its targets, too. Lanes that stand are sent theirs as well, so that a target that was damaged on the way is
-//! followed for no longer than a slice. A unit confirms nothing.
+//! followed for no longer than a slice. A unit confirms nothing: frames count as confirmed once one of its motors was read where they lead it,
+//! the motors by turns.
 
 mod axis;
 mod lane;
@@ -28,6 +29,7 @@ use crate::drive::link::{
     AxisFigures, BrakeReason, LedPose, LinkFault, LinkFigures, LinkPort, Stage, StreamEvent, StreamTerms,
     axis_number, lane_number as number,
 };
+use crate::drive::terms::Lead;
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{PiTarget, SixpackFrame, SixpackOrder};
 
@@ -42,9 +44,13 @@ const UNDERSTOOD: u32 = 5;
 
 /// How long before the seat is to be there its poses have to come: a slice and a half until the last of what is sent in one, a
 /// tick until it can be interpolated, a question that makes a slice late; the rest is for ticks that are missed.
+pub(crate) const LEAD: Lead = Lead { periods: 4, ticks: 4 };
+
+/// The longest from one reading of a seat until the next, where so many seats with so many axes in all are on a link: each has its turn
+/// once for each of them, and who it is may be asked in one.
 #[must_use]
-pub(crate) fn lead(terms: StreamTerms) -> Duration {
-    terms.period * 4 + 4 * terms.tick
+pub(crate) fn read_every(period: Duration, seats: u32, axes: u32) -> Duration {
+    period * (TARGETS.div_ceil(axes.max(1)) + 1) * 2 * seats
 }
 
 /// A play on one link.
@@ -57,13 +63,13 @@ pub(crate) struct Stream<P> {
     events: Producer<StreamEvent>,
     figures: LinkFigures,
     next_slice: MonoTime,
-    /// Targets since the last question, and the lane and axis that is asked next.
+    /// Targets since the last question, and the lane that is asked next.
     targets: u32,
-    next_asked: (usize, usize),
+    next_asked: usize,
 }
 
 impl<P: LinkPort> Stream<P> {
-    /// With lanes that are home and at rest, on units that were found: what [`super::find()`] told of a reset is not told again.
+    /// With lanes that are out until somebody has them [looked at](Self::look).
     ///
     /// # Errors
     /// [`HomeError::WakingRate`] at a rate at which a unit that was restarted goes on following targets; what else the settings of
@@ -86,17 +92,7 @@ impl<P: LinkPort> Stream<P> {
         };
         let lanes = lanes.iter().map(lane).collect::<Result<_, HomeError>>()?;
         let figures = LinkFigures::default();
-        Ok(Self {
-            talk,
-            terms,
-            lanes,
-            poses,
-            events,
-            figures,
-            next_slice: now,
-            targets: 0,
-            next_asked: (0, 0),
-        })
+        Ok(Self { talk, terms, lanes, poses, events, figures, next_slice: now, targets: 0, next_asked: 0 })
     }
 
     /// Takes what poses came, and does what is due next: the targets of a slice, or one question. Nothing due: waits a millisecond.
@@ -109,7 +105,7 @@ impl<P: LinkPort> Stream<P> {
         (0..self.lanes.len()).for_each(|lane| self.mind(lane, now));
         let done = if now >= self.next_slice {
             self.send_targets()
-        } else if self.has_time() && self.ask_next(now)? {
+        } else if self.has_time(now) && self.ask_next(now)? {
             Ok(())
         } else {
             let until = self.next_slice.min(now + IDLE);
@@ -143,15 +139,38 @@ impl<P: LinkPort> Stream<P> {
     /// A lane that was out was homed again.
     pub(crate) fn rejoin(&mut self, lane: u16) {
         if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
-            lane.failing_since = None;
+            lane.is_failing = false;
             lane.make_ready();
         }
+    }
+
+    /// Has a lane's axes read as soon as there is time.
+    pub(crate) fn locate(&mut self, lane: u16) {
+        (self.next_asked, self.targets) = (usize::from(lane), TARGETS);
+    }
+
+    /// Has it looked whether the unit of a lane is home; one that is out comes back then.
+    pub(crate) fn look(&mut self, lane: u16) {
+        if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
+            lane.known = None;
+        }
+    }
+
+    /// True if a lane moves, or may.
+    #[must_use]
+    pub(crate) fn is_busy(&self) -> bool {
+        self.lanes.iter().any(|lane| matches!(lane.stage, Stage::Runs | Stage::Ends | Stage::Readying))
     }
 
     /// How an axis of a lane stands.
     #[must_use]
     pub(crate) fn axis(&self, lane: u16, axis: usize) -> Option<AxisFigures> {
         Some(self.lanes.get(usize::from(lane))?.axes.get(axis)?.figures)
+    }
+
+    /// The port.
+    pub(crate) fn port(&mut self) -> &mut P {
+        self.talk.port()
     }
 
     /// True if a lane stands and waits for poses.
@@ -177,8 +196,8 @@ impl<P: LinkPort> Stream<P> {
             let index = usize::from(pose.lane);
             match self.lanes.get(index).map(|lane| lane.stage) {
                 Some(Stage::Runs) => self.lanes[index].push(&pose, now),
-                Some(Stage::Ready) => self.begin(index, &pose, now),
-                _ => self.figures.poses_skipped += 1,
+                Some(Stage::Ready) if self.lanes[index].may_begin(now) => self.begin(index, &pose, now),
+                _ => self.skip(index, &pose, now),
             }
         }
     }
@@ -187,17 +206,25 @@ impl<P: LinkPort> Stream<P> {
     fn begin(&mut self, index: usize, pose: &LedPose, now: MonoTime) {
         if let Some((axis, by_mm)) = self.lanes[index].off(&pose.pose, NEAR_MM) {
             // Told once while it stands, not at each tick.
-            if !std::mem::replace(&mut self.lanes[index].is_elsewhere, true) {
+            if !std::mem::replace(&mut self.lanes[index].moves, true) {
                 self.tell(StreamEvent::Elsewhere { lane: number(index), axis: axis_number(axis), by_mm });
             }
-            self.figures.poses_skipped += 1;
+            self.skip(index, pose, now);
             return;
         }
         let lane = &mut self.lanes[index];
-        lane.is_elsewhere = false;
+        (lane.moves, lane.unconfirmed) = (false, pose.pose.frame);
         lane.track.begin(pose.at.max(now + self.terms.period));
         lane.push(pose, now);
         lane.stage = Stage::Runs;
+    }
+
+    /// A pose that is not followed.
+    fn skip(&mut self, index: usize, pose: &LedPose, now: MonoTime) {
+        self.figures.poses_skipped += 1;
+        if let Some(lane) = self.lanes.get_mut(index) {
+            lane.hear(pose, now);
+        }
     }
 
     /// What a lane does by itself as time goes on.
@@ -244,29 +271,24 @@ impl<P: LinkPort> Stream<P> {
         if !frames.is_empty() {
             self.talk.send(&frames)?;
         }
-        (0..self.lanes.len()).for_each(|lane| self.tell_sent(lane, at + half));
+        (0..self.lanes.len()).for_each(|lane| self.tell_motion(lane, at + half));
         Ok(())
     }
 
-    /// What a lane that runs has been sent, and whether it moves by that.
-    fn tell_sent(&mut self, index: usize, at: MonoTime) {
+    /// Whether a lane that runs moves by what it has been sent.
+    fn tell_motion(&mut self, index: usize, at: MonoTime) {
         let lane = &mut self.lanes[index];
         if lane.stage != Stage::Runs {
             return;
         }
-        let (frame, moves) = (lane.track.frame(at), lane.axes.iter().any(Axis::moves));
-        let is_new = frame.is_some() && frame != lane.sent;
-        let turns = moves != lane.moves;
-        let places = lane.places();
-        (lane.sent, lane.moves) = (frame.or(lane.sent), moves);
-        let lane = number(index);
-        if let Some(frame) = frame.filter(|_| is_new) {
-            self.tell(StreamEvent::Sent { lane, frame });
-        }
-        if turns && moves {
-            self.tell(StreamEvent::Moves { lane, at });
-        } else if turns {
-            self.tell(StreamEvent::Rests { lane, axes: places, at });
+        let moves = lane.axes.iter().any(Axis::moves);
+        if std::mem::replace(&mut lane.moves, moves) != moves {
+            let (axes, lane) = (lane.places(), number(index));
+            self.tell(if moves {
+                StreamEvent::Moves { lane, at }
+            } else {
+                StreamEvent::Rests { lane, axes, at }
+            });
         }
     }
 

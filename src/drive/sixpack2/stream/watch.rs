@@ -7,48 +7,49 @@ use super::{Stream, StreamEvent, TARGETS, Track, axis_number, number};
 use crate::drive::link::Stage;
 use crate::drive::link::{LinkFault, LinkPort};
 use crate::drive::sixpack2::find::{WHO, waking_baud, who};
-use crate::drive::sixpack2::look::where_is;
+use crate::drive::sixpack2::look::{OUTSIDE_MM, searches, where_is};
 use crate::drive::sixpack2::talk::TalkFault;
 use crate::time::MonoTime;
-use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackReply, action};
+use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackReply, UnitTold, action};
 
 /// How often a unit is asked who it is.
 const IDENTITY: Duration = Duration::from_secs(10);
 /// From one look whether a motor still moves to the next.
 const LOOKS: Duration = Duration::from_millis(20);
-/// A unit that does not answer for so long is lost, or for ten periods.
-const LOST: Duration = Duration::from_millis(250);
 /// How often a unit that is lost is asked.
 const PROBES: Duration = Duration::from_millis(250);
 /// How far a motor may be from where its targets lead, mm.
 const OFF_COURSE_MM: f64 = 0.5;
 /// When exactly a unit reads its counter is not known to better than this, seconds: its loop, and when that falls.
 const READING: f64 = 0.004;
-/// How far outside its stroke a seat that is home may stand, mm; what is farther than the other is no place of it at all.
-const OUTSIDE_MM: f64 = 0.5;
+/// What is so far outside the stroke is no place of the seat at all, mm.
 const LOST_ZERO_MM: f64 = 10.0;
 
 impl<P: LinkPort> Stream<P> {
-    /// True if a question does not make the next slice later than it has to.
-    pub(super) fn has_time(&self) -> bool {
-        !self.lanes.iter().any(|lane| lane.is_led()) || self.targets >= TARGETS
+    /// True if a question does not make the next slice later than it has to: there is one after each slice that leaves room for it.
+    pub(super) fn has_time(&self, now: MonoTime) -> bool {
+        let is_led = self.lanes.iter().any(|lane| lane.is_led());
+        let has_room = !self.lanes.iter().any(Lane::plays) || now + self.talk.question() <= self.next_slice;
+        !is_led || self.targets >= TARGETS || (self.targets > 0 && has_room)
     }
 
     /// Asks what is due; false where nothing is.
     pub(super) fn ask_next(&mut self, now: MonoTime) -> Result<bool, LinkFault> {
         let count = self.lanes.len();
-        let Some((first, _)) = (count > 0).then_some(self.next_asked) else { return Ok(false) };
         for step in 0..count {
-            let index = (first + step) % count;
+            let index = (self.next_asked + step) % count;
             let lane = &self.lanes[index];
-            let is_due = lane.not_before <= now;
+            let (is_due, targets) = (lane.not_before <= now, std::mem::take(&mut self.targets));
             match lane.stage {
                 Stage::Lost if is_due => self.probe(index, now)?,
+                Stage::Out if is_due && lane.known.is_none() => self.probe(index, now)?,
                 Stage::Readying if is_due => self.look_at(index, now)?,
                 Stage::Ready | Stage::Runs | Stage::Ends => self.ask(index, now)?,
-                _ => continue,
+                _ => {
+                    self.targets = targets;
+                    continue;
+                }
             }
-            self.targets = 0;
             return Ok(true);
         }
         Ok(false)
@@ -56,14 +57,16 @@ impl<P: LinkPort> Stream<P> {
 
     /// Asks a lane that is led: its next motor, or who it is.
     fn ask(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
-        let (_, axis) = self.next_asked;
-        let lane = &self.lanes[index];
-        if lane.known.is_none_or(|at| now.since(at) >= IDENTITY) {
+        self.next_asked = (index + 1) % self.lanes.len();
+        let lane = &mut self.lanes[index];
+        let axis = lane.next_axis;
+        // Once for all of its motors: whoever wants to know again and again keeps none of them from being read.
+        if axis == 0 && !lane.asked_who && lane.known.is_none_or(|at| now.since(at) >= IDENTITY) {
+            lane.asked_who = true;
             return self.ask_who(index, now);
         }
-        let axis = axis.min(lane.axes.len() - 1);
-        let is_last = axis + 1 == lane.axes.len();
-        self.next_asked = if is_last { ((index + 1) % self.lanes.len(), 0) } else { (index, axis + 1) };
+        lane.asked_who = false;
+        lane.next_axis = (axis + 1) % lane.axes.len();
         if let Some(told) = self.place_of(index, axis)? {
             self.judge(index, axis, told)?;
         }
@@ -76,7 +79,10 @@ impl<P: LinkPort> Stream<P> {
         if let Some(SixpackReply::UnitTold(told)) = self.heard(index, answer)? {
             self.lanes[index].known = Some(now);
             if told.reset != 0 {
-                self.put_out(index, StreamEvent::Restarted { lane: number(index), axis: 0 })?;
+                return self.is_not_home(index, 0);
+            }
+            if self.lanes[index].is_led() {
+                self.tell(StreamEvent::Homed { lane: number(index), homed: true });
             }
         }
         Ok(())
@@ -91,8 +97,12 @@ impl<P: LinkPort> Stream<P> {
             self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
             return Ok(None);
         };
+        let a = axis_number(axis);
         let axis = &mut self.lanes[index].axes[axis];
-        axis.figures.position = axis.scale.fraction(told.position.into());
+        let position = axis.scale.fraction(told.position.into());
+        axis.figures.position = position;
+        let at = self.talk.moment().sent;
+        self.tell(StreamEvent::Read { lane: number(index), axis: a, position, at });
         Ok(Some(told))
     }
 
@@ -104,13 +114,14 @@ impl<P: LinkPort> Stream<P> {
         axis.run(sent);
         let (by_mm, mm_s) = axis.beside(told.position);
         axis.figures.error_mm = by_mm;
-        let searches = matches!(told.action, action::SEARCH..=action::LAST_SEARCH | action::MECHANICAL);
+        let searches = searches(told.action);
         let is_off = by_mm.abs() > OFF_COURSE_MM + mm_s * READING;
         if !is_off {
             axis.figures.off_course_mm = axis.figures.off_course_mm.max(by_mm.abs());
         }
         if !(is_off || searches) {
             axis.strayed = 0;
+            self.confirm(index, sent);
             return Ok(());
         }
         if axis.strayed == 0 {
@@ -123,19 +134,22 @@ impl<P: LinkPort> Stream<P> {
         let is_lost = !(low..=high).contains(&f64::from(told.position));
         let is_for_good = searches || is_lost || sent.since(axis.strays_since) > axis.heals_in();
         if axis.strayed > 1 && is_for_good {
+            if is_lost {
+                return self.is_not_home(index, a);
+            }
             let (lane, axis) = (number(index), axis_number(a));
-            return self.put_out(
-                index,
-                if is_lost {
-                    StreamEvent::Restarted { lane, axis }
-                } else {
-                    StreamEvent::OffCourse { lane, axis, by_mm }
-                },
-            );
+            return self.put_out(index, StreamEvent::OffCourse { lane, axis, by_mm });
         }
-        self.next_asked = (index, a);
-        self.targets = TARGETS;
+        // It is asked again next.
+        (self.next_asked, self.lanes[index].next_axis) = (index, a);
         Ok(())
+    }
+
+    /// A motor was read where it was led at that instant.
+    fn confirm(&mut self, index: usize, at: MonoTime) {
+        if let Some((first, last)) = self.lanes[index].confirm(at) {
+            self.tell(StreamEvent::Confirmed { lane: number(index), first, last });
+        }
     }
 
     /// Looks whether all motors of a lane stand, and where.
@@ -155,15 +169,20 @@ impl<P: LinkPort> Stream<P> {
         if !is_idle || axis.stood_at != Some(told.position) {
             axis.stood_at = is_idle.then_some(told.position);
             lane.not_before = now + LOOKS;
-            return Ok(());
+            // Nobody has it search: a search has no end by itself.
+            return if searches(told.action) { self.stop_motors(index) } else { Ok(()) };
         }
         let (low, high) = axis.scale.reach(OUTSIDE_MM);
-        if (low..=high).contains(&f64::from(told.position)) {
-            axis.rest_at(told.position, self.talk.now());
-            return Ok(());
+        if !(low..=high).contains(&f64::from(told.position)) {
+            // Its counter says nothing of where it is.
+            return self.is_not_home(index, a);
         }
-        // Its counter says nothing of where it is: it is not home.
-        self.put_out(index, StreamEvent::Restarted { lane: number(index), axis: axis_number(a) })
+        let is_there = axis.beside(told.position).0.abs() <= OFF_COURSE_MM;
+        axis.rest_at(told.position, self.talk.now());
+        if is_there {
+            self.confirm(index, now);
+        }
+        Ok(())
     }
 
     /// All of its motors stand: it follows poses from here.
@@ -172,8 +191,9 @@ impl<P: LinkPort> Stream<P> {
         let lane = &mut self.lanes[index];
         let axes = lane.places();
         lane.track = Track::at_rest(tick, axes, now);
-        (lane.stage, lane.moves, lane.is_elsewhere) = (Stage::Ready, false, false);
+        (lane.stage, lane.moves, lane.is_home) = (Stage::Ready, false, true);
         self.tell(StreamEvent::Rests { lane: number(index), axes, at: now });
+        self.tell(StreamEvent::Homed { lane: number(index), homed: true });
     }
 
     /// Whether a unit answers.
@@ -182,19 +202,20 @@ impl<P: LinkPort> Stream<P> {
         index: usize,
         answer: Result<SixpackReply, TalkFault>,
     ) -> Result<Option<SixpackReply>, LinkFault> {
-        let (now, lane) = (self.talk.now(), &mut self.lanes[index]);
+        let lane = &mut self.lanes[index];
         match answer {
             Ok(reply) => {
-                lane.failing_since = None;
+                lane.is_failing = false;
                 Ok(Some(reply))
             }
             Err(TalkFault::Link(fault)) => Err(fault),
             Err(TalkFault::Silent { .. }) => {
-                let since = *lane.failing_since.get_or_insert(now);
-                // Soon again: what is silent is asked first.
-                self.targets = TARGETS;
-                if now.since(since) > LOST.max(self.terms.period * 10) {
+                // One answer may be lost. Whoever hears no targets stands, and would make up for all of them at once by the next that it
+                // hears: so it is asked again next, and told none without an answer.
+                if std::mem::replace(&mut lane.is_failing, true) {
                     self.lose(index);
+                } else {
+                    (self.next_asked, self.targets) = (index, TARGETS);
                 }
                 Ok(None)
             }
@@ -208,18 +229,31 @@ impl<P: LinkPort> Stream<P> {
         if matches!(lane.stage, Stage::Lost | Stage::Out) {
             return;
         }
-        (lane.stage, lane.not_before) = (Stage::Lost, now + PROBES);
+        lane.let_go(Stage::Lost, now);
+        lane.not_before = now + PROBES;
         self.tell(StreamEvent::Lost { lane: number(index), axis: 0 });
     }
 
     /// Out until a person has looked: stopped, and led no more.
     fn put_out(&mut self, index: usize, event: StreamEvent) -> Result<(), LinkFault> {
-        if self.lanes[index].stage == Stage::Out {
-            return Ok(());
-        }
-        self.lanes[index].stage = Stage::Out;
+        let now = self.talk.now();
+        let lane = &mut self.lanes[index];
+        lane.let_go(Stage::Out, now);
+        lane.known = Some(now);
         self.tell(event);
         self.stop_motors(index)
+    }
+
+    /// A unit that was restarted, or never homed: none of its motors knows its place.
+    fn is_not_home(&mut self, index: usize, axis: usize) -> Result<(), LinkFault> {
+        let (lane, axis) = (number(index), axis_number(axis));
+        let was_home = std::mem::take(&mut self.lanes[index].is_home);
+        let event = if was_home {
+            StreamEvent::Restarted { lane, axis }
+        } else {
+            StreamEvent::Homed { lane, homed: false }
+        };
+        self.put_out(index, event)
     }
 
     /// Ends what each motor may search, and stops it by its ramp. Nobody answers, so it is said twice.
@@ -234,29 +268,37 @@ impl<P: LinkPort> Stream<P> {
         Ok(())
     }
 
-    /// Whether the unit of a lost lane answers; at the rate with which it wakes only while nobody plays on the link.
+    /// Looks for the unit of a lane that is lost or out.
     fn probe(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
         self.lanes[index].not_before = now + PROBES;
-        let unit = self.lanes[index].unit;
-        let restarted = StreamEvent::Restarted { lane: number(index), axis: 0 };
-        if let Some(told) = who(&mut self.talk, unit)? {
-            if told.reset != 0 {
-                return self.put_out(index, restarted);
-            }
-            let lane = &mut self.lanes[index];
-            lane.failing_since = None;
-            lane.make_ready();
+        let Some(told) = self.seek(self.lanes[index].unit)? else { return Ok(()) };
+        if told.reset != 0 {
+            return self.is_not_home(index, 0);
+        }
+        let lane = &mut self.lanes[index];
+        let was_lost = lane.stage == Stage::Lost;
+        (lane.is_failing, lane.not_before) = (false, now);
+        lane.make_ready();
+        if was_lost {
             self.tell(StreamEvent::Back { lane: number(index) });
-        } else if !self.lanes.iter().any(Lane::plays) {
-            let baud = self.talk.baud();
-            self.talk.set_baud(waking_baud())?;
-            let found = who(&mut self.talk, unit);
-            self.talk.set_baud(baud)?;
-            if found?.is_some() {
-                return self.put_out(index, restarted);
-            }
         }
         Ok(())
+    }
+
+    /// Who a unit is, if it is there; one that woke is switched to the rate of the link, but only while nobody plays on it.
+    fn seek(&mut self, unit: u8) -> Result<Option<UnitTold>, LinkFault> {
+        let told = who(&mut self.talk, unit)?;
+        if told.is_some() || self.lanes.iter().any(Lane::plays) {
+            return Ok(told);
+        }
+        let baud = self.talk.baud();
+        self.talk.set_baud(waking_baud())?;
+        let found = who(&mut self.talk, unit).and_then(|told| {
+            told.map_or(Ok(()), |_| self.talk.switch(unit, baud))?;
+            Ok(told)
+        });
+        self.talk.set_baud(baud)?;
+        found
     }
 }
 

@@ -1,5 +1,6 @@
 //! How units are found and switched, and what a line may do to that.
 
+use crate::drive::sixpack2::look::look;
 use std::time::Duration;
 
 use super::bench::*;
@@ -161,4 +162,16 @@ fn on_two_wires_nothing_is_said_while_a_unit_still_holds_them() {
         look(&mut talk, 1, &[0, 1, 2]).unwrap();
     }
     assert_eq!((unit(&mut talk).books.collisions, talk.counts().asked), (0, talk.counts().answered + 2));
+}
+
+#[test]
+fn a_look_tells_a_unit_that_waits_as_it_woke_from_one_that_is_not_there_and_switches_neither() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    assert_eq!(look_for(&mut talk, 1, &[0]), Ok(None));
+    let silent = look_for(&mut talk, 2, &[0]).unwrap_err();
+    assert_eq!(silent, TalkFault::Silent { unit: 2, baud: BAUD });
+    assert_eq!(look_for(&mut talk, 1, &[0]), Ok(None), "it was not switched");
+    find(&mut talk, &[1]).unwrap();
+    let told = look_for(&mut talk, 1, &[0, 1]).unwrap().expect("it talks at the rate of the link");
+    assert_eq!((told.unit, told.motors.len()), (1, 2));
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::bench::*;
+use crate::config::drive::DriveFamily;
 use crate::cue::Vibration;
 use crate::drive::link::{LedPose, LinkPose, StreamEvent, StreamTerms};
 use crate::drive::sixpack2::*;
@@ -25,8 +26,8 @@ pub(super) struct Play {
     pub(super) stream: Stream<VirtualPort>,
     poses: Producer<LedPose>,
     events: Consumer<StreamEvent>,
-    terms: StreamTerms,
-    seats: u16,
+    pub(super) terms: StreamTerms,
+    pub(super) seats: u16,
     ticks: u32,
     begin: MonoTime,
     pub(super) told: Vec<(MonoTime, StreamEvent)>,
@@ -86,6 +87,7 @@ impl Play {
             origin: begin,
             judged: true,
         };
+        (0..seats).for_each(|seat| play.stream.look(seat));
         play.wait(1.0);
         assert!((0..seats).all(|seat| play.stream.is_ready(seat)), "{:?}", play.rare());
         play
@@ -126,7 +128,7 @@ impl Play {
     /// Begins to play a course, from now on.
     pub(super) fn begin(&mut self, course: fn(f64, usize) -> f64) {
         (self.course, self.ticks, self.begin) = (course, 0, self.now());
-        self.origin = self.begin + lead(self.terms);
+        self.origin = self.begin + self.terms.lead(DriveFamily::Sixpack2);
     }
 
     /// Ticks of so many seconds; `missed` of them, at the beginning, are slept through.
@@ -148,7 +150,8 @@ impl Play {
             for lane in 0..self.seats {
                 let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
                 let pose = LinkPose { frame: FrameNo(self.ticks), lasts_ms: 10, axes, vibration };
-                let _ = self.poses.push(LedPose { lane, at: due + lead(self.terms), pose });
+                let _ =
+                    self.poses.push(LedPose { lane, at: due + self.terms.lead(DriveFamily::Sixpack2), pose });
             }
             self.ticks += 1;
         }
@@ -200,7 +203,11 @@ impl Play {
         let rare = |event: &&(_, StreamEvent)| {
             !matches!(
                 event.1,
-                StreamEvent::Sent { .. } | StreamEvent::Moves { .. } | StreamEvent::Rests { .. }
+                StreamEvent::Confirmed { .. }
+                    | StreamEvent::Read { .. }
+                    | StreamEvent::Homed { homed: true, .. }
+                    | StreamEvent::Moves { .. }
+                    | StreamEvent::Rests { .. }
             )
         };
         self.told.iter().filter(rare).map(|(_, event)| format!("{event:?}")).collect()

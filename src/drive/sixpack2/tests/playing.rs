@@ -2,7 +2,10 @@
 
 use super::bench::*;
 use super::play::*;
+use std::time::Duration;
+
 use crate::drive::link::{BrakeReason, StreamEvent};
+use crate::drive::sixpack2::read_every;
 
 #[test]
 fn a_ride_is_executed_within_a_fifth_of_a_millimetre_by_axes_that_do_not_wait_for_each_other() {
@@ -22,20 +25,33 @@ fn a_ride_is_executed_within_a_fifth_of_a_millimetre_by_axes_that_do_not_wait_fo
 }
 
 #[test]
-fn frames_are_told_as_sent_before_they_are_executed_and_never_as_confirmed() {
+fn frames_are_confirmed_once_they_are_executed_and_a_motor_was_read_where_they_lead() {
+    for (units, wires) in [(1, false), (2, true)] {
+        let setups: Vec<_> = (1..=units).map(|unit| wired(unit, wires)).collect();
+        let mut play = Play::over(&setups, if units > 1 { 113_636 } else { BAUD });
+        play.begin(ride);
+        play.play(10.0, 0);
+        play.judged = false;
+        play.wait(1.5);
+        let mut next = vec![0; setups.len()];
+        for (at, event) in &play.told {
+            let StreamEvent::Confirmed { lane, first, last } = event else { continue };
+            let executed = play.origin + TICK * last.0;
+            assert_eq!(first.0, std::mem::replace(&mut next[usize::from(*lane)], last.0 + 1));
+            assert!(*at >= executed, "{last:?} {at:?}");
+            let (seats, every) = (u32::from(play.seats), play.terms.period);
+            let latest = play.origin + TICK * first.0 + read_every(every, seats, 3 * seats);
+            assert!(*at < latest + Duration::from_millis(15), "{first:?} {:?}", at.since(latest));
+        }
+        assert!(next.iter().all(|next| *next > 990), "{next:?}: what it braked from is not executed");
+    }
+}
+
+#[test]
+fn it_moves_once_and_says_so() {
     let mut play = Play::over(&[wired(1, false)], BAUD);
     play.begin(ride);
     play.play(10.0, 0);
-    let mut last = None;
-    for (at, event) in &play.told {
-        assert!(!matches!(event, StreamEvent::Confirmed { .. }), "nothing confirms anything");
-        if let StreamEvent::Sent { frame, .. } = event {
-            assert!(last < Some(frame.0), "{last:?} {frame:?}");
-            last = Some(frame.0);
-            assert!(*at < play.origin + TICK * frame.0 + TICK, "{frame:?} {at:?}");
-        }
-    }
-    assert!(last > Some(980), "{last:?}");
     let moves = play.told.iter().filter(|(_, event)| matches!(event, StreamEvent::Moves { .. })).count();
     assert_eq!(moves, 1);
 }

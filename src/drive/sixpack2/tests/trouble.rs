@@ -2,9 +2,12 @@
 
 use super::bench::*;
 use super::play::*;
+use std::time::Duration;
+
 use crate::drive::link::LinkFault;
 use crate::sim::serial::LineFaults;
 use crate::sim::sixpack2::SixpackFault;
+use crate::wire::sixpack2::{ReferenceSearch, SixpackOrder, action};
 
 fn riding(seconds: f64) -> Play {
     let mut play = Play::over(&[wired(1, false)], BAUD);
@@ -89,13 +92,17 @@ fn at_the_rate_of_a_unit_that_restarted_nothing_is_played() {
 }
 
 #[test]
-fn a_seat_that_is_not_home_is_told_so_and_never_led() {
-    let mut talk = talk_to(&[unit_with(1, shaft())]);
-    crate::drive::sixpack2::find(&mut talk, &[1]).unwrap();
+fn a_seat_that_is_not_home_is_told_so_at_each_look_and_never_led() {
+    let talk = talk_to(&[unit_with(1, shaft())]);
     let (mut stream, _poses, mut events, _) = Play::stream_over(talk, 1).unwrap();
-    (0..500).for_each(|_| stream.round().unwrap());
-    let told = std::iter::from_fn(|| events.pop().ok()).map(|event| format!("{event:?}"));
-    assert_eq!(told.collect::<Vec<_>>(), ["Restarted { lane: 0, axis: 0 }"]);
+    // As it woke: told by its flag, which is gone then; and by its counters.
+    for look in 0..2 {
+        stream.look(0);
+        (0..500).for_each(|_| stream.round().unwrap());
+        let told = std::iter::from_fn(|| events.pop().ok()).map(|event| format!("{event:?}"));
+        let told: Vec<_> = told.filter(|event| !event.starts_with("Read")).collect();
+        assert_eq!(told, ["Homed { lane: 0, homed: false }"], "{look}");
+    }
     let sent = stream.talk().port().sent.clone();
     assert!(!stream.is_ready(0) && sent.iter().all(|(_, octets)| octets[1] != 0x24), "{sent:?}");
 }
@@ -103,16 +110,19 @@ fn a_seat_that_is_not_home_is_told_so_and_never_led() {
 #[test]
 fn a_motor_that_searches_by_a_damaged_question_is_ended_and_out() {
     let mut play = riding(10.0);
-    let now = play.now();
-    let search =
-        crate::wire::sixpack2::SixpackCommand::ReferenceSearch(crate::wire::sixpack2::ReferenceSearch {
-            motor: 1,
-        });
-    play.line().send_break(now);
-    play.line().send(&search.frame(1).octets(), now);
-    play.play(0.2, 0);
-    let action = play.bus().units()[0].motors[1].action();
-    assert!(play.has("OffCourse { lane: 0, axis: 1") && action == 0, "{action} {:?}", play.rare());
+    let search = SixpackOrder::Search(ReferenceSearch { motor: 1 });
+    // Not amidst the frames of a slice.
+    let does = |play: &mut Play| play.bus().units()[0].motors[1].action();
+    while does(&mut play) < action::SEARCH {
+        let now = play.now();
+        play.line().send_break(now);
+        play.line().send(&search.frame(1).octets(), now);
+        play.play(0.01, 0);
+    }
+    // Each of three motors has its turn by then, and this one a second.
+    play.play(0.3, 0);
+    let action = does(&mut play);
+    assert!(play.has("OffCourse { lane: 0, axis: 1") && action == action::IDLE, "{action} {:?}", play.rare());
 }
 
 #[test]
@@ -121,7 +131,7 @@ fn octets_that_are_damaged_lead_no_axis_out_of_its_stroke() {
         LineFaults { lost: 0.000_5, ..LineFaults::default() },
         LineFaults { doubled: 0.000_5, ..LineFaults::default() },
         LineFaults { flipped: 0.000_5, ..LineFaults::default() },
-        LineFaults { answer_lost: 0.1, ..LineFaults::default() },
+        LineFaults { answer_lost: 0.02, ..LineFaults::default() },
     ]
     .into_iter()
     .enumerate()
@@ -135,8 +145,37 @@ fn octets_that_are_damaged_lead_no_axis_out_of_its_stroke() {
         play.play(40.0, 0);
         play.assert_inside();
         if index != 2 {
-            let through = play.rare();
-            assert!(through.is_empty(), "{index}: {through:?}");
+            // Two answers in a row may be lost.
+            let is_loss = |event: &&String| event.starts_with("Lost") || event.starts_with("Back");
+            let other = play.rare().into_iter().find(|event| !is_loss(&event));
+            assert_eq!(other, None, "{index}");
+        }
+    }
+}
+
+/// The greatest jump of speed after a cut of so long in a ride, mm/s, at one of ten moments, and what was told.
+fn jump_after(cut: Duration, phase: u32) -> (f64, Play) {
+    let mut play = riding(8.0 + 0.173 * f64::from(phase));
+    play.bus_mut().forget();
+    play.line().faults.unplugged = true;
+    play.play(cut.as_secs_f64(), 0);
+    play.line().faults.unplugged = false;
+    play.play(1.5, 0);
+    play.assert_inside();
+    let motors = play.bus().units()[0].motors[..3].iter();
+    (motors.map(|motor| motor.shaft.executed().jump / MM).fold(0.0, f64::max), play)
+}
+
+#[test]
+fn what_was_not_heard_while_a_line_was_cut_is_not_made_up_for_at_once() {
+    for ms in [60, 100, 240, 400] {
+        for phase in [0, 3, 6] {
+            let (jump, play) = jump_after(Duration::from_millis(ms), phase);
+            assert!(
+                jump <= 32.0 && play.has("Lost") && play.has("Back"),
+                "{ms} ms: {jump} mm/s {:?}",
+                play.rare()
+            );
         }
     }
 }

@@ -1,0 +1,155 @@
+//! A play on one link, whatever its drives: what its thread and the control plane ask of the streams of all families.
+
+use std::time::Duration;
+
+use rtrb::{Consumer, Producer};
+
+use super::link::{
+    AxisFigures, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms, TalkTerms, canary,
+};
+use super::{silvermax, sixpack2};
+use crate::config::drive::DriveFamily;
+use crate::config::drive_controller::Motors;
+use crate::config::{Controller, Drives, Link};
+
+/// A play on one link. A variant for each family, matched and never boxed.
+#[derive(Debug)]
+pub(crate) enum LinkStream<P> {
+    /// SilverMax units.
+    SilverMax(silvermax::Stream<P>),
+    /// SIXpack 2 units.
+    Sixpack2(sixpack2::Stream<P>),
+}
+
+/// The same of either.
+macro_rules! of_either {
+    ($stream:ident in $of:expr => $what:expr) => {
+        match $of {
+            LinkStream::SilverMax($stream) => $what,
+            LinkStream::Sixpack2($stream) => $what,
+        }
+    };
+}
+
+impl<P: LinkPort> LinkStream<P> {
+    /// Over a port that is open, with lanes that are out until somebody has them [looked at](Self::look): the seats on that link.
+    ///
+    /// # Errors
+    /// Why its drives cannot be played to.
+    pub(crate) fn new(
+        port: P,
+        (link, terms): (&Link, StreamTerms),
+        seats: &[&Controller],
+        poses: Consumer<LedPose>,
+        events: Producer<StreamEvent>,
+    ) -> Result<Self, String> {
+        let talk = TalkTerms::of(link);
+        if link.family == Some(DriveFamily::Sixpack2) {
+            let lanes = seats.iter().map(|seat| motors_of(seat, terms.period)).collect::<Option<Vec<_>>>();
+            let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, sixpack2::Talk::new(port, talk));
+            let stream = sixpack2::Stream::new(talk, terms, &lanes, poses, events);
+            return stream.map(Self::Sixpack2).map_err(|error| error.to_string());
+        }
+        let lanes =
+            seats.iter().map(|seat| Some(silvermax::LaneUnits { seat: units_of(seat)?, canary: None }));
+        let lanes = lanes.collect::<Option<Vec<_>>>();
+        let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, silvermax::Talk::new(port, talk));
+        let stream = silvermax::Stream::new(talk, terms, &lanes, poses, events);
+        stream.map(Self::SilverMax).map_err(|error| error.to_string())
+    }
+
+    /// Takes what poses came, and does what is due next; nothing due: waits a millisecond.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone: all lanes are lost by then. It may be called again.
+    pub(crate) fn round(&mut self) -> Result<(), LinkFault> {
+        of_either!(stream in self => stream.round())
+    }
+
+    /// Brakes all lanes.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    pub(crate) fn stop(&mut self) -> Result<(), LinkFault> {
+        of_either!(stream in self => stream.stop(None))
+    }
+
+    /// Has a lane's axes read as soon as there is time.
+    pub(crate) fn locate(&mut self, lane: u16) {
+        of_either!(stream in self => stream.locate(lane));
+    }
+
+    /// Has it looked whether the units of a lane are home; one that is out comes back then.
+    pub(crate) fn look(&mut self, lane: u16) {
+        of_either!(stream in self => stream.look(lane));
+    }
+
+    /// True if a lane moves, or may.
+    #[must_use]
+    pub(crate) fn is_busy(&self) -> bool {
+        of_either!(stream in self => stream.is_busy())
+    }
+
+    /// How an axis of a lane stands.
+    #[must_use]
+    pub(crate) fn axis(&self, lane: u16, axis: usize) -> Option<AxisFigures> {
+        of_either!(stream in self => stream.axis(lane, axis))
+    }
+
+    /// How the link stands.
+    #[must_use]
+    pub(crate) fn figures(&self) -> LinkFigures {
+        of_either!(stream in self => stream.figures())
+    }
+
+    /// The port.
+    pub(crate) fn port(&mut self) -> &mut P {
+        of_either!(stream in self => stream.port())
+    }
+
+    /// Homes the seat of a lane while no lane moves, as long as it `goes_on`. Whatever came of it, the lane looks anew at its units.
+    ///
+    /// # Errors
+    /// Why it is not home, with what to do.
+    pub(crate) fn home(
+        &mut self,
+        lane: u16,
+        (controller, terms): (&Controller, StreamTerms),
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<(), String> {
+        let told = &mut |_| {};
+        let homed = match self {
+            Self::SilverMax(stream) => {
+                let seat = units_of(controller).ok_or(NO_DRIVES)?;
+                let canary = canary().map_err(|error| format!("the system gives no chance: {error}"))?;
+                let homed = silvermax::home(stream.talk(), seat, silvermax::Homing { canary, goes_on, told });
+                homed.map(|()| stream.rejoin(lane, canary)).map_err(|error| error.to_string())
+            }
+            Self::Sixpack2(stream) => {
+                let seat = motors_of(controller, terms.period).ok_or(NO_DRIVES)?;
+                let homed = sixpack2::home(stream.talk(), seat, sixpack2::Homing { goes_on, told });
+                homed.map(|()| stream.rejoin(lane)).map_err(|error| error.to_string())
+            }
+        };
+        self.look(lane);
+        homed
+    }
+}
+
+const NO_DRIVES: &str = "it has no drives of that link";
+
+/// The units that move a seat; none where others do.
+pub(crate) fn units_of(controller: &Controller) -> Option<silvermax::SeatUnits<'_>> {
+    let Drives { drive, motors: Motors::SilverMax(units), .. } = controller.drives()? else { return None };
+    let silvermax = drive.silvermax.as_ref()?;
+    Some(silvermax::SeatUnits { seat: &controller.seat, drive, silvermax, units })
+}
+
+/// The motors that move a seat, which are told something new in each period; none where others do.
+pub(crate) fn motors_of(controller: &Controller, period: Duration) -> Option<sixpack2::SeatMotors<'_>> {
+    let Drives { drive, motors: Motors::Sixpack2 { unit, motors }, .. } = controller.drives()? else {
+        return None;
+    };
+    let sixpack2 = drive.sixpack2.as_ref()?;
+    Some(sixpack2::SeatMotors { seat: &controller.seat, drive, sixpack2, unit: *unit, motors, period })
+}
