@@ -116,6 +116,11 @@ impl<P: LinkPort> Talk<P> {
         self.octets(BREAK + 2 * NINE) + delay + hold
     }
 
+    /// When a question that is asked next is over.
+    pub(crate) fn question_over(&self) -> MonoTime {
+        self.now().max(self.busy) + self.question()
+    }
+
     /// Does nothing for so long.
     pub(crate) fn pause(&mut self, span: Duration) {
         let until = self.now() + span;

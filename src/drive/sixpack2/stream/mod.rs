@@ -105,7 +105,7 @@ impl<P: LinkPort> Stream<P> {
         (0..self.lanes.len()).for_each(|lane| self.mind(lane, now));
         let done = if now >= self.next_slice {
             self.send_targets()
-        } else if self.has_time(now) && self.ask_next(now)? {
+        } else if self.has_time() && self.ask_next(now)? {
             Ok(())
         } else {
             let until = self.next_slice.min(now + IDLE);

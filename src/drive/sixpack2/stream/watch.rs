@@ -27,9 +27,9 @@ const LOST_ZERO_MM: f64 = 10.0;
 
 impl<P: LinkPort> Stream<P> {
     /// True if a question does not make the next slice later than it has to: there is one after each slice that leaves room for it.
-    pub(super) fn has_time(&self, now: MonoTime) -> bool {
+    pub(super) fn has_time(&self) -> bool {
         let is_led = self.lanes.iter().any(|lane| lane.is_led());
-        let has_room = !self.lanes.iter().any(Lane::plays) || now + self.talk.question() <= self.next_slice;
+        let has_room = !self.lanes.iter().any(Lane::plays) || self.talk.question_over() <= self.next_slice;
         !is_led || self.targets >= TARGETS || (self.targets > 0 && has_room)
     }
 
