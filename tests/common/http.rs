@@ -10,7 +10,7 @@ use kinocue::harness::sys::clock::wall_now_ns;
 use serde_json::Value;
 
 /// Longer than anything here takes.
-pub const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Where to.
 #[derive(Debug, Clone)]
