@@ -445,7 +445,7 @@ fn frames_that_may_be_confirmed_late_and_many_at_once_are_missed_only_when_they_
         bench.send(0.5, 10, now);
         frames += 1;
         // Every 400 ms all that was executed by then: the first of them waited for 600 ms.
-        if acks && now % later == 0 && now > lead {
+        if acks && now.is_multiple_of(later) && now > lead {
             bench.ack(u32::try_from((now - lead) / 10).unwrap());
         }
         bench.look(now)
