@@ -2,21 +2,39 @@
 //!
 //! The tick thread copies what it asked for and what left, octet by octet, into a ring, one chunk a tick, all of it or nothing
 //! ([`Tap`]). A thread behind the ring takes chunks apart ([`Chunk`]), folds them into samples ([`Sampled`]) and writes these as MCAP
-//! ([`Recording`], `mcap.dev/spec`). It is told no time but that of the ticks.
+//! ([`Recording`], `mcap.dev/spec`), where it is asked for with every tick as it was (`full`). It is told no time but that of the
+//! ticks. [`read`] reads such files back.
 
 mod chunk;
+mod columns;
+mod descriptors;
+mod full;
+mod margins;
+mod read;
+#[cfg(test)]
+mod reading_tests;
 mod recorder;
 mod recording;
+mod recover;
 mod sampled;
 mod seat;
+mod summary;
 mod tap;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
+pub(crate) use margins::{Margin, Margins, Quantity};
+#[cfg(test)]
+pub(crate) use read::Told;
+pub(crate) use read::{Contents, ReadError, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;
-pub(crate) use recording::{About, Recording, SAMPLE_HZ};
+pub(crate) use recording::{About, Mode, Recording, SAMPLE_HZ};
+pub(crate) use recover::{RecoverError, Recovered, recover};
 pub(crate) use sampled::{Message, Sampled};
 pub use seat::{FrameKind, RecordedSeat};
+#[cfg(test)]
+pub(crate) use summary::each_chunk;
+pub(crate) use summary::{Summary, summarize};
 pub use tap::{Tap, tap};

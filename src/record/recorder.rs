@@ -1,13 +1,14 @@
 //! The other end of the ring: takes ticks as they come, folds them, and writes. A thread of its own, alone at the disk.
 
-use std::io::{Seek, Write};
+use std::io::{self, Seek, Write};
 use std::time::Duration;
 
 use mcap::McapResult;
 use rtrb::Consumer;
 
-use super::{Chunk, Recording, Sampled};
-use crate::time::{Clock, MonoTime};
+use super::full::Block;
+use super::{Chunk, Margins, RecordedSeat, Recording, SAMPLE_HZ, Sampled};
+use crate::time::{Clock, MonoTime, Rate};
 
 /// How often it looks for ticks.
 const LOOK: Duration = Duration::from_millis(20);
@@ -18,7 +19,10 @@ const FLUSH: Duration = Duration::from_millis(500);
 pub(crate) struct Recorder<W: Write + Seek> {
     ring: Consumer<u8>,
     held: Vec<u8>,
+    seats: Vec<RecordedSeat>,
     fold: Sampled,
+    margins: Margins,
+    block: Block,
     file: Recording<W>,
     ticks: u64,
     frames: u64,
@@ -26,9 +30,11 @@ pub(crate) struct Recorder<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> Recorder<W> {
-    /// One of the ring's ticks.
-    pub(crate) const fn new(ring: Consumer<u8>, fold: Sampled, file: Recording<W>) -> Self {
-        Self { ring, held: Vec::new(), fold, file, ticks: 0, frames: 0, dropped: 0 }
+    /// One of the ring's ticks, of these seats at that rate.
+    pub(crate) fn new(ring: Consumer<u8>, seats: Vec<RecordedSeat>, rate: Rate, file: Recording<W>) -> Self {
+        let (fold, margins) = (Sampled::new(seats.clone(), SAMPLE_HZ), Margins::new(&seats, rate));
+        let (held, block) = (Vec::new(), Block::default());
+        Self { ring, held, seats, fold, margins, block, file, ticks: 0, frames: 0, dropped: 0 }
     }
 
     /// Records until the tick thread is over.
@@ -58,17 +64,23 @@ impl<W: Write + Seek> Recorder<W> {
     /// # Errors
     /// Where writing fails.
     pub(crate) fn take(&mut self) -> McapResult<()> {
-        let Self { ring, held, fold, file, ticks, frames, dropped } = self;
+        let Self { ring, held, seats, fold, margins, block, file, ticks, frames, dropped } = self;
         held.resize(ring.slots(), 0);
         // Chunks are pushed whole, so whole ones are there.
         ring.pop_entire_slice(held).unwrap_or_default();
         let (mut rest, mut result) = (held.as_slice(), Ok(()));
         while let Some((chunk, behind)) = Chunk::parse(rest) {
+            let octets = &rest[..rest.len() - behind.len()];
             rest = behind;
             *ticks += 1;
             *dropped += u64::from(chunk.dropped);
             *frames += chunk.frames().count() as u64;
+            margins.take(&chunk, seats, &mut |_, _, _| ());
             fold.take(&chunk, &mut writer(file, &mut result));
+            let full = if file.is_full() { block.add(&chunk, octets, seats) } else { None };
+            if let (Some((at, block)), Ok(())) = (full, &result) {
+                result = file.write_block(at, &block);
+            }
         }
         result
     }
@@ -89,8 +101,18 @@ impl<W: Write + Seek> Recorder<W> {
         let mut result = Ok(());
         self.fold.close(&mut writer(&mut self.file, &mut result));
         result?;
-        let end = [("ticks", self.ticks), ("frames", self.frames), ("dropped", self.dropped)];
-        self.file.finish(end, report)
+        if let Some((at, block)) = self.block.close(&self.seats) {
+            self.file.write_block(at, &block)?;
+        }
+        let most = serde_json::to_string(&self.margins.most(&self.seats)).map_err(io::Error::from)?;
+        let count = |count: u64| count.to_string();
+        let end = [
+            ("ticks", count(self.ticks)),
+            ("frames", count(self.frames)),
+            ("dropped", count(self.dropped)),
+            ("most", most),
+        ];
+        self.file.finish(&end, report)
     }
 }
 

@@ -7,15 +7,37 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
 use serde_json::{Value, json};
 
+use super::descriptors::descriptors;
 use super::{Message, RecordedSeat};
-use crate::motion::AxisUnit;
 use crate::state::State;
 use crate::time::MonoTime;
 
 /// The version of topics, messages and metadata.
-const VERSION: &str = "1";
+pub(super) const VERSION: &str = "1";
+/// The topic of whole ticks.
+pub(super) const SENT: &str = "/full/sent";
 /// Samples a second of each seat.
 pub(crate) const SAMPLE_HZ: u32 = 20;
+
+/// How much is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub(crate) enum Mode {
+    /// Samples, each the worst of its window.
+    #[default]
+    Sampled,
+    /// Samples, and every tick and frame.
+    Full,
+}
+
+impl Mode {
+    /// The word for it.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::Sampled => "sampled",
+            Self::Full => "full",
+        }
+    }
+}
 
 /// What a recording is of.
 #[derive(Debug, Clone)]
@@ -30,6 +52,8 @@ pub(crate) struct About {
     pub(crate) cue_sha256: String,
     /// Ticks a second.
     pub(crate) rate_hz: f64,
+    /// How much of it is kept.
+    pub(crate) mode: Mode,
     /// One instant on both clocks: monotonic, and wall in nanoseconds since 1970.
     pub(crate) clocks: (MonoTime, u64),
 }
@@ -41,6 +65,8 @@ pub(crate) struct Recording<W: Write + Seek> {
     seats: Vec<u16>,
     ticks: u16,
     hall: u16,
+    /// The channel of whole ticks, where they are kept.
+    sent: Option<u16>,
     sequence: u32,
 }
 
@@ -50,12 +76,8 @@ impl<W: Write + Seek> Recording<W> {
     /// # Errors
     /// Where writing fails, as all of these.
     pub(crate) fn begin(out: W, about: &About, seats: &[RecordedSeat]) -> McapResult<Self> {
-        let mut writer = WriteOptions::new()
-            .library(concat!("kinocue ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Lz4))
-            // By time alone, so that of a file that is cut short no more than half a second is lost.
-            .chunk_size(None)
-            .create(out)?;
+        // By time alone, so that of a file that is cut short no more than half a second is lost.
+        let mut writer = options().chunk_size(None).create(out)?;
         write_metadata(&mut writer, "kinocue", first(about, seats))?;
         let mut channel = |topic: &str, schema: &Value| {
             let name = schema["title"].as_str().unwrap_or_default();
@@ -65,7 +87,21 @@ impl<W: Write + Seek> Recording<W> {
         let names = seats.iter().map(|seat| format!("/seat/{}", seat.name));
         let seats = names.map(|topic| channel(&topic, &schema_of_seat())).collect::<McapResult<_>>()?;
         let (ticks, hall) = (channel("/tick", &schema_of_tick())?, channel("/hall", &schema_of_hall())?);
-        Ok(Self { writer, clocks: about.clocks, seats, ticks, hall, sequence: 0 })
+        let sent = (about.mode == Mode::Full).then(|| {
+            let schema = writer.add_schema("kinocue.Sent", "protobuf", &descriptors())?;
+            writer.add_channel(schema, SENT, "protobuf", &BTreeMap::new())
+        });
+        Ok(Self { writer, clocks: about.clocks, seats, ticks, hall, sent: sent.transpose()?, sequence: 0 })
+    }
+
+    /// Whether it keeps whole ticks.
+    pub(crate) const fn is_full(&self) -> bool {
+        self.sent.is_some()
+    }
+
+    /// Adds a block of whole ticks, of which the first was then.
+    pub(crate) fn write_block(&mut self, at: MonoTime, block: &[u8]) -> McapResult<()> {
+        self.sent.map_or(Ok(()), |channel| self.put(channel, at, block))
     }
 
     /// Adds a message.
@@ -75,11 +111,15 @@ impl<W: Write + Seek> Recording<W> {
             Message::Tick(sample) => (self.ticks, serde_json::to_vec(sample)),
             Message::State(state) => (self.hall, serde_json::to_vec(&json!({"state": number(*state)}))),
         };
+        self.put(channel_id, at, &data.map_err(std::io::Error::from)?)
+    }
+
+    fn put(&mut self, channel_id: u16, at: MonoTime, data: &[u8]) -> McapResult<()> {
         let (origin, wall) = self.clocks;
         let log_time = wall.saturating_add(at.as_nanos()).saturating_sub(origin.as_nanos());
         self.sequence = self.sequence.wrapping_add(1);
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
-        self.writer.write_to_known_channel(&header, &data.map_err(std::io::Error::from)?)
+        self.writer.write_to_known_channel(&header, data)
     }
 
     /// Has everything so far read even of a file that is cut short.
@@ -88,18 +128,24 @@ impl<W: Write + Seek> Recording<W> {
     }
 
     /// Ends the file with these figures, and a report if there is one; gives what was written to.
-    pub(crate) fn finish(mut self, end: [(&str, u64); 3], report: Option<&[u8]>) -> McapResult<W> {
+    pub(crate) fn finish(mut self, end: &[(&str, String)], report: Option<&[u8]>) -> McapResult<W> {
         if let Some(report) = report {
             let (name, media_type) = ("report.json".to_owned(), "application/json".to_owned());
             let log_time = self.clocks.1;
             let data = report.into();
             self.writer.attach(&Attachment { log_time, create_time: log_time, name, media_type, data })?;
         }
-        let end = end.map(|(key, value)| (key.to_owned(), value.to_string()));
-        write_metadata(&mut self.writer, "kinocue.end", end.into())?;
+        let end = end.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+        write_metadata(&mut self.writer, "kinocue.end", end)?;
         self.writer.finish()?;
         Ok(self.writer.into_inner())
     }
+}
+
+/// How files are written.
+pub(super) fn options() -> WriteOptions {
+    let options = WriteOptions::new().library(concat!("kinocue ", env!("CARGO_PKG_VERSION")));
+    options.compression(Some(Compression::Lz4))
 }
 
 fn write_metadata<W: Write + Seek>(
@@ -112,14 +158,12 @@ fn write_metadata<W: Write + Seek>(
 
 /// What stands at the beginning, so that a file that is cut short still says what it is of.
 fn first(about: &About, seats: &[RecordedSeat]) -> BTreeMap<String, String> {
-    let About { hall, cue, title, cue_sha256, rate_hz, clocks: (origin, wall) } = about;
-    let unit = |unit| if unit == AxisUnit::Degree { "deg" } else { "mm" };
-    let seat = |seat: &RecordedSeat| json!({"name": &*seat.name, "units": seat.units().map(unit).collect::<Vec<_>>()});
-    let seats = Value::from_iter(seats.iter().map(seat));
+    let About { hall, cue, title, cue_sha256, rate_hz, mode, clocks: (origin, wall) } = about;
+    let seats = serde_json::to_string(seats).unwrap_or_default();
     let entries = [
         ("version", VERSION.to_owned()),
         ("kind", "recording".to_owned()),
-        ("mode", "sampled".to_owned()),
+        ("mode", mode.word().to_owned()),
         ("program", concat!("kinocue ", env!("CARGO_PKG_VERSION")).to_owned()),
         ("hall", hall.clone()),
         ("cue", cue.clone()),
@@ -127,7 +171,7 @@ fn first(about: &About, seats: &[RecordedSeat]) -> BTreeMap<String, String> {
         ("cue_sha256", cue_sha256.clone()),
         ("rate_hz", rate_hz.to_string()),
         ("sample_hz", SAMPLE_HZ.to_string()),
-        ("seats", seats.to_string()),
+        ("seats", seats),
         ("monotonic_ns", origin.as_nanos().to_string()),
         ("wall_ns", wall.to_string()),
     ];

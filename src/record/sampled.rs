@@ -1,6 +1,6 @@
 //! Many ticks into few samples. Of each window the worst is kept, so that nothing that lasted a tick is smoothed away.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::chunk::{Chunk, Handed, SentFrame};
 use super::{RecordedSeat, TickHead};
@@ -8,7 +8,8 @@ use crate::state::State;
 use crate::time::MonoTime;
 
 /// A seat in a window: its frame in which asked and sent differ most, the last of these, and sums of all its frames.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct SeatSample {
     /// Show time of that frame, seconds.
     pub(crate) film_s: f64,
@@ -26,8 +27,16 @@ pub(crate) struct SeatSample {
     pub(crate) clamps: u64,
 }
 
+impl SeatSample {
+    /// How far asked and sent are apart at most, mm or degrees.
+    pub(crate) fn apart(&self) -> f64 {
+        self.asked_mm.iter().zip(&self.sent_mm).map(|(asked, sent)| (asked - sent).abs()).fold(0.0, f64::max)
+    }
+}
+
 /// All ticks of a window.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct TickSample {
     /// Show time of the last, seconds.
     pub(crate) film_s: f64,

@@ -14,30 +14,30 @@ use crate::state::{PlayMode, State};
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, VibrationPort};
 
-const MS: u64 = 1_000_000;
+pub(super) const MS: u64 = 1_000_000;
 const PLAYING: State = State::Playing(PlayMode::Following);
 
-fn window() -> Window {
+pub(super) fn window() -> Window {
     let seat = SeatType::bench3(3);
     Window::new((0..3).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect())
 }
 
-fn seat() -> RecordedSeat {
+pub(super) fn seat() -> RecordedSeat {
     RecordedSeat::new("A1", &window(), FrameKind::Datagram(VibrationPort::Two))
 }
 
-fn head(ms: u64) -> TickHead {
+pub(super) fn head(ms: u64) -> TickHead {
     let film = ShowTime::from_millis(ms.cast_signed());
     let deadline = MonoTime::from_nanos(ms * MS);
     TickHead { index: ms, deadline, late_ns: 1_000 * ms, missed: 0, film, state: PLAYING }
 }
 
-fn asked(place: f64) -> Asked {
+pub(super) fn asked(place: f64) -> Asked {
     Asked { pose: [place; MAX_AXES], slots: 3, level: 1.0, clamps: 0 }
 }
 
 /// A frame that sends all axes to that fraction of the stroke.
-fn frame(place: f64, buf: &mut [u8; MAX_LEN]) -> &[u8] {
+pub(super) fn frame(place: f64, buf: &mut [u8; MAX_LEN]) -> &[u8] {
     let positions = [0, 1, 2].map(|slot| window().slots()[slot].pulses(place));
     let motion = Motion {
         timing: Timing::Relative,
@@ -54,23 +54,29 @@ fn frame(place: f64, buf: &mut [u8; MAX_LEN]) -> &[u8] {
     motion.emit(buf)
 }
 
-fn about() -> About {
+pub(super) fn about() -> About {
     About {
         hall: "hall".to_owned(),
         cue: "ride.csv".to_owned(),
         title: String::new(),
         cue_sha256: "00".to_owned(),
         rate_hz: 100.0,
+        mode: Mode::Sampled,
         clocks: (MonoTime::from_nanos(0), 1_000_000 * MS),
     }
 }
 
 /// What a play of these ticks, each of a place asked for and one sent, comes to as a file; ticks 10 ms apart.
 fn recorded(ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
+    recorded_as(Mode::Sampled, ticks)
+}
+
+pub(super) fn recorded_as(mode: Mode, ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
     let seats = [seat()];
     let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
-    let file = Recording::begin(Cursor::new(Vec::new()), &about(), &seats).unwrap();
-    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    let about = About { mode, ..about() };
+    let file = Recording::begin(Cursor::new(Vec::new()), &about, &seats).unwrap();
+    let mut recorder = Recorder::new(ring, seats.to_vec(), Rate::from_hz(100.0), file);
     for (tick, (wanted, sent)) in (0_u64..).zip(ticks) {
         let mut buf = [0; MAX_LEN];
         tap.asked(asked(wanted));
@@ -187,7 +193,7 @@ fn a_disk_that_is_full_ends_the_recording_and_not_the_ticks() {
     let seats = [seat()];
     let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
     let file = Recording::begin(Full(Cursor::default(), 4_000), &about(), &seats).unwrap();
-    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    let mut recorder = Recorder::new(ring, seats.to_vec(), Rate::from_hz(100.0), file);
     let ended = (0..1_000).find_map(|tick| {
         let mut buf = [0; MAX_LEN];
         tap.asked(asked(0.5));
@@ -208,7 +214,7 @@ fn what_was_flushed_is_read_of_a_file_whose_writer_was_killed() {
     let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
     let out = io::BufWriter::new(on_disk.reopen().unwrap());
     let file = Recording::begin(out, &about(), &seats).unwrap();
-    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    let mut recorder = Recorder::new(ring, seats.to_vec(), Rate::from_hz(100.0), file);
     for tick in 0..100 {
         tap.tick(&head(10 * tick));
     }
