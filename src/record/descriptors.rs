@@ -44,7 +44,7 @@ enum Kind {
     Many(&'static str),
 }
 
-const MESSAGES: [(&str, &[(&str, Kind)]); 3] = [
+const MESSAGES: [(&str, &[(&str, Kind)]); 4] = [
     (
         "Sent",
         &[("ticks", Kind::Count), ("tick_columns", Kind::Many("Column")), ("lanes", Kind::Many("Lane"))],
@@ -61,6 +61,7 @@ const MESSAGES: [(&str, &[(&str, Kind)]); 3] = [
             ("raw", Kind::Bytes),
         ],
     ),
+    ("Acks", &[("drains", Kind::Bytes)]),
     ("Column", &[("second_differences", Kind::Numbers)]),
 ];
 

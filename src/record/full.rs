@@ -86,6 +86,24 @@ struct Row {
     vibration: [i64; 2 * MAX_AXES],
 }
 
+/// What the ack thread took in half a second: `kinocue.Acks`.
+#[derive(Clone, PartialEq, prost::Message)]
+pub(crate) struct Acks {
+    /// The drains as they crossed to the recorder, one behind the other (docs/recordings.md).
+    #[prost(bytes = "vec", tag = "1")]
+    drains: Vec<u8>,
+}
+
+/// Drains as a message.
+pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
+    Acks { drains: drains.to_vec() }.encode_to_vec()
+}
+
+/// The drains of a message.
+pub(super) fn drains(message: &[u8]) -> Option<Vec<u8>> {
+    Acks::decode(message).ok().map(|acks| acks.drains)
+}
+
 /// Ticks that become a block.
 #[derive(Debug, Default)]
 pub(crate) struct Block {

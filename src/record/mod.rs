@@ -5,10 +5,13 @@
 //! ([`Recording`], `mcap.dev/spec`), where it is asked for with every tick as it was (`full`). It is told no time but that of the
 //! ticks. [`read`] reads such files back.
 
+mod acks;
 mod chunk;
 mod columns;
+mod cursor;
 mod descriptors;
 mod full;
+mod intake;
 mod margins;
 mod read;
 #[cfg(test)]
@@ -23,8 +26,11 @@ mod tap;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use acks::{AckChunk, AckRecord, AckStanding, latency_ns};
+pub use acks::{AckTap, ack_tap};
 pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
+pub(crate) use intake::{Intake, Taps};
 pub(crate) use margins::{Margin, Margins, Quantity};
 #[cfg(test)]
 pub(crate) use read::Told;

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::full;
 use super::margins::Margin;
-use super::recording::{SENT, VERSION};
+use super::recording::{ACKS, SENT, VERSION};
 use super::sampled::{SeatSample, TickSample};
 use super::seat::RecordedSeat;
 use crate::container::{self, ChannelRecord, Trouble};
@@ -63,6 +63,8 @@ pub(crate) enum Told<'a> {
     State(u64),
     /// Whole ticks: chunks, one behind the other.
     Chunks(Vec<u8>),
+    /// Drains of the ack thread, one behind the other.
+    Drains(Vec<u8>),
     /// Anything else, as it stands there: topic and octets.
     Other(&'a str, &'a [u8]),
 }
@@ -184,6 +186,7 @@ enum Topic {
     Tick,
     Hall,
     Sent,
+    Acks,
     Other(String),
 }
 
@@ -273,6 +276,7 @@ impl Reading<'_, '_> {
             "/tick" => Topic::Tick,
             "/hall" => Topic::Hall,
             SENT => Topic::Sent,
+            ACKS => Topic::Acks,
             other => {
                 let seat = other.strip_prefix("/seat/").and_then(|name| self.contents.seat(name));
                 seat.map_or_else(|| Topic::Other(other.to_owned()), Topic::Seat)
@@ -302,7 +306,8 @@ impl Reading<'_, '_> {
             Topic::Hall => json::<Value>(data).and_then(|hall| {
                 hall["state"].as_u64().map(Told::State).ok_or_else(|| "no state".to_owned())
             }),
-            Topic::Sent if !wanted.full => return,
+            Topic::Sent | Topic::Acks if !wanted.full => return,
+            Topic::Acks => full::drains(data).map(Told::Drains).ok_or_else(|| "no drains".to_owned()),
             Topic::Sent => {
                 let chunks = full::unpack(data, &contents.seats);
                 chunks.map(Told::Chunks).ok_or_else(|| "not a block of ticks".to_owned())

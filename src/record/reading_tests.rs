@@ -71,10 +71,11 @@ fn a_file_that_is_no_recording_is_refused() {
 #[test]
 fn of_a_cut_file_all_that_is_complete_is_written_anew_with_an_index() {
     let seats = [seat()];
-    let (mut tap, ring) = tap(&seats, crate::time::Rate::from_hz(100.0));
+    let (Taps { ticks: mut tap, .. }, intake) =
+        Intake::new(seats.to_vec(), crate::time::Rate::from_hz(100.0), SAMPLE_HZ);
     let about = About { mode: Mode::Full, ..about() };
     let file = Recording::begin(Cursor::new(Vec::new()), &about, &seats).unwrap();
-    let mut recorder = Recorder::new(ring, seats.to_vec(), crate::time::Rate::from_hz(100.0), file);
+    let mut recorder = Recorder::new(intake.in_full(), file);
     for (tick, (wanted, sent)) in (0_u64..).zip(swing(300)) {
         tap.asked(asked(wanted));
         tap.frame(

@@ -7,7 +7,9 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
 use serde_json::{Value, json};
 
+use super::acks::standing_words;
 use super::descriptors::descriptors;
+use super::full::packed;
 use super::{Message, RecordedSeat};
 use crate::state::State;
 use crate::time::MonoTime;
@@ -16,6 +18,8 @@ use crate::time::MonoTime;
 pub(super) const VERSION: &str = "1";
 /// The topic of whole ticks.
 pub(super) const SENT: &str = "/full/sent";
+/// That of what the ack thread took.
+pub(super) const ACKS: &str = "/full/acks";
 /// Samples a second of each seat.
 pub(crate) const SAMPLE_HZ: u32 = 20;
 
@@ -65,8 +69,8 @@ pub(crate) struct Recording<W: Write + Seek> {
     seats: Vec<u16>,
     ticks: u16,
     hall: u16,
-    /// The channel of whole ticks, where they are kept.
-    sent: Option<u16>,
+    /// The channels of whole ticks and drains, where these are kept.
+    whole: Option<[u16; 2]>,
     sequence: u32,
 }
 
@@ -87,21 +91,15 @@ impl<W: Write + Seek> Recording<W> {
         let names = seats.iter().map(|seat| format!("/seat/{}", seat.name));
         let seats = names.map(|topic| channel(&topic, &schema_of_seat())).collect::<McapResult<_>>()?;
         let (ticks, hall) = (channel("/tick", &schema_of_tick())?, channel("/hall", &schema_of_hall())?);
-        let sent = (about.mode == Mode::Full).then(|| {
-            let schema = writer.add_schema("kinocue.Sent", "protobuf", &descriptors())?;
-            writer.add_channel(schema, SENT, "protobuf", &BTreeMap::new())
-        });
-        Ok(Self { writer, clocks: about.clocks, seats, ticks, hall, sent: sent.transpose()?, sequence: 0 })
-    }
-
-    /// Whether it keeps whole ticks.
-    pub(crate) const fn is_full(&self) -> bool {
-        self.sent.is_some()
-    }
-
-    /// Adds a block of whole ticks, of which the first was then.
-    pub(crate) fn write_block(&mut self, at: MonoTime, block: &[u8]) -> McapResult<()> {
-        self.sent.map_or(Ok(()), |channel| self.put(channel, at, block))
+        let mut whole = |topic: &str, schema: &str| {
+            let schema = writer.add_schema(schema, "protobuf", &descriptors())?;
+            writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())
+        };
+        let whole = match about.mode {
+            Mode::Sampled => None,
+            Mode::Full => Some([whole(SENT, "kinocue.Sent")?, whole(ACKS, "kinocue.Acks")?]),
+        };
+        Ok(Self { writer, clocks: about.clocks, seats, ticks, hall, whole, sequence: 0 })
     }
 
     /// Adds a message.
@@ -109,9 +107,16 @@ impl<W: Write + Seek> Recording<W> {
         let (channel_id, data) = match message {
             Message::Seat(lane, sample) => (self.seats[*lane], serde_json::to_vec(sample)),
             Message::Tick(sample) => (self.ticks, serde_json::to_vec(sample)),
+            Message::Ticks(block) => return self.whole(0, at, block),
+            Message::Drains(drains) => return self.whole(1, at, &packed(drains)),
             Message::State(state) => (self.hall, serde_json::to_vec(&json!({"state": number(*state)}))),
         };
         self.put(channel_id, at, &data.map_err(std::io::Error::from)?)
+    }
+
+    /// Of what is kept only where it is asked for.
+    fn whole(&mut self, which: usize, at: MonoTime, data: &[u8]) -> McapResult<()> {
+        self.whole.map_or(Ok(()), |channels| self.put(channels[which], at, data))
     }
 
     fn put(&mut self, channel_id: u16, at: MonoTime, data: &[u8]) -> McapResult<()> {
@@ -184,26 +189,38 @@ fn number(state: State) -> usize {
 }
 
 /// Viewers take one type a property, never null, arrays of scalars, and `oneOf` only to name numbers.
-fn schema(title: &str, properties: &[(&str, Value)]) -> Value {
-    let required: Vec<&str> = properties.iter().map(|(name, _)| *name).collect();
+fn schema(title: &str, always: &[(&str, Value)], at_times: &[(&str, Value)]) -> Value {
+    let required: Vec<&str> = always.iter().map(|(name, _)| *name).collect();
+    let all = always.iter().chain(at_times);
     let properties: serde_json::Map<String, Value> =
-        properties.iter().map(|(name, kind)| ((*name).to_owned(), kind.clone())).collect();
+        all.map(|(name, kind)| ((*name).to_owned(), kind.clone())).collect();
     json!({"title": title, "type": "object", "required": required, "properties": properties})
 }
 
 fn schema_of_seat() -> Value {
     let [number, count] = [json!({"type": "number"}), json!({"type": "integer"})];
     let places = json!({"type": "array", "items": {"type": "number"}});
+    let standings =
+        (0..).zip(standing_words()).map(|(at, word): (u8, _)| json!({"title": word, "const": at}));
     schema(
         "kinocue.seat",
         &[
             ("film_s", number.clone()),
             ("asked_mm", places.clone()),
-            ("sent_mm", places),
-            ("level", number),
+            ("sent_mm", places.clone()),
+            ("level", number.clone()),
             ("sent", count.clone()),
             ("unsent", count.clone()),
-            ("clamps", count),
+            ("clamps", count.clone()),
+            ("measured_mm", places),
+            ("acked", count.clone()),
+            ("refused", count.clone()),
+            ("lost", count),
+        ],
+        &[
+            ("ack_us", number.clone()),
+            ("ack_max_us", number),
+            ("standing", json!({"type": "integer", "oneOf": standings.collect::<Vec<_>>()})),
         ],
     )
 }
@@ -220,10 +237,11 @@ fn schema_of_tick() -> Value {
             ("missed", count.clone()),
             ("dropped", count),
         ],
+        &[],
     )
 }
 
 fn schema_of_hall() -> Value {
     let named = State::ALL.map(|state| json!({"title": state.word(), "const": number(state)}));
-    schema("kinocue.hall", &[("state", json!({"type": "integer", "oneOf": named}))])
+    schema("kinocue.hall", &[("state", json!({"type": "integer", "oneOf": named}))], &[])
 }

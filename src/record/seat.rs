@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::chunk::{Asked, SentFrame, longest_frame};
 use crate::drive::link::{LinkPose, RECORD_LEN};
-use crate::motion::{AxisUnit, MAX_AXES, Window};
+use crate::motion::{AxisUnit, MAX_AXES, Pulses, Window};
 use crate::wire::{MotionRequest, VibrationPort, motion_len};
 
 /// What the frames of a lane are.
@@ -154,6 +154,12 @@ impl RecordedSeat {
             pose[axis.slot] = (place - axis.low) / axis.stroke;
         }
         pose
+    }
+
+    /// Where its axes are that stand at these places, millimetres or degrees.
+    pub(super) fn measured(&self, pulses: &[Pulses]) -> Vec<f64> {
+        let place = |axis: &RecordedAxis| pulses.get(axis.slot).map(|at| f64::from(at.0) * axis.pulse);
+        self.axes.iter().map_while(place).collect()
     }
 
     /// Where its axes were sent, millimetres or degrees; none where that is no frame of its kind.
