@@ -67,7 +67,7 @@ pub(super) struct SeatArgs {
 
     /// The seat type to judge for [default: of each axis that of its controller; bench3 without a configuration].
     #[arg(long, value_name = "NAME")]
-    seat: Option<String>,
+    pub(super) seat: Option<String>,
 
     /// Frames a second [default: those of the configuration; 100 without].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]

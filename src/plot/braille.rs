@@ -39,6 +39,11 @@ pub(crate) fn braille(picture: &Picture) -> String {
     for flag in &picture.flags {
         lines.push(format!("{:BEFORE$}{} {}", "", clock(flag.at_s, 0.0), plain::escaped(&flag.name, 200)));
     }
+    for one in &picture.histograms {
+        let bar = |(end, count): &(String, u64)| (*count > 0).then(|| format!("to {end}: {count}"));
+        let bars: Vec<String> = one.bins.iter().filter_map(bar).collect();
+        lines.push(format!("{}  {}", one.name, bars.join("  ")));
+    }
     lines.extend(picture.facts.iter().map(|fact| plain::escaped(fact, 400).into_owned()));
     lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
 }

@@ -98,7 +98,7 @@ impl Intake {
     /// What it came to so far, each by its name in `kinocue.end`: counts, and as JSON the most that each axis was sent to do.
     pub(crate) fn end(&self) -> Vec<(&'static str, String)> {
         let most = serde_json::to_string(&self.margins.most(&self.seats)).unwrap_or_default();
-        let counts = self.counts.named().map(|(name, count)| (name, count.to_string()));
+        let counts = self.counts().named().map(|(name, count)| (name, count.to_string()));
         counts.into_iter().chain([("most", most)]).collect()
     }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::RecordedSeat;
 use super::chunk::{Chunk, Handed};
 use crate::motion::{Measure, Reading, Spacing};
+use crate::plain::escaped;
 use crate::time::{MonoTime, Rate, ShowTime};
 
 /// After so long without a frame a seat is taken to rest, and is measured anew.
@@ -57,6 +58,16 @@ impl Margin {
     /// As a part of the limit; 1 is the limit.
     pub(crate) fn part(&self) -> f64 {
         self.value / self.limit
+    }
+
+    /// In words: which axis of which seat, when, and how near.
+    pub(crate) fn in_words(&self) -> String {
+        let Self { seat, axis, quantity, value, limit, film_s } = self;
+        let (seat, at) = (escaped(seat, 200), ShowTime::from_secs_f64(*film_s));
+        let (word, percent) = (quantity.word(), 100.0 * self.part());
+        format!(
+            "{word} of {seat} a{axis} at {at} comes nearest to its limit, {value:.0} of {limit:.0}, {percent:.0} %"
+        )
     }
 }
 

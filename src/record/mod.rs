@@ -8,7 +8,9 @@
 mod acks;
 mod chunk;
 mod columns;
+mod compare;
 mod cursor;
+mod cut;
 mod descriptors;
 mod full;
 mod intake;
@@ -30,17 +32,18 @@ pub(crate) use acks::{AckChunk, AckRecord, AckStanding, latency_ns};
 pub use acks::{AckTap, ack_tap};
 pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
+pub(crate) use compare::{Comparison, Places, compare, tracks};
+pub(crate) use cut::{CutError, Manner as CutManner, Stretch, cut, each_tick};
 pub(crate) use intake::{Intake, Taps};
 pub(crate) use margins::{Margin, Margins, Quantity};
-#[cfg(test)]
-pub(crate) use read::Told;
-pub(crate) use read::{Contents, ReadError, Wanted, beginning, read};
+pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;
 pub(crate) use recording::{About, Mode, Recording, SAMPLE_HZ};
 pub(crate) use recover::{RecoverError, Recovered, recover};
-pub(crate) use sampled::{Message, Sampled};
+pub(crate) use sampled::{Message, Sampled, SeatSample, TickSample};
+pub(crate) use seat::RecordedAxis;
 pub use seat::{FrameKind, RecordedSeat};
-#[cfg(test)]
-pub(crate) use summary::each_chunk;
-pub(crate) use summary::{Summary, summarize};
+pub(crate) use summary::{SeatTotals, Summary, each_chunk, state_word, summarize};
 pub use tap::{Tap, tap};
+#[cfg(test)]
+pub(crate) use tests::recorded_as;

@@ -111,6 +111,11 @@ impl RecordedSeat {
         Self { address: Some(address), ..self }
     }
 
+    /// The same without name and address, which nobody knows again.
+    pub(super) fn without_names(&self, index: usize) -> Self {
+        Self { name: format!("S{}", index + 1), address: None, ..self.clone() }
+    }
+
     /// Its axes, in their order.
     pub(crate) fn axes(&self) -> &[RecordedAxis] {
         &self.axes
