@@ -103,13 +103,13 @@ impl Request {
         let Id { servo, channel, start, num, .. } = id;
         let (accept, reply) = (peer.code, peer.code);
         match *self {
-            Self::Read { .. } if servo => ServoRead { servo: channel, accept, reply, start, num }.emit(buf),
+            Self::Read { .. } if servo => ServoRead { channel, accept, reply, start, num }.emit(buf),
             Self::Read { .. } => ReadRequest { channel, accept, reply, start, num }.emit(buf),
             Self::Write { value, .. } => {
                 let words = [value];
                 let data = Words::from(&words[..]);
                 if servo {
-                    ServoWrite { servo: channel, accept, reply, start, data }.emit(buf)
+                    ServoWrite { channel, accept, reply, start, data }.emit(buf)
                 } else {
                     WriteRequest { channel, accept, reply, start, data }.emit(buf)
                 }

@@ -17,7 +17,7 @@ use crate::config::{Controller, Station};
 use crate::motion::Pulses;
 use crate::time::MonoTime;
 use crate::wire::{
-    Code, DPFE, Dialect, FrameNo, FromController, MotionReply, PerAxis, ReplyCode, Report, Status,
+    Code, DPFE, Dialect, FrameNo, FromController, MotionReply, PerAxis, RegisterReport, ReplyCode, Status,
     VibrationPort,
 };
 
@@ -229,7 +229,7 @@ impl Observer {
     }
 
     /// Hears registers that an IMAX or MBOX controller reports unasked.
-    pub(crate) fn on_report(&mut self, controller: usize, report: &Report<'_>, at: MonoTime) {
+    pub(crate) fn on_report(&mut self, controller: usize, report: &RegisterReport<'_>, at: MonoTime) {
         let state = &mut self.states[controller];
         state.reports += 1;
         state.heard_at = Some(at);

@@ -203,7 +203,7 @@ fn a_report_of_registers_is_an_alarm_of_an_mbox_controller_and_else_an_event() {
     let say = |dialect, start, data: &[u16]| {
         let mut observer = observer(dialect);
         let data = Words::from(data);
-        let report = Report { channel: 0, accept: Code::NONE, reply: Code::NONE, start, data };
+        let report = RegisterReport { channel: 0, accept: Code::NONE, reply: Code::NONE, start, data };
         observer.on_report(0, &report, at(5));
         happened(&observer).remove(0).1
     };

@@ -138,7 +138,7 @@ impl Sheet {
             Message::ServoRead(read) => {
                 self.head(bytes, "read servo registers", true);
                 self.codes(read.accept, read.reply);
-                self.numbered("servo", u32::from(read.servo));
+                self.numbered("servo", u32::from(read.channel));
                 self.asked(read.start, read.num, None);
                 if read.num > MAX_SERVO_READ {
                     self.line(
@@ -151,7 +151,7 @@ impl Sheet {
             Message::ServoWrite(write) => {
                 self.head(bytes, "write servo registers", true);
                 self.codes(write.accept, write.reply);
-                self.numbered("servo", u32::from(write.servo));
+                self.numbered("servo", u32::from(write.channel));
                 self.registers(write.start, write.data, None);
                 self.surplus(bytes, WORDS + 2 * write.data.len());
             }
