@@ -61,7 +61,7 @@ impl Counter {
     }
 
     /// True if it is time to read it; if so, the next time is due a while later.
-    pub(super) fn take_turn(&mut self, controller: usize, now: MonoTime) -> bool {
+    pub(super) fn is_turn(&mut self, controller: usize, now: MonoTime) -> bool {
         let turn = u32::try_from(controller % TURNS).unwrap_or_default();
         let next = *self.next.get_or_insert(now + APART * turn);
         let due = now >= next;
@@ -160,7 +160,7 @@ mod tests {
         let ms = |ms: u64| MonoTime::from_nanos(ms * 1_000_000);
         let mut counter = Counter::default();
         let times: Vec<u64> =
-            (0..250).map(|tick| 10 * tick).filter(|at| counter.take_turn(3, ms(*at))).collect();
+            (0..250).map(|tick| 10 * tick).filter(|at| counter.is_turn(3, ms(*at))).collect();
         assert_eq!(times, [60, 1_060, 2_060]);
     }
 }

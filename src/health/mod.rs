@@ -14,6 +14,7 @@ mod judge;
 mod late;
 mod member;
 mod proof;
+mod reads;
 mod replies;
 #[cfg(test)]
 mod tests;
@@ -209,7 +210,7 @@ impl HealthTable {
 
     /// A seat at rest was found elsewhere than frames left it: its group is out until it was looked at, and joins from there.
     pub(crate) fn on_moved(&mut self, controller: usize) {
-        self.members[controller].moved = true;
+        self.members[controller].unsure = Some(Why::Moved(controller));
     }
 
     /// It is not known where the frames to a controller have led its seat, and none goes there any more: its group is out until it was

@@ -142,9 +142,9 @@ impl FastPath {
         }
     }
 
-    /// Takes `pose` if it is calm on all axes; says whether it was taken.
+    /// Takes `pose` if it is calm on all axes; true if it was.
     #[inline]
-    pub(super) fn take_calm(&mut self, pose: &Pose) -> bool {
+    pub(super) fn admit_calm(&mut self, pose: &Pose) -> bool {
         let (seen, calm) = self.see(pose);
         if calm {
             self.keep(pose, &seen);

@@ -153,7 +153,7 @@ impl Limiter {
     pub fn admit(&mut self, pose: &mut Pose, index: u64, asked: Provenance) -> Admitted {
         let time_ms = self.times.of(index);
         self.fast_path.begin(f64::from(time_ms) * 1e-3);
-        if self.following && self.fast_path.take_calm(pose) {
+        if self.following && self.fast_path.admit_calm(pose) {
             self.history.push(*pose, time_ms);
             self.counter.tick(time_ms, false, false);
             return Admitted::Passed;

@@ -234,7 +234,7 @@ mod tests {
                 at += f64::from(times.of(frame)) * 1e-3;
                 pose[0] = place(at);
                 limiter.fast_path.begin(f64::from(rate.time_ms(frame)) * 1e-3);
-                let is_calm = limiter.following && limiter.fast_path.clone().take_calm(&pose);
+                let is_calm = limiter.following && limiter.fast_path.clone().admit_calm(&pose);
                 limiter.admit(&mut pose, frame, Provenance::Anyhow);
                 if is_calm {
                     calm += 1;

@@ -1,6 +1,6 @@
 //! Parking: from wherever a lane is and however it moves to rest in its park pose, no faster than 50 mm/s, or 10 degrees a second.
 
-use super::seam::{Before, SLACK, roughness_of_leaving};
+use super::seam::{Before, LeastRough, roughness_of_leaving};
 use super::solve::{Problem, to_position, to_velocity};
 use super::{AxisState, Plan, PlanError};
 use crate::motion::{AxisGeometry, Limits, SeatType, Window};
@@ -27,7 +27,7 @@ pub(super) fn park(
     pace: f64,
     mut before: Option<Before<'_, '_>>,
 ) -> Result<Plan, PlanError> {
-    let mut least_rough: Option<(f64, Plan)> = None;
+    let mut least_rough = LeastRough::default();
     let mut refused = None;
     // Where the pace was changing, that shows as jerk too.
     let shares = if pace == 1.0 { &SHARES[..] } else { &SHARES[1..] };
@@ -50,14 +50,11 @@ pub(super) fn park(
             .as_deref_mut()
             .map(|before| roughness_of_leaving(window, &mut plan, start, rate_hz, before));
         let roughness = leaving.unwrap_or(0.0);
-        if roughness <= SLACK {
-            return Ok(plan);
-        }
-        if least_rough.as_ref().is_none_or(|(least, _)| roughness < *least) {
-            least_rough = Some((roughness, plan));
+        if let Some(smooth) = least_rough.smooth_or_keep(plan, roughness) {
+            return Ok(smooth);
         }
     }
-    least_rough.map(|(_, plan)| plan).ok_or_else(|| PlanError::NoStop(refused.unwrap_or_default()))
+    least_rough.into_plan().ok_or_else(|| PlanError::NoStop(refused.unwrap_or_default()))
 }
 
 fn target(window: &Window) -> Vec<AxisState> {

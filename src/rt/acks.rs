@@ -160,7 +160,7 @@ impl AckLoop {
         if clock.now() >= *tell_at {
             self.tell_times();
             *tell_at = clock.now() + TELL;
-        } else if self.watch.as_mut().is_some_and(Watch::take_untold) {
+        } else if self.watch.as_ref().is_some_and(Watch::is_untold) {
             self.tell_table();
         }
         let now = clock.now();

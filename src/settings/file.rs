@@ -54,7 +54,8 @@ struct Tray {
     due: Option<String>,
     over: bool,
     trouble: Option<String>,
-    mended: bool,
+    /// What became better, until it is said.
+    news: Option<&'static str>,
 }
 
 /// That something is being loaded because it was before the start. Where the program ends meanwhile other than in order, it is
@@ -119,9 +120,9 @@ impl SettingsFile {
         self.exchange.lock().trouble.clone()
     }
 
-    /// True if trouble has ended since this was last asked.
-    pub(crate) fn take_mended(&mut self) -> bool {
-        std::mem::take(&mut self.exchange.lock().mended)
+    /// What has become better since the last time.
+    pub(crate) fn news(&mut self) -> Option<&'static str> {
+        self.exchange.lock().news.take()
     }
 }
 
@@ -184,7 +185,9 @@ impl Tray {
     }
 
     fn mend(&mut self) {
-        self.mended |= self.trouble.take().is_some();
+        if self.trouble.take().is_some() {
+            self.news = Some("what people set is kept again");
+        }
     }
 }
 

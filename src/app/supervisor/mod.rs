@@ -315,9 +315,7 @@ impl Supervisor {
         let log = &self.ports.service_log;
         self.features.records.settle_folds(now).iter().for_each(|action| log.say_ask(action));
         log.say_journal(self.features.records.news());
-        if self.ports.settings_file.take_mended() {
-            log.say_mended();
-        }
+        log.say_settings(self.ports.settings_file.news());
         self.keep_settings();
         self.publish();
     }

@@ -79,7 +79,7 @@ pub(super) fn run<B: Drives>(bus: B, args: &Args, path: &Path, signals: Signals)
     let _control = control(args, Arc::new(carry_out))?; // its file goes when this does
     tell(&format!("ready {}", path.display()));
     signals.wait()?;
-    let (object, lines) = running.stop().map(|line| line.bus().report()).unwrap_or_default();
+    let (object, lines) = running.stop().bus().report();
     if args.json {
         print::json(&object)?;
     } else {

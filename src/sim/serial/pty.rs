@@ -6,11 +6,11 @@ use std::io;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::{Bus, SerialLine};
 use crate::plain;
+use crate::sim::thread::SimThread;
 use crate::sys::clock::Monotonic;
 use crate::sys::serial::pty::Pty;
 use crate::time::{Clock as _, MonoTime};
@@ -54,7 +54,7 @@ enum Order<B> {
 /// A line on a pseudo-terminal, run by a thread of its own until this is stopped or dropped.
 pub(crate) struct PtyLoop<B> {
     remote: Remote<B>,
-    thread: Option<JoinHandle<SerialLine<B>>>,
+    thread: SimThread<SerialLine<B>>,
 }
 
 /// Has things happen to a line, from any thread.
@@ -89,9 +89,10 @@ impl<B: Bus + Send + 'static> PtyLoop<B> {
         script.sort_by_key(|(at, _)| *at);
         let (sender, orders) = mpsc::channel();
         let running = Running { line, plug: Plug::new(path)?, orders, script: script.into() };
-        let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());
-        let thread = thread.spawn(move || running.run()).map_err(PtyError::System)?;
-        Ok(Self { remote: Remote(sender), thread: Some(thread) })
+        let ending = sender.clone();
+        let stop = move || drop(ending.send(Order::Stop));
+        let thread = SimThread::spawn(move || running.run(), stop).map_err(PtyError::System)?;
+        Ok(Self { remote: Remote(sender), thread })
     }
 }
 
@@ -102,22 +103,8 @@ impl<B> PtyLoop<B> {
     }
 
     /// Ends the thread, which takes the link away; gives the line back.
-    pub(crate) fn stop(mut self) -> Option<SerialLine<B>> {
-        self.end()
-    }
-
-    fn end(&mut self) -> Option<SerialLine<B>> {
-        let thread = self.thread.take()?;
-        let _ = self.remote.0.send(Order::Stop); // a thread that has ended needs no telling
-        Some(thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    }
-}
-
-impl<B> Drop for PtyLoop<B> {
-    fn drop(&mut self) {
-        if !std::thread::panicking() {
-            let _ = self.end(); // nobody is left to be given the line
-        }
+    pub(crate) fn stop(self) -> SerialLine<B> {
+        self.thread.end()
     }
 }
 
