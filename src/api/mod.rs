@@ -187,13 +187,13 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         .max_blocking_threads(BLOCKING)
         .build()
         .map_err(ApiError::System)?;
-    let sockets = Sockets { local, _file: file, tcp, log };
+    let sockets = ApiSockets { local, _file: file, tcp, log };
     let thread = Builder::new().name(THREAD.to_owned()).spawn(move || run(runtime, sockets, shared, router));
     Ok(Running { addresses, _thread: ServingThread::new(closing, thread.map_err(ApiError::System)?) })
 }
 
 /// What is listened on.
-struct Sockets {
+struct ApiSockets {
     local: std::os::unix::net::UnixListener,
     /// Goes when the server ends.
     _file: SocketFile,
@@ -202,11 +202,11 @@ struct Sockets {
 }
 
 /// Serves until the server ends.
-fn run(runtime: Runtime, sockets: Sockets, shared: Arc<Shared>, router: axum::Router) {
-    let Sockets { local, _file, tcp, log } = sockets;
+fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, router: axum::Router) {
+    let ApiSockets { local, _file, tcp, log } = sockets;
     let mut closing = shared.closing.clone();
     let (alive, mut all_gone) = mpsc::channel(1);
-    let hall = serve::Hall { router, closing: closing.clone(), alive, log };
+    let hall = serve::ServedHall { router, closing: closing.clone(), alive, log };
     runtime.block_on(async move {
         tokio::spawn(Pulse::follow(shared));
         let places = serve::tcp_places();

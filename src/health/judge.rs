@@ -1,7 +1,8 @@
 //! From what is known of the members to the standing of their group, and to what the hall has to hear of it.
 
 use super::{
-    Change, Demand, HealthState, HealthTable, Latch, LossPolicy, Notice, Place, WELL_AFTER, Why, state, well,
+    Change, Demand, GroupStanding, HealthState, HealthTable, Latch, LossPolicy, Notice, WELL_AFTER, Why,
+    state, well,
 };
 use crate::time::MonoTime;
 use crate::wire::DPFE;
@@ -166,7 +167,7 @@ impl Why {
     }
 }
 
-impl Place {
+impl GroupStanding {
     fn after(self, found: Findings, watched: bool, now: MonoTime) -> (HealthState, Why) {
         let same = (self.standing, self.why);
         if let Some(why) = found.tripped {

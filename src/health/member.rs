@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::Why;
-use super::counter::{Counter, Said};
+use super::counter::{CountVerdict, PacketCounter};
 use super::faults::FaultLatch;
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
 use super::reads::Reads;
@@ -23,7 +23,7 @@ const FLOWS: Duration = Duration::from_millis(500);
 
 /// By what a controller is known again.
 #[derive(Debug, Clone, Copy)]
-enum Identity {
+enum KnownBy {
     /// Its position is known from homing or preflight, so that the next sighting needs no proof.
     Trusted,
     /// Nothing can prove that it has not restarted.
@@ -37,7 +37,7 @@ pub(super) struct Member {
     controller: usize,
     replies: Replies,
     traffic: Traffic,
-    identity: Identity,
+    identity: KnownBy,
     /// It has to say that it knows its zero, however it came.
     must_be_home: bool,
     /// When it was last seen as it was.
@@ -59,7 +59,7 @@ pub(super) struct Member {
     pub(super) ambiguous: bool,
     /// When a frame was last sent, and what the controller counts meanwhile.
     framed: Option<MonoTime>,
-    counter: Counter,
+    counter: PacketCounter,
     /// Another master that was found, until the hall is told.
     trouble: Option<Trouble>,
 }
@@ -70,7 +70,7 @@ impl Member {
             controller,
             replies: Replies::new(interval),
             traffic: Traffic::default(),
-            identity: Identity::Trusted,
+            identity: KnownBy::Trusted,
             must_be_home: false,
             seen: None,
             reads: Reads::default(),
@@ -82,7 +82,7 @@ impl Member {
             outside: None,
             ambiguous: false,
             framed: None,
-            counter: Counter::default(),
+            counter: PacketCounter::default(),
             trouble: None,
         }
     }
@@ -158,7 +158,7 @@ impl Member {
         } else {
             let renewed = |before: Baseline| before.renewed(sighting, self.traffic, at);
             let baseline = self.baseline().map_or_else(|| Baseline::of(sighting, self.traffic), renewed);
-            self.identity = Identity::Seen(baseline);
+            self.identity = KnownBy::Seen(baseline);
             self.replies.forget_gap();
             self.seen = is_well.then_some(at);
         }
@@ -177,9 +177,9 @@ impl Member {
     fn against(&self, sighting: &Sighting, now: MonoTime) -> Option<Why> {
         let controller = self.controller;
         let verdict = match &self.identity {
-            Identity::Seen(baseline) => baseline.judge(sighting, self.traffic, self.replies.has_gap(), now),
-            Identity::Trusted => Verdict::Same,
-            Identity::Unproved => Verdict::Unproved,
+            KnownBy::Seen(baseline) => baseline.judge(sighting, self.traffic, self.replies.has_gap(), now),
+            KnownBy::Trusted => Verdict::Same,
+            KnownBy::Unproved => Verdict::Unproved,
         };
         match verdict {
             Verdict::Same if self.must_be_home && !sighting.homed => Some(Why::NotHome(controller)),
@@ -225,8 +225,8 @@ impl Member {
 
     const fn baseline(&self) -> Option<Baseline> {
         match self.identity {
-            Identity::Seen(baseline) => Some(baseline),
-            Identity::Trusted | Identity::Unproved => None,
+            KnownBy::Seen(baseline) => Some(baseline),
+            KnownBy::Trusted | KnownBy::Unproved => None,
         }
     }
 
@@ -271,10 +271,10 @@ impl Member {
     /// It was homed: its position is known, and what it counts from here on is the new measure.
     pub(super) fn on_homed(&mut self) {
         self.must_rehome = None;
-        self.identity = Identity::Trusted;
+        self.identity = KnownBy::Trusted;
         self.seen = None;
         self.replies.on_homed();
-        self.counter = Counter::default();
+        self.counter = PacketCounter::default();
     }
 
     /// What was latched is over, unless it goes on.
@@ -291,8 +291,8 @@ impl Member {
     pub(super) fn tick(&mut self, now: MonoTime) {
         self.replies.tick(now);
         match self.counter.judge(self.traffic, now) {
-            Some(Said::Crowded) => self.must_home_again(Why::OtherMaster(self.controller)),
-            Some(Said::Rebooted) => self.must_home_again(Why::Rebooted(self.controller)),
+            Some(CountVerdict::Crowded) => self.must_home_again(Why::OtherMaster(self.controller)),
+            Some(CountVerdict::Rebooted) => self.must_home_again(Why::Rebooted(self.controller)),
             None => {}
         }
     }
@@ -323,8 +323,8 @@ impl Member {
 
     /// Where it was never read, nothing can prove any more that it has not rebooted.
     pub(super) const fn distrust(&mut self) {
-        if matches!(self.identity, Identity::Trusted) {
-            self.identity = Identity::Unproved;
+        if matches!(self.identity, KnownBy::Trusted) {
+            self.identity = KnownBy::Unproved;
         }
     }
 
@@ -342,9 +342,9 @@ impl Member {
     /// show: that it is not home any more is the only sign of a reset.
     pub(super) fn wants_baseline(&self, now: MonoTime) -> bool {
         let of_identity = match &self.identity {
-            Identity::Trusted => true,
-            Identity::Unproved => false,
-            Identity::Seen(baseline) => {
+            KnownBy::Trusted => true,
+            KnownBy::Unproved => false,
+            KnownBy::Seen(baseline) => {
                 baseline.is_stale(self.traffic) || (!baseline.is_counted() && self.reads.is_old(now))
             }
         };

@@ -46,7 +46,7 @@ const WELL_AFTER: Duration = Duration::from_secs(1);
 pub struct HealthTable {
     groups: Groups,
     members: Vec<Member>,
-    places: Vec<Place>,
+    places: Vec<GroupStanding>,
     policy: LossPolicy,
     watched: bool,
     /// The hall was told of an emergency stop, and not yet that it is over.
@@ -57,7 +57,7 @@ pub struct HealthTable {
 
 /// Where one group stands.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct GroupStanding {
     standing: HealthState,
     why: Why,
     /// When acks were last missing.
@@ -73,7 +73,7 @@ impl HealthTable {
         let interval = period * ack_every.max(1);
         let members = (0..groups.controllers()).map(|controller| Member::new(controller, interval)).collect();
         let (standing, why) = well(watched);
-        let place = Place { standing, why, poor: MonoTime::default() };
+        let place = GroupStanding { standing, why, poor: MonoTime::default() };
         let places = vec![place; groups.len()];
         Self { groups, members, places, policy, watched, stop_told: false, latch_told: Latch::Free }
     }

@@ -52,7 +52,7 @@ impl Watched {
 
 /// What the first reply to a frame says beside positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Answer {
+pub(crate) struct FirstAnswer {
     /// The frame that it answers.
     pub(crate) frame: FrameNo,
     /// How the controller does.
@@ -153,7 +153,7 @@ impl Observer {
     }
 
     /// Hears the first reply to a frame. One to a frame older than the newest that was answered says nothing new.
-    pub(crate) fn on_answer(&mut self, controller: usize, answer: &Answer, at: MonoTime) {
+    pub(crate) fn on_answer(&mut self, controller: usize, answer: &FirstAnswer, at: MonoTime) {
         let smc = self.is_smc(controller);
         let state = &mut self.states[controller];
         if state.answered.is_some_and(|newest| answer.frame.since(newest) <= 0) {

@@ -34,7 +34,7 @@ fn reply() -> MotionReply {
 
 /// The first reply to the frame of that number.
 fn answers(observer: &mut Observer, frame: u32, code: ReplyCode, error: u16, inputs: u16, at: MonoTime) {
-    observer.on_answer(0, &Answer { frame: FrameNo(frame), code, error, inputs }, at);
+    observer.on_answer(0, &FirstAnswer { frame: FrameNo(frame), code, error, inputs }, at);
 }
 
 const CALM: Look = Look { stop: StopSign::Over, inputs: None };

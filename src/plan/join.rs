@@ -1,7 +1,7 @@
 //! Joins: a move from where a lane is onto the moving cue, met at its position, velocity and acceleration.
 
 use super::seam::{Before, LeastRough, SLACK, roughness_around, roughness_of_leaving};
-use super::solve::{Problem, to_position};
+use super::solve::{MoveProblem, to_position};
 use super::states::following;
 use super::{AxisState, Curve, Plan, PlanError};
 use crate::motion::{Limits, Window};
@@ -83,7 +83,7 @@ fn attempt(
         .zip(from.iter().zip(&to))
         .map(|((_, slot), (from, to))| raised(slot.limits, from, to))
         .collect();
-    to_position(&Problem { from, to: &to, limits: &limits, minimum_s: meeting })
+    to_position(&MoveProblem { from, to: &to, limits: &limits, minimum_s: meeting })
 }
 
 /// Ninety per cent of the limits, raised to what the present state and the target need.

@@ -37,13 +37,13 @@ pub(crate) struct Kept {
 pub(crate) struct SettingsFile {
     folder: PathBuf,
     given: Option<Settings>,
-    exchange: Arc<Exchange>,
+    exchange: Arc<SettingsExchange>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// Between whoever sets and whoever writes.
 #[derive(Debug, Default)]
-struct Exchange {
+struct SettingsExchange {
     tray: Mutex<Tray>,
     come: Condvar,
 }
@@ -81,7 +81,7 @@ impl SettingsFile {
             kept.said.push(format!("{} is not loaded: {why}; load it again", show.cue));
         }
         drop(Loading(loading));
-        let exchange = Arc::<Exchange>::default();
+        let exchange = Arc::<SettingsExchange>::default();
         let (of_thread, to) = (Arc::clone(&exchange), folder.to_owned());
         let thread = thread::Builder::new().name("settings".to_owned()).spawn(move || {
             let _ = realtime::normal_priority();
@@ -138,7 +138,7 @@ impl Drop for SettingsFile {
     }
 }
 
-impl Exchange {
+impl SettingsExchange {
     /// What is behind the lock is whole at any time, also where a thread that held it panicked.
     fn lock(&self) -> MutexGuard<'_, Tray> {
         self.tray.lock().unwrap_or_else(PoisonError::into_inner)

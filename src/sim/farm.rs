@@ -7,7 +7,7 @@ use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Sender};
 
-use super::event_loop::{DELAYED, EventLoop, Order, wait_for};
+use super::event_loop::{DELAYED, EventLoop, LoopOrder, wait_for};
 use super::log::Logs;
 use super::outcome::Outcome;
 use super::station::{VirtualStation, listen};
@@ -62,7 +62,7 @@ pub struct Farm {
 /// Has things happen to the virtual controllers of a farm, from any thread.
 #[derive(Debug, Clone)]
 pub struct Remote {
-    orders: Sender<Order>,
+    orders: Sender<LoopOrder>,
     bell: Arc<OwnedFd>,
 }
 
@@ -93,7 +93,7 @@ impl Farm {
         };
         let remote = Remote { orders: sender, bell };
         let ending = remote.clone();
-        let stop = move || drop(ending.order(Order::Stop));
+        let stop = move || drop(ending.order(LoopOrder::Stop));
         let thread = SimThread::spawn(move || event_loop.run(), stop).map_err(system)?;
         Ok(Self { addresses, remote, thread })
     }
@@ -127,11 +127,11 @@ impl Remote {
     pub fn tell(&self, command: Command) -> Result<(), CommandError> {
         command.action.check()?;
         let (told, answer) = mpsc::sync_channel(1);
-        self.order(Order::Do(command, told))?;
+        self.order(LoopOrder::Do(command, told))?;
         answer.recv().map_err(|_| CommandError::Ended)?
     }
 
-    fn order(&self, order: Order) -> Result<(), CommandError> {
+    fn order(&self, order: LoopOrder) -> Result<(), CommandError> {
         self.orders.send(order).map_err(|_| CommandError::Ended)?;
         rustix::io::write(&*self.bell, &1_u64.to_ne_bytes()).map_err(|_| CommandError::Ended)?;
         Ok(())
