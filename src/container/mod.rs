@@ -114,8 +114,13 @@ fn trouble(error: &McapError, read: u64, begun: bool) -> Trouble {
 }
 
 /// Schema record: its id.
+<<<<<<< HEAD:src/container/mod.rs
 pub(crate) fn schema(body: &[u8]) -> Option<u16> {
     Body(body).u16()
+=======
+pub(super) fn schema(body: &[u8]) -> Option<u16> {
+    RecordBody(body).u16()
+>>>>>>> main:src/cue/mcap/record.rs
 }
 
 /// Schema record, whole: id, name, encoding and data.
@@ -135,15 +140,25 @@ pub(crate) struct ChannelRecord<'a> {
 }
 
 impl<'a> ChannelRecord<'a> {
+<<<<<<< HEAD:src/container/mod.rs
     pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
         let mut body = Body(body);
+=======
+    pub(super) fn parse(body: &'a [u8]) -> Option<Self> {
+        let mut body = RecordBody(body);
+>>>>>>> main:src/cue/mcap/record.rs
         Some(Self { id: body.u16()?, schema: body.u16()?, topic: body.text()?, encoding: body.text()? })
     }
 }
 
 /// Message record: channel, log time and data.
+<<<<<<< HEAD:src/container/mod.rs
 pub(crate) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
     let mut body = Body(body);
+=======
+pub(super) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
+    let mut body = RecordBody(body);
+>>>>>>> main:src/cue/mcap/record.rs
     let channel = body.u16()?;
     body.u32()?; // sequence
     let log_time = body.u64()?;
@@ -152,11 +167,16 @@ pub(crate) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
 }
 
 /// Metadata record: name and entries.
+<<<<<<< HEAD:src/container/mod.rs
 pub(crate) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
     let mut body = Body(body);
+=======
+pub(super) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
+    let mut body = RecordBody(body);
+>>>>>>> main:src/cue/mcap/record.rs
     let name = body.text()?;
     let length = body.u32()?;
-    let mut entries = Body(body.bytes(length)?);
+    let mut entries = RecordBody(body.bytes(length)?);
     let mut map = BTreeMap::new();
     while !entries.0.is_empty() {
         map.insert(entries.text()?, entries.text()?);
@@ -177,9 +197,9 @@ pub(crate) fn attachment(body: &[u8]) -> Option<(&str, &[u8])> {
 }
 
 /// What is left of a record's body; little-endian, texts behind their length (mcap.dev/spec).
-struct Body<'a>(&'a [u8]);
+struct RecordBody<'a>(&'a [u8]);
 
-impl<'a> Body<'a> {
+impl<'a> RecordBody<'a> {
     fn bytes(&mut self, count: u32) -> Option<&'a [u8]> {
         let (front, rest) = self.0.split_at_checked(usize::try_from(count).ok()?)?;
         self.0 = rest;

@@ -631,7 +631,7 @@ mod tests {
         let expected = "A1 at 00:01.140: held back by the limiter for 80 ms, by up to 15 mm; ";
         assert!(picture.sentence.starts_with(expected), "{}", picture.sentence);
         let sampled = drawn(Mode::Sampled, 114..122, 300);
-        let expected = "held back by the limiter for about 100 ms, by up to 15 mm; ";
+        let expected = "held back by the limiter for about 120 ms, by up to 15 mm; ";
         assert!(sampled.sentence.contains(expected), "{}", sampled.sentence);
         let quiet = drawn(Mode::Full, 0..0, 300);
         assert!(quiet.sentence.starts_with("A1: sent as it was asked for; "), "{}", quiet.sentence);
