@@ -8,13 +8,8 @@ use std::thread::{Builder, JoinHandle};
 
 use mcap::{McapError, McapResult};
 
-<<<<<<< HEAD
-use super::Report;
-use crate::config::{Config, Connection, Controller};
-=======
 use super::PlayReport;
-use crate::config::{Config, Connection};
->>>>>>> main
+use crate::config::{Config, Connection, Controller};
 use crate::drive::Lane;
 use crate::record::{About, FrameKind, Intake, Mode, RecordedSeat, Recorder, Recording, SAMPLE_HZ, Taps};
 use crate::sys::clock::Monotonic;

@@ -175,7 +175,9 @@ fn of_recording(
         };
         text += &format!("{:.6}{}\n", at - first, places.iter().zip(axes).map(place).collect::<String>());
     }
-    Ok(cue::read(path, text.as_bytes(), &Source::Native).map(|cue| (cue, None)))
+    // As text it is, whatever the recording is called.
+    let named = PathBuf::from(format!("{} of {}", name, path.display())).with_extension("csv");
+    Ok(cue::read(&named, text.as_bytes(), &Source::Native).map(|cue| (cue, None)))
 }
 
 fn tell_lost(cue: &Cue, lost: Option<&Problem>) {

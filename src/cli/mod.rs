@@ -153,32 +153,6 @@ fn end_on_panic() {
 
 fn run(command: ProgramCommand) -> Result<Exit, Failure> {
     match command {
-<<<<<<< HEAD
-        Command::Demo(args) => demo::run(&args),
-        Command::Play(args) => play::run(&args),
-        Command::Sim(args) => sim::run(&args),
-        Command::Check(args) => check::run(&args),
-        Command::Info(args) => info::run(&args),
-        Command::Plot(args) => plot::run(&args),
-        Command::Convert(args) => convert::run(&args),
-        Command::Fit(args) => fit::run(&args),
-        Command::Decode(args) => decode::run(&args),
-        Command::Preflight(args) => preflight::run(&args),
-        Command::Register(args) => register::run(&args),
-        Command::Sync(args) => sync::run(&args),
-        Command::Home(args) => home::run(&args),
-        Command::Doctor(args) => doctor::run(&args),
-        Command::Serve(args) => serve::run(&args),
-        Command::Latency(args) => latency::run(&args),
-        Command::Report(args) => report::run(&args),
-        Command::Record(args) => record::run(&args),
-        Command::Token(args) => token::run(&args),
-        Command::Client(command) => client::run(&command),
-        Command::Completions(args) => completions::run(&args),
-        Command::Prove(args) => prove::run(&args),
-        Command::FilmPlayer(args) => film_player::run(&args),
-        Command::Man(args) => man::run(&args),
-=======
         ProgramCommand::Demo(args) => demo::run(&args),
         ProgramCommand::Play(args) => play::run(&args),
         ProgramCommand::Sim(args) => sim::run(&args),
@@ -196,13 +170,13 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Serve(args) => serve::run(&args),
         ProgramCommand::Latency(args) => latency::run(&args),
         ProgramCommand::Report(args) => report::run(&args),
+        ProgramCommand::Record(args) => record::run(&args),
         ProgramCommand::Token(args) => token::run(&args),
         ProgramCommand::Client(command) => client::run(&command),
         ProgramCommand::Completions(args) => completions::run(&args),
         ProgramCommand::Prove(args) => prove::run(&args),
         ProgramCommand::FilmPlayer(args) => film_player::run(&args),
         ProgramCommand::Man(args) => man::run(&args),
->>>>>>> main
     }
 }
 

@@ -66,7 +66,7 @@ pub(super) fn picture(asked: &Asked<'_>) -> Result<Picture, Failure> {
                 .seat(name)
                 .ok_or_else(|| anyhow!("{}: no seat {name}", path.display()))
                 .or_exit(Exit::Usage)?;
-            Some(("other".to_owned(), self::gathered(path, Look { lane, ..look }, &contents)?))
+            Some(self::gathered(path, Look { lane, ..look }, &contents)?)
         }
         None => None,
     };

@@ -114,18 +114,13 @@ fn trouble(error: &McapError, read: u64, begun: bool) -> Trouble {
 }
 
 /// Schema record: its id.
-<<<<<<< HEAD:src/container/mod.rs
 pub(crate) fn schema(body: &[u8]) -> Option<u16> {
-    Body(body).u16()
-=======
-pub(super) fn schema(body: &[u8]) -> Option<u16> {
     RecordBody(body).u16()
->>>>>>> main:src/cue/mcap/record.rs
 }
 
 /// Schema record, whole: id, name, encoding and data.
 pub(crate) fn schema_of(body: &[u8]) -> Option<(u16, &str, &str, &[u8])> {
-    let mut body = Body(body);
+    let mut body = RecordBody(body);
     let (id, name, encoding, length) = (body.u16()?, body.text()?, body.text()?, body.u32()?);
     Some((id, name, encoding, body.bytes(length)?))
 }
@@ -140,25 +135,15 @@ pub(crate) struct ChannelRecord<'a> {
 }
 
 impl<'a> ChannelRecord<'a> {
-<<<<<<< HEAD:src/container/mod.rs
     pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
-        let mut body = Body(body);
-=======
-    pub(super) fn parse(body: &'a [u8]) -> Option<Self> {
         let mut body = RecordBody(body);
->>>>>>> main:src/cue/mcap/record.rs
         Some(Self { id: body.u16()?, schema: body.u16()?, topic: body.text()?, encoding: body.text()? })
     }
 }
 
 /// Message record: channel, log time and data.
-<<<<<<< HEAD:src/container/mod.rs
 pub(crate) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
-    let mut body = Body(body);
-=======
-pub(super) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
     let mut body = RecordBody(body);
->>>>>>> main:src/cue/mcap/record.rs
     let channel = body.u16()?;
     body.u32()?; // sequence
     let log_time = body.u64()?;
@@ -167,13 +152,8 @@ pub(super) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
 }
 
 /// Metadata record: name and entries.
-<<<<<<< HEAD:src/container/mod.rs
 pub(crate) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
-    let mut body = Body(body);
-=======
-pub(super) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
     let mut body = RecordBody(body);
->>>>>>> main:src/cue/mcap/record.rs
     let name = body.text()?;
     let length = body.u32()?;
     let mut entries = RecordBody(body.bytes(length)?);
@@ -186,7 +166,7 @@ pub(super) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
 
 /// Attachment record: name and data.
 pub(crate) fn attachment(body: &[u8]) -> Option<(&str, &[u8])> {
-    let mut body = Body(body);
+    let mut body = RecordBody(body);
     body.u64()?; // log time
     body.u64()?; // create time
     let name = body.text()?;

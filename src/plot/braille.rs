@@ -28,9 +28,9 @@ pub(crate) fn braille(picture: &Picture) -> String {
     let mut lines = vec![plain::escaped(&picture.title, 200).into_owned(), picture.sentence.clone()];
     for panel in &picture.panels {
         match panel.scale {
-            Scale::Range => {
-                (0..panel.bands.len()).for_each(|band| lines.extend(position(panel, band, cells)))
-            }
+            Scale::Range => (0..panel.bands.len())
+                .filter(|band| !panel.bands[*band].name.is_empty())
+                .for_each(|band| lines.extend(position(panel, band, cells))),
             Scale::Limit => lines.extend(measured(panel, cells)),
         }
     }

@@ -131,9 +131,7 @@ impl Gathered {
             lateness: vec![0; BINS_US.len()],
             latency: vec![0; BINS_US.len()],
             counts: Counts::default(),
-            lanes: ["held back", "missed ticks", "lost acks", "refused", "not taken", "not recorded"]
-                .map(lane)
-                .into(),
+            lanes: ["held", "missed", "lost", "refused", "untaken", "gaps"].map(lane).into(),
             state: None,
             states: Vec::new(),
             flags: Vec::new(),
@@ -188,7 +186,7 @@ impl Gathered {
         self.on(2, column, sample.lost);
         self.on(3, column, sample.refused.into());
         if let Some(ack) = sample.ack_max_us {
-            self.acks.take(column, [ack]);
+            self.acks.take(column, [ack / 1e3]);
             self.counts.ack_us = self.counts.ack_us.max(ack);
         }
         if let Some(ack) = sample.ack_us {
@@ -235,7 +233,7 @@ impl Gathered {
     #[expect(clippy::cast_possible_truncation, reason = "a picture is no finer")]
     fn late(&mut self, column: usize, film_s: f64, late_us: f64) {
         if self.late[column].len() < KEPT {
-            self.late[column].push(late_us as f32);
+            self.late[column].push((late_us / 1e3) as f32);
         }
         self.lateness[bin(late_us)] += 1;
         if late_us > self.counts.late_us {
@@ -333,7 +331,7 @@ pub(crate) fn of_recording(
     contents: &Contents,
     summary: &Summary,
     gathered: Gathered,
-    other: Option<(String, Gathered)>,
+    other: Option<Gathered>,
 ) -> Picture {
     let seat = &contents.seats[gathered.look.lane];
     let sentence = sentence(&seat.name, &gathered, contents.rate_hz());
@@ -359,13 +357,16 @@ pub(crate) fn of_recording(
     let named = |name: &'static str| move |axis: usize| format!("a{}{name}", axis + 1);
     let (low, high) = range(seat, &asked, &sent);
     let mut bands = sent.bands(named(""), 0);
-    if look.is_detailed {
-        bands.extend(asked.bands(named(" asked"), 6));
+    let mut note = "";
+    // Dashed in the colour of the axis, whose name stands at the end of what was sent.
+    if let Some(other) = other {
+        note = "dashed: the other recording";
+        bands.extend(other.sent.bands(|_| String::new(), 6));
+    } else if look.is_detailed && counts.apart > APART {
+        note = "dashed: where it was asked to be";
+        bands.extend(asked.bands(|_| String::new(), 6));
     }
-    if let Some((name, other)) = other {
-        bands.extend(other.sent.bands(|axis| format!("a{} {name}", axis + 1), 6));
-    }
-    let mut panels = vec![panel("Sent", unit, (low, high), bands)];
+    let mut panels = vec![Panel { note: note.to_owned(), ..panel("Sent", unit, (low, high), bands) }];
     if counts.apart > APART {
         let ends = apart.ends().unwrap_or((0.0, 1.0));
         let mut panel =
@@ -374,7 +375,7 @@ pub(crate) fn of_recording(
         panel.place = ShowTime::from_secs_f64(counts.apart_s).to_string();
         panels.push(panel);
     }
-    if measured.ends().is_some() {
+    if look.is_detailed && measured.ends().is_some() {
         panels.push(panel("Measured", unit, (low, high), measured.bands(named("m"), 0)));
     }
     if parts.ends().is_some() {
@@ -382,8 +383,9 @@ pub(crate) fn of_recording(
     }
     panels.extend(lateness_panel(&late, look.is_detailed, &counts));
     if let Some((_, high)) = acks.ends() {
-        let mut panel = panel("Ack latency", "µs", (0.0, high.max(1.0)), acks.bands(|_| "ack".to_owned(), 3));
-        panel.note = format!("{} µs at most", number(counts.ack_us));
+        let mut panel =
+            panel("Ack latency", "ms", (0.0, high.max(0.001)), acks.bands(|_| "ack".to_owned(), 3));
+        panel.note = format!("{:.3} ms at most", counts.ack_us / 1e3);
         panels.push(panel);
     }
     let used = lanes.into_iter().filter(|(.., count)| *count > 0);
@@ -496,7 +498,7 @@ fn lateness_panel(late: &[Vec<f32>], is_detailed: bool, counts: &Counts) -> Opti
         .collect();
     let at = |percent: usize| {
         let of = |column: &Vec<f32>| {
-            column.get((column.len().saturating_sub(1) * percent).div_ceil(100)).map(|us| [*us, *us])
+            column.get((column.len().saturating_sub(1) * percent).div_ceil(100)).map(|ms| [*ms, *ms])
         };
         sorted.iter().map(of).collect::<Vec<_>>()
     };
@@ -506,8 +508,8 @@ fn lateness_panel(late: &[Vec<f32>], is_detailed: bool, counts: &Counts) -> Opti
         bands.extend([band("p99", 1, 99), band("p50", 0, 50)]);
     }
     bands[0].last()?;
-    let mut panel = panel("Lateness", "µs", (0.0, counts.late_us.max(1.0)), bands);
-    panel.note = format!("{} µs at most", number(counts.late_us));
+    let mut panel = panel("Lateness", "ms", (0.0, (counts.late_us / 1e3).max(0.001)), bands);
+    panel.note = format!("{:.3} ms at most", counts.late_us / 1e3);
     panel.place = ShowTime::from_secs_f64(counts.late_s).to_string();
     Some(panel)
 }
@@ -554,7 +556,8 @@ fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String {
 
 fn facts(contents: &Contents, summary: &Summary) -> Vec<String> {
     let entry = |key| contents.entry(key);
-    let nearest = summary.nearest().map(|margin| format!("In all of it {}.", margin.in_words()));
+    let nearest =
+        summary.nearest().map(|margin| format!("Nearest to its limit in all of it: {}.", margin.in_words()));
     let mut facts = vec![
         format!(
             "{} recording of {}, hall {}, {} Hz",

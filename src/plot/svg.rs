@@ -159,6 +159,7 @@ pub(super) fn names(panel: &Panel, high: f64, apart: f64) -> Vec<(usize, &str, f
     let mut names: Vec<_> = panel
         .bands
         .iter()
+        .filter(|band| !band.name.is_empty())
         .filter_map(|band| {
             let [least, most] = band.last()?.map(f64::from);
             let end = if panel.scale == Scale::Limit { most } else { f64::midpoint(least, most) };

@@ -108,7 +108,7 @@ fn every_datagram_comes_back_from_a_whole_recording_as_the_controller_received_i
     let kept = datagrams(&std::fs::read(&pcap).expect("it is there"));
     assert_eq!(Value::from(kept.len()), report["controllers"][0]["sent"]);
     assert!(kept == received, "{} kept, {} received", kept.len(), received.len());
-    let run = kinocue(&["decode", text(&pcap)]);
+    let run = kinocue(&["decode", text(&pcap), "--all"]);
     assert!(run.code == Some(0) && run.stdout.lines().count() >= kept.len(), "{run:?}");
 }
 
