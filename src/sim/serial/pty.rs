@@ -12,6 +12,7 @@ use std::time::Duration;
 use super::{Bus, SerialLine};
 use crate::plain;
 use crate::sys::clock::Monotonic;
+use crate::sys::realtime;
 use crate::sys::serial::pty::Pty;
 use crate::time::{Clock as _, MonoTime};
 
@@ -90,7 +91,12 @@ impl<B: Bus + Send + 'static> PtyLoop<B> {
         let (sender, orders) = mpsc::channel();
         let running = Running { line, plug: Plug::new(path)?, orders, script: script.into() };
         let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());
-        let thread = thread.spawn(move || running.run()).map_err(PtyError::System)?;
+        let run = move || {
+            // Drives answer in their time however busy this machine is.
+            let _ = realtime::request_below(realtime::PRIORITY);
+            running.run()
+        };
+        let thread = thread.spawn(run).map_err(PtyError::System)?;
         Ok(Self { remote: Remote(sender), thread: Some(thread) })
     }
 }
