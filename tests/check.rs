@@ -491,6 +491,6 @@ fn the_bench_ride_fits_the_seats_of_all_examples() {
     for example in ["silvermax", "sixpack2", "chair"] {
         let config = format!("{}/examples/{example}.toml", env!("CARGO_MANIFEST_DIR"));
         let run = kinocue(&["check", "cues/bench-ride.csv", "--config", &config]);
-        assert_eq!(run.code, Some(0), "{example}: {run:?}");
+        assert_eq!(run.code, Some(0), "{example}: {}{}", run.stdout, run.stderr);
     }
 }

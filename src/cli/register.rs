@@ -34,11 +34,11 @@ SilverMax units as R38 or R0..40, in decimal; queries of a SIXpack 2 as \"\\$20\
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     #[command(subcommand)]
-    command: Command,
+    command: RegisterCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+enum RegisterCommand {
     List(list::Args),
     Read(read::Args),
     Write(write::Args),
@@ -48,11 +48,11 @@ enum Command {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     match &args.command {
-        Command::List(args) => list::run(args),
-        Command::Read(args) => read::run(args),
-        Command::Write(args) => write::run(args),
-        Command::Save(args) => save::run(args),
-        Command::Diff(args) => diff::run(args),
+        RegisterCommand::List(args) => list::run(args),
+        RegisterCommand::Read(args) => read::run(args),
+        RegisterCommand::Write(args) => write::run(args),
+        RegisterCommand::Save(args) => save::run(args),
+        RegisterCommand::Diff(args) => diff::run(args),
     }
 }
 

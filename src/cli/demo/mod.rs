@@ -8,11 +8,11 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 
 use super::play;
-use super::sim::Family;
+use super::sim::SimFamily;
 use super::token::Token;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::serve::{Parts, Places, serve};
-use crate::app::supervisor::Signals;
+use crate::app::supervisor::SystemSignals;
 use crate::control::{Command, Role};
 use crate::log::Log;
 use crate::sys::own_folder::OwnFolder;
@@ -26,7 +26,7 @@ mod virtual_hall;
 
 use film::DemoFilm;
 use screen::Screen;
-use script::{Script, Show};
+use script::{DemoShow, Script};
 use virtual_hall::VirtualHall;
 
 /// The cue as the report names it.
@@ -51,8 +51,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "HZ", value_parser = super::load::parse_rate, default_value = "100")]
     rate: f64,
     /// What moves the seats: controllers, or serial drives at the ends of pseudo-terminals.
-    #[arg(long, value_enum, default_value_t = Family::Smc)]
-    dialect: Family,
+    #[arg(long, value_enum, default_value_t = SimFamily::Smc)]
+    dialect: SimFamily,
     /// Show this film with mpv, and play a gentle cue of its length to it. mpv has to be installed.
     #[arg(long, value_name = "FILE")]
     film: Option<PathBuf>,
@@ -63,7 +63,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let film = args.film.as_deref().map(DemoFilm::find).transpose()?;
-    let signals = Signals::default();
+    let signals = SystemSignals::default();
     play::leave_on_signals(&signals.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let temporary = env::temp_dir();
     let no_folder = || format!("cannot make a folder in {}; set TMPDIR to another", temporary.display());
@@ -87,7 +87,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let served = serve(parts, |handle, addresses| {
         let console = addresses.first().map(|address| link(*address, &token.token)).unwrap_or_default();
         welcome(&seats, &console, cue_name);
-        let show = Show { needs_home: seats.needs_home(), load };
+        let show = DemoShow { needs_home: seats.needs_home(), load };
         script = Some(Script::start(handle, signals, screen, on_terminal.then_some(console), show));
     });
     // Over by now, as nothing of the hall is left.

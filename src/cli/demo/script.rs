@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::runtime;
 
 use super::screen::Screen;
-use crate::app::supervisor::Signals;
+use crate::app::supervisor::SystemSignals;
 use crate::control::{Code, Command, Handle, Problem, Role, Severity, Status, Surface, Who};
 use crate::state::State;
 
@@ -26,7 +26,7 @@ const ARM: Command = Command::Arm { seats_empty: false };
 pub(super) struct Script(JoinHandle<Result<(), Problem>>);
 
 /// What is to be done.
-pub(super) struct Show {
+pub(super) struct DemoShow {
     /// The seats have to be homed first.
     pub(super) needs_home: bool,
     /// What loads what is played.
@@ -43,10 +43,10 @@ impl Script {
     /// If the system starts no further thread; the hall ends then.
     pub(super) fn start(
         handle: Handle,
-        signals: Signals,
+        signals: SystemSignals,
         screen: Screen,
         console: Option<String>,
-        show: Show,
+        show: DemoShow,
     ) -> io::Result<Self> {
         let leave = Arc::clone(&signals.leave);
         let start = || {
@@ -72,10 +72,10 @@ impl Script {
 
 async fn lead(
     handle: &Handle,
-    signals: &Signals,
+    signals: &SystemSignals,
     screen: &Screen,
     console: Option<&str>,
-    show: Show,
+    show: DemoShow,
 ) -> Result<(), Problem> {
     let led = ride(handle, screen, show).await;
     if signals.is_leaving() {
@@ -98,7 +98,7 @@ async fn lead(
 }
 
 /// Has what that loads played, and waits until the seats rest again.
-async fn ride(handle: &Handle, screen: &Screen, show: Show) -> Result<(), Problem> {
+async fn ride(handle: &Handle, screen: &Screen, show: DemoShow) -> Result<(), Problem> {
     if show.needs_home && home(handle, screen).await?.is_none() {
         return Ok(());
     }

@@ -8,7 +8,7 @@ use crate::sys::own_folder::OwnFolder;
 use crate::wire::Dialect;
 
 /// A seat.
-pub(super) struct Seat {
+pub(super) struct DemoSeat {
     pub(super) name: &'static str,
     row: &'static str,
     axes: u16,
@@ -17,17 +17,17 @@ pub(super) struct Seat {
 }
 
 /// The virtual seats: two with all three axes, and a pair that shares one frame, each taking its own window by PA95.
-pub(super) const SEATS: [Seat; 4] = [
-    Seat { name: "A1", row: "A", axes: 3, offset: 0, fan_out: "slice" },
-    Seat { name: "A2", row: "A", axes: 3, offset: 0, fan_out: "slice" },
-    Seat { name: "B1", row: "B", axes: 2, offset: 0, fan_out: "shared" },
-    Seat { name: "B2", row: "B", axes: 1, offset: 2, fan_out: "shared" },
+pub(super) const SEATS: [DemoSeat; 4] = [
+    DemoSeat { name: "A1", row: "A", axes: 3, offset: 0, fan_out: "slice" },
+    DemoSeat { name: "A2", row: "A", axes: 3, offset: 0, fan_out: "slice" },
+    DemoSeat { name: "B1", row: "B", axes: 2, offset: 0, fan_out: "shared" },
+    DemoSeat { name: "B2", row: "B", axes: 1, offset: 2, fan_out: "shared" },
 ];
 
 /// The seats where serial drives move them, each on a line of its own.
 pub(super) const DRIVEN: [&str; 2] = ["A1", "A2"];
 
-impl Seat {
+impl DemoSeat {
     /// Its controller, set as a safe one is, that answers to `host`.
     pub(super) fn setup(&self, host: SocketAddrV4, dialect: Dialect) -> Setup {
         let parameters = vec![(pa::OFFSET, self.offset)];

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Context as _;
 
 use super::seats::{DRIVEN, SEATS};
-use crate::cli::sim::{Drives, Family};
+use crate::cli::sim::{Drives, SimFamily};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::sim::serial::{LineFaults, PtyError, PtyLoop, SerialLine};
 use crate::sim::silvermax::{SilverBus, UnitSetup};
@@ -37,7 +37,7 @@ pub(super) enum VirtualHall {
 
 impl VirtualHall {
     /// Starts what this family has: controllers that answer to `host`, or drives on lines in `folder`.
-    pub(super) fn start(family: Family, host: SocketAddrV4, folder: &OwnFolder) -> Result<Self, Failure> {
+    pub(super) fn start(family: SimFamily, host: SocketAddrV4, folder: &OwnFolder) -> Result<Self, Failure> {
         let farm = |dialect| {
             let setups = SEATS.iter().map(|seat| seat.setup(host, dialect)).collect();
             Farm::start(Options::loopback(setups))
@@ -46,13 +46,13 @@ impl VirtualHall {
         };
         let now = Monotonic.now();
         match family {
-            Family::Smc => farm(Dialect::Smc),
-            Family::Mbox => farm(Dialect::Mbox),
-            Family::Silvermax => {
+            SimFamily::Smc => farm(Dialect::Smc),
+            SimFamily::Mbox => farm(Dialect::Mbox),
+            SimFamily::Silvermax => {
                 let units = [16, 17, 18].map(UnitSetup::new);
                 lines(folder, || SilverBus::new(&units, SILVERMAX_BAUD, now)).map(Self::SilverMax)
             }
-            Family::Sixpack2 => {
+            SimFamily::Sixpack2 => {
                 let shaft = ShaftSetup { jump: JUMP_MM_S * MICROSTEPS, ..ShaftSetup::default() };
                 let setup =
                     SixpackSetup { unit: 1, serial: 1_001, shafts: [shaft; MOTORS], is_two_wires: false };
@@ -120,7 +120,7 @@ pub(super) fn port(folder: &OwnFolder, seat: &str) -> std::path::PathBuf {
 
 fn tell_executed<B: Drives>(lines: Vec<PtyLoop<B>>) {
     for (seat, line) in DRIVEN.iter().zip(lines) {
-        let (_, words) = line.stop().map(|line| line.bus().report()).unwrap_or_default();
+        let (_, words) = line.stop().bus().report();
         words.iter().for_each(|words| print::tell(&format!("{seat}: {words}")));
     }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::drives::{self, DriveFound, DriveRegisters};
 use super::read_values;
-use crate::cli::targets::{Driven, TargetArgs, Targets, Troubles, read_file};
+use crate::cli::targets::{DrivenTargets, TargetArgs, Targets, Troubles, read_file};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::{Controller, Station};
 use crate::device::settings::{self, Difference, Saved, SavedDrives, SavedHall, differences};
@@ -43,15 +43,15 @@ pub(super) struct Args {
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
+struct DiffReport<'a> {
     same: bool,
-    controllers: Vec<ControllerReport<'a>>,
+    controllers: Vec<ControllerDiff<'a>>,
     /// Seats on serial links.
-    drives: Vec<DriveReport<'a>>,
+    drives: Vec<DrivesDiff<'a>>,
 }
 
 #[derive(Serialize)]
-struct DriveReport<'a> {
+struct DrivesDiff<'a> {
     name: &'a str,
     address: String,
     saved_as: &'a str,
@@ -69,7 +69,7 @@ struct DriveDifference {
 }
 
 #[derive(Serialize)]
-struct ControllerReport<'a> {
+struct ControllerDiff<'a> {
     name: &'a str,
     address: String,
     saved_as: &'a str,
@@ -96,7 +96,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     };
     let on_links = drives::read(&driven, &DriveRegisters::settings(), &mut troubles)?;
     let reports = targets.controllers.iter().zip(&saved).zip(found).map(|((controller, saved), found)| {
-        ControllerReport {
+        ControllerDiff {
             name: &controller.name,
             address: controller.connection.address.to_string(),
             saved_as: &saved.name,
@@ -107,11 +107,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let controllers: Vec<_> = reports.collect();
     let of_drives = driven.controllers.iter().zip(saved_drives).zip(on_links);
     let drives: Vec<_> =
-        of_drives.map(|((controller, saved), found)| DriveReport::new(controller, saved, found)).collect();
+        of_drives.map(|((controller, saved), found)| DrivesDiff::new(controller, saved, found)).collect();
     let same = troubles.none()
         && controllers.iter().all(|one| one.differences.is_empty())
         && drives.iter().all(|one| one.differences.is_empty());
-    let report = Report { same, controllers, drives };
+    let report = DiffReport { same, controllers, drives };
     if args.json {
         print::json(&report)?
     } else {
@@ -123,7 +123,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     })
 }
 
-impl<'a> DriveReport<'a> {
+impl<'a> DrivesDiff<'a> {
     fn new(controller: &'a Controller, saved: &'a SavedDrives, found: DriveFound) -> Self {
         let differs = |value: &drives::DriveValue| {
             let saved = *saved.registers.get(&value.register)?;
@@ -139,7 +139,7 @@ impl<'a> DriveReport<'a> {
 /// For each seat on a link what the file has of it.
 fn matched_drives<'f>(
     file: &'f [SavedDrives],
-    driven: &Driven,
+    driven: &DrivenTargets,
     like: Option<&str>,
 ) -> anyhow::Result<Vec<&'f SavedDrives>> {
     let of = |controller: &Controller| {
@@ -178,7 +178,7 @@ pub(super) fn matched<'f>(
     targets.controllers.iter().map(of).collect()
 }
 
-fn tell(report: &Report<'_>, all: bool) -> Result<(), Failure> {
+fn tell(report: &DiffReport<'_>, all: bool) -> Result<(), Failure> {
     let mut table_of = Table::new();
     table_of.load_style(presets::NOTHING);
     table_of.set_header(["controller", "register", "in the file", "in the controller", "name", "meaning"]);

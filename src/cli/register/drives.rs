@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use anyhow::{anyhow, bail};
 use serde::Serialize;
 
-use crate::cli::targets::{Driven, Troubles};
+use crate::cli::targets::{DrivenTargets, Troubles};
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::config::drive::DriveFamily;
 use crate::config::drive_controller::Motors;
@@ -164,10 +164,10 @@ impl DriveRegisters {
 }
 
 /// Those seats of which something is asked; the others have nothing of it.
-pub(super) fn asked(driven: Driven, wanted: &DriveRegisters) -> Driven {
+pub(super) fn asked(driven: DrivenTargets, wanted: &DriveRegisters) -> DrivenTargets {
     let is_asked =
         |one: &Controller| one.drives().is_some_and(|drives| wanted.is_for(drives.motors.family()));
-    Driven { controllers: driven.controllers.into_iter().filter(is_asked).collect(), ..driven }
+    DrivenTargets { controllers: driven.controllers.into_iter().filter(is_asked).collect(), ..driven }
 }
 
 /// Reads that of each seat, link after link. What is wrong with a port is told of each of its seats.
@@ -175,7 +175,7 @@ pub(super) fn asked(driven: Driven, wanted: &DriveRegisters) -> Driven {
 /// # Errors
 /// 75 where another program has a port.
 pub(super) fn read(
-    driven: &Driven,
+    driven: &DrivenTargets,
     wanted: &DriveRegisters,
     troubles: &mut Troubles,
 ) -> Result<Vec<DriveFound>, Failure> {
@@ -188,9 +188,9 @@ pub(super) fn read(
             continue;
         }
         let mut line = match open(link) {
-            Ok(line) => Reader::over(line, link),
-            Err(Unopened::Taken(error)) => return Err(error).or_exit(Exit::TryAgain),
-            Err(Unopened::Other(why)) => {
+            Ok(line) => RegisterReader::over(line, link),
+            Err(PortRefused::Taken(error)) => return Err(error).or_exit(Exit::TryAgain),
+            Err(PortRefused::Other(why)) => {
                 for index in on_it {
                     troubles.miss(&driven.controllers[index].name, &why);
                     found[index].faults.push(why.clone());
@@ -207,31 +207,31 @@ pub(super) fn read(
     Ok(found)
 }
 
-enum Unopened {
+enum PortRefused {
     Taken(anyhow::Error),
     Other(String),
 }
 
-fn open(link: &Link) -> Result<LinkLine, Unopened> {
+fn open(link: &Link) -> Result<LinkLine, PortRefused> {
     if link.wiring == LinkWiring::Can {
-        return Err(Unopened::Other(format!("link {} is a CAN bus, which is not opened yet", link.name)));
+        return Err(PortRefused::Other(format!("link {} is a CAN bus, which is not opened yet", link.name)));
     }
     LinkLine::open(link).map_err(|error| match error {
-        SerialError::Taken(_) => Unopened::Taken(anyhow!(
+        SerialError::Taken(_) => PortRefused::Taken(anyhow!(
             "{error}. If that is the service, stop it first (`systemctl stop kinocue`); `kinocue preflight` without --config asks \
              through it"
         )),
-        _ => Unopened::Other(error.to_string()),
+        _ => PortRefused::Other(error.to_string()),
     })
 }
 
 /// The conversation with the drives of a link.
-enum Reader {
+enum RegisterReader {
     SilverMax(silvermax::Talk<LinkLine>),
     Sixpack2(sixpack2::Talk<LinkLine>),
 }
 
-impl Reader {
+impl RegisterReader {
     fn over(line: LinkLine, link: &Link) -> Self {
         let terms = TalkTerms::of(link);
         match link.family {
@@ -348,7 +348,7 @@ pub(super) fn kept(found: &DriveFound) -> BTreeMap<String, i64> {
 }
 
 /// Seats of which no setting can be read.
-pub(super) fn unreadable(driven: &Driven) -> Vec<&str> {
+pub(super) fn unreadable(driven: &DrivenTargets) -> Vec<&str> {
     let is_pack = |one: &&Controller| {
         one.drives().is_some_and(|drives| drives.motors.family() == DriveFamily::Sixpack2)
     };

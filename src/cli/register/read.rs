@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::drives::{self, DriveFound, DriveRegisters, DriveValue};
 use super::{Found, read_values};
-use crate::cli::targets::{Driven, TargetArgs, Targets, Troubles};
+use crate::cli::targets::{DrivenTargets, TargetArgs, Targets, Troubles};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::{Controller, Station};
 use crate::device::change::dialect_name;
@@ -63,7 +63,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     };
     let on_links = drives::read(&driven, &of_drives, &mut troubles)?;
     if args.json {
-        print::json(&Report::new((&targets, &found), (&driven, &on_links)))?;
+        print::json(&ReadReport::new((&targets, &found), (&driven, &on_links)))?;
         return Ok(troubles.exit());
     }
     if found.iter().any(|one| !one.values.is_empty()) {
@@ -92,14 +92,14 @@ fn wanted(selections: &[Selection], controller: &Controller<Station>) -> anyhow:
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
-    controllers: Vec<ControllerReport<'a>>,
+struct ReadReport<'a> {
+    controllers: Vec<ControllerRegisters<'a>>,
     /// Seats on serial links.
-    drives: Vec<DriveReport<'a>>,
+    drives: Vec<SeatRegisters<'a>>,
 }
 
 #[derive(Serialize)]
-struct DriveReport<'a> {
+struct SeatRegisters<'a> {
     name: &'a str,
     address: String,
     dialect: &'static str,
@@ -108,18 +108,18 @@ struct DriveReport<'a> {
 }
 
 #[derive(Serialize)]
-struct ControllerReport<'a> {
+struct ControllerRegisters<'a> {
     name: &'a str,
     address: String,
     dialect: &'static str,
     /// Null where it is the normal one, or the controller did not answer.
     state: Option<&'a str>,
-    registers: Vec<RegisterReport>,
+    registers: Vec<RegisterRow>,
     faults: &'a [String],
 }
 
 #[derive(Serialize)]
-struct RegisterReport {
+struct RegisterRow {
     register: Address,
     name: &'static str,
     value: u16,
@@ -127,12 +127,12 @@ struct RegisterReport {
     says: Option<String>,
 }
 
-impl<'a> Report<'a> {
+impl<'a> ReadReport<'a> {
     fn new(
         (targets, found): (&'a Targets, &'a [Found]),
-        (driven, on_links): (&'a Driven, &'a [DriveFound]),
+        (driven, on_links): (&'a DrivenTargets, &'a [DriveFound]),
     ) -> Self {
-        let one = |(controller, found): (&'a Controller<Station>, &'a Found)| ControllerReport {
+        let one = |(controller, found): (&'a Controller<Station>, &'a Found)| ControllerRegisters {
             name: &controller.name,
             address: controller.connection.address.to_string(),
             dialect: dialect_name(controller.connection.dialect),
@@ -140,7 +140,7 @@ impl<'a> Report<'a> {
             registers: registers(controller, &found.values),
             faults: &found.faults,
         };
-        let of_drives = |(controller, found): (&'a Controller, &'a DriveFound)| DriveReport {
+        let of_drives = |(controller, found): (&'a Controller, &'a DriveFound)| SeatRegisters {
             name: &controller.name,
             address: controller.address(),
             dialect: controller.drives().map_or("", |drives| drives.motors.family().word()),
@@ -154,10 +154,10 @@ impl<'a> Report<'a> {
     }
 }
 
-fn registers(controller: &Controller<Station>, values: &Values) -> Vec<RegisterReport> {
+fn registers(controller: &Controller<Station>, values: &Values) -> Vec<RegisterRow> {
     let one = |(&address, &value)| {
         let register = table().get(address);
-        RegisterReport {
+        RegisterRow {
             register: address,
             name: register.map_or("", |register| register.name.as_str()),
             value,
@@ -201,7 +201,7 @@ fn text(targets: &Targets, found: &[Found]) -> Table {
     table
 }
 
-fn text_of_drives(driven: &Driven, found: &[DriveFound]) -> Table {
+fn text_of_drives(driven: &DrivenTargets, found: &[DriveFound]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     table.set_header(["controller", "register", "value", "name", "meaning"]);
