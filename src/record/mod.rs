@@ -7,7 +7,10 @@
 mod acks;
 mod chunk;
 mod cursor;
+mod flight;
+mod incidents;
 mod intake;
+mod notes;
 mod recorder;
 mod recording;
 mod sampled;
@@ -20,10 +23,14 @@ pub(crate) use acks::{AckChunk, AckRecord, AckStanding, latency_ns};
 pub use acks::{AckTap, ack_tap};
 pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
-pub(crate) use intake::{Intake, Taps};
+pub(crate) use flight::{Entry, Flight, read as read_flight};
+pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
+pub(crate) use intake::{Counts, Intake, Taps};
+pub(crate) use notes::{ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote};
 
 pub(crate) use recorder::Recorder;
-pub(crate) use recording::{About, Recording, SAMPLE_HZ};
+pub(crate) use recording::{About, EntryMaker, Opening, Recording, SAMPLE_HZ, state_number};
 pub(crate) use sampled::{Message, Sampled};
 pub use seat::{FrameKind, RecordedSeat};
+pub(crate) use tap::octets_a_second;
 pub use tap::{Tap, tap};

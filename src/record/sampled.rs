@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::acks::{AckChunk, AckRecord, standing_number};
 use super::chunk::{Chunk, Handed, SentFrame};
+use super::notes::Note;
 use super::{RecordedSeat, TickHead};
 use crate::state::State;
 use crate::time::MonoTime;
@@ -72,6 +73,10 @@ pub(crate) enum Message {
     Tick(TickSample),
     /// The hall's state, from now on.
     State(State),
+    /// What the service tells.
+    Note(Note),
+    /// Every tick (0), or every reply (1), as they crossed the taps.
+    Full(usize, Vec<u8>),
 }
 
 /// A window of a seat that is not over.

@@ -31,6 +31,14 @@ pub fn tap(seats: &[RecordedSeat], rate: Rate) -> (Tap, Consumer<u8>) {
     (Tap { ring, chunk, asked: Asked::NOTHING, dropped: 0 }, end)
 }
 
+/// Octets a second of the ticks of these seats and of their replies, at the most.
+pub(crate) fn octets_a_second(seats: &[RecordedSeat], rate: Rate) -> u64 {
+    let tick: usize = 64 + seats.iter().map(|seat| seat.longest_frame() + 48).sum::<usize>();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a thousand a second")]
+    let ticks = rate.hz().ceil() as u64;
+    ticks * tick as u64
+}
+
 impl Tap {
     /// The next frame comes of that.
     #[inline]

@@ -7,6 +7,7 @@ mod http;
 mod levels;
 mod panel;
 mod playlist;
+mod record;
 mod reply;
 mod rows;
 mod server;
@@ -39,6 +40,7 @@ pub(super) enum Command {
     #[command(flatten)]
     Cues(cues::Command),
     Test(test::Args),
+    Mark(record::MarkArgs),
 }
 
 pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
@@ -51,5 +53,6 @@ pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
         Command::Levels(command) => levels::run(command),
         Command::Cues(command) => cues::run(command),
         Command::Test(args) => test::run(args),
+        Command::Mark(args) => record::mark(args),
     }
 }
