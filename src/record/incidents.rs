@@ -46,20 +46,6 @@ pub(crate) enum IncidentCause {
 }
 
 impl IncidentCause {
-    /// Every one that there is.
-    pub(crate) const ALL: [Self; 10] = [
-        Self::Stop,
-        Self::Fault,
-        Self::EmergencyStop,
-        Self::Clamp,
-        Self::LostSeat,
-        Self::RefusedFrame,
-        Self::Gap,
-        Self::Mark,
-        Self::Dump,
-        Self::Crash,
-    ];
-
     /// The word for it in names of files and figures.
     pub(crate) const fn word(self) -> &'static str {
         match self {

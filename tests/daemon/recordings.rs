@@ -82,7 +82,7 @@ fn a_show_leaves_a_recording_whose_counts_are_those_of_its_report_and_in_which_n
     assert_eq!(Value::from(of_seats("sent")), frames["sent"], "{report}");
     assert_eq!(Value::from(of_seats("acked")), frames["acked"], "{report}");
     let metadata = recorded.metadata();
-    assert_eq!((&*metadata["kinocue"]["kind"], &*metadata["kinocue"]["cue"]), ("show", "ride"));
+    assert_eq!((&*metadata["kinocue"]["of"], &*metadata["kinocue"]["cue"]), ("show", "ride"));
     assert_eq!(metadata["kinocue.end"]["dropped"], "0");
     let configuration = recorded.attachment("configuration.toml");
     assert!(

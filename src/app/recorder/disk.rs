@@ -11,8 +11,9 @@ use super::plain_name;
 use crate::config::Record;
 use crate::control::is_recording;
 use crate::record::IncidentCause;
+use crate::sys::clock::wall_now_ns;
 
-const GIB: f64 = (1_u64 << 30) as f64;
+const GIB: f64 = 1_073_741_824.0;
 /// What a file is called until it is whole.
 pub(super) const PART: &str = ".part.mcap";
 const WHOLE: &str = ".mcap";
@@ -27,6 +28,11 @@ pub(super) struct PartFile {
 }
 
 impl PartFile {
+    /// The same, which is removed again unless it is begun.
+    pub(super) const fn until_begun(self) -> Unbegun {
+        Unbegun(Some(self))
+    }
+
     /// Octets so far that were handed over.
     pub(super) fn len(&self) -> u64 {
         self.disk.metadata().map_or(0, |about| about.len())
@@ -52,6 +58,29 @@ impl PartFile {
     /// Its name once it is whole.
     pub(super) fn name(&self) -> String {
         self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+}
+
+/// A file of which nothing is written yet: where that fails, it goes.
+#[derive(Debug)]
+pub(super) struct Unbegun(Option<PartFile>);
+
+impl Unbegun {
+    /// Its beginning is written.
+    ///
+    /// # Panics
+    /// Never: it is taken once.
+    pub(super) fn begun(mut self) -> PartFile {
+        self.0.take().expect("it is taken once")
+    }
+}
+
+impl Drop for Unbegun {
+    fn drop(&mut self) {
+        if let Some(file) = &self.0 {
+            // What cannot be removed is recovered at the next start, or is seen to be none.
+            let _ = fs::remove_file(&file.part);
+        }
     }
 }
 
@@ -125,7 +154,7 @@ impl Disk {
     pub(super) fn clear_out(&self) -> io::Result<bool> {
         let mut all = self.kept()?;
         let age = Duration::from_secs(86_400 * u64::from(self.record.max_age_days));
-        let oldest = SystemTime::now().checked_sub(age).unwrap_or(SystemTime::UNIX_EPOCH);
+        let oldest = wall_now().checked_sub(age).unwrap_or(SystemTime::UNIX_EPOCH);
         let (old, kept): (Vec<_>, Vec<_>) = all.into_iter().partition(|one| one.modified < oldest);
         old.iter().for_each(remove);
         all = kept;
@@ -201,6 +230,10 @@ impl Disk {
     pub(super) fn create_incident(&self, cause: IncidentCause) -> io::Result<(PartFile, BufWriter<File>)> {
         self.create("incident", cause.word(), 1)
     }
+}
+
+fn wall_now() -> SystemTime {
+    SystemTime::UNIX_EPOCH + Duration::from_nanos(wall_now_ns())
 }
 
 #[expect(clippy::cast_precision_loss, reason = "far fewer octets than a double counts")]

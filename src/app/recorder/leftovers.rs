@@ -55,7 +55,12 @@ pub(super) fn clear_up(
     }
     for path in cut_short {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        told(&name, recover(path, may));
+        let recovered = recover(path, may);
+        if recovered.is_err() {
+            // It stays, and is not tried at each start again.
+            let _ = fs::rename(path, path.with_extension("unreadable"));
+        }
+        told(&name, recovered);
     }
 }
 

@@ -9,7 +9,7 @@ mod worker;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::thread::{Builder, JoinHandle};
+use std::thread::{self, Builder, JoinHandle};
 
 use sha2::{Digest as _, Sha256};
 
@@ -17,7 +17,7 @@ pub(crate) use link::{RecordAsk, RecordLink, ShowStart};
 
 use super::recording;
 use super::runtime::Runtime;
-use crate::config::{Config, RecordMode};
+use crate::config::RecordMode;
 use crate::record::{About, EntryMaker, Intake, Opening, octets_a_second};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::sys::realtime;
@@ -86,9 +86,11 @@ impl HallRecorder {
         let disk = Disk::new(&config.record, &places.recordings);
         let worker = Worker::new(intake, asks, link.clone(), opening, maker, disk, config.record.clone());
         let safe = safe_configuration(&text);
+        let told = link.clone();
         let (live, ring) = (runtime.control().live, flight.clone());
         let thread = Builder::new().name("recorder".to_owned()).spawn(move || {
             realtime::stand_back();
+            let _told = TellsOfPanic(told);
             let worker = worker.attaching(safe).flying(&ring, flight_len);
             worker.clear_up(leftover, move || !live.is_moving());
             worker.run(&Monotonic);
@@ -114,6 +116,21 @@ impl HallRecorder {
         if thread.join().is_ok() {
             // An end in order leaves nothing to be recovered.
             let _ = fs::remove_file(&self.flight);
+        }
+    }
+}
+
+/// Says so where the thread that has it panics: the hall goes on.
+struct TellsOfPanic(RecordLink);
+
+impl Drop for TellsOfPanic {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
+            self.0.trouble(Some(
+                "nothing is recorded any more: the recorder failed; restart the service between two shows"
+                    .to_owned(),
+            ));
         }
     }
 }

@@ -117,7 +117,7 @@ impl Worker {
         if self.record.flight_s == 0 {
             return self;
         }
-        match Flight::create(path, &self.opening.clone().with("kind", "incident").to_octets(), len) {
+        match Flight::create(path, &self.opening.clone().with("of", "incident").to_octets(), len) {
             Ok(flight) => self.flight = Some(flight),
             Err(error) => {
                 let path = path.display();
@@ -264,7 +264,7 @@ impl Worker {
             let opening = self
                 .opening
                 .clone()
-                .with("kind", *kind)
+                .with("of", *kind)
                 .with("mode", self.record.mode.word())
                 .with("cue", cue.clone())
                 .with("title", title.clone())
@@ -272,6 +272,7 @@ impl Worker {
                 .with("part", number.to_string());
             let word = if cue.is_empty() { kind } else { cue.as_str() };
             let (disk, out) = self.disk.create(kind, word, number)?;
+            let disk = disk.until_begun();
             let mut file = Recording::open(out, &opening, self.maker).map_err(in_io)?;
             // The first has what was before the show; those behind it how the hall stands.
             let first = if number == 1 { self.recent.iter() } else { self.recent.range(..0) };
@@ -281,14 +282,14 @@ impl Worker {
             if let Some(safe) = &self.safe {
                 file.attach("configuration.toml", "application/toml", safe.as_bytes()).map_err(in_io)?;
             }
-            if let Some(cue) = attached.as_ref().filter(|_| number == 1) {
-                if let Some(octets) = small_file(cue) {
-                    let name = cue.file_name().unwrap_or_default().to_string_lossy();
-                    file.attach(&name, "application/octet-stream", &octets).map_err(in_io)?;
-                }
+            if let Some(cue) = attached.as_ref().filter(|_| number == 1)
+                && let Some(octets) = small_file(cue)
+            {
+                let name = cue.file_name().unwrap_or_default().to_string_lossy();
+                file.attach(&name, "application/octet-stream", &octets).map_err(in_io)?;
             }
             file.flush().map_err(in_io)?;
-            Ok((number, OpenFile { file, disk, counts: self.intake.counts() }))
+            Ok((number, OpenFile { file, disk: disk.begun(), counts: self.intake.counts() }))
         });
         match opened {
             Ok((number, open)) => {
@@ -351,8 +352,9 @@ impl Worker {
         flight.write()?;
         self.disk.clear_out_for_more()?;
         let (disk, out) = self.disk.create_incident(cause)?;
+        let disk = disk.until_begun();
         let opening =
-            self.opening.clone().with("kind", "incident").with("mode", "full").with("cause", cause.word());
+            self.opening.clone().with("of", "incident").with("mode", "full").with("cause", cause.word());
         let mut file = Recording::open(out, &opening, self.maker).map_err(in_io)?;
         for entry in self.hall.iter().chain(&flight.read()?) {
             file.put(entry).map_err(in_io)?;
@@ -361,7 +363,7 @@ impl Worker {
             file.attach("configuration.toml", "application/toml", safe.as_bytes()).map_err(in_io)?;
         }
         file.flush().map_err(in_io)?;
-        self.incident = Some(OpenFile { file, disk, counts: Counts::default() });
+        self.incident = Some(OpenFile { file, disk: disk.begun(), counts: Counts::default() });
         Ok(())
     }
 
@@ -423,8 +425,9 @@ impl Worker {
             self.fail_incident(&in_io(error));
         }
         let file = self.show.as_mut().and_then(|show| show.file.as_mut());
-        if let Some(Err(error)) = file.map(|open| open.file.flush()) {
-            self.fail_show(&in_io(error), now);
+        let flushed = file.map(|open| open.file.flush().map_err(in_io).and_then(|()| open.disk.is_there()));
+        if let Some(Err(error)) = flushed {
+            self.fail_show(&error, now);
         }
         let counts = self.intake.counts();
         let flight_s = self.flight.as_ref().map_or(0.0, |_| f64::from(self.record.flight_s));
@@ -442,8 +445,7 @@ impl Worker {
         let file = self.show.as_ref().and_then(|show| show.file.as_ref());
         let Some(open) = file else { return };
         let kept = open.disk.sync().and_then(|()| self.disk.clear_out_for_more());
-        let is_there = open.disk.is_there();
-        if let Err(error) = kept.and_then(|()| is_there) {
+        if let Err(error) = kept {
             self.fail_show(&error, now);
         }
     }
