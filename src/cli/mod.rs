@@ -32,6 +32,7 @@ mod plot;
 mod preflight;
 mod print;
 mod prove;
+mod record;
 mod register;
 mod report;
 mod serve;
@@ -89,6 +90,7 @@ enum Command {
     Serve(serve::Args),
     Latency(latency::Args),
     Report(report::Args),
+    Record(record::Args),
     Token(token::Args),
     #[command(flatten)]
     Client(client::Command),
@@ -169,6 +171,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Serve(args) => serve::run(&args),
         Command::Latency(args) => latency::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Record(args) => record::run(&args),
         Command::Token(args) => token::run(&args),
         Command::Client(command) => client::run(&command),
         Command::Completions(args) => completions::run(&args),

@@ -5,7 +5,8 @@ use std::io::{BufWriter, Result};
 use std::path::Path;
 
 use crate::record::{
-    About, AckRecord, AckTap, Entry, EntryMaker, Flight, Intake, Opening, RecordedSeat, Recording, Tap, Taps,
+    About, AckRecord, AckTap, Entry, EntryMaker, Flight, Intake, Mode, Opening, RecordedSeat, Recording, Tap,
+    Taps,
 };
 use crate::time::{MonoTime, Rate};
 use crate::tracker::{Fate, Reply};
@@ -30,6 +31,7 @@ impl RecorderRig {
             title: String::new(),
             cue_sha256: String::new(),
             rate_hz: rate.hz(),
+            mode: Mode::Full,
             clocks,
         };
         let (opening, maker) = (Opening::new(&about, &seats), EntryMaker::new(seats.len(), clocks));

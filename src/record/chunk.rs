@@ -76,7 +76,7 @@ pub(crate) enum Handed {
 }
 
 impl Handed {
-    const ALL: [Self; 3] = [Self::Taken, Self::TakenAfterRefusal, Self::Refused];
+    pub(super) const ALL: [Self; 3] = [Self::Taken, Self::TakenAfterRefusal, Self::Refused];
 }
 
 impl From<Delivery> for Handed {

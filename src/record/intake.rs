@@ -1,9 +1,9 @@
 //! The other end of the rings: ticks and drains as they come, each in the order of its thread, folded into messages.
 
-use std::time::Duration;
-
 use rtrb::Consumer;
 
+use super::full::Block;
+use super::margins::Margins;
 use super::{
     AckChunk, AckRecord, AckTap, Chunk, IncidentCause, Message, RecordedSeat, Sampled, Tap, Watchman,
     ack_tap, tap,
@@ -11,9 +11,6 @@ use super::{
 use crate::time::{MonoTime, Rate};
 use crate::tracker::Fate;
 use crate::wire::ReplyCode;
-
-/// How much of every tick and of every reply makes a message.
-const BLOCK: Duration = Duration::from_millis(500);
 
 /// The ends of both rings that threads of a runtime have.
 #[derive(Debug)]
@@ -76,12 +73,21 @@ pub(crate) struct Intake {
     acks: Consumer<u8>,
     held: Vec<u8>,
     held_acks: Vec<u8>,
+    seats: Vec<RecordedSeat>,
     fold: Sampled,
+    margins: Margins,
+    /// What becomes blocks, where whole ticks are kept.
+    whole: Option<Whole>,
     counts: Counts,
-    /// What is collected of every tick and of every reply, and since when, where that is wanted.
-    full: Option<[(MonoTime, Vec<u8>); 2]>,
     watchman: Watchman,
     found: Vec<(IncidentCause, MonoTime)>,
+}
+
+/// Ticks and drains of the half second that is not over.
+#[derive(Debug, Default)]
+struct Whole {
+    ticks: Block,
+    drains: Vec<u8>,
 }
 
 impl Intake {
@@ -94,18 +100,32 @@ impl Intake {
             acks: of_acks,
             held: Vec::new(),
             held_acks: Vec::new(),
-            fold: Sampled::new(seats, sample_hz),
+            margins: Margins::new(&seats, rate),
+            fold: Sampled::new(seats.clone(), sample_hz),
+            seats,
+            whole: None,
             counts: Counts::default(),
-            full: None,
             watchman,
             found: Vec::new(),
         };
         (Taps { ticks, acks }, intake)
     }
 
-    /// The same that tells of every tick and of every reply as well.
+    /// The same, which tells of every tick and drain beside the samples.
     pub(crate) fn in_full(self) -> Self {
-        Self { full: Some(Default::default()), ..self }
+        Self { whole: Some(Whole::default()), ..self }
+    }
+
+    /// What it came to so far, each by its name in `kinocue.end`: counts, and as JSON the most that each axis was sent to do.
+    pub(crate) fn end(&self) -> Vec<(&'static str, String)> {
+        self.end_since(&Counts::default())
+    }
+
+    /// The same of a file that was begun later, when so much had come through; the most is of all.
+    pub(crate) fn end_since(&self, before: &Counts) -> Vec<(&'static str, String)> {
+        let most = serde_json::to_string(&self.margins.most(&self.seats)).unwrap_or_default();
+        let counts = self.counts.since(before).named();
+        counts.into_iter().chain([("most", most)]).collect()
     }
 
     /// What was found since it was asked last that is worth an incident.
@@ -129,37 +149,37 @@ impl Intake {
         empty(&mut self.acks, &mut held_acks);
         empty(&mut self.ticks, &mut held);
         let (mut drains, mut rest) = (held_acks.as_slice(), held.as_slice());
+        if let Some(whole) = &mut self.whole {
+            whole.drains.extend_from_slice(&held_acks);
+        }
         while let Some((chunk, behind)) = Chunk::parse(rest) {
             let octets = &rest[..rest.len() - behind.len()];
             rest = behind;
-            self.take_acks(&mut drains, Some(chunk.head.deadline), tell);
-            let Self { fold, counts, full, watchman, found, .. } = self;
+            self.take_acks(&mut drains, Some(chunk.head.deadline));
+            let Self { seats, fold, margins, whole, counts, watchman, found, .. } = self;
             counts.ticks += 1;
             counts.dropped += u64::from(chunk.dropped);
             counts.frames += chunk.frames().count() as u64;
             watchman.look(&chunk, &mut |cause, at| found.push((cause, at)));
+            margins.take(&chunk, seats, &mut |_, _, _| ());
             fold.take(&chunk, tell);
-            if let Some(full) = full {
-                collect(full, 0, chunk.head.deadline, octets, tell);
+            if let Some(whole) = whole
+                && let Some((at, block)) = whole.ticks.add(&chunk, octets, seats)
+            {
+                whole.tell(at, block, tell);
             }
         }
-        self.take_acks(&mut drains, None, tell);
+        self.take_acks(&mut drains, None);
         (self.held, self.held_acks) = (held, held_acks);
     }
 
     /// Takes the drains up to an instant, or all.
-    fn take_acks(
-        &mut self,
-        drains: &mut &[u8],
-        until: Option<MonoTime>,
-        tell: &mut impl FnMut(MonoTime, Message),
-    ) {
-        let Self { fold, counts, full, watchman, found, .. } = self;
+    fn take_acks(&mut self, drains: &mut &[u8], until: Option<MonoTime>) {
+        let Self { fold, counts, watchman, found, .. } = self;
         while let Some((chunk, behind)) = AckChunk::parse(drains) {
             if chunk.drained.zip(until).is_some_and(|(drained, until)| drained > until) {
                 return;
             }
-            let octets = &drains[..drains.len() - behind.len()];
             *drains = behind;
             counts.dropped_records += u64::from(chunk.dropped);
             for record in chunk.records() {
@@ -171,39 +191,29 @@ impl Intake {
             }
             watchman.look_at_acks(&chunk, &mut |cause, at| found.push((cause, at)));
             fold.take_acks(&chunk);
-            if let (Some(full), Some(at)) = (full.as_mut(), chunk.drained.or(until)) {
-                collect(full, 1, at, octets, tell);
-            }
         }
     }
 
     /// Tells of what is not over.
     pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
         self.fold.close(tell);
-        for (topic, (since, octets)) in self.full.iter_mut().flatten().enumerate() {
-            if !octets.is_empty() {
-                tell(*since, Message::Full(topic, std::mem::take(octets)));
-            }
+        let Self { whole, seats, .. } = self;
+        if let Some(whole) = whole
+            && let Some((at, block)) = whole.ticks.close(seats)
+        {
+            whole.tell(at, block, tell);
         }
     }
 }
 
-/// Adds octets to those of a topic, and tells of these once they are of half a second.
-fn collect(
-    full: &mut [(MonoTime, Vec<u8>); 2],
-    topic: usize,
-    at: MonoTime,
-    octets: &[u8],
-    tell: &mut impl FnMut(MonoTime, Message),
-) {
-    let (since, held) = &mut full[topic];
-    if !held.is_empty() && at.since(*since) >= BLOCK {
-        tell(*since, Message::Full(topic, std::mem::take(held)));
+impl Whole {
+    /// Tells of a block that began then, and of the drains so far.
+    fn tell(&mut self, at: MonoTime, block: Vec<u8>, tell: &mut impl FnMut(MonoTime, Message)) {
+        tell(at, Message::Ticks(block));
+        if !self.drains.is_empty() {
+            tell(at, Message::Drains(std::mem::take(&mut self.drains)));
+        }
     }
-    if held.is_empty() {
-        *since = at;
-    }
-    held.extend_from_slice(octets);
 }
 
 /// All that is in a ring. Chunks are pushed whole, so whole ones are there.

@@ -9,21 +9,44 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::acks::standing_words;
+use super::descriptors::descriptors;
 use super::flight::Entry;
+use super::full::packed;
 use super::notes::topics;
 use super::{Message, RecordedSeat};
-use crate::motion::AxisUnit;
 use crate::state::State;
 use crate::time::MonoTime;
 
 /// The version of topics, messages and metadata.
-const VERSION: &str = "1";
+pub(super) const VERSION: &str = "1";
+/// The topic of whole ticks.
+pub(super) const SENT: &str = "/full/sent";
+/// That of what the ack thread took.
+pub(super) const ACKS: &str = "/full/acks";
 /// Samples a second of each seat.
 pub(crate) const SAMPLE_HZ: u32 = 20;
 /// Topics of notes.
 const NOTE_TOPICS: usize = 6;
-/// Topics of every tick and every reply: chunks as they crossed the taps, one behind the other.
-const FULL_TOPICS: [&str; 2] = ["/full/ticks", "/full/replies"];
+
+/// How much is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub(crate) enum Mode {
+    /// Samples, each the worst of its window.
+    #[default]
+    Sampled,
+    /// Samples, and every tick and frame.
+    Full,
+}
+
+impl Mode {
+    /// The word for it.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::Sampled => "sampled",
+            Self::Full => "full",
+        }
+    }
+}
 
 /// What a recording is of.
 #[derive(Debug, Clone)]
@@ -38,6 +61,8 @@ pub(crate) struct About {
     pub(crate) cue_sha256: String,
     /// Ticks a second.
     pub(crate) rate_hz: f64,
+    /// How much of it is kept.
+    pub(crate) mode: Mode,
     /// One instant on both clocks: monotonic, and wall in nanoseconds since 1970.
     pub(crate) clocks: (MonoTime, u64),
 }
@@ -47,43 +72,44 @@ pub(crate) struct About {
 pub(crate) struct Opening {
     /// The metadata record `kinocue`.
     pub(crate) metadata: BTreeMap<String, String>,
-    channels: Vec<OpeningChannel>,
-}
-
-/// A channel, and how its messages are written.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct OpeningChannel {
-    topic: String,
-    schema_name: String,
-    schema_encoding: String,
-    schema: String,
-    encoding: String,
+    /// Each with its name, its encoding and its octets.
+    schemas: Vec<(String, String, Vec<u8>)>,
+    /// Each with its topic, the place of its schema, and the encoding of its messages.
+    channels: Vec<(String, usize, String)>,
 }
 
 impl Opening {
     /// That of a recording of these seats.
     pub(crate) fn new(about: &About, seats: &[RecordedSeat]) -> Self {
-        let json = |topic: &str, schema: &Value| OpeningChannel {
-            topic: topic.to_owned(),
-            schema_name: schema["title"].as_str().unwrap_or_default().to_owned(),
-            schema_encoding: "jsonschema".to_owned(),
-            schema: schema.to_string(),
-            encoding: "json".to_owned(),
-        };
-        let octets = |topic: &str| OpeningChannel {
-            topic: topic.to_owned(),
-            schema_name: String::new(),
-            schema_encoding: String::new(),
-            schema: String::new(),
-            encoding: "application/octet-stream".to_owned(),
-        };
-        let of_seat = schema_of_seat();
-        let seat = |seat: &RecordedSeat| json(&format!("/seat/{}", seat.name), &of_seat);
-        let mut channels: Vec<_> = seats.iter().map(seat).collect();
-        channels.push(json("/tick", &schema_of_tick()));
-        channels.extend(topics().iter().map(|(topic, schema)| json(topic, schema)));
-        channels.extend(FULL_TOPICS.map(octets));
-        Self { metadata: first(about, seats), channels }
+        let mut opening = Self { metadata: first(about, seats), schemas: Vec::new(), channels: Vec::new() };
+        let of_seat = opening.schema(&schema_of_seat());
+        for seat in seats {
+            opening.channels.push((format!("/seat/{}", seat.name), of_seat, "json".to_owned()));
+        }
+        for (topic, schema) in [("/tick", schema_of_tick())].iter().chain(&topics()) {
+            let schema = opening.schema(schema);
+            opening.channels.push(((*topic).to_owned(), schema, "json".to_owned()));
+        }
+        if about.mode == Mode::Full {
+            for (topic, name) in [(SENT, "kinocue.Sent"), (ACKS, "kinocue.Acks")] {
+                opening.schemas.push((name.to_owned(), "protobuf".to_owned(), descriptors()));
+                let schema = opening.schemas.len() - 1;
+                opening.channels.push((topic.to_owned(), schema, "protobuf".to_owned()));
+            }
+        }
+        opening
+    }
+
+    fn schema(&mut self, schema: &Value) -> usize {
+        let name = schema["title"].as_str().unwrap_or_default().to_owned();
+        self.schemas.push((name, "jsonschema".to_owned(), schema.to_string().into_bytes()));
+        self.schemas.len() - 1
+    }
+
+    /// The same of samples alone.
+    pub(crate) fn sampled(mut self) -> Self {
+        self.channels.retain(|(topic, ..)| ![SENT, ACKS].contains(&topic.as_str()));
+        self.with("mode", Mode::Sampled.word())
     }
 
     /// Octets from which it is read back.
@@ -134,7 +160,8 @@ impl EntryMaker {
                 (self.seats + 1, serde_json::to_vec(&json!({"state": state_number(*state)}))?)
             }
             Message::Note(note) => (self.seats + 1 + note.topic(), note.json()?),
-            Message::Full(topic, octets) => (self.seats + 1 + NOTE_TOPICS + topic, octets.clone()),
+            Message::Ticks(block) => (self.seats + 1 + NOTE_TOPICS, block.clone()),
+            Message::Drains(drains) => (self.seats + 2 + NOTE_TOPICS, packed(drains)),
         };
         let channel = u16::try_from(channel).unwrap_or(u16::MAX);
         Ok(Entry { channel, log_time: self.wall(at), data })
@@ -166,22 +193,17 @@ impl<W: Write + Seek> Recording<W> {
 
     /// The same with an opening that was made before.
     pub(crate) fn open(out: W, opening: &Opening, maker: EntryMaker) -> McapResult<Self> {
-        let mut writer = WriteOptions::new()
-            .library(concat!("kinocue ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Lz4))
-            // By time alone, so that of a file that is cut short no more than half a second is lost.
-            .chunk_size(None)
-            .create(out)?;
+        // By time alone, so that of a file that is cut short no more than half a second is lost.
+        let mut writer = options().chunk_size(None).create(out)?;
         write_metadata(&mut writer, "kinocue", opening.metadata.clone())?;
-        let mut channel = |one: &OpeningChannel| {
-            let schema = if one.schema_name.is_empty() {
-                0
-            } else {
-                writer.add_schema(&one.schema_name, &one.schema_encoding, one.schema.as_bytes())?
+        let mut channels = Vec::new();
+        for (topic, schema, encoding) in &opening.channels {
+            let schema = match opening.schemas.get(*schema) {
+                Some((name, encoding, octets)) => writer.add_schema(name, encoding, octets)?,
+                None => 0,
             };
-            writer.add_channel(schema, &one.topic, &one.encoding, &BTreeMap::new())
-        };
-        let channels = opening.channels.iter().map(&mut channel).collect::<McapResult<_>>()?;
+            channels.push(writer.add_channel(schema, topic, encoding, &BTreeMap::new())?);
+        }
         Ok(Self { writer, channels, maker, sequence: 0, last: 0 })
     }
 
@@ -226,6 +248,12 @@ impl<W: Write + Seek> Recording<W> {
     }
 }
 
+/// How files are written.
+pub(super) fn options() -> WriteOptions {
+    let options = WriteOptions::new().library(concat!("kinocue ", env!("CARGO_PKG_VERSION")));
+    options.compression(Some(Compression::Lz4))
+}
+
 fn write_metadata<W: Write + Seek>(
     writer: &mut Writer<W>,
     name: &str,
@@ -236,14 +264,12 @@ fn write_metadata<W: Write + Seek>(
 
 /// What stands at the beginning, so that a file that is cut short still says what it is of.
 fn first(about: &About, seats: &[RecordedSeat]) -> BTreeMap<String, String> {
-    let About { hall, cue, title, cue_sha256, rate_hz, clocks: (origin, wall) } = about;
-    let unit = |unit| if unit == AxisUnit::Degree { "deg" } else { "mm" };
-    let seat = |seat: &RecordedSeat| json!({"name": &*seat.name, "units": seat.units().map(unit).collect::<Vec<_>>()});
-    let seats = Value::from_iter(seats.iter().map(seat));
+    let About { hall, cue, title, cue_sha256, rate_hz, mode, clocks: (origin, wall) } = about;
+    let seats = serde_json::to_string(seats).unwrap_or_default();
     let entries = [
         ("version", VERSION.to_owned()),
         ("kind", "recording".to_owned()),
-        ("mode", "sampled".to_owned()),
+        ("mode", mode.word().to_owned()),
         ("program", concat!("kinocue ", env!("CARGO_PKG_VERSION")).to_owned()),
         ("hall", hall.clone()),
         ("cue", cue.clone()),
@@ -251,7 +277,7 @@ fn first(about: &About, seats: &[RecordedSeat]) -> BTreeMap<String, String> {
         ("cue_sha256", cue_sha256.clone()),
         ("rate_hz", rate_hz.to_string()),
         ("sample_hz", SAMPLE_HZ.to_string()),
-        ("seats", seats.to_string()),
+        ("seats", seats),
         ("monotonic_ns", origin.as_nanos().to_string()),
         ("wall_ns", wall.to_string()),
     ];

@@ -1,27 +1,20 @@
 //! What an earlier program left when it was killed: the flight recorder's file becomes an incident, and recordings that were cut short
 //! are written anew with an index. Each is read back before it takes the place of the other.
 
-use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write as _};
+use std::io::{self, BufReader, BufWriter, Read};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-use mcap::read::{ChunkFlattener, Options};
-use mcap::records::{Metadata, Record};
-use mcap::{Attachment, Compression, McapResult, MessageStream, WriteOptions};
-
 use super::disk::{Disk, PART};
 use super::link::RecordLink;
 use crate::app::recording::in_io;
-use crate::record::{Entry, EntryMaker, IncidentCause, Opening, Recording, read_flight};
+use crate::record::{self, Entry, EntryMaker, IncidentCause, Opening, Recording, Wanted, read_flight};
 use crate::time::MonoTime;
 
 /// How often it is asked whether it may go on.
 const PATIENCE: Duration = Duration::from_millis(100);
-/// The largest file that is recovered, octets: it is held in memory.
-const MOST: u64 = 2 << 30;
 
 /// What a flight recorder held.
 pub(super) type Leftover = (Opening, Vec<Entry>);
@@ -74,7 +67,7 @@ fn wait_for(may: &impl Fn() -> bool) {
 fn incident(disk: &Disk, (opening, entries): &Leftover, may: &impl Fn() -> bool) -> io::Result<()> {
     disk.clear_out_for_more()?;
     let (part, out) = disk.create_incident(IncidentCause::Crash)?;
-    let opening = opening.clone().with("mode", "full").with("cause", IncidentCause::Crash.word());
+    let opening = opening.clone().with("cause", IncidentCause::Crash.word());
     let mut file =
         Recording::open(out, &opening, EntryMaker::new(0, (MonoTime::default(), 0))).map_err(in_io)?;
     for some in entries.chunks(1_000) {
@@ -93,25 +86,13 @@ fn incident(disk: &Disk, (opening, entries): &Leftover, may: &impl Fn() -> bool)
 /// # Errors
 /// Where nothing of it can be read, or the new one cannot be written; what was there stays then.
 fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
-    if fs::metadata(path)?.len() > MOST {
-        return Err(io::ErrorKind::FileTooLarge.into());
-    }
-    let octets = fs::read(path)?;
     let name = path.to_string_lossy();
     let whole = PathBuf::from(format!("{}.mcap", name.strip_suffix(PART).unwrap_or(&name)));
     let fresh = path.with_extension("recovering");
     if whole.try_exists()? {
         return Err(io::ErrorKind::AlreadyExists.into());
     }
-    let copied = copy(&octets, &fresh, may).map_err(in_io);
-    let result = copied.and_then(|messages| {
-        // Read back before the one that was cut short goes.
-        let again = fs::read(&fresh)?;
-        let read =
-            MessageStream::new(&again).map_err(in_io)?.collect::<McapResult<Vec<_>>>().map_err(in_io)?;
-        if read.len() != messages {
-            return Err(io::Error::other(format!("{messages} messages were written, {} read", read.len())));
-        }
+    let result = copy(path, &fresh, may).and_then(|()| {
         fs::rename(&fresh, &whole)?;
         fs::remove_file(path)
     });
@@ -122,50 +103,43 @@ fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     result
 }
 
-/// Writes what is whole of it to another file; gives how many messages there are.
-fn copy(octets: &[u8], to: &Path, may: &impl Fn() -> bool) -> McapResult<usize> {
-    let options = || Options::IgnoreEndMagic.into();
-    let mut out = WriteOptions::new()
-        .library(concat!("kinocue ", env!("CARGO_PKG_VERSION")))
-        .compression(Some(Compression::Lz4))
-        .create(BufWriter::new(File::create(to)?))?;
-    for record in ChunkFlattener::new_with_options(octets, options())?.map_while(Result::ok) {
-        match record {
-            Record::Metadata(metadata) => out.write_metadata(&metadata)?,
-            Record::Attachment { header, data, .. } => out.attach(&Attachment {
-                log_time: header.log_time,
-                create_time: header.create_time,
-                name: header.name,
-                media_type: header.media_type,
-                data,
-            })?,
-            _ => {}
-        }
+/// Writes what is whole of it to another file, and reads that back.
+fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
+    let input = Patient { file: BufReader::new(File::open(from)?), may };
+    let (recovered, out) =
+        record::recover(input, BufWriter::new(File::create(to)?)).map_err(io::Error::other)?;
+    if recovered.messages.is_empty() {
+        return Err(io::Error::other("it has no whole message"));
     }
-    let mut messages = 0;
-    for message in MessageStream::new_with_options(octets, options())?.map_while(Result::ok) {
-        if messages % 1_000 == 0 {
-            wait_for(may);
-        }
-        out.write(&message)?;
-        messages += 1;
+    out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+    let again = Patient { file: BufReader::new(File::open(to)?), may };
+    let unwanted = Wanted { samples: false, full: false, ..Wanted::ALL };
+    let read = record::read(again, unwanted, &mut |_, _, _| ()).map_err(io::Error::other)?;
+    if read.trouble.is_some() || read.messages != recovered.messages {
+        return Err(io::Error::other("what was written does not read back; the disk may be failing"));
     }
-    if messages == 0 {
-        return Err(io::Error::other("it has no whole message").into());
+    Ok(())
+}
+
+/// A file of which more is read only while it may.
+struct Patient<'a, F> {
+    file: BufReader<File>,
+    may: &'a F,
+}
+
+impl<F: Fn() -> bool> Read for Patient<'_, F> {
+    fn read(&mut self, octets: &mut [u8]) -> io::Result<usize> {
+        wait_for(self.may);
+        self.file.read(octets)
     }
-    let metadata = BTreeMap::from([("messages".to_owned(), messages.to_string())]);
-    out.write_metadata(&Metadata { name: "kinocue.recovered".to_owned(), metadata })?;
-    out.finish()?;
-    let mut file = out.into_inner();
-    file.flush()?;
-    file.get_ref().sync_all()?;
-    Ok(messages)
 }
 
 #[cfg(test)]
 mod tests {
+    use mcap::MessageStream;
+
     use super::*;
-    use crate::record::{About, EventNote, Message, Note};
+    use crate::record::{About, EventNote, Message, Mode, Note};
 
     fn opening() -> Opening {
         let about = About {
@@ -174,6 +148,7 @@ mod tests {
             title: String::new(),
             cue_sha256: String::new(),
             rate_hz: 100.0,
+            mode: Mode::Sampled,
             clocks: (MonoTime::default(), 0),
         };
         Opening::new(&about, &[])

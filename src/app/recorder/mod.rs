@@ -18,7 +18,7 @@ pub(crate) use link::{RecordAsk, RecordLink, ShowStart};
 use super::recording;
 use super::runtime::Runtime;
 use crate::config::RecordMode;
-use crate::record::{About, EntryMaker, Intake, Opening, octets_a_second};
+use crate::record::{About, EntryMaker, Intake, Mode, Opening, octets_a_second};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
@@ -64,6 +64,7 @@ impl HallRecorder {
             title: String::new(),
             cue_sha256: String::new(),
             rate_hz: rate.hz(),
+            mode: Mode::Full,
             clocks,
         };
         let text = fs::read(&places.config).unwrap_or_default();

@@ -261,11 +261,11 @@ impl Worker {
         let opened = self.disk.clear_out_for_more().and_then(|()| {
             let ShowStart { kind, cue, title, sha256, attached } = &show.start;
             let number = show.part + 1;
-            let opening = self
-                .opening
-                .clone()
+            let opening = self.opening.clone();
+            let is_full = self.record.mode == RecordMode::Full;
+            let opening = if is_full { opening } else { opening.sampled() };
+            let opening = opening
                 .with("of", *kind)
-                .with("mode", self.record.mode.word())
                 .with("cue", cue.clone())
                 .with("title", title.clone())
                 .with("cue_sha256", sha256.clone())
@@ -353,8 +353,7 @@ impl Worker {
         self.disk.clear_out_for_more()?;
         let (disk, out) = self.disk.create_incident(cause)?;
         let disk = disk.until_begun();
-        let opening =
-            self.opening.clone().with("of", "incident").with("mode", "full").with("cause", cause.word());
+        let opening = self.opening.clone().with("of", "incident").with("cause", cause.word());
         let mut file = Recording::open(out, &opening, self.maker).map_err(in_io)?;
         for entry in self.hall.iter().chain(&flight.read()?) {
             file.put(entry).map_err(in_io)?;
@@ -407,7 +406,7 @@ impl Worker {
 
     fn close_file(&self, open: OpenFile, report: Option<&[u8]>) -> io::Result<()> {
         let OpenFile { file, disk, counts } = open;
-        let end = self.intake.counts().since(&counts).named();
+        let end = self.intake.end_since(&counts);
         let out = file.finish(&end, report).map_err(in_io)?;
         out.into_inner().map_err(io::IntoInnerError::into_error)?;
         let len = disk.len();

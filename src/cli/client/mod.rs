@@ -20,6 +20,7 @@ mod view;
 mod watch;
 
 pub(super) use film::{UseArgs, choose as choose_film_source, show as show_film};
+pub(super) use record::dump as dump_record;
 pub(super) use server::ServerArgs;
 pub(super) use show::{home, preflight};
 
