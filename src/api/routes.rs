@@ -107,7 +107,7 @@ fn describe(path: &mut PathItem) {
         ];
         operation.parameters.get_or_insert_default().extend(headers.map(RefOr::T));
     });
-    [&mut path.get, &mut path.post, &mut path.put].into_iter().flatten().for_each(may_fail);
+    [&mut path.get, &mut path.post, &mut path.put, &mut path.delete].into_iter().flatten().for_each(may_fail);
 }
 
 fn may_fail(operation: &mut Operation) {

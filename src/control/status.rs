@@ -85,7 +85,8 @@ pub struct Status {
     pub test: Option<TestStatus>,
     /// What a person should know, gravest first.
     pub warnings: Vec<Warning>,
-    /// What is recorded.
+    /// What is recorded; left out where nothing is.
+    #[serde(skip_serializing_if = "RecordStatus::is_nothing")]
     pub record: RecordStatus,
     /// The newest lines of the journal, newest first, at most 20.
     pub journal: Vec<JournalLine>,
@@ -164,6 +165,12 @@ pub struct RecordStatus {
     pub(crate) errors: u64,
     /// What is wrong, and what to do; null if all is well.
     pub(crate) trouble: Option<String>,
+}
+
+impl RecordStatus {
+    fn is_nothing(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// What is loaded, and where in it the hall is.

@@ -77,7 +77,7 @@ fn a_show_leaves_a_recording_whose_counts_are_those_of_its_report_and_in_which_n
     hall.comes_to("parked");
     let recorded = Recorded::read(&closed(&hall, "-show-ride"));
     let report: Value = serde_json::from_str(&recorded.attachment("report.json")).unwrap();
-    let frames = &report["outcome"]["frames"];
+    let frames = &report["outcome"];
     let of_seats = |key| recorded.sum("/seat/A1", key) + recorded.sum("/seat/A2", key);
     assert_eq!(Value::from(of_seats("sent")), frames["sent"], "{report}");
     assert_eq!(Value::from(of_seats("acked")), frames["acked"], "{report}");

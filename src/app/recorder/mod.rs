@@ -73,7 +73,7 @@ impl HallRecorder {
             .with("config_sha256", digest)
             .with("sample_hz", config.record.sample_hz.to_string());
         let maker = EntryMaker::new(seats.len(), clocks);
-        let octets_a_s = octets_a_second(&seats, rate);
+        let octets_a_s = octets_a_second(&seats, rate, config.record.sample_hz);
         let (taps, intake) = Intake::new(seats, rate, config.record.sample_hz);
         let (link, asks) = RecordLink::new();
         let flight = places.runtime.join(FLIGHT_FILE);

@@ -332,7 +332,7 @@ impl Worker {
             IncidentStep::TooMany => {}
             IncidentStep::Join => self.say_incident(cause, now),
             IncidentStep::Begin => {
-                if let Err(error) = self.begin_incident(cause) {
+                if let Err(error) = self.begin_incident(cause, at) {
                     self.fail_incident(&error);
                 }
                 self.say_incident(cause, now);
@@ -347,7 +347,7 @@ impl Worker {
     }
 
     /// Begins a file with all that the flight recorder holds.
-    fn begin_incident(&mut self, cause: IncidentCause) -> io::Result<()> {
+    fn begin_incident(&mut self, cause: IncidentCause, at: MonoTime) -> io::Result<()> {
         let Some(flight) = &mut self.flight else { return Ok(()) };
         flight.write()?;
         self.disk.clear_out_for_more()?;
@@ -355,7 +355,9 @@ impl Worker {
         let disk = disk.until_begun();
         let opening = self.opening.clone().with("of", "incident").with("cause", cause.word());
         let mut file = Recording::open(out, &opening, self.maker).map_err(in_io)?;
-        for entry in self.hall.iter().chain(&flight.read()?) {
+        let oldest = self.maker.wall(at).saturating_sub(1_000_000_000 * u64::from(self.record.flight_s));
+        let held = flight.read()?;
+        for entry in self.hall.iter().chain(held.iter().filter(|entry| entry.log_time >= oldest)) {
             file.put(entry).map_err(in_io)?;
         }
         if let Some(safe) = &self.safe {
