@@ -3,12 +3,20 @@
 //!
 //! `cargo bench --bench record -- [--rounds N] [--quick]`
 
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "figures of a few digits"
+)]
+
 mod common {
     pub(crate) mod spread;
 }
 mod senders {
     pub(super) mod again;
     pub(super) mod children;
+    #[expect(dead_code, reason = "each bench uses its own part")]
     pub(super) mod ours;
     pub(super) mod outcome;
     pub(super) mod peer;

@@ -5,8 +5,8 @@ use std::io::{BufWriter, Result};
 use std::path::Path;
 
 use crate::record::{
-    About, AckRecord, AckTap, Entry, EntryMaker, Flight, Intake, Mode, Opening, RecordedSeat, Recording, Tap,
-    Taps,
+    self, About, AckRecord, AckTap, Chunk, Entry, EntryMaker, Flight, Handed, Intake, Mode, Opening,
+    RecordedSeat, Recording, SentFrame, Tap, Taps, Wanted,
 };
 use crate::time::{MonoTime, Rate};
 use crate::tracker::{Fate, Reply};
@@ -75,6 +75,24 @@ impl RecorderRig {
         let counts = self.intake.counts();
         (counts.dropped, counts.dropped_records)
     }
+}
+
+/// The frames of a recording of whole ticks: lane, octets and whether the kernel took it, in the order in which they left.
+#[must_use]
+pub fn datagrams(file: &[u8]) -> Vec<(usize, Vec<u8>, bool)> {
+    let mut all = Vec::new();
+    let mut take = |_: &record::Contents, _, told: record::Told<'_>| {
+        let record::Told::Chunks(octets) = told else { return };
+        let mut rest = octets.as_slice();
+        while let Some((chunk, behind)) = Chunk::parse(rest) {
+            rest = behind;
+            let frame =
+                |frame: SentFrame<'_>| (frame.lane, frame.datagram.to_vec(), frame.handed != Handed::Refused);
+            all.extend(chunk.frames().map(frame));
+        }
+    };
+    record::read(file, Wanted::ALL, &mut take).expect("a recording");
+    all
 }
 
 /// The ack thread takes a reply to a frame of a controller, and says what it was.

@@ -33,12 +33,14 @@ pub(crate) use acks::{AckChunk, AckRecord, AckStanding, latency_ns};
 pub use acks::{AckTap, ack_tap};
 pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
+#[cfg(feature = "harness")]
+pub(crate) use chunk::{Handed, SentFrame};
 pub(crate) use flight::{Entry, Flight, read as read_flight};
 pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
 pub(crate) use intake::{Counts, Intake, Taps};
 pub(crate) use margins::{Margin, Margins, Quantity};
 pub(crate) use notes::{ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote};
-#[cfg(test)]
+#[cfg(any(test, feature = "harness"))]
 pub(crate) use read::Told;
 pub(crate) use read::{Contents, ReadError, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;

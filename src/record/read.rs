@@ -64,7 +64,7 @@ pub(crate) enum Told<'a> {
     /// Whole ticks: chunks, one behind the other.
     Chunks(Vec<u8>),
     /// Drains of the ack thread, one behind the other.
-    Drains(#[cfg_attr(not(test), expect(dead_code, reason = "for who plays a recording again"))] Vec<u8>),
+    Drains(#[expect(dead_code, reason = "for who plays a recording again")] Vec<u8>),
     /// Anything else, as it stands there: topic and octets.
     Other(&'a str, &'a [u8]),
 }

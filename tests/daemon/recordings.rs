@@ -5,6 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use kinocue::harness::recording::datagrams;
+use kinocue::wire::MotionRequest;
 use mcap::{MessageStream, Summary};
 use serde_json::Value;
 
@@ -95,6 +97,32 @@ fn a_show_leaves_a_recording_whose_counts_are_those_of_its_report_and_in_which_n
     assert!(recorded.of("/action").any(|(_, _, value)| value["what"] == "go"));
     assert_eq!(recorded.full, 0, "samples alone");
     assert!(!files(&hall).iter().any(|name| name.contains(".part.")), "{:?}", files(&hall));
+}
+
+#[test]
+fn every_datagram_of_a_show_is_in_its_full_recording_as_the_controllers_received_it() {
+    let hall = Hall::open_with(|config| format!("{config}[record]\nmode = \"full\"\n"));
+    hall.play("ride");
+    hall.comes_to("parked");
+    let file = fs::read(closed(&hall, "-show-ride")).expect("it is there");
+    let mut sent = BTreeMap::<usize, Vec<_>>::new();
+    for (lane, octets, is_taken) in datagrams(&file) {
+        let request = MotionRequest::parse(&octets).expect("a motion frame");
+        let positions: Vec<i32> = request.positions.iter().map(|pulses| pulses.0).collect();
+        assert!(is_taken);
+        sent.entry(lane).or_default().push((request.frame.0, request.time_ms, request.extend, positions));
+    }
+    let mut received = BTreeMap::<String, Vec<_>>::new();
+    for row in hall.end().rows {
+        let positions = row.commanded[..3].to_vec();
+        received.entry(row.controller).or_default().push((row.frame, row.time_ms, row.extend, positions));
+    }
+    let (mut sent, mut received): (Vec<_>, Vec<_>) =
+        (sent.into_values().collect(), received.into_values().collect());
+    sent.sort();
+    received.sort();
+    assert!(sent.len() == 2 && sent[0].len() > 200, "{} frames", sent[0].len());
+    assert_eq!(sent, received);
 }
 
 #[test]
