@@ -115,12 +115,12 @@ fn trouble(error: &McapError, read: u64, begun: bool) -> Trouble {
 
 /// Schema record: its id.
 pub(crate) fn schema(body: &[u8]) -> Option<u16> {
-    Body(body).u16()
+    RecordBody(body).u16()
 }
 
 /// Schema record, whole: id, name, encoding and data.
 pub(crate) fn schema_of(body: &[u8]) -> Option<(u16, &str, &str, &[u8])> {
-    let mut body = Body(body);
+    let mut body = RecordBody(body);
     let (id, name, encoding, length) = (body.u16()?, body.text()?, body.text()?, body.u32()?);
     Some((id, name, encoding, body.bytes(length)?))
 }
@@ -136,14 +136,14 @@ pub(crate) struct ChannelRecord<'a> {
 
 impl<'a> ChannelRecord<'a> {
     pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
-        let mut body = Body(body);
+        let mut body = RecordBody(body);
         Some(Self { id: body.u16()?, schema: body.u16()?, topic: body.text()?, encoding: body.text()? })
     }
 }
 
 /// Message record: channel, log time and data.
 pub(crate) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
-    let mut body = Body(body);
+    let mut body = RecordBody(body);
     let channel = body.u16()?;
     body.u32()?; // sequence
     let log_time = body.u64()?;
@@ -153,10 +153,10 @@ pub(crate) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
 
 /// Metadata record: name and entries.
 pub(crate) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
-    let mut body = Body(body);
+    let mut body = RecordBody(body);
     let name = body.text()?;
     let length = body.u32()?;
-    let mut entries = Body(body.bytes(length)?);
+    let mut entries = RecordBody(body.bytes(length)?);
     let mut map = BTreeMap::new();
     while !entries.0.is_empty() {
         map.insert(entries.text()?, entries.text()?);
@@ -166,7 +166,7 @@ pub(crate) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
 
 /// Attachment record: name and data.
 pub(crate) fn attachment(body: &[u8]) -> Option<(&str, &[u8])> {
-    let mut body = Body(body);
+    let mut body = RecordBody(body);
     body.u64()?; // log time
     body.u64()?; // create time
     let name = body.text()?;
@@ -177,9 +177,9 @@ pub(crate) fn attachment(body: &[u8]) -> Option<(&str, &[u8])> {
 }
 
 /// What is left of a record's body; little-endian, texts behind their length (mcap.dev/spec).
-struct Body<'a>(&'a [u8]);
+struct RecordBody<'a>(&'a [u8]);
 
-impl<'a> Body<'a> {
+impl<'a> RecordBody<'a> {
     fn bytes(&mut self, count: u32) -> Option<&'a [u8]> {
         let (front, rest) = self.0.split_at_checked(usize::try_from(count).ok()?)?;
         self.0 = rest;

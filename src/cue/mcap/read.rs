@@ -29,7 +29,7 @@ const REASON_TOLD: usize = 200;
 
 /// Reads an MCAP cue; `path` names it in faults.
 pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
-    let mut reading = Reading::new(path);
+    let mut reading = McapReading::new(path);
     if let Err((place, problem)) = each(input, &mut reading) {
         reading.faults.add(place, None, problem);
     }
@@ -42,7 +42,7 @@ pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaul
 /// # Errors
 /// Where what is complete makes no cue.
 pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), CueFaults> {
-    let mut reading = Reading::new(path);
+    let mut reading = McapReading::new(path);
     let lost = match each(input, &mut reading) {
         Ok(()) => None,
         Err((_, problem @ (Problem::CutShort | Problem::Damaged(_)))) => Some(problem),
@@ -57,7 +57,7 @@ pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), 
 }
 
 /// Hands it every record, until one is wrong; says then where that is.
-fn each(input: impl Read, reading: &mut Reading) -> Result<(), (Place, Problem)> {
+fn each(input: impl Read, reading: &mut McapReading) -> Result<(), (Place, Problem)> {
     container::each(input, MAX_FILE, |opcode, body| reading.take(opcode, body)).map_err(|(at, problem)| {
         let place = if matches!(problem, Problem::Damaged(_)) { Place::Byte(at) } else { Place::File };
         (place, problem)
@@ -97,7 +97,7 @@ impl At {
 }
 
 /// A file while it is read. Units may be declared behind the messages, so values are checked at the end.
-struct Reading {
+struct McapReading {
     faults: Collector,
     schemas: HashSet<u16>,
     channels: HashMap<u16, Option<Topic>>,
@@ -109,7 +109,7 @@ struct Reading {
     switched: u32,
 }
 
-impl Reading {
+impl McapReading {
     fn new(path: &Path) -> Self {
         Self {
             faults: Collector::default(),
@@ -262,7 +262,7 @@ impl Reading {
         Ok(())
     }
 
-    fn io(&mut self, at: At, io: message::Io) -> Result<(), Problem> {
+    fn io(&mut self, at: At, io: message::IoMessage) -> Result<(), Problem> {
         let begun = self.seen.get(&Topic::Io).is_some_and(|(count, _)| *count > 1);
         match (io.effects, io.word, &mut self.cue.effects) {
             (None, Some(word), Effects::Words(steps)) => steps.push(at.time(), value::outputs(word)?),
@@ -285,7 +285,7 @@ impl Reading {
         Ok(())
     }
 
-    fn marker(&mut self, at: At, marker: message::Marker) -> Result<(), Problem> {
+    fn marker(&mut self, at: At, marker: message::MarkerMessage) -> Result<(), Problem> {
         if self.cue.markers.len() == MAX_MARKERS {
             return Err(Problem::TooManyMarkers);
         }
