@@ -149,6 +149,8 @@ fn what_was_before_a_crash_in_mid_show_is_whole_after_the_next_start_and_nothing
     let mut hall = Hall::open();
     hall.play("night");
     hall.rises(0);
+    // What is killed has lost its last second.
+    hall.lives_on(120);
     hall.kill();
     let killed = u64::try_from(SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos()).unwrap();
     assert!(files(&hall).iter().any(|name| name.ends_with("-show-night.part.mcap")), "{:?}", files(&hall));
