@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use kinocue::harness::recording::datagrams;
+use kinocue::harness::sys::clock::wall_now_ns;
 use kinocue::wire::MotionRequest;
 use mcap::{MessageStream, Summary};
 use serde_json::Value;
@@ -152,7 +152,7 @@ fn what_was_before_a_crash_in_mid_show_is_whole_after_the_next_start_and_nothing
     // What is killed has lost its last second.
     hall.lives_on(120);
     hall.kill();
-    let killed = u64::try_from(SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_nanos()).unwrap();
+    let killed = wall_now_ns();
     assert!(files(&hall).iter().any(|name| name.ends_with("-show-night.part.mcap")), "{:?}", files(&hall));
     hall.relay(0).count();
     hall.serve();
