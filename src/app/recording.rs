@@ -74,7 +74,7 @@ impl PlayRecording {
     }
 }
 
-fn in_io(error: McapError) -> io::Error {
+pub(super) fn in_io(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,
         // It words a write that failed inside a record as one that cannot be parsed; below it is what the system said.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::acks::{AckChunk, AckRecord, standing_number};
 use super::chunk::{Chunk, Handed, SentFrame};
+use super::notes::Note;
 use super::{RecordedSeat, TickHead};
 use crate::state::State;
 use crate::time::MonoTime;
@@ -81,6 +82,8 @@ pub(crate) enum Message {
     Tick(TickSample),
     /// The hall's state, from now on.
     State(State),
+    /// What the service tells.
+    Note(Note),
     /// A block of whole ticks, of which the first was then.
     Ticks(Vec<u8>),
     /// What the ack thread took, as it crossed.

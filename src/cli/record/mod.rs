@@ -8,6 +8,7 @@ use anyhow::{Context as _, anyhow};
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
+use super::client::{ServerArgs, dump_record as dump};
 use super::{Exit, Failure, OrExit as _};
 use crate::plain;
 use crate::record::{Contents, ReadError};
@@ -34,6 +35,8 @@ enum Command {
     Info(info::Args),
     Recover(recover::Args),
     Layout(layout::Args),
+    /// Has the running service write out what its flight recorder holds, as an incident.
+    Dump(ServerArgs),
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
@@ -44,6 +47,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         Command::Info(args) => info::run(args),
         Command::Recover(args) => recover::run(args),
         Command::Layout(args) => layout::run(args),
+        Command::Dump(server) => dump(server),
     }
 }
 
