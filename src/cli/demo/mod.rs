@@ -36,9 +36,9 @@ const CUE: &[u8] = include_bytes!("../../../cues/bench-ride.csv");
 
 /// Plays the bench ride to four virtual controllers, with nothing to set up.
 ///
-/// It is the daemon itself, with its web console, whose address is printed at once. On a terminal the console stays up after the
+/// Runs the daemon itself with its web console, and prints the console's address at once. On a terminal the console stays up after the
 /// ride until Ctrl-C, to arm and go again there. Two of the controllers are a pair that shares one frame (PA95). Everything
-/// stays on this machine, in a folder that is gone at the end.
+/// stays on this machine, in a temporary folder that is removed at the end.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json\n  kinocue demo --film film.mkv"
