@@ -49,7 +49,7 @@ pub(super) struct Args {
     #[command(flatten)]
     drives: DriveArgs,
 
-    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. What passes at a level passes below it.
+    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. A cue that passes at one level passes at every lower one.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 
