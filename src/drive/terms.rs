@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use super::link::StreamTerms;
+use super::link::{Family as _, Lead, StreamTerms};
 use super::rates::LinkLoad;
-use super::{silvermax, sixpack2};
+use super::silvermax::SilverMax;
+use super::sixpack2::Sixpack2;
 use crate::config::drive::DriveFamily;
 use crate::config::{Config, Link};
 use crate::motion::MAX_LEAD;
@@ -32,25 +33,15 @@ impl StreamTerms {
 
     /// How long before a seat is there its poses have to come.
     pub(crate) fn lead(self, family: DriveFamily) -> Duration {
-        let Lead { periods, ticks } = Lead::of(family);
-        periods * self.period + ticks * self.tick
+        Lead::of(family).over(self)
     }
-}
-
-/// How long before a seat is there its poses have to come: so many periods of its link, and so many ticks.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Lead {
-    /// Periods.
-    pub(crate) periods: u32,
-    /// Ticks.
-    pub(crate) ticks: u32,
 }
 
 impl Lead {
     const fn of(family: DriveFamily) -> Self {
         match family {
-            DriveFamily::SilverMax => silvermax::LEAD,
-            DriveFamily::Sixpack2 => sixpack2::LEAD,
+            DriveFamily::SilverMax => SilverMax::LEAD,
+            DriveFamily::Sixpack2 => Sixpack2::LEAD,
         }
     }
 }
