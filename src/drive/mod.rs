@@ -14,7 +14,7 @@ mod segments;
 pub(crate) mod silvermax;
 pub(crate) mod sixpack2;
 mod stream;
-mod terms;
+pub(crate) mod terms;
 
 pub use lane::Lane;
 pub(crate) use lane::Stamped;

@@ -1,5 +1,12 @@
 //! Seats on virtual drives, and whoever plays to them, in virtual time.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "numbers of axes and ticks"
+)]
+
 use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};

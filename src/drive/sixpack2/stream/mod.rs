@@ -34,6 +34,8 @@ use crate::wire::sixpack2::{PiTarget, SixpackFrame, SixpackOrder};
 const TARGETS: u32 = 10;
 /// How far from the rate with which a unit wakes a line is no longer understood by one, in parts of a hundred.
 const UNDERSTOOD: u32 = 5;
+/// A slice that is so many periods late is not made up for.
+const HELD_UP: u32 = 4;
 /// How often a unit that is lost is asked.
 const PROBES: Duration = Duration::from_millis(250);
 
@@ -87,9 +89,15 @@ impl Family for Sixpack2 {
     }
 
     fn mind<P: LinkPort>(stream: &mut Stream<Self, P>, index: usize, now: MonoTime) {
+        let is_held_up = now.since(stream.own.next_slice) > HELD_UP * stream.terms.period;
         let lane = &mut stream.lanes[index];
         lane.own.track.forget(now);
         match lane.stage {
+            // Its motors stand by now, and would make up at once for all that they were not told.
+            Stage::Runs | Stage::Ends if is_held_up => {
+                lane.make_ready();
+                stream.tell(StreamEvent::Braked { lane: number(index), why: BrakeReason::Dry });
+            }
             Stage::Runs if lane.is_left_alone(now) && !lane.ends_moving() => {
                 lane.own.track.end();
                 lane.stage = Stage::Ends;

@@ -179,3 +179,20 @@ fn what_was_not_heard_while_a_line_was_cut_is_not_made_up_for_at_once() {
         }
     }
 }
+
+#[test]
+fn what_a_seat_was_not_told_while_its_thread_was_held_up_is_not_made_up_for_at_once() {
+    for ms in [60, 100, 400, 1_000] {
+        for phase in [0, 3, 6] {
+            let mut play = riding(8.0 + 0.173 * f64::from(phase));
+            play.bus_mut().forget();
+            let until = play.now() + Duration::from_millis(ms);
+            play.stream.talk.port().sleep_until(until);
+            play.play(3.0, 0);
+            let motors = play.bus().units()[0].motors[..3].iter();
+            let jump = motors.map(|motor| motor.shaft.executed().jump / MM).fold(0.0, f64::max);
+            assert!(jump <= 32.0 && play.has("Dry"), "{ms} ms: {jump} mm/s {:?}", play.rare());
+            play.assert_inside();
+        }
+    }
+}
