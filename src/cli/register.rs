@@ -30,11 +30,11 @@ values are decimal, or hexadecimal behind 0x.";
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     #[command(subcommand)]
-    command: Command,
+    command: RegisterCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+enum RegisterCommand {
     List(list::Args),
     Read(read::Args),
     Write(write::Args),
@@ -44,11 +44,11 @@ enum Command {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     match &args.command {
-        Command::List(args) => list::run(args),
-        Command::Read(args) => read::run(args),
-        Command::Write(args) => write::run(args),
-        Command::Save(args) => save::run(args),
-        Command::Diff(args) => diff::run(args),
+        RegisterCommand::List(args) => list::run(args),
+        RegisterCommand::Read(args) => read::run(args),
+        RegisterCommand::Write(args) => write::run(args),
+        RegisterCommand::Save(args) => save::run(args),
+        RegisterCommand::Diff(args) => diff::run(args),
     }
 }
 

@@ -11,7 +11,7 @@ use super::play;
 use super::token::Token;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::serve::{Parts, Places, serve};
-use crate::app::supervisor::Signals;
+use crate::app::supervisor::SystemSignals;
 use crate::control::Role;
 use crate::log::Log;
 use crate::sim::{Farm, Options};
@@ -57,7 +57,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let film = args.film.as_deref().map(DemoFilm::find).transpose()?;
-    let signals = Signals::default();
+    let signals = SystemSignals::default();
     play::leave_on_signals(&signals.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let temporary = env::temp_dir();
     let no_folder = || format!("cannot make a folder in {}; set TMPDIR to another", temporary.display());

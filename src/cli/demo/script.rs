@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::runtime;
 
 use super::screen::Screen;
-use crate::app::supervisor::Signals;
+use crate::app::supervisor::SystemSignals;
 use crate::control::{Code, Command, Handle, Problem, Role, Status, Surface, Who};
 use crate::state::State;
 
@@ -33,7 +33,7 @@ impl Script {
     /// If the system starts no further thread; the hall ends then.
     pub(super) fn start(
         handle: Handle,
-        signals: Signals,
+        signals: SystemSignals,
         screen: Screen,
         console: Option<String>,
         load: Command,
@@ -62,7 +62,7 @@ impl Script {
 
 async fn lead(
     handle: &Handle,
-    signals: &Signals,
+    signals: &SystemSignals,
     screen: &Screen,
     console: Option<&str>,
     load: Command,

@@ -7,7 +7,7 @@ use crate::sim::{Setup, pa};
 use crate::sys::own_folder::OwnFolder;
 
 /// A seat.
-pub(super) struct Seat {
+pub(super) struct DemoSeat {
     pub(super) name: &'static str,
     row: &'static str,
     axes: u16,
@@ -16,14 +16,14 @@ pub(super) struct Seat {
 }
 
 /// The virtual seats: two with all three axes, and a pair that shares one frame, each taking its own window by PA95.
-pub(super) const SEATS: [Seat; 4] = [
-    Seat { name: "A1", row: "A", axes: 3, offset: 0, fan_out: "slice" },
-    Seat { name: "A2", row: "A", axes: 3, offset: 0, fan_out: "slice" },
-    Seat { name: "B1", row: "B", axes: 2, offset: 0, fan_out: "shared" },
-    Seat { name: "B2", row: "B", axes: 1, offset: 2, fan_out: "shared" },
+pub(super) const SEATS: [DemoSeat; 4] = [
+    DemoSeat { name: "A1", row: "A", axes: 3, offset: 0, fan_out: "slice" },
+    DemoSeat { name: "A2", row: "A", axes: 3, offset: 0, fan_out: "slice" },
+    DemoSeat { name: "B1", row: "B", axes: 2, offset: 0, fan_out: "shared" },
+    DemoSeat { name: "B2", row: "B", axes: 1, offset: 2, fan_out: "shared" },
 ];
 
-impl Seat {
+impl DemoSeat {
     /// Its controller, set as a safe one is, that answers to `host`.
     pub(super) fn setup(&self, host: SocketAddrV4) -> Setup {
         let setup =

@@ -42,13 +42,13 @@ pub(super) struct Args {
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
+struct DiffReport<'a> {
     same: bool,
-    controllers: Vec<ControllerReport<'a>>,
+    controllers: Vec<ControllerDiff<'a>>,
 }
 
 #[derive(Serialize)]
-struct ControllerReport<'a> {
+struct ControllerDiff<'a> {
     name: &'a str,
     address: String,
     saved_as: &'a str,
@@ -67,7 +67,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut troubles = Troubles::default();
     let found = read_values(&mut talk, &targets, &wanted, &mut troubles);
     let reports = targets.controllers.iter().zip(&saved).zip(found).map(|((controller, saved), found)| {
-        ControllerReport {
+        ControllerDiff {
             name: &controller.name,
             address: controller.connection.address.to_string(),
             saved_as: &saved.name,
@@ -77,7 +77,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     });
     let controllers: Vec<_> = reports.collect();
     let same = troubles.none() && controllers.iter().all(|one| one.differences.is_empty());
-    let report = Report { same, controllers };
+    let report = DiffReport { same, controllers };
     if args.json {
         print::json(&report)?
     } else {
@@ -117,7 +117,7 @@ pub(super) fn matched<'f>(
     targets.controllers.iter().map(of).collect()
 }
 
-fn tell(report: &Report<'_>, all: bool) -> Result<(), Failure> {
+fn tell(report: &DiffReport<'_>, all: bool) -> Result<(), Failure> {
     let mut table_of = Table::new();
     table_of.load_style(presets::NOTHING);
     table_of.set_header(["controller", "register", "in the file", "in the controller", "name", "meaning"]);

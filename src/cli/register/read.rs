@@ -45,7 +45,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut troubles = Troubles::default();
     let found = read_values(&mut talk, &targets, &wanted, &mut troubles);
     if args.json {
-        print::json(&Report::new(&targets, &found))?;
+        print::json(&ReadReport::new(&targets, &found))?;
     } else if found.iter().any(|one| !one.values.is_empty()) {
         print::out(&format!("{}\n", text(&targets, &found)))?;
     }
@@ -69,23 +69,23 @@ fn wanted(selections: &[Selection], controller: &Controller<Station>) -> anyhow:
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
-    controllers: Vec<ControllerReport<'a>>,
+struct ReadReport<'a> {
+    controllers: Vec<ControllerRegisters<'a>>,
 }
 
 #[derive(Serialize)]
-struct ControllerReport<'a> {
+struct ControllerRegisters<'a> {
     name: &'a str,
     address: String,
     dialect: &'static str,
     /// Null where it is the normal one, or the controller did not answer.
     state: Option<&'a str>,
-    registers: Vec<RegisterReport>,
+    registers: Vec<RegisterRow>,
     faults: &'a [String],
 }
 
 #[derive(Serialize)]
-struct RegisterReport {
+struct RegisterRow {
     register: Address,
     name: &'static str,
     value: u16,
@@ -93,9 +93,9 @@ struct RegisterReport {
     says: Option<String>,
 }
 
-impl<'a> Report<'a> {
+impl<'a> ReadReport<'a> {
     fn new(targets: &'a Targets, found: &'a [Found]) -> Self {
-        let one = |(controller, found): (&'a Controller<Station>, &'a Found)| ControllerReport {
+        let one = |(controller, found): (&'a Controller<Station>, &'a Found)| ControllerRegisters {
             name: &controller.name,
             address: controller.connection.address.to_string(),
             dialect: dialect_name(controller.connection.dialect),
@@ -107,10 +107,10 @@ impl<'a> Report<'a> {
     }
 }
 
-fn registers(controller: &Controller<Station>, values: &Values) -> Vec<RegisterReport> {
+fn registers(controller: &Controller<Station>, values: &Values) -> Vec<RegisterRow> {
     let one = |(&address, &value)| {
         let register = table().get(address);
-        RegisterReport {
+        RegisterRow {
             register: address,
             name: register.map_or("", |register| register.name.as_str()),
             value,
