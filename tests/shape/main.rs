@@ -25,8 +25,8 @@ const ROWS: &[Row] = &[
     ("bool fields in one struct", counts::bools_of_one_struct, Less, 6.0, 3.0),
     ("enums with the words of the hall's state", counts::encodings_of_state, Less, 1.0, 1.0),
     ("compositions", counts::compositions, Less, 1.0, 1.0),
-    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 98.0, 30.0),
-    ("uses of one type name", counts::uses_of_one_type_name, Less, 6.0, 2.0),
+    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 96.0, 30.0),
+    ("uses of one type name", counts::uses_of_one_type_name, Less, 5.0, 2.0),
     // The one left is the stop, which is a flag by design: whoever asks for it waits for nobody. Of the nine before, four were no
     // such flags, but said that something was due, or took a pose; they are named so now.
     ("polled said-once flags", counts::flags_told_once, Less, 1.0, 0.0),
@@ -36,8 +36,8 @@ const ROWS: &[Row] = &[
     // By this count 49 where the target of 170 was set, of what were 192 then, lists of public fields among them.
     // Two more for one more command in the list of commands.
     // Six more for two families of drives that are simulated and decoded side by side, most of them rows of tables.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 48.0, 43.0),
-    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 9.0, 2.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 46.0, 43.0),
+    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 6.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
     // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 1,040 for films
@@ -50,7 +50,9 @@ const ROWS: &[Row] = &[
     // 290 for one list of controllers and lanes that are led ahead; 300 for the reel of a day and the film's figures; 4,550 for the messages of two
     // families of drives, read and written, and virtual units of both; 2,200 for the host's end of a SilverMax line, and 180 for homing by it;
     // 2,510 for drives in the service and in its status, pictures of cues and recordings of plays.
-    ("lines of code", counts::lines_of_code, Less, 75_650.0, 39_800.0),
+    // 280 for SIXpack 2 seats in plays and in the service, which were not noted then; 520 for recordings of the service and what acks come to in
+    // them; 260 for faults by chance of both families; one stream for both took as much away as its seam added.
+    ("lines of code", counts::lines_of_code, Less, 76_604.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     ("public items and fields", counts::public_items, Less, 1_209.0, 400.0),
