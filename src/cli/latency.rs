@@ -122,7 +122,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 /// The controllers that the arguments name.
 fn configuration(args: &Args) -> Result<Config, Failure> {
     if let Some(path) = &args.config {
-        return load::playable(path);
+        return load::without_drives(path);
     }
     let says_axes = |to: &str| to.split(',').any(|part| part.trim_start().starts_with("axes="));
     let with_axes = |to: &String| if says_axes(to) { to.clone() } else { format!("{to},{AXES}") };

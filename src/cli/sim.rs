@@ -12,6 +12,7 @@ use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use control::{CarryOut, Control};
+pub(super) use tty::Drives;
 
 use super::print::{self, tell};
 use super::{Exit, Failure, OrExit as _};
@@ -164,7 +165,7 @@ pub(super) struct Args {
 
 /// A family of controllers, or of serial drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum SimFamily {
+pub(super) enum SimFamily {
     Smc,
     Mbox,
     Silvermax,

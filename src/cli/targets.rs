@@ -67,7 +67,7 @@ impl TargetArgs {
     pub(super) fn resolve(&self, names: &[String]) -> Result<Targets, Failure> {
         // Without a cue nothing limits the axes but the protocol.
         let meant = self.meant(names, MAX_AXES)?;
-        Config { controllers: meant.on_links, ..meant.config }.playable().or_exit(Exit::Config)?;
+        Config { controllers: meant.on_links, ..meant.config }.without_drives().or_exit(Exit::Config)?;
         Ok(meant.on_network)
     }
 

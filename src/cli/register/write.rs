@@ -153,7 +153,7 @@ fn from_file(
     targets: &Targets,
 ) -> Result<Vec<Vec<Assignment>>, Failure> {
     let file = diff::load(path)?;
-    let saved = diff::matched(&file, targets, None).with_context(|| path.display().to_string());
+    let saved = diff::matched(&file.controllers, targets, None).with_context(|| path.display().to_string());
     let saved = saved.or_exit(Exit::Usage)?;
     let writable = |address: Address, dialect: Dialect| {
         let register = table().get(address);

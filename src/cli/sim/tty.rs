@@ -44,7 +44,7 @@ impl TtyArgs {
 }
 
 /// Drives that can be run on a line: what happens to them in words, and what became of them.
-pub(super) trait Drives: Bus + Send + Sized + 'static {
+pub(in crate::cli) trait Drives: Bus + Send + Sized + 'static {
     /// Bits of an octet with start and stop.
     const BITS: u32;
     /// The number of a unit that nobody gave one.

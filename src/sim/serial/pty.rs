@@ -12,6 +12,7 @@ use super::{Bus, SerialLine};
 use crate::plain;
 use crate::sim::thread::SimThread;
 use crate::sys::clock::Monotonic;
+use crate::sys::realtime;
 use crate::sys::serial::pty::Pty;
 use crate::time::{Clock as _, MonoTime};
 
@@ -91,7 +92,12 @@ impl<B: Bus + Send + 'static> PtyLoop<B> {
         let running = LineRunning { line, plug: Plug::new(path)?, orders, script: script.into() };
         let ending = sender.clone();
         let stop = move || drop(ending.send(LineOrder::Stop));
-        let thread = SimThread::spawn(move || running.run(), stop).map_err(PtyError::System)?;
+        let run = move || {
+            // Drives answer in their time however busy this machine is.
+            let _ = realtime::request_below(realtime::PRIORITY);
+            running.run()
+        };
+        let thread = SimThread::spawn(run, stop).map_err(PtyError::System)?;
         Ok(Self { remote: LineRemote(sender), thread })
     }
 }
