@@ -40,6 +40,7 @@ mod time;
 pub mod wire;
 
 mod channel;
+mod container;
 pub mod cue;
 mod timeline;
 

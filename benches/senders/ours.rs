@@ -12,7 +12,7 @@ use kinocue::harness::drive::Lane;
 use kinocue::harness::motion::MAX_AXES;
 use kinocue::harness::net::{DrainGrid, Ports, Sender};
 use kinocue::harness::rt::{
-    Accounts, AckLoop, Conductor, Live, MailEnds, Places, PlanLoop, Planning, TickLoop, mailboxes,
+    Accounts, AckLoop, Conductor, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, TickLoop, mailboxes,
 };
 use kinocue::harness::sys::clock::{Monotonic, thread_cpu_time};
 use kinocue::harness::sys::realtime::{RealTime, normal_priority, request};
@@ -37,6 +37,17 @@ struct Run {
 
 /// Plays a ride of that many seconds on that clock; `silent` asks for no replies.
 pub(crate) fn run(clock: &impl Clock, seconds: u32, to: &[SocketAddrV4], silent: bool) -> Outcome {
+    run_into(clock, seconds, to, silent, |sender, _| sender)
+}
+
+/// The same through what `sink` makes of the sockets.
+pub(crate) fn run_into<S: FrameSink>(
+    clock: &impl Clock,
+    seconds: u32,
+    to: &[SocketAddrV4],
+    silent: bool,
+    sink: impl FnOnce(Sender, &mut AckLoop) -> S,
+) -> Outcome {
     let (staged, watched) = stage(ride(seconds, 0.0, &[]), 1000.0, to, silent);
     let rate = staged.show.rate;
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
@@ -46,6 +57,7 @@ pub(crate) fn run(clock: &impl Clock, seconds: u32, to: &[SocketAddrV4], silent:
     let MailEnds { sent, ticks, tasks, answers, .. } = ends;
     let mut acks = AckLoop::new(receiver, watched, u32::from(!silent), sent, ticks);
     acks.tell(Arc::clone(&live));
+    let sink = sink(sender, &mut acks);
     let desk = staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
     let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
@@ -56,18 +68,8 @@ pub(crate) fn run(clock: &impl Clock, seconds: u32, to: &[SocketAddrV4], silent:
     let grid = TickGrid::new(origin, rate);
     let drains = if silent { DrainGrid::rare } else { DrainGrid::new }(origin, rate.period());
     let never = AtomicBool::new(false);
-    let tick_loop = TickLoop {
-        clock,
-        grid,
-        engine,
-        conductor,
-        lanes,
-        places,
-        sink: sender,
-        mail,
-        desk: &desk,
-        leave: &never,
-    };
+    let tick_loop =
+        TickLoop { clock, grid, engine, conductor, lanes, places, sink, mail, desk: &desk, leave: &never };
     outcome(to.len(), run_threads(tick_loop, acks, plans, drains))
 }
 
@@ -78,8 +80,8 @@ pub(crate) fn stand_at_park(live: &Live, lanes: usize, at: MonoTime) {
 }
 
 /// The calling thread becomes the tick thread, once the others have been started.
-fn run_threads<C: Clock>(
-    mut tick_loop: TickLoop<'_, C, Sender>,
+fn run_threads<C: Clock, S: FrameSink>(
+    mut tick_loop: TickLoop<'_, C, S>,
     acks: AckLoop,
     mut plans: PlanLoop,
     drains: DrainGrid,

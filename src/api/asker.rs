@@ -68,6 +68,11 @@ impl Asker {
         self.least(Role::Engineer, "changing the library")
     }
 
+    /// True if they are an engineer; `what` needs one.
+    pub(super) fn least_engineer(&self, what: &str) -> Result<(), Problem> {
+        self.least(Role::Engineer, what)
+    }
+
     /// Over TCP arming needs an engineer: whoever arms sees the seats.
     fn allow(&self, ask: &Command) -> Result<(), Problem> {
         let local = self.who.surface == Surface::Socket;

@@ -36,6 +36,7 @@ mod peer;
 mod pieces;
 mod playlist;
 mod problem;
+mod recordings;
 mod reports;
 mod rest;
 mod routes;
@@ -83,6 +84,8 @@ pub struct Setup {
     pub playlists: Shelf,
     /// The folder of the journal.
     pub journal: PathBuf,
+    /// The folder of recordings.
+    pub recordings: PathBuf,
     /// The console.
     pub pages: Pages,
     /// Where it is said who was turned away.
@@ -155,7 +158,7 @@ impl Running {
 /// # Errors
 /// [`ApiError`] where a socket or a port cannot be had; nothing is served then.
 pub fn start(setup: Setup) -> Result<Running, ApiError> {
-    let Setup { config, socket, handle, library, playlists, journal, pages, log } = setup;
+    let Setup { config, socket, handle, library, playlists, journal, recordings, pages, log } = setup;
     let (local, file) = socket::unix(&socket)?;
     let (tcp, addresses) = ports(&config.listen)?;
     let (closing, closed) = watch::channel(false);
@@ -174,6 +177,7 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         library,
         shelf: playlists,
         journal,
+        recordings,
         pages,
         log: log.clone(),
         pulse: Pulse::default(),

@@ -14,7 +14,7 @@ use utoipa_axum::routes;
 
 use super::problem::{PROBLEM_JSON, ProblemBody};
 use super::shared::Shared;
-use super::{controllers, cues, gate, playlist, reports, service, settings, show, status};
+use super::{controllers, cues, gate, playlist, recordings, reports, service, settings, show, status};
 use crate::control::Code;
 
 /// What can be said of the whole.
@@ -69,7 +69,11 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(cues::all))
         .routes(routes!(cues::one, cues::upload))
         .routes(routes!(cues::curve))
-        .routes(routes!(reports::one));
+        .routes(routes!(reports::one))
+        .routes(routes!(recordings::all))
+        .routes(routes!(recordings::one, recordings::remove))
+        .routes(routes!(recordings::mark))
+        .routes(routes!(recordings::dump));
     let (router, document) = router.split_for_parts();
     (router.fallback(service::page).method_not_allowed_fallback(service::wrong_method), completed(document))
 }
@@ -103,7 +107,7 @@ fn describe(path: &mut PathItem) {
         ];
         operation.parameters.get_or_insert_default().extend(headers.map(RefOr::T));
     });
-    [&mut path.get, &mut path.post, &mut path.put].into_iter().flatten().for_each(may_fail);
+    [&mut path.get, &mut path.post, &mut path.put, &mut path.delete].into_iter().flatten().for_each(may_fail);
 }
 
 fn may_fail(operation: &mut Operation) {

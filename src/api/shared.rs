@@ -56,6 +56,8 @@ pub(super) struct Shared {
     pub(super) shelf: Shelf,
     /// The folder of the journal.
     pub(super) journal: PathBuf,
+    /// The folder of recordings.
+    pub(super) recordings: PathBuf,
     /// The console.
     pub(super) pages: Pages,
     /// Where it is said who was turned away.

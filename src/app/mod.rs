@@ -5,6 +5,7 @@ pub(crate) mod film;
 mod helpers;
 mod play;
 pub(crate) mod player;
+pub(crate) mod recorder;
 mod recording;
 mod refused;
 mod report;

@@ -18,7 +18,7 @@ use crate::engine::{Ending, Show};
 use crate::film::chase::ChaseRules;
 use crate::film::point::PublishedPoint;
 use crate::proof::{self, Digest, Proof, Terms};
-use crate::record::About as Recorded;
+use crate::record::{About as Recorded, Mode};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock as _, Rate};
 use crate::timeline::Timeline;
@@ -100,7 +100,7 @@ impl Play {
     ///
     /// # Errors
     /// Where the file cannot be begun.
-    pub(crate) fn recorded(mut self, path: &Path) -> io::Result<Self> {
+    pub(crate) fn recorded(mut self, path: &Path, mode: Mode) -> io::Result<Self> {
         let Self { runtime, staged, .. } = &mut self;
         let (config, cue) = (Arc::clone(runtime.config()), staged.timeline.cue());
         let about = Recorded {
@@ -109,6 +109,7 @@ impl Play {
             title: cue.title().unwrap_or_default().to_owned(),
             cue_sha256: Digest::of(cue).to_string(),
             rate_hz: staged.show.rate.hz(),
+            mode,
             clocks: (Monotonic.now(), wall_now_ns()),
         };
         let seats = recording::seats(&config, &staged.lanes);

@@ -9,9 +9,9 @@ use std::thread::{Builder, JoinHandle};
 use mcap::{McapError, McapResult};
 
 use super::PlayReport;
-use crate::config::{Config, Connection};
+use crate::config::{Config, Connection, Controller};
 use crate::drive::Lane;
-use crate::record::{About, FrameKind, Intake, RecordedSeat, Recorder, Recording, SAMPLE_HZ, Taps};
+use crate::record::{About, FrameKind, Intake, Mode, RecordedSeat, Recorder, Recording, SAMPLE_HZ, Taps};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::Rate;
@@ -45,6 +45,7 @@ impl PlayRecording {
         let out = BufWriter::new(File::create_new(&part)?);
         let file = Recording::begin(out, about, &seats).map_err(in_io)?;
         let (taps, intake) = Intake::new(seats, rate, SAMPLE_HZ);
+        let intake = if about.mode == Mode::Full { intake.in_full() } else { intake };
         let recorder = Recorder::new(intake, file);
         let thread = Builder::new().name("recorder".to_owned()).spawn(move || {
             realtime::stand_back();
@@ -73,7 +74,7 @@ impl PlayRecording {
     }
 }
 
-fn in_io(error: McapError) -> io::Error {
+pub(super) fn in_io(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,
         // It words a write that failed inside a record as one that cannot be parsed; below it is what the system said.
@@ -87,8 +88,12 @@ pub(super) fn seats(config: &Config, lanes: &[Lane]) -> Vec<RecordedSeat> {
         Connection::Udp(station) => FrameKind::Datagram(station.vibration_port),
         Connection::Link(_) => FrameKind::Pose,
     };
-    let controllers = config.controllers.iter().zip(lanes);
-    controllers
-        .map(|(one, lane)| RecordedSeat::new(&one.name, &lane.window, frames(&one.connection)))
-        .collect()
+    let seat = |(one, lane): (&Controller, &Lane)| {
+        let seat = RecordedSeat::new(&one.name, &lane.window, frames(&one.connection));
+        match &one.connection {
+            Connection::Udp(station) => seat.at(station.address.to_string()),
+            Connection::Link(_) => seat,
+        }
+    };
+    config.controllers.iter().zip(lanes).map(seat).collect()
 }

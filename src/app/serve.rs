@@ -17,6 +17,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use super::film::HallFilm;
+use super::recorder::{HallRecorder, RecordLink, RecordPlaces};
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
 use super::sum_up::{Played, SumUp, sum_up};
@@ -193,7 +194,20 @@ fn serve_halls(
     let service_log = ServiceLog::new(log.clone());
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let carryover = Carryover::of(kept);
-    let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
+    let record_places = RecordPlaces {
+        runtime: places.sockets.control.parent().map(Path::to_owned).unwrap_or_default(),
+        recordings: config.record.folder(&places.state),
+        config: places.config.clone(),
+    };
+    let surfaces = Surfaces::open(
+        &config,
+        &places.sockets,
+        &handle,
+        library.clone(),
+        record_places.recordings.clone(),
+        pages,
+        &log,
+    )?;
     let mut ports = SupervisorPorts {
         inbox,
         source,
@@ -206,6 +220,7 @@ fn serve_halls(
         film: None,
         player: None,
         osc: surfaces.osc_counts(),
+        recorder: RecordLink::default(),
     };
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
@@ -214,7 +229,10 @@ fn serve_halls(
     let mut feeder = None;
     let served = loop {
         (ports.film, ports.player) = (film.table(), film.player());
+        let recorder = HallRecorder::start(&mut runtime, &record_places);
+        ports.recorder = recorder.link();
         let left = keep(runtime, ports, library.clone(), journal, &mut feeder)?;
+        recorder.end();
         (ports, journal) = (left.ports, left.journal);
         let Some(next) = left.reload else {
             break Served { config, closed: left.closed, ended: left.ended };

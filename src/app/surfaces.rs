@@ -65,6 +65,7 @@ impl Surfaces {
         sockets: &Sockets,
         handle: &Handle,
         library: Library,
+        recordings: PathBuf,
         pages: Pages,
         log: &Log,
     ) -> Result<Self, SurfaceError> {
@@ -76,6 +77,7 @@ impl Surfaces {
             library,
             playlists: Shelf::new(&config.playlists()),
             journal: config.log.dir.clone(),
+            recordings,
             pages,
             log: log.clone(),
         })?;

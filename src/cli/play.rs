@@ -20,6 +20,7 @@ use crate::drive::Manner;
 use crate::engine::Show;
 use crate::film::source::{ClockStart, FilmArgs, FilmSource};
 use crate::health::ACKS_OFF;
+use crate::record::Mode;
 use crate::sys::{signal, terminal};
 use crate::time::{Rate, ShowTime, parse_time};
 use crate::timeline::Timeline;
@@ -99,6 +100,9 @@ pub(super) struct Args {
     /// Record the play to an MCAP file that is not there yet: 20 times a second where each seat was asked to be, and was sent.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// How much is recorded: samples, each the worst of its twentieth of a second, or every tick and frame beside them.
+    #[arg(long, value_enum, value_name = "MODE", requires = "record", default_value_t)]
+    record_mode: Mode,
     /// Print the report as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -163,7 +167,10 @@ fn play(
     };
     let mut play = play.map_err(|error| refused(error, &cue))?;
     if let Some(file) = &args.record {
-        play = play.recorded(file).with_context(|| file.display().to_string()).or_exit(Exit::Io)?;
+        play = play
+            .recorded(file, args.record_mode)
+            .with_context(|| file.display().to_string())
+            .or_exit(Exit::Io)?;
     }
     let control = play.control();
     let ctrl_c =

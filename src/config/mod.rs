@@ -27,6 +27,7 @@ mod log;
 mod osc;
 mod preset;
 mod read;
+mod record;
 mod seat;
 mod section;
 mod site;
@@ -52,6 +53,7 @@ pub(crate) use link::Link;
 pub(crate) use log::Log;
 pub(crate) use osc::OscPort;
 pub(crate) use preset::Preset;
+pub(crate) use record::{Record, RecordMode};
 pub(crate) use section::{Entry, Section, did_you_mean};
 pub(crate) use sync::FilmSync;
 pub use target::from_to_args;
@@ -80,6 +82,8 @@ pub struct Config {
     pub(crate) store: Store,
     /// Where the journal is kept, and how much of it.
     pub(crate) log: Log,
+    /// What is recorded, and how much of it is kept.
+    pub(crate) record: Record,
     /// The controllers that take part, at least one: those on the network in the order of the file, then those on links likewise. A
     /// lane has the place of its controller.
     pub controllers: Vec<Controller>,

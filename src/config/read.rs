@@ -22,6 +22,7 @@ use super::link::{LinkEntry, links};
 use super::log::log;
 use super::osc::osc;
 use super::preset::presets;
+use super::record::record;
 use super::seat::seats;
 use super::section::{Entry, Section, did_you_mean};
 use super::site::{Site, inputs_up_to, seat_of};
@@ -29,7 +30,8 @@ use super::sync::{FilmSync, sync};
 use super::text::text;
 use super::{
     Absent, Accept, Api, Belts, Config, Connection, Controller, Dialect, Effect, FanOut, Log, LossPolicy,
-    MAX_FILE_LEN, Show, Station, Store, Timing, VibrationPort, check_effect_name, check_peer, check_window,
+    MAX_FILE_LEN, Record, Show, Station, Store, Timing, VibrationPort, check_effect_name, check_peer,
+    check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] bytes.
@@ -77,7 +79,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let mut section = Section::new("the file", 0, table, faults);
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
-    let [api_at, link_at] = ["api", "link"].map(|key| section.get(key));
+    let [api_at, link_at, record_at] = ["api", "link", "record"].map(|key| section.get(key));
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
@@ -91,6 +93,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let presets = preset_at.map_or_else(Vec::new, |entry| presets(entry, &effects, faults));
     let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, faults));
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
+    let record = record_at.map_or_else(|| Some(Record::default()), |entry| record(entry, faults));
     let stated = Stated { show: show_at, seat: seat_at, controller: controller_at, link: link_at };
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let (controllers, absent, links) = stated.controllers(&site, faults);
@@ -109,6 +112,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         presets,
         store: store?,
         log: log?,
+        record: record?,
         controllers,
         absent,
         links,

@@ -8,7 +8,7 @@ use crate::motion::{MAX_AXES, SeatType};
 
 use super::section::did_you_mean;
 use super::{
-    Accept, Api, Config, Connection, Controller, Dialect, Effect, FanOut, Log, Show, Station, Store,
+    Accept, Api, Config, Connection, Controller, Dialect, Effect, FanOut, Log, Record, Show, Station, Store,
     VibrationPort, check_effect_name, check_peer, check_window,
 };
 
@@ -92,6 +92,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         presets: Vec::new(),
         store: Store::default(),
         log: Log::default(),
+        record: Record::default(),
         controllers,
         absent: Vec::new(),
         links: Vec::new(),

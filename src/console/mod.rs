@@ -51,6 +51,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/marks.js" JS,
     "js/playlist.js" JS,
     "js/press.js" JS,
+    "js/recordings.js" JS,
     "js/reports.js" JS,
     "js/sources.js" JS,
     "js/state.js" JS,

@@ -82,6 +82,13 @@ pub enum Command {
     },
     /// Read the configuration anew.
     Reload,
+    /// Mark this moment in what is recorded, and keep what was before and after it.
+    Mark {
+        /// What was seen, in words.
+        text: Option<String>,
+    },
+    /// Write out what the flight recorder holds.
+    Dump,
 }
 
 /// How much of a cue the seats make.
@@ -151,6 +158,8 @@ impl Command {
             Self::Preflight => ("preflight", Operate, LASTS, None),
             Self::Test { .. } => ("test", Engineer, STALE, None),
             Self::Reload => ("reload", Engineer, LASTS, None),
+            Self::Mark { .. } => ("mark", Operate, LASTS, None),
+            Self::Dump => ("dump", Operate, LASTS, None),
         }
     }
 
@@ -206,6 +215,7 @@ impl fmt::Display for Command {
                 write!(f, " {name}")
             }
             Self::Disable { name, why: Some(why) } => write!(f, " {name}: {}", why.escape_debug()),
+            Self::Mark { text: Some(text) } => write!(f, " {}", text.escape_debug()),
             Self::Arm { seats_empty: true } => f.write_str(" with empty seats"),
             Self::Test { rows } if rows.is_empty() => f.write_str(" all rows"),
             Self::Test { rows } => write!(f, " rows {}", rows.join(", ")),

@@ -8,6 +8,7 @@ mod links;
 pub(crate) mod model;
 mod places;
 mod problem;
+mod recordings;
 mod status;
 mod who;
 
@@ -21,9 +22,10 @@ pub use model::Health;
 pub(crate) use model::{Histogram, Percentiles, Severity, Then, Times};
 pub(crate) use places::{Place, Places, network};
 pub use problem::{Code, Problem};
+pub(crate) use recordings::is_recording;
 pub use status::{ControllerStatus, JournalLine, Status};
 pub(crate) use status::{
     EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, PlaylistStatus,
-    PreflightStatus, RealTimeStatus, ShowStatus, TestRow, TestStatus, Warning,
+    PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus, TestRow, TestStatus, Warning,
 };
 pub use who::{Surface, Who};

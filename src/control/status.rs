@@ -85,6 +85,9 @@ pub struct Status {
     pub test: Option<TestStatus>,
     /// What a person should know, gravest first.
     pub warnings: Vec<Warning>,
+    /// What is recorded; left out where nothing is.
+    #[serde(skip_serializing_if = "RecordStatus::is_nothing")]
+    pub record: RecordStatus,
     /// The newest lines of the journal, newest first, at most 20.
     pub journal: Vec<JournalLine>,
 }
@@ -129,6 +132,44 @@ impl From<&Status> for HallFacts {
             next: status.next.clone(),
             position_s: status.show.as_ref().map(|show| show.position_s),
         }
+    }
+}
+
+/// What is recorded, since the hall was opened with its configuration.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub struct RecordStatus {
+    /// How much of shows is kept: `off`, `sampled` or `full`.
+    pub(crate) mode: String,
+    /// The file that is being written of a show; null if there is none.
+    pub(crate) recording: Option<String>,
+    /// The file that was whole last; null if there is none yet.
+    pub(crate) last: Option<String>,
+    /// How far back the flight recorder reaches, s; 0 if there is none.
+    pub(crate) flight_s: f64,
+    /// Bytes of all files that were closed.
+    pub(crate) bytes: u64,
+    /// Bytes that are free on the disk of recordings.
+    pub(crate) free_bytes: u64,
+    /// Ticks that were not recorded.
+    pub(crate) dropped_ticks: u64,
+    /// Records of replies that were not recorded.
+    pub(crate) dropped_records: u64,
+    /// Events and commands that were not recorded.
+    pub(crate) dropped_notes: u64,
+    /// Incidents by what they are of; what joined one that was under way is counted, too.
+    pub(crate) incidents: BTreeMap<String, u64>,
+    /// Moments that were marked.
+    pub(crate) marks: u64,
+    /// How often something could not be written.
+    pub(crate) errors: u64,
+    /// What is wrong, and what to do; null if all is well.
+    pub(crate) trouble: Option<String>,
+}
+
+impl RecordStatus {
+    fn is_nothing(&self) -> bool {
+        *self == Self::default()
     }
 }
 

@@ -38,6 +38,7 @@ pub(crate) use tracks::{Tracks, Vibration};
 pub(crate) use unit::{DeclaredUnit, Interpolation, Unit, Units, UnknownInterpolation};
 
 use crate::channel::{ChannelId, Sample};
+use crate::container::MAGIC;
 use crate::plain;
 use crate::sys;
 use crate::time::ShowTime;
@@ -338,17 +339,17 @@ fn title_of(text: &str) -> String {
 /// True if a file that begins so is MCAP.
 #[must_use]
 pub(crate) fn is_mcap(front: &[u8]) -> bool {
-    front.starts_with(mcap::MAGIC)
+    front.starts_with(MAGIC)
 }
 
 /// Reads a cue of our own: the content says whether it is MCAP, and a name in `.mcap` that it should be.
 fn read_native(path: &Path, mut input: impl Read) -> Result<Cue, CueFaults> {
     let mut front = Vec::new();
-    if let Err(error) = input.by_ref().take(mcap::MAGIC.len() as u64).read_to_end(&mut front) {
+    if let Err(error) = input.by_ref().take(MAGIC.len() as u64).read_to_end(&mut front) {
         return Err(CueFaults::one(path, Problem::Unread(error.to_string())));
     }
     let named_so = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
-    let begins_so = front == mcap::MAGIC;
+    let begins_so = front == MAGIC;
     let input = front.as_slice().chain(input);
     if named_so || begins_so { mcap::read(path, input) } else { csv::read(path, input) }
 }

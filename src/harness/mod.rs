@@ -10,6 +10,7 @@
 pub mod asked;
 mod hall;
 mod played;
+pub mod recording;
 mod ride;
 mod rooms;
 pub(crate) mod shown;

@@ -14,6 +14,7 @@ use crate::control::{self, Status};
 mod controllers;
 mod film;
 mod links;
+mod record;
 mod shows;
 #[cfg(test)]
 mod tests;
@@ -38,6 +39,7 @@ fn families(status: &Status) -> Vec<MetricFamily> {
     let mut families = shows::families(status);
     families.extend(controllers::families(&status.controllers));
     families.extend(links::families(&status.links));
+    families.extend(record::families(&status.record));
     families.extend(status.film.iter().flat_map(film::families));
     families
 }

@@ -4,8 +4,8 @@ use super::*;
 use crate::control::model::FrameCounts;
 use crate::control::{
     ControllerStatus, FilmDisagreement, FilmSourceStatus, FilmStatus, Health, Histogram, Levels,
-    LinkAxisStatus, LinkStatus, Percentiles, PreflightStatus, RealTimeStatus, Severity, ShowStatus, Times,
-    Warning,
+    LinkAxisStatus, LinkStatus, Percentiles, PreflightStatus, RealTimeStatus, RecordStatus, Severity,
+    ShowStatus, Times, Warning,
 };
 use crate::state::{PlayMode, State};
 
@@ -92,6 +92,12 @@ fn playing() -> Status {
     };
     Status {
         test: None,
+        record: RecordStatus {
+            mode: "sampled".to_owned(),
+            recording: Some("2026-01-31T19-00-00-show-storm.mcap".to_owned()),
+            incidents: [("mark".to_owned(), 2)].into(),
+            ..RecordStatus::default()
+        },
         hall: "1".to_owned(),
         format: 2,
         version: "9.9.9".to_owned(),

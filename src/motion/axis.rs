@@ -1,5 +1,7 @@
 //! One axis of a seat type: its range, its limits, and the way from fractions of the range to pulses.
 
+use serde::{Deserialize, Serialize};
+
 use super::{PulseRange, Pulses};
 
 /// The speed limit of a controller as it leaves the factory, turns a minute (PA07, IMAX manual 2.3.1).
@@ -12,11 +14,13 @@ const PARK_VELOCITY_MM_S: f64 = 50.0;
 const PARK_VELOCITY_DEG_S: f64 = 10.0;
 
 /// What the places of an axis are told in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum AxisUnit {
     /// A cylinder: millimetres.
+    #[serde(rename = "mm")]
     Millimetre,
     /// A rotary axis: degrees.
+    #[serde(rename = "deg")]
     Degree,
 }
 

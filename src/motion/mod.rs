@@ -12,6 +12,7 @@ pub use axis::AxisGeometry;
 pub(crate) use axis::AxisUnit;
 pub(crate) use brake::{AxisState, Brake};
 pub(crate) use halt::{Begun, Halt, Means};
+pub(crate) use measure::Reading;
 #[cfg(test)]
 pub(crate) use measure::Readings;
 pub use measure::{Measure, Spacing};

@@ -53,6 +53,7 @@ pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<OscOrder
         ["pause"] => taken.button(Command::Pause),
         ["resume"] => taken.button(Command::Resume),
         ["park"] => taken.button(Command::Park),
+        ["mark"] => taken.button(Command::Mark { text: None }),
         ["seek"] => taken.allowed(GearWord::Seek)?.seek(),
         ["trim"] => taken.allowed(GearWord::Trim)?.trim(),
         ["nudge"] => taken.allowed(GearWord::Trim)?.nudge(),

@@ -29,6 +29,16 @@ pub struct TickHead {
     pub(crate) state: State,
 }
 
+#[cfg(feature = "harness")]
+impl TickHead {
+    /// A tick on time, in the middle of a show.
+    #[must_use]
+    pub const fn of(index: u64, deadline: MonoTime) -> Self {
+        let state = State::Playing(crate::state::PlayMode::Following);
+        Self { index, deadline, late_ns: 0, missed: 0, film: ShowTime::ZERO, state }
+    }
+}
+
 /// What was asked of a lane before the limiter saw it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asked {
@@ -43,6 +53,13 @@ pub struct Asked {
 }
 
 impl Asked {
+    /// That pose of so many slots at full level.
+    #[cfg(feature = "harness")]
+    #[must_use]
+    pub const fn of(pose: Pose, slots: usize) -> Self {
+        Self { pose, slots, level: 1.0, clamps: 0 }
+    }
+
     /// Nothing: a frame that no tick asked for.
     pub(crate) const NOTHING: Self = Self { pose: [0.0; MAX_AXES], slots: 0, level: 0.0, clamps: 0 };
 }
@@ -59,7 +76,7 @@ pub(crate) enum Handed {
 }
 
 impl Handed {
-    const ALL: [Self; 3] = [Self::Taken, Self::TakenAfterRefusal, Self::Refused];
+    pub(super) const ALL: [Self; 3] = [Self::Taken, Self::TakenAfterRefusal, Self::Refused];
 }
 
 impl From<Delivery> for Handed {

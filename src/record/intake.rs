@@ -2,7 +2,12 @@
 
 use rtrb::Consumer;
 
-use super::{AckChunk, AckRecord, AckTap, Chunk, Message, RecordedSeat, Sampled, Tap, ack_tap, tap};
+use super::full::Block;
+use super::margins::Margins;
+use super::{
+    AckChunk, AckRecord, AckTap, Chunk, IncidentCause, Message, RecordedSeat, Sampled, Tap, Watchman,
+    ack_tap, tap,
+};
 use crate::time::{MonoTime, Rate};
 use crate::tracker::Fate;
 use crate::wire::ReplyCode;
@@ -34,8 +39,20 @@ pub(crate) struct Counts {
 }
 
 impl Counts {
+    /// What came since.
+    pub(crate) const fn since(&self, before: &Self) -> Self {
+        Self {
+            ticks: self.ticks - before.ticks,
+            frames: self.frames - before.frames,
+            dropped: self.dropped - before.dropped,
+            acked: self.acked - before.acked,
+            refused: self.refused - before.refused,
+            dropped_records: self.dropped_records - before.dropped_records,
+        }
+    }
+
     /// Each by its name in `kinocue.end`.
-    pub(crate) const fn named(&self) -> [(&'static str, u64); 6] {
+    pub(crate) fn named(&self) -> [(&'static str, String); 6] {
         let Self { ticks, frames, dropped, acked, refused, dropped_records } = *self;
         [
             ("ticks", ticks),
@@ -45,6 +62,7 @@ impl Counts {
             ("refused", refused),
             ("dropped_records", dropped_records),
         ]
+        .map(|(name, count)| (name, count.to_string()))
     }
 }
 
@@ -55,23 +73,64 @@ pub(crate) struct Intake {
     acks: Consumer<u8>,
     held: Vec<u8>,
     held_acks: Vec<u8>,
+    seats: Vec<RecordedSeat>,
     fold: Sampled,
+    margins: Margins,
+    /// What becomes blocks, where whole ticks are kept.
+    whole: Option<Whole>,
     counts: Counts,
+    watchman: Watchman,
+    found: Vec<(IncidentCause, MonoTime)>,
+}
+
+/// Ticks and drains of the half second that is not over.
+#[derive(Debug, Default)]
+struct Whole {
+    ticks: Block,
+    drains: Vec<u8>,
 }
 
 impl Intake {
     /// Taps of the lanes of these seats, in their order, and what takes from them and makes so many samples a second.
     pub(crate) fn new(seats: Vec<RecordedSeat>, rate: Rate, sample_hz: u32) -> (Taps, Self) {
+        let watchman = Watchman::new(seats.len(), rate.period());
         let ((ticks, of_ticks), (acks, of_acks)) = (tap(&seats, rate), ack_tap(seats.len(), rate));
         let intake = Self {
             ticks: of_ticks,
             acks: of_acks,
             held: Vec::new(),
             held_acks: Vec::new(),
-            fold: Sampled::new(seats, sample_hz),
+            margins: Margins::new(&seats, rate),
+            fold: Sampled::new(seats.clone(), sample_hz),
+            seats,
+            whole: None,
             counts: Counts::default(),
+            watchman,
+            found: Vec::new(),
         };
         (Taps { ticks, acks }, intake)
+    }
+
+    /// The same, which tells of every tick and drain beside the samples.
+    pub(crate) fn in_full(self) -> Self {
+        Self { whole: Some(Whole::default()), ..self }
+    }
+
+    /// What it came to so far, each by its name in `kinocue.end`: counts, and as JSON the most that each axis was sent to do.
+    pub(crate) fn end(&self) -> Vec<(&'static str, String)> {
+        self.end_since(&Counts::default())
+    }
+
+    /// The same of a file that was begun later, when so much had come through; the most is of all.
+    pub(crate) fn end_since(&self, before: &Counts) -> Vec<(&'static str, String)> {
+        let most = serde_json::to_string(&self.margins.most(&self.seats)).unwrap_or_default();
+        let counts = self.counts.since(before).named();
+        counts.into_iter().chain([("most", most)]).collect()
+    }
+
+    /// What was found since it was asked last that is worth an incident.
+    pub(crate) fn take_found(&mut self) -> Vec<(IncidentCause, MonoTime)> {
+        std::mem::take(&mut self.found)
     }
 
     /// True once the threads have let go of their ends. To be asked before they are emptied for the last time.
@@ -86,25 +145,74 @@ impl Intake {
 
     /// Takes all that is there, and tells of what is over by it.
     pub(crate) fn take(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
-        let Self { ticks, acks, held, held_acks, fold, counts } = self;
-        empty(acks, held_acks);
-        empty(ticks, held);
-        let mut drains = held_acks.as_slice();
-        let mut rest = held.as_slice();
+        let (mut held, mut held_acks) = (std::mem::take(&mut self.held), std::mem::take(&mut self.held_acks));
+        empty(&mut self.acks, &mut held_acks);
+        empty(&mut self.ticks, &mut held);
+        let (mut drains, mut rest) = (held_acks.as_slice(), held.as_slice());
+        if let Some(whole) = &mut self.whole {
+            whole.drains.extend_from_slice(&held_acks);
+        }
         while let Some((chunk, behind)) = Chunk::parse(rest) {
+            let octets = &rest[..rest.len() - behind.len()];
             rest = behind;
-            take_acks(&mut drains, Some(chunk.head.deadline), fold, counts);
+            self.take_acks(&mut drains, Some(chunk.head.deadline));
+            let Self { seats, fold, margins, whole, counts, watchman, found, .. } = self;
             counts.ticks += 1;
             counts.dropped += u64::from(chunk.dropped);
             counts.frames += chunk.frames().count() as u64;
+            watchman.look(&chunk, &mut |cause, at| found.push((cause, at)));
+            margins.take(&chunk, seats, &mut |_, _, _| ());
             fold.take(&chunk, tell);
+            if let Some(whole) = whole
+                && let Some((at, block)) = whole.ticks.add(&chunk, octets, seats)
+            {
+                whole.tell(at, block, tell);
+            }
         }
-        take_acks(&mut drains, None, fold, counts);
+        self.take_acks(&mut drains, None);
+        (self.held, self.held_acks) = (held, held_acks);
+    }
+
+    /// Takes the drains up to an instant, or all.
+    fn take_acks(&mut self, drains: &mut &[u8], until: Option<MonoTime>) {
+        let Self { fold, counts, watchman, found, .. } = self;
+        while let Some((chunk, behind)) = AckChunk::parse(drains) {
+            if chunk.drained.zip(until).is_some_and(|(drained, until)| drained > until) {
+                return;
+            }
+            *drains = behind;
+            counts.dropped_records += u64::from(chunk.dropped);
+            for record in chunk.records() {
+                match record {
+                    AckRecord::Fate(_, _, Fate::Answered(ReplyCode::Running), _) => counts.acked += 1,
+                    AckRecord::Fate(_, _, Fate::Answered(_), _) => counts.refused += 1,
+                    _ => {}
+                }
+            }
+            watchman.look_at_acks(&chunk, &mut |cause, at| found.push((cause, at)));
+            fold.take_acks(&chunk);
+        }
     }
 
     /// Tells of what is not over.
     pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
         self.fold.close(tell);
+        let Self { whole, seats, .. } = self;
+        if let Some(whole) = whole
+            && let Some((at, block)) = whole.ticks.close(seats)
+        {
+            whole.tell(at, block, tell);
+        }
+    }
+}
+
+impl Whole {
+    /// Tells of a block that began then, and of the drains so far.
+    fn tell(&mut self, at: MonoTime, block: Vec<u8>, tell: &mut impl FnMut(MonoTime, Message)) {
+        tell(at, Message::Ticks(block));
+        if !self.drains.is_empty() {
+            tell(at, Message::Drains(std::mem::take(&mut self.drains)));
+        }
     }
 }
 
@@ -112,23 +220,4 @@ impl Intake {
 fn empty(ring: &mut Consumer<u8>, held: &mut Vec<u8>) {
     held.resize(ring.slots(), 0);
     ring.pop_entire_slice(held).unwrap_or_default();
-}
-
-/// Takes the drains up to an instant, or all.
-fn take_acks(drains: &mut &[u8], until: Option<MonoTime>, fold: &mut Sampled, counts: &mut Counts) {
-    while let Some((chunk, behind)) = AckChunk::parse(drains) {
-        if chunk.drained.zip(until).is_some_and(|(drained, until)| drained > until) {
-            return;
-        }
-        *drains = behind;
-        counts.dropped_records += u64::from(chunk.dropped);
-        for record in chunk.records() {
-            match record {
-                AckRecord::Fate(_, _, Fate::Answered(ReplyCode::Running), _) => counts.acked += 1,
-                AckRecord::Fate(_, _, Fate::Answered(_), _) => counts.refused += 1,
-                _ => {}
-            }
-        }
-        fold.take_acks(&chunk);
-    }
 }

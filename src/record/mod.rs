@@ -2,16 +2,29 @@
 //!
 //! The tick thread copies what it asked for and what left, octet by octet, into a ring, one chunk a tick, all of it or nothing
 //! ([`Tap`]). A thread behind the ring takes chunks apart ([`Chunk`]), folds them into samples ([`Sampled`]) and writes these as MCAP
-//! ([`Recording`], `mcap.dev/spec`). It is told no time but that of the ticks.
+//! ([`Recording`], `mcap.dev/spec`), where it is asked for with every tick as it was (`full`). It is told no time but that of the
+//! ticks. [`read`] reads such files back.
 
 mod acks;
 mod chunk;
+mod columns;
 mod cursor;
+mod descriptors;
+mod flight;
+mod full;
+mod incidents;
 mod intake;
+mod margins;
+mod notes;
+mod read;
+#[cfg(test)]
+mod reading_tests;
 mod recorder;
 mod recording;
+mod recover;
 mod sampled;
 mod seat;
+mod summary;
 mod tap;
 #[cfg(test)]
 mod tests;
@@ -20,10 +33,23 @@ pub(crate) use acks::{AckChunk, AckRecord, AckStanding, latency_ns};
 pub use acks::{AckTap, ack_tap};
 pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
-pub(crate) use intake::{Intake, Taps};
-
+#[cfg(feature = "harness")]
+pub(crate) use chunk::{Handed, SentFrame};
+pub(crate) use flight::{Entry, Flight, read as read_flight};
+pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
+pub(crate) use intake::{Counts, Intake, Taps};
+pub(crate) use margins::{Margin, Margins, Quantity};
+pub(crate) use notes::{ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote};
+#[cfg(any(test, feature = "harness"))]
+pub(crate) use read::Told;
+pub(crate) use read::{Contents, ReadError, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;
-pub(crate) use recording::{About, Recording, SAMPLE_HZ};
+pub(crate) use recording::{About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ, state_number};
+pub(crate) use recover::{RecoverError, Recovered, recover};
 pub(crate) use sampled::{Message, Sampled};
 pub use seat::{FrameKind, RecordedSeat};
+#[cfg(test)]
+pub(crate) use summary::each_chunk;
+pub(crate) use summary::{Summary, summarize};
+pub(crate) use tap::octets_a_second;
 pub use tap::{Tap, tap};

@@ -73,7 +73,7 @@ impl<W: Write + Seek> Recorder<W> {
         let mut result = Ok(());
         self.intake.close(&mut writer(&mut self.file, &mut result));
         result?;
-        self.file.finish(&self.intake.counts().named(), report)
+        self.file.finish(&self.intake.end(), report)
     }
 }
 

@@ -4,19 +4,49 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
+use mcap::{Attachment, Compression, McapResult, WriteOptions, Writer};
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::acks::standing_words;
+use super::descriptors::descriptors;
+use super::flight::Entry;
+use super::full::packed;
+use super::notes::topics;
 use super::{Message, RecordedSeat};
-use crate::motion::AxisUnit;
 use crate::state::State;
 use crate::time::MonoTime;
 
 /// The version of topics, messages and metadata.
-const VERSION: &str = "1";
+pub(super) const VERSION: &str = "1";
+/// The topic of whole ticks.
+pub(super) const SENT: &str = "/full/sent";
+/// That of what the ack thread took.
+pub(super) const ACKS: &str = "/full/acks";
 /// Samples a second of each seat.
 pub(crate) const SAMPLE_HZ: u32 = 20;
+/// Topics of notes.
+const NOTE_TOPICS: usize = 6;
+
+/// How much is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub(crate) enum Mode {
+    /// Samples, each the worst of its window.
+    #[default]
+    Sampled,
+    /// Samples, and every tick and frame.
+    Full,
+}
+
+impl Mode {
+    /// The word for it.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::Sampled => "sampled",
+            Self::Full => "full",
+        }
+    }
+}
 
 /// What a recording is of.
 #[derive(Debug, Clone)]
@@ -31,18 +61,125 @@ pub(crate) struct About {
     pub(crate) cue_sha256: String,
     /// Ticks a second.
     pub(crate) rate_hz: f64,
+    /// How much of it is kept.
+    pub(crate) mode: Mode,
     /// One instant on both clocks: monotonic, and wall in nanoseconds since 1970.
     pub(crate) clocks: (MonoTime, u64),
+}
+
+/// What a file begins with: whoever has it can write what was folded for it, and needs to know nothing else.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Opening {
+    /// The metadata record `kinocue`.
+    pub(crate) metadata: BTreeMap<String, String>,
+    /// Each with its name, its encoding and its octets.
+    schemas: Vec<(String, String, Vec<u8>)>,
+    /// Each with its topic, the place of its schema, and the encoding of its messages.
+    channels: Vec<(String, usize, String)>,
+}
+
+impl Opening {
+    /// That of a recording of these seats.
+    pub(crate) fn new(about: &About, seats: &[RecordedSeat]) -> Self {
+        let mut opening = Self { metadata: first(about, seats), schemas: Vec::new(), channels: Vec::new() };
+        let of_seat = opening.schema(&schema_of_seat());
+        for seat in seats {
+            opening.channels.push((format!("/seat/{}", seat.name), of_seat, "json".to_owned()));
+        }
+        for (topic, schema) in [("/tick", schema_of_tick())].iter().chain(&topics()) {
+            let schema = opening.schema(schema);
+            opening.channels.push(((*topic).to_owned(), schema, "json".to_owned()));
+        }
+        if about.mode == Mode::Full {
+            for (topic, name) in [(SENT, "kinocue.Sent"), (ACKS, "kinocue.Acks")] {
+                opening.schemas.push((name.to_owned(), "protobuf".to_owned(), descriptors()));
+                let schema = opening.schemas.len() - 1;
+                opening.channels.push((topic.to_owned(), schema, "protobuf".to_owned()));
+            }
+        }
+        opening
+    }
+
+    fn schema(&mut self, schema: &Value) -> usize {
+        let name = schema["title"].as_str().unwrap_or_default().to_owned();
+        self.schemas.push((name, "jsonschema".to_owned(), schema.to_string().into_bytes()));
+        self.schemas.len() - 1
+    }
+
+    /// The same of samples alone.
+    pub(crate) fn sampled(mut self) -> Self {
+        self.channels.retain(|(topic, ..)| ![SENT, ACKS].contains(&topic.as_str()));
+        self.with("mode", Mode::Sampled.word())
+    }
+
+    /// Octets from which it is read back.
+    pub(crate) fn to_octets(&self) -> Vec<u8> {
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+
+    /// From these octets; `None` where they are of no opening.
+    pub(crate) fn of_octets(octets: &[u8]) -> Option<Self> {
+        serde_json::from_slice(octets).ok()
+    }
+
+    /// The same of a part, or of something else.
+    pub(crate) fn with(mut self, key: &str, value: impl Into<String>) -> Self {
+        self.metadata.insert(key.to_owned(), value.into());
+        self
+    }
+}
+
+/// Makes messages of what was folded.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EntryMaker {
+    seats: usize,
+    clocks: (MonoTime, u64),
+}
+
+impl EntryMaker {
+    /// One of so many seats; `clocks` is one instant on both clocks, as [`About`] has it.
+    pub(crate) const fn new(seats: usize, clocks: (MonoTime, u64)) -> Self {
+        Self { seats, clocks }
+    }
+
+    /// The wall clock's time of an instant, ns since 1970.
+    pub(crate) const fn wall(&self, at: MonoTime) -> u64 {
+        let (origin, wall) = self.clocks;
+        wall.saturating_add(at.as_nanos()).saturating_sub(origin.as_nanos())
+    }
+
+    /// A message as it stands in files.
+    ///
+    /// # Errors
+    /// Where a figure is none.
+    pub(crate) fn entry(&self, at: MonoTime, message: &Message) -> serde_json::Result<Entry> {
+        let (channel, data) = match message {
+            Message::Seat(lane, sample) => (*lane, serde_json::to_vec(sample)?),
+            Message::Tick(sample) => (self.seats, serde_json::to_vec(sample)?),
+            Message::State(state) => {
+                (self.seats + 1, serde_json::to_vec(&json!({"state": state_number(*state)}))?)
+            }
+            Message::Note(note) => (self.seats + 1 + note.topic(), note.json()?),
+            Message::Ticks(block) => (self.seats + 1 + NOTE_TOPICS, block.clone()),
+            Message::Drains(drains) => (self.seats + 2 + NOTE_TOPICS, packed(drains)),
+        };
+        let channel = u16::try_from(channel).unwrap_or(u16::MAX);
+        Ok(Entry { channel, log_time: self.wall(at), data })
+    }
+
+    /// True if a channel has every tick and every reply, not samples.
+    pub(crate) const fn is_full(&self, channel: u16) -> bool {
+        channel as usize > self.seats + NOTE_TOPICS
+    }
 }
 
 /// A file that is being written.
 pub(crate) struct Recording<W: Write + Seek> {
     writer: Writer<W>,
-    clocks: (MonoTime, u64),
-    seats: Vec<u16>,
-    ticks: u16,
-    hall: u16,
+    channels: Vec<u16>,
+    maker: EntryMaker,
     sequence: u32,
+    last: u64,
 }
 
 impl<W: Write + Seek> Recording<W> {
@@ -51,36 +188,47 @@ impl<W: Write + Seek> Recording<W> {
     /// # Errors
     /// Where writing fails, as all of these.
     pub(crate) fn begin(out: W, about: &About, seats: &[RecordedSeat]) -> McapResult<Self> {
-        let mut writer = WriteOptions::new()
-            .library(concat!("kinocue ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Lz4))
-            // By time alone, so that of a file that is cut short no more than half a second is lost.
-            .chunk_size(None)
-            .create(out)?;
-        write_metadata(&mut writer, "kinocue", first(about, seats))?;
-        let mut channel = |topic: &str, schema: &Value| {
-            let name = schema["title"].as_str().unwrap_or_default();
-            let schema = writer.add_schema(name, "jsonschema", schema.to_string().as_bytes())?;
-            writer.add_channel(schema, topic, "json", &BTreeMap::new())
-        };
-        let names = seats.iter().map(|seat| format!("/seat/{}", seat.name));
-        let seats = names.map(|topic| channel(&topic, &schema_of_seat())).collect::<McapResult<_>>()?;
-        let (ticks, hall) = (channel("/tick", &schema_of_tick())?, channel("/hall", &schema_of_hall())?);
-        Ok(Self { writer, clocks: about.clocks, seats, ticks, hall, sequence: 0 })
+        Self::open(out, &Opening::new(about, seats), EntryMaker::new(seats.len(), about.clocks))
+    }
+
+    /// The same with an opening that was made before.
+    pub(crate) fn open(out: W, opening: &Opening, maker: EntryMaker) -> McapResult<Self> {
+        // By time alone, so that of a file that is cut short no more than half a second is lost.
+        let mut writer = options().chunk_size(None).create(out)?;
+        write_metadata(&mut writer, "kinocue", opening.metadata.clone())?;
+        let mut channels = Vec::new();
+        for (topic, schema, encoding) in &opening.channels {
+            let schema = match opening.schemas.get(*schema) {
+                Some((name, encoding, octets)) => writer.add_schema(name, encoding, octets)?,
+                None => 0,
+            };
+            channels.push(writer.add_channel(schema, topic, encoding, &BTreeMap::new())?);
+        }
+        Ok(Self { writer, channels, maker, sequence: 0, last: 0 })
     }
 
     /// Adds a message.
     pub(crate) fn write(&mut self, at: MonoTime, message: &Message) -> McapResult<()> {
-        let (channel_id, data) = match message {
-            Message::Seat(lane, sample) => (self.seats[*lane], serde_json::to_vec(sample)),
-            Message::Tick(sample) => (self.ticks, serde_json::to_vec(sample)),
-            Message::State(state) => (self.hall, serde_json::to_vec(&json!({"state": number(*state)}))),
-        };
-        let (origin, wall) = self.clocks;
-        let log_time = wall.saturating_add(at.as_nanos()).saturating_sub(origin.as_nanos());
+        let entry = self.maker.entry(at, message).map_err(std::io::Error::from)?;
+        self.put(&entry)
+    }
+
+    /// Adds one that was made before; of a channel that the opening lacks nothing.
+    pub(crate) fn put(&mut self, entry: &Entry) -> McapResult<()> {
+        let Entry { channel, log_time, data } = entry;
+        let Some(&channel_id) = self.channels.get(usize::from(*channel)) else { return Ok(()) };
         self.sequence = self.sequence.wrapping_add(1);
-        let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
-        self.writer.write_to_known_channel(&header, &data.map_err(std::io::Error::from)?)
+        self.last = self.last.max(*log_time);
+        let (log_time, publish_time) = (*log_time, *log_time);
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time };
+        self.writer.write_to_known_channel(&header, data)
+    }
+
+    /// Attaches a file.
+    pub(crate) fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> McapResult<()> {
+        let (log_time, create_time) = (self.last, self.last);
+        let (name, media_type) = (name.to_owned(), media_type.to_owned());
+        self.writer.attach(&Attachment { log_time, create_time, name, media_type, data: data.into() })
     }
 
     /// Has everything so far read even of a file that is cut short.
@@ -89,38 +237,39 @@ impl<W: Write + Seek> Recording<W> {
     }
 
     /// Ends the file with these figures, and a report if there is one; gives what was written to.
-    pub(crate) fn finish(mut self, end: &[(&str, u64)], report: Option<&[u8]>) -> McapResult<W> {
+    pub(crate) fn finish(mut self, end: &[(&str, String)], report: Option<&[u8]>) -> McapResult<W> {
         if let Some(report) = report {
-            let (name, media_type) = ("report.json".to_owned(), "application/json".to_owned());
-            let log_time = self.clocks.1;
-            let data = report.into();
-            self.writer.attach(&Attachment { log_time, create_time: log_time, name, media_type, data })?;
+            self.attach("report.json", "application/json", report)?;
         }
-        let end = end.iter().map(|(key, value)| ((*key).to_owned(), value.to_string()));
-        write_metadata(&mut self.writer, "kinocue.end", end.collect())?;
+        let end = end.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+        write_metadata(&mut self.writer, "kinocue.end", end)?;
         self.writer.finish()?;
         Ok(self.writer.into_inner())
     }
+}
+
+/// How files are written.
+pub(super) fn options() -> WriteOptions {
+    let options = WriteOptions::new().library(concat!("kinocue ", env!("CARGO_PKG_VERSION")));
+    options.compression(Some(Compression::Lz4))
 }
 
 fn write_metadata<W: Write + Seek>(
     writer: &mut Writer<W>,
     name: &str,
     metadata: BTreeMap<String, String>,
-) -> Result<(), McapError> {
+) -> McapResult<()> {
     writer.write_metadata(&Metadata { name: name.to_owned(), metadata })
 }
 
 /// What stands at the beginning, so that a file that is cut short still says what it is of.
 fn first(about: &About, seats: &[RecordedSeat]) -> BTreeMap<String, String> {
-    let About { hall, cue, title, cue_sha256, rate_hz, clocks: (origin, wall) } = about;
-    let unit = |unit| if unit == AxisUnit::Degree { "deg" } else { "mm" };
-    let seat = |seat: &RecordedSeat| json!({"name": &*seat.name, "units": seat.units().map(unit).collect::<Vec<_>>()});
-    let seats = Value::from_iter(seats.iter().map(seat));
+    let About { hall, cue, title, cue_sha256, rate_hz, mode, clocks: (origin, wall) } = about;
+    let seats = serde_json::to_string(seats).unwrap_or_default();
     let entries = [
         ("version", VERSION.to_owned()),
         ("kind", "recording".to_owned()),
-        ("mode", "sampled".to_owned()),
+        ("mode", mode.word().to_owned()),
         ("program", concat!("kinocue ", env!("CARGO_PKG_VERSION")).to_owned()),
         ("hall", hall.clone()),
         ("cue", cue.clone()),
@@ -128,7 +277,7 @@ fn first(about: &About, seats: &[RecordedSeat]) -> BTreeMap<String, String> {
         ("cue_sha256", cue_sha256.clone()),
         ("rate_hz", rate_hz.to_string()),
         ("sample_hz", SAMPLE_HZ.to_string()),
-        ("seats", seats.to_string()),
+        ("seats", seats),
         ("monotonic_ns", origin.as_nanos().to_string()),
         ("wall_ns", wall.to_string()),
     ];
@@ -136,12 +285,12 @@ fn first(about: &About, seats: &[RecordedSeat]) -> BTreeMap<String, String> {
 }
 
 /// A state as viewers have it: a number that the schema names.
-fn number(state: State) -> usize {
+pub(crate) fn state_number(state: State) -> usize {
     State::ALL.iter().position(|one| *one == state).unwrap_or_default()
 }
 
 /// Viewers take one type a property, never null, arrays of scalars, and `oneOf` only to name numbers.
-fn schema(title: &str, always: &[(&str, Value)], at_times: &[(&str, Value)]) -> Value {
+pub(super) fn schema(title: &str, always: &[(&str, Value)], at_times: &[(&str, Value)]) -> Value {
     let required: Vec<&str> = always.iter().map(|(name, _)| *name).collect();
     let all = always.iter().chain(at_times);
     let properties: serde_json::Map<String, Value> =
@@ -193,7 +342,8 @@ fn schema_of_tick() -> Value {
     )
 }
 
-fn schema_of_hall() -> Value {
-    let named = State::ALL.map(|state| json!({"title": state.word(), "const": number(state)}));
-    schema("kinocue.hall", &[("state", json!({"type": "integer", "oneOf": named}))], &[])
+/// A state by number.
+pub(super) fn state_schema() -> Value {
+    let named = State::ALL.map(|state| json!({"title": state.word(), "const": state_number(state)}));
+    json!({"type": "integer", "oneOf": named})
 }

@@ -1,9 +1,10 @@
 //! Many ticks into few samples. Of each window the worst is kept, so that nothing that lasted a tick is smoothed away.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::acks::{AckChunk, AckRecord, standing_number};
 use super::chunk::{Chunk, Handed, SentFrame};
+use super::notes::Note;
 use super::{RecordedSeat, TickHead};
 use crate::state::State;
 use crate::time::MonoTime;
@@ -11,7 +12,8 @@ use crate::tracker::Fate;
 use crate::wire::ReplyCode;
 
 /// A seat in a window: its frame in which asked and sent differ most, the last of these, and sums of all its frames.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct SeatSample {
     /// Show time of that frame, seconds.
     pub(crate) film_s: f64,
@@ -46,8 +48,16 @@ pub(crate) struct SeatSample {
     pub(crate) standing: Option<u8>,
 }
 
+impl SeatSample {
+    /// How far asked and sent are apart at most, mm or degrees.
+    pub(crate) fn apart(&self) -> f64 {
+        self.asked_mm.iter().zip(&self.sent_mm).map(|(asked, sent)| (asked - sent).abs()).fold(0.0, f64::max)
+    }
+}
+
 /// All ticks of a window.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub(crate) struct TickSample {
     /// Show time of the last, seconds.
     pub(crate) film_s: f64,
@@ -72,6 +82,12 @@ pub(crate) enum Message {
     Tick(TickSample),
     /// The hall's state, from now on.
     State(State),
+    /// What the service tells.
+    Note(Note),
+    /// A block of whole ticks, of which the first was then.
+    Ticks(Vec<u8>),
+    /// What the ack thread took, as it crossed.
+    Drains(Vec<u8>),
 }
 
 /// A window of a seat that is not over.

@@ -1,14 +1,16 @@
-//! The seat of a lane: from what was asked and from the octets that left to where its axes were to be.
+//! The seat of a lane: from what was asked and from the octets that left to where its axes were to be; and as it stands in the
+//! metadata of a file, from which all of that can be told again.
 
-use std::sync::Arc;
+use serde::{Deserialize, Serialize};
 
 use super::chunk::{Asked, SentFrame, longest_frame};
 use crate::drive::link::{LinkPose, RECORD_LEN};
-use crate::motion::{AxisUnit, Pulses, Window};
+use crate::motion::{AxisUnit, MAX_AXES, Pulses, Window};
 use crate::wire::{MotionRequest, VibrationPort, motion_len};
 
 /// What the frames of a lane are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "u8", try_from = "u8")]
 pub enum FrameKind {
     /// Motion frames with Port Out so in those with vibration.
     Datagram(VibrationPort),
@@ -16,26 +18,70 @@ pub enum FrameKind {
     Pose,
 }
 
+/// As octets of Port Out; 0 where frames have none.
+impl From<FrameKind> for u8 {
+    fn from(kind: FrameKind) -> Self {
+        match kind {
+            FrameKind::Datagram(VibrationPort::Two) => 2,
+            FrameKind::Datagram(VibrationPort::Four) => 4,
+            FrameKind::Pose => 0,
+        }
+    }
+}
+
+impl TryFrom<u8> for FrameKind {
+    type Error = String;
+
+    fn try_from(octets: u8) -> Result<Self, String> {
+        match (octets, VibrationPort::of_bytes(octets)) {
+            (0, _) => Ok(Self::Pose),
+            (_, Some(port)) => Ok(Self::Datagram(port)),
+            _ => Err(format!("frames with {octets} octets of outputs; there are 0, 2 or 4")),
+        }
+    }
+}
+
 /// A seat that is recorded.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordedSeat {
     /// Its controller's name.
-    pub(crate) name: Arc<str>,
-    frames: FrameKind,
+    pub(crate) name: String,
+    /// Where its controller hears: address and port; none of a link, or where addresses were left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) address: Option<String>,
+    /// Octets of outputs in frames with vibration; 0 where frames are poses for a link.
+    #[serde(rename = "port_octets")]
+    pub(crate) frames: FrameKind,
     slots: usize,
     axes: Vec<RecordedAxis>,
 }
 
-/// One of its axes.
-#[derive(Debug, Clone, Copy)]
-struct RecordedAxis {
+/// One of its axes; lengths in its unit, speeds in that a second, and so on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RecordedAxis {
     slot: usize,
-    /// The lower end of its range, and how long that is, millimetres or degrees.
-    low: f64,
-    stroke: f64,
-    /// Millimetres or degrees of a pulse.
-    pulse: f64,
-    unit: AxisUnit,
+    /// The lower end of its range, and how long that is.
+    pub(crate) low: f64,
+    pub(crate) stroke: f64,
+    /// How long a pulse is.
+    pub(crate) pulse: f64,
+    pub(crate) unit: AxisUnit,
+    pub(crate) max_velocity: f64,
+    pub(crate) max_acceleration: f64,
+    pub(crate) max_jerk: f64,
+}
+
+impl RecordedAxis {
+    /// The limits of speed, acceleration and jerk.
+    pub(crate) const fn limits(&self) -> [f64; 3] {
+        [self.max_velocity, self.max_acceleration, self.max_jerk]
+    }
+
+    /// To whole pulses.
+    #[expect(clippy::cast_possible_truncation, reason = "a saturating cast is what is wanted")]
+    pub(super) fn pulses(&self, place: f64) -> i64 {
+        (place / self.pulse).round() as i64
+    }
 }
 
 impl RecordedSeat {
@@ -45,14 +91,45 @@ impl RecordedSeat {
         let own = window.slots().iter().enumerate().filter(|(_, slot)| slot.is_own);
         let axis = |(slot, own): (usize, &crate::motion::Slot)| {
             let pulse = own.stroke / own.stroke_pulses;
-            RecordedAxis { slot, low: own.low_pulses * pulse, stroke: own.stroke, pulse, unit: own.unit }
+            RecordedAxis {
+                slot,
+                low: own.low_pulses * pulse,
+                stroke: own.stroke,
+                pulse,
+                unit: own.unit,
+                max_velocity: own.limits.velocity * own.stroke,
+                max_acceleration: own.limits.acceleration * own.stroke,
+                max_jerk: own.limits.jerk * own.stroke,
+            }
         };
-        Self { name: name.into(), frames, slots: window.slots().len(), axes: own.map(axis).collect() }
+        let (slots, axes) = (window.slots().len(), own.map(axis).collect());
+        Self { name: name.to_owned(), address: None, frames, slots, axes }
     }
 
-    /// What each axis is measured in.
-    pub(crate) fn units(&self) -> impl Iterator<Item = AxisUnit> {
-        self.axes.iter().map(|axis| axis.unit)
+    /// The same, of a controller that hears there.
+    pub(crate) fn at(self, address: String) -> Self {
+        Self { address: Some(address), ..self }
+    }
+
+    /// Its axes, in their order.
+    pub(crate) fn axes(&self) -> &[RecordedAxis] {
+        &self.axes
+    }
+
+    /// What of it cannot be so, where it was read from a file.
+    pub(super) fn fault(&self) -> Option<&'static str> {
+        let is_length = |length: f64| length.is_finite() && length > 0.0;
+        let is_sound = |axis: &RecordedAxis| {
+            let lengths = axis.limits().into_iter().chain([axis.stroke, axis.pulse]);
+            axis.slot < self.slots && axis.low.is_finite() && lengths.into_iter().all(is_length)
+        };
+        if self.slots > MAX_AXES || self.axes.len() > self.slots {
+            Some("more axes than a seat can have")
+        } else if !self.axes.iter().all(is_sound) {
+            Some("an axis that no seat can have")
+        } else {
+            None
+        }
     }
 
     /// Octets of its longest frame in a chunk.
@@ -65,9 +142,18 @@ impl RecordedSeat {
     }
 
     /// Where its axes were asked to be, millimetres or degrees; none where no tick asked.
-    pub(super) fn asked(&self, asked: &Asked) -> Vec<f64> {
+    pub(crate) fn asked(&self, asked: &Asked) -> Vec<f64> {
         let axes = self.axes.iter().take_while(|axis| axis.slot < asked.slots);
         axes.map(|axis| axis.low + asked.pose[axis.slot] * axis.stroke).collect()
+    }
+
+    /// What has to be asked for so that [`Self::asked`] tells these places.
+    pub(super) fn pose(&self, places: &[f64]) -> [f64; MAX_AXES] {
+        let mut pose = [0.0; MAX_AXES];
+        for (axis, place) in self.axes.iter().zip(places) {
+            pose[axis.slot] = (place - axis.low) / axis.stroke;
+        }
+        pose
     }
 
     /// Where its axes are that stand at these places, millimetres or degrees.
@@ -77,7 +163,7 @@ impl RecordedSeat {
     }
 
     /// Where its axes were sent, millimetres or degrees; none where that is no frame of its kind.
-    pub(super) fn sent(&self, frame: &SentFrame<'_>) -> Vec<f64> {
+    pub(crate) fn sent(&self, frame: &SentFrame<'_>) -> Vec<f64> {
         match self.frames {
             FrameKind::Datagram(port) => {
                 let request = MotionRequest::parse_as(port, frame.datagram).ok();

@@ -10,6 +10,9 @@ use crate::time::{MonoTime, Rate};
 /// Seconds of ticks that the ring holds: a disk may take so long.
 const HELD_S: f64 = 2.0;
 
+/// Octets of a sample of a seat.
+const SAMPLE: u64 = 400;
+
 /// Copies what leaves. Never waits, never allocates: a tick that finds no room is lost as a whole, and the next says so.
 #[derive(Debug)]
 pub struct Tap {
@@ -29,6 +32,15 @@ pub fn tap(seats: &[RecordedSeat], rate: Rate) -> (Tap, Consumer<u8>) {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "two thousand at the most")]
     let (ring, end) = RingBuffer::new(chunk.room() * chunks as usize);
     (Tap { ring, chunk, asked: Asked::NOTHING, dropped: 0 }, end)
+}
+
+/// Octets a second that all of these seats takes in the flight recorder: samples, and columns of ticks and replies, which take less than a
+/// quarter of what crosses the taps.
+pub(crate) fn octets_a_second(seats: &[RecordedSeat], rate: Rate, sample_hz: u32) -> u64 {
+    let tick: usize = 64 + seats.iter().map(|seat| seat.longest_frame() + 48).sum::<usize>();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a thousand a second")]
+    let ticks = rate.hz().ceil() as u64;
+    ticks * tick as u64 / 4 + SAMPLE * u64::from(sample_hz) * (1 + seats.len() as u64)
 }
 
 impl Tap {

@@ -15,30 +15,30 @@ use crate::time::{MonoTime, Rate, ShowTime};
 use crate::tracker::Fate;
 use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, ReplyCode, Timing, VibrationPort};
 
-const MS: u64 = 1_000_000;
+pub(super) const MS: u64 = 1_000_000;
 const PLAYING: State = State::Playing(PlayMode::Following);
 
-fn window() -> Window {
+pub(super) fn window() -> Window {
     let seat = SeatType::bench3(3);
     Window::new((0..3).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect())
 }
 
-fn seat() -> RecordedSeat {
+pub(super) fn seat() -> RecordedSeat {
     RecordedSeat::new("A1", &window(), FrameKind::Datagram(VibrationPort::Two))
 }
 
-fn head(ms: u64) -> TickHead {
+pub(super) fn head(ms: u64) -> TickHead {
     let film = ShowTime::from_millis(ms.cast_signed());
     let deadline = MonoTime::from_nanos(ms * MS);
     TickHead { index: ms, deadline, late_ns: 1_000 * ms, missed: 0, film, state: PLAYING }
 }
 
-fn asked(place: f64) -> Asked {
+pub(super) fn asked(place: f64) -> Asked {
     Asked { pose: [place; MAX_AXES], slots: 3, level: 1.0, clamps: 0 }
 }
 
 /// A frame that sends all axes to that fraction of the stroke.
-fn frame(place: f64, buf: &mut [u8; MAX_LEN]) -> &[u8] {
+pub(super) fn frame(place: f64, buf: &mut [u8; MAX_LEN]) -> &[u8] {
     let positions = [0, 1, 2].map(|slot| window().slots()[slot].pulses(place));
     let motion = Motion {
         timing: Timing::Relative,
@@ -55,23 +55,30 @@ fn frame(place: f64, buf: &mut [u8; MAX_LEN]) -> &[u8] {
     motion.emit(buf)
 }
 
-fn about() -> About {
+pub(super) fn about() -> About {
     About {
         hall: "hall".to_owned(),
         cue: "ride.csv".to_owned(),
         title: String::new(),
         cue_sha256: "00".to_owned(),
         rate_hz: 100.0,
+        mode: Mode::Sampled,
         clocks: (MonoTime::from_nanos(0), 1_000_000 * MS),
     }
 }
 
 /// What a play of these ticks, each of a place asked for and one sent, comes to as a file; ticks 10 ms apart.
 fn recorded(ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
+    recorded_as(Mode::Sampled, ticks)
+}
+
+pub(super) fn recorded_as(mode: Mode, ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
     let seats = [seat()];
     let (Taps { ticks: mut tap, mut acks }, intake) =
         Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);
-    let file = Recording::begin(Cursor::new(Vec::new()), &about(), &seats).unwrap();
+    let intake = if mode == Mode::Full { intake.in_full() } else { intake };
+    let about = About { mode, ..about() };
+    let file = Recording::begin(Cursor::new(Vec::new()), &about, &seats).unwrap();
     let mut recorder = Recorder::new(intake, file);
     for (tick, (wanted, sent)) in (0_u64..).zip(ticks) {
         let mut buf = [0; MAX_LEN];
@@ -235,15 +242,17 @@ fn what_was_flushed_is_read_of_a_file_whose_writer_was_killed() {
 fn schemas_keep_to_what_viewers_draw() {
     let file = recorded((0..10).map(|_| (0.5, 0.5)));
     let summary = mcap::Summary::read(&file).unwrap().unwrap();
-    assert_eq!(summary.schemas.len(), 3);
+    assert_eq!(summary.schemas.len(), 2 + 6, "seats, ticks and what the service tells");
     let all = messages(&file);
     for channel in summary.channels.values() {
-        let schema: Value = serde_json::from_slice(&channel.schema.as_ref().unwrap().data).unwrap();
+        let Some(schema) = &channel.schema else { continue };
+        let schema: Value = serde_json::from_slice(&schema.data).unwrap();
         assert_eq!(schema["type"], "object");
         let properties = schema["properties"].as_object().unwrap();
         for kind in properties.values() {
             assert!(kind["type"].is_string(), "{kind}");
-            assert!(kind["type"] != "array" || kind["items"]["type"] == "number", "{kind}");
+            let item = &kind["items"]["type"];
+            assert!(kind["type"] != "array" || item == "number" || item == "string", "{kind}");
         }
         let named: Vec<&String> = properties.keys().collect();
         for (_, _, value) in all.iter().filter(|(topic, ..)| *topic == channel.topic) {

@@ -70,6 +70,7 @@ impl Hall {
             library: library(dir.path()),
             playlists: Shelf::new(&dir.path().join("playlists")),
             journal: dir.path().join("journal"),
+            recordings: dir.path().join("recordings"),
             pages,
             log: Log::start(|_| {}).unwrap(),
         };

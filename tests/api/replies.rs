@@ -62,6 +62,12 @@ fn every_change_reaches_the_hall_as_it_was_asked() {
         (put("/api/v1/playlist", r#"{"id":null}"#), Command::Playlist { id: None }),
         (post("/api/v1/playlist/select", r#"{"entry":2}"#), Command::Select { entry: 2 }),
         (plain("/api/v1/reload"), Command::Reload),
+        (plain("/api/v1/record/mark"), Command::Mark { text: None }),
+        (
+            post("/api/v1/record/mark", r#"{"text":"F4 jerked"}"#),
+            Command::Mark { text: Some("F4 jerked".to_owned()) },
+        ),
+        (plain("/api/v1/record/dump"), Command::Dump),
     ];
     for (request, ask) in &requests {
         let reply = request.send(&hall.socket());

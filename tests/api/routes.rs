@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::client::{Request, problem};
 use crate::hall::Hall;
 
-const GETS: [&str; 14] = [
+const GETS: [&str; 16] = [
     "/api/v1/controllers",
     "/api/v1/controllers/{name}",
     "/api/v1/cues",
@@ -14,6 +14,8 @@ const GETS: [&str; 14] = [
     "/api/v1/events",
     "/api/v1/openapi.json",
     "/api/v1/playlists",
+    "/api/v1/recordings",
+    "/api/v1/recordings/{name}",
     "/api/v1/reports/{day}",
     "/api/v1/status",
     "/api/v1/sync",
@@ -22,12 +24,14 @@ const GETS: [&str; 14] = [
     "/readyz",
 ];
 
-const CHANGES: [(&str, &str); 22] = [
+const CHANGES: [(&str, &str); 24] = [
     ("post", "/api/v1/controllers/{name}/disable"),
     ("post", "/api/v1/controllers/{name}/enable"),
     ("post", "/api/v1/playlist/select"),
     ("post", "/api/v1/preflight"),
     ("post", "/api/v1/presets/{name}"),
+    ("post", "/api/v1/record/dump"),
+    ("post", "/api/v1/record/mark"),
     ("post", "/api/v1/reload"),
     ("post", "/api/v1/show/arm"),
     ("post", "/api/v1/show/clear"),
@@ -63,14 +67,14 @@ fn the_description_has_every_route_and_every_route_is_served() {
     let hall = Hall::open();
     let mut wanted: Vec<_> = GETS.iter().map(|path| ("get", *path)).collect();
     wanted.extend(CHANGES);
-    wanted.push(("put", "/api/v1/cues/{id}"));
+    wanted.extend([("put", "/api/v1/cues/{id}"), ("delete", "/api/v1/recordings/{name}")]);
     let mut wanted: Vec<_> =
         wanted.iter().map(|(method, path)| ((*method).to_owned(), (*path).to_owned())).collect();
     let mut found = described(&hall);
     wanted.sort();
     found.sort();
     assert_eq!(found, wanted);
-    for (_, path) in found {
+    for (_, path) in found.into_iter().filter(|(_, path)| path != "/api/v1/recordings/{name}") {
         let path = path.replace("{name}", "a").replace("{id}", "a").replace("{day}", "2026-01-31");
         let reply = Request::new("DELETE", &path).send(&hall.socket());
         assert_eq!(reply.problem(), problem(405, "method"), "{path}");

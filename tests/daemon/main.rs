@@ -30,6 +30,7 @@ mod library;
 mod mbox;
 mod player;
 mod playlist;
+mod recordings;
 mod remedies;
 mod show;
 mod signals;

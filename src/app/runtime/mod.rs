@@ -250,6 +250,11 @@ impl Runtime {
         self.acks.record(taps.acks);
     }
 
+    /// How its seats are sent to at first.
+    pub(super) fn lanes(&self) -> &[Lane] {
+        &self.ticks.lanes
+    }
+
     /// What it is led and watched by.
     #[must_use]
     pub(crate) fn control(&self) -> Control {

@@ -9,6 +9,7 @@ use super::hall::{HallContext, ShowChange};
 use super::hall_settings::HallSettings;
 use super::job::Job;
 use super::player;
+use super::recorded;
 use super::seat_testing::SeatTesting;
 use super::show::no_cue;
 use crate::control::{Asked, Code, Command, LevelsChange, Problem, Who, overtaken};
@@ -64,6 +65,8 @@ impl Features {
             Command::Enable(name) => self.enable(name, hall),
             Command::Disable { name, why } => disable(name, who, why.as_deref(), hall),
             Command::Reload => Ok(vec![Act::Reload]),
+            Command::Mark { text } => recorded::mark(text.as_deref(), who, hall),
+            Command::Dump => recorded::dump(hall),
         }
     }
 

@@ -12,6 +12,7 @@ use super::player::FilmShown;
 use super::playlist::Onward;
 use super::readiness::ReadinessCheck;
 use super::record::ShowRecords;
+use super::recorded::HallTeller;
 use super::seat_testing::SeatTesting;
 use crate::control::Problem;
 use crate::time::ShowTime;
@@ -28,6 +29,7 @@ pub(super) struct Features {
     pub(super) records: ShowRecords,
     pub(super) figures: Figures,
     pub(super) shown: FilmShown,
+    pub(super) teller: HallTeller,
 }
 
 impl Features {
@@ -43,13 +45,16 @@ impl Features {
             records,
             figures: Figures::default(),
             shown: FilmShown::default(),
+            teller: HallTeller::default(),
         }
     }
 
     /// Tells all of them what happens; gives what is to be done for it.
     pub(super) fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext) -> Vec<Act> {
-        let Self { onward, homing, seats, lasting, gear, records, figures, shown, readiness: _ } = self;
-        let all: [&mut dyn Feature; 8] = [onward, homing, seats, lasting, gear, records, figures, shown];
+        let Self { onward, homing, seats, lasting, gear, records, figures, shown, teller, readiness: _ } =
+            self;
+        let all: [&mut dyn Feature; 9] =
+            [onward, homing, seats, lasting, gear, records, figures, shown, teller];
         let mut out = Vec::new();
         all.into_iter().for_each(|feature| feature.on(event, hall, &mut out));
         out

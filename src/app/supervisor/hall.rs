@@ -10,6 +10,7 @@ use super::show::ProvedShow;
 use super::state_mirror::StateMirror;
 use crate::app::film::SharedTable;
 use crate::app::player::PlayerLink;
+use crate::app::recorder::RecordLink;
 use crate::app::runtime::RuntimeHandle;
 use crate::config::Config;
 use crate::control::{Code, Problem};
@@ -50,6 +51,8 @@ pub(super) struct HallContext {
     pub(super) player: Option<PlayerLink>,
     /// What has come to the port for OSC, if there is one.
     pub(super) osc: Option<Arc<Counts>>,
+    /// The way to the recorder.
+    pub(super) recorder: RecordLink,
     /// The serial links that have seats.
     pub(super) links: Vec<LinkEnd>,
     /// The slow work that is under way.
@@ -120,6 +123,7 @@ impl HallContext {
             film: None,
             player: None,
             osc: None,
+            recorder: RecordLink::default(),
             links: runtime.links.clone(),
             job: None,
             now,

@@ -25,6 +25,7 @@ mod preflighted;
 mod procedures;
 mod readiness;
 mod record;
+mod recorded;
 mod reload;
 mod seat_test;
 mod seat_testing;
@@ -55,6 +56,7 @@ use jiff::Zoned;
 
 use super::film::SharedTable;
 use super::player::PlayerLink;
+use super::recorder::RecordLink;
 use super::runtime::{RuntimeEnd, RuntimeHandle};
 use crate::config::Config;
 use crate::control::model::Ending;
@@ -62,6 +64,7 @@ use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, Stat
 use crate::journal::Journal;
 use crate::library::Library;
 use crate::osc::Counts;
+use crate::record::{ActionNote, LogNote, Note};
 use crate::rt::{News, Ticket};
 use crate::settings::{Settings, SettingsFile};
 use crate::state::State;
@@ -107,6 +110,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) player: Option<PlayerLink>,
     /// What has come to the port for OSC, where there is one.
     pub(crate) osc: Option<Arc<Counts>>,
+    /// The way to the recorder.
+    pub(crate) recorder: RecordLink,
 }
 
 /// What is left once the hall has closed.
@@ -162,6 +167,7 @@ impl Supervisor {
         examine(library.clone());
         let mut hall = HallContext::new(&runtime, settings, now);
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
+        hall.recorder = ports.recorder.clone();
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,
@@ -331,6 +337,8 @@ impl Supervisor {
     /// Notes what no state says, for the log and the warnings.
     fn note(&mut self, note: String) {
         self.ports.service_log.say_note(&note);
+        let line = LogNote { level: 3, message: note.clone(), name: "supervisor".to_owned() };
+        self.hall.recorder.keep(Note::Log(line));
         self.notes.push_back(note);
         if self.notes.len() > NOTES {
             self.notes.pop_front();
@@ -340,6 +348,12 @@ impl Supervisor {
     /// Writes down what somebody asked, and what came of it.
     fn write_down(&mut self, desired: &Desired, result: &Result<(), Problem>) {
         let state = self.hall.mirror.state;
+        self.hall.recorder.keep(Note::Action(ActionNote {
+            who: recorded::name_of(&desired.who, &self.hall),
+            what: desired.ask.to_string(),
+            result: result.as_ref().map_or_else(ToString::to_string, |()| "done".to_owned()),
+            state: state.to_string(),
+        }));
         let due = self.features.records.write_down(desired, result, state, self.hall.now);
         due.iter().for_each(|action| self.ports.service_log.say_ask(action));
     }

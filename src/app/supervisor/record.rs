@@ -8,6 +8,7 @@ use jiff::Zoned;
 use super::act::{Act, Feature, ShowBegun, SupervisorEvent};
 use super::hall::{Counted, HallContext};
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
+use crate::app::recorder::RecordAsk;
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 use crate::control::{Desired, JournalLine, Problem, Surface};
 use crate::film::point::FilmState;
@@ -227,6 +228,9 @@ impl ShowRecords {
             film: film.map(|(proof, _)| proof),
         });
         self.journal.show(&record);
+        if let Ok(report) = serde_json::to_vec(&record) {
+            hall.recorder.put(RecordAsk::Report(report));
+        }
     }
 }
 

@@ -90,6 +90,7 @@ impl StatusParts<'_> {
             preflight: preflighted.as_ref().map(|it| it.status(now, |lane| hall.settings.is_on(lane))),
             warnings,
             test: features.seats.test.as_ref().map(|test| test.status.clone()),
+            record: hall.recorder.status(),
             journal: features.records.newest(),
         }
     }

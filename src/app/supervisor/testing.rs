@@ -418,6 +418,7 @@ fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, Supe
             film: None,
             player: None,
             osc: None,
+            recorder: crate::app::recorder::RecordLink::default(),
         },
     )
 }

@@ -51,6 +51,7 @@ impl StatusParts<'_> {
         warnings.extend(player::warnings(hall).iter().map(|trouble| in_two("player", trouble)));
         warnings.extend(links::troubles(hall).map(|trouble| in_two("link", &trouble)));
         warnings.extend(features.lasting.warnings(hall));
+        warnings.extend(hall.recorder.status().trouble.map(|trouble: String| in_two("record", &trouble)));
         warnings.extend(settings_file.map(|trouble| in_two("settings", &trouble)));
         warnings.extend(features.records.trouble().map(|trouble| Warning {
             id: "journal".to_owned(),

@@ -7,6 +7,7 @@ mod http;
 mod levels;
 mod panel;
 mod playlist;
+mod record;
 mod reply;
 mod rows;
 mod server;
@@ -19,6 +20,7 @@ mod view;
 mod watch;
 
 pub(super) use film::{UseArgs, choose as choose_film_source, show as show_film};
+pub(super) use record::dump as dump_record;
 pub(super) use server::ServerArgs;
 pub(super) use show::{home, preflight};
 
@@ -39,6 +41,7 @@ pub(super) enum ClientCommand {
     #[command(flatten)]
     Cues(cues::CuesCommand),
     Test(test::Args),
+    Mark(record::MarkArgs),
 }
 
 pub(super) fn run(command: &ClientCommand) -> Result<Exit, Failure> {
@@ -51,5 +54,6 @@ pub(super) fn run(command: &ClientCommand) -> Result<Exit, Failure> {
         ClientCommand::Levels(command) => levels::run(command),
         ClientCommand::Cues(command) => cues::run(command),
         ClientCommand::Test(args) => test::run(args),
+        ClientCommand::Mark(args) => record::mark(args),
     }
 }

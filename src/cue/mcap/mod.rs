@@ -2,10 +2,7 @@
 
 mod message;
 mod read;
-mod record;
-mod walk;
 mod write;
-mod zstd;
 
 use crate::channel::{CHANNELS, Channel, ChannelId, Scope};
 
@@ -13,8 +10,6 @@ pub(super) use read::read;
 pub use read::recover;
 pub use write::write;
 
-/// What every MCAP file begins and ends with (mcap.dev/spec).
-pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// The name of the metadata record.
 const METADATA: &str = "kinocue";
 /// The version of the layout of topics and messages.

@@ -11,13 +11,15 @@ use serde::de::DeserializeSeed;
 
 use super::super::fault::{Collector, CueFaults, Place};
 use super::super::header::is_effect_name;
-use super::super::limits::{MAX_EFFECTS, MAX_LINE, MAX_MARKER_NAME, MAX_MARKERS, MAX_ROWS, MAX_TIME};
+use super::super::limits::{
+    MAX_EFFECTS, MAX_FILE, MAX_LINE, MAX_MARKER_NAME, MAX_MARKERS, MAX_ROWS, MAX_TIME,
+};
 use super::super::problem::Problem;
 use super::super::unit::DeclaredUnits;
 use super::super::{Cue, Effects, Marker, Origin, Steps, title_of, value};
-use super::record::{self, ChannelRecord};
 use super::{METADATA, Topic, VERSION, message};
 use crate::channel::{ChannelId, Sample};
+use crate::container::{self, ChannelRecord, Trouble};
 use crate::motion::MAX_AXES;
 use crate::plain::escaped;
 use crate::time::ShowTime;
@@ -28,7 +30,7 @@ const REASON_TOLD: usize = 200;
 /// Reads an MCAP cue; `path` names it in faults.
 pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
     let mut reading = McapReading::new(path);
-    if let Err((place, problem)) = record::each(input, |opcode, body| reading.take(opcode, body)) {
+    if let Err((place, problem)) = each(input, &mut reading) {
         reading.faults.add(place, None, problem);
     }
     reading.finish()
@@ -41,7 +43,7 @@ pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaul
 /// Where what is complete makes no cue.
 pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), CueFaults> {
     let mut reading = McapReading::new(path);
-    let lost = match record::each(input, |opcode, body| reading.take(opcode, body)) {
+    let lost = match each(input, &mut reading) {
         Ok(()) => None,
         Err((_, problem @ (Problem::CutShort | Problem::Damaged(_)))) => Some(problem),
         Err((place, problem)) => {
@@ -52,6 +54,27 @@ pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), 
     let mut cue = reading.finish()?;
     cue.shrink();
     Ok((cue, lost))
+}
+
+/// Hands it every record, until one is wrong; says then where that is.
+fn each(input: impl Read, reading: &mut McapReading) -> Result<(), (Place, Problem)> {
+    container::each(input, MAX_FILE, |opcode, body| reading.take(opcode, body)).map_err(|(at, problem)| {
+        let place = if matches!(problem, Problem::Damaged(_)) { Place::Byte(at) } else { Place::File };
+        (place, problem)
+    })
+}
+
+impl From<Trouble> for Problem {
+    fn from(trouble: Trouble) -> Self {
+        match trouble {
+            Trouble::Empty => Self::Empty,
+            Trouble::CutShort => Self::CutShort,
+            Trouble::Foreign(why) => Self::Foreign(why),
+            Trouble::Damaged(what) => Self::Damaged(what),
+            Trouble::TooLarge => Self::FileTooLarge,
+            Trouble::Unread(why) => Self::Unread(why),
+        }
+    }
 }
 
 /// A message's topic, number in its topic, and log time.
@@ -105,19 +128,19 @@ impl McapReading {
         let broken = |what: &str| Problem::Damaged(format!("a {what} record that is too short"));
         match opcode {
             op::SCHEMA => {
-                self.schemas.insert(record::schema(body).ok_or_else(|| broken("schema"))?);
+                self.schemas.insert(container::schema(body).ok_or_else(|| broken("schema"))?);
             }
             op::CHANNEL => {
                 self.channel(&ChannelRecord::parse(body).ok_or_else(|| broken("channel"))?)?;
             }
             op::METADATA => {
-                let (name, entries) = record::metadata(body).ok_or_else(|| broken("metadata"))?;
+                let (name, entries) = container::metadata(body).ok_or_else(|| broken("metadata"))?;
                 if name == METADATA {
                     self.declare(&entries);
                 }
             }
             op::MESSAGE => {
-                let (channel, log_time, data) = record::message(body).ok_or_else(|| broken("message"))?;
+                let (channel, log_time, data) = container::message(body).ok_or_else(|| broken("message"))?;
                 if let Some(Some(topic)) = self.channels.get(&channel).copied() {
                     let (number, before) = self.seen.get(&topic).copied().unwrap_or_default();
                     let at = At { topic, number: number + 1, log_time };

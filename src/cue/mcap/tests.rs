@@ -6,6 +6,7 @@ use mcap::{Compression, WriteOptions};
 use proptest::prelude::*;
 
 use super::*;
+use crate::container::MAGIC;
 use crate::cue::{self, Cue, CueFaults, Interpolation, Problem, Source, Unit};
 use crate::time::ShowTime;
 

@@ -11,6 +11,7 @@ import { showLevels } from './levels.js';
 import { showLinks } from './links.js';
 import { showMap, startMap } from './map.js';
 import { readLists, showPlaylist, startPlaylist } from './playlist.js';
+import { showRecordings, startRecordings } from './recordings.js';
 import { showReports, startReports } from './reports.js';
 import { startSources } from './sources.js';
 import { showTrim, startTrim } from './trim.js';
@@ -22,11 +23,11 @@ import { watch } from './state.js';
 
 const STARTS = [
   startTransport, startToken, startHeadline, startFilm, startMap, startTrim, startPlaylist, startReports, startCurves,
-  startUpload, startWarnings, startFollow, startSources,
+  startUpload, startWarnings, startFollow, startSources, startRecordings,
 ];
 const SHOWS = [
   showHeadline, showTransport, showFilm, showFollow, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,
-  showLinks, showHistograms, showReports, showCurves,
+  showLinks, showHistograms, showReports, showCurves, showRecordings,
 ];
 
 for (const start of STARTS) start();

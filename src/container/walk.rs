@@ -3,7 +3,6 @@
 
 use mcap::records::op;
 
-use super::super::limits::MAX_FILE;
 use super::MAGIC;
 
 /// What a chunk may unpack to beside so many times its packed size: repeated rows pack well, up to some 50 times.
@@ -32,13 +31,15 @@ pub(super) struct Walk {
     left: u64,
     /// Behind the footer there are no records.
     over: bool,
+    /// What a chunk may unpack to at the most.
+    most: u64,
 }
 
 impl Walk {
-    /// At the front of a file.
-    pub(super) fn new() -> Self {
+    /// At the front of a file that may unpack to so much.
+    pub(super) fn new(most: u64) -> Self {
         let left = MAGIC.len() as u64;
-        Self { at: 0, record: 0, head: Vec::new(), left, over: false }
+        Self { at: 0, record: 0, head: Vec::new(), left, over: false, most }
     }
 
     /// Where the record begins that was gone by last.
@@ -131,7 +132,7 @@ impl Walk {
     fn look_at_chunk(&self) -> Result<(), String> {
         let name = self.name_len();
         let (unpacked, packed) = (self.u64(HEAD + 16), self.u64(HEAD + CHUNK + name));
-        let most = packed.saturating_mul(MAX_RATIO).saturating_add(SLACK).min(MAX_FILE);
+        let most = packed.saturating_mul(MAX_RATIO).saturating_add(SLACK).min(self.most);
         if unpacked > most {
             return Err(format!("a chunk of {packed} bytes that unpacks to {unpacked}; the most is {most}"));
         }

@@ -1,0 +1,315 @@
+//! What recording costs: the taps on the tick and ack threads, the thread behind them, the lateness of ticks with and without, and
+//! how soon an incident is on the disk. 64 controllers of six axes, 1,000 ticks a second.
+//!
+//! `cargo bench --bench record -- [--rounds N] [--quick]`
+
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "figures of a few digits"
+)]
+
+mod common {
+    pub(crate) mod spread;
+}
+mod senders {
+    pub(super) mod again;
+    pub(super) mod children;
+    #[expect(dead_code, reason = "each bench uses its own part")]
+    pub(super) mod ours;
+    pub(super) mod outcome;
+    pub(super) mod peer;
+}
+
+use std::hint::black_box;
+use std::net::{SocketAddrV4, UdpSocket};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use common::spread::{Spread, verdict};
+use kinocue::harness::motion::{MAX_AXES, SeatType, Slot, Window};
+use kinocue::harness::net::{Delivery, Sender};
+use kinocue::harness::record::{AckTap, Asked, FrameKind, RecordedSeat, Tap, TickHead};
+use kinocue::harness::recording::{RecorderRig, drained, reply};
+use kinocue::harness::rt::FrameSink;
+use kinocue::harness::sys::clock::{Monotonic, thread_cpu_time};
+use kinocue::harness::sys::realtime::normal_priority;
+use kinocue::harness::time::{Clock as _, MonoTime, Rate};
+use kinocue::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, VibrationPort};
+use senders::again::sender;
+use senders::children::Peer;
+use senders::outcome::Outcome;
+use senders::{ours, peer};
+
+const LANES: usize = 64;
+const AXES: usize = 6;
+const RATE_HZ: f64 = 1_000.0;
+const FLIGHT: u64 = 512 << 20;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match words[..] {
+        ["peer", count] => peer::run(count.parse().expect("a number")),
+        ["plain", seconds, ref to @ ..] => finish(&play(seconds, to, false)),
+        ["tapped", seconds, ref to @ ..] => finish(&play(seconds, to, true)),
+        _ => measure(&words),
+    }
+}
+
+fn finish(outcome: &Outcome) {
+    println!("{}", serde_json::to_string(outcome).expect("an outcome has only names and numbers"));
+}
+
+fn measure(words: &[&str]) {
+    let is_quick = words.contains(&"--quick");
+    let given = words.iter().skip_while(|word| **word != "--rounds").nth(1);
+    let rounds: usize = given.map_or(if is_quick { 2 } else { 5 }, |count| count.parse().expect("a number"));
+    let seconds = if is_quick { 2 } else { 10 };
+    println!(
+        "recording {LANES} controllers of {AXES} axes at {RATE_HZ} Hz, {rounds} rounds of {seconds} s: median (least..greatest)"
+    );
+    costs(rounds, seconds);
+    lateness(rounds, seconds);
+}
+
+/// Flat out: every tick of some seconds is tapped, and taken every twenty.
+fn costs(rounds: usize, seconds: u64) {
+    let all: Vec<Costs> = (0..rounds).map(|_| Costs::of(seconds)).collect();
+    let spread = |figure: fn(&Costs) -> f64| Spread::of(all.iter().map(figure));
+    let tap = spread(|costs| costs.tap_us);
+    println!("tick tap, p50         {tap:.2} us  <= 2: {}", verdict(tap, 2.0));
+    println!("tick tap, p99         {:.2} us", spread(|costs| costs.tap_p99_us));
+    println!("tick tap / bare sends {:.4}", spread(|costs| costs.tap_us / costs.sends_us));
+    println!("ack tap, a drain, p50 {:.2} us", spread(|costs| costs.acks_us));
+    let share = spread(|costs| costs.share);
+    println!("recorder thread       {share:.2} % of a core  <= 3: {}", verdict(share, 3.0));
+    println!("flight recorder       {:.2} MB/s", spread(|costs| costs.octets_a_s / 1e6));
+    let incident = spread(|costs| costs.incident_s);
+    println!("incident of {seconds} s       {incident:.2} s");
+    let of_70 = Spread::of(all.iter().map(|costs| costs.incident_s * 70.0 / seconds as f64));
+    println!("the same of 70 s, by proportion {of_70:.2} s  <= 2: {}", verdict(of_70, 2.0));
+}
+
+struct Costs {
+    tap_us: f64,
+    tap_p99_us: f64,
+    sends_us: f64,
+    acks_us: f64,
+    share: f64,
+    octets_a_s: f64,
+    incident_s: f64,
+}
+
+impl Costs {
+    fn of(seconds: u64) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("flight.ring");
+        let (mut tap, mut acks, mut rig) = RecorderRig::new(seats(), Rate::from_hz(RATE_HZ), &path, FLIGHT);
+        let sockets = Sockets::open();
+        let (mut ticks_us, mut drains_us, mut sends_us) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut cpu, mut octets) = (Duration::ZERO, 0);
+        for tick in 0..1_000 * seconds {
+            let at = MonoTime::from_nanos(tick * 1_000_000);
+            let frames = frames(tick);
+            ticks_us.push(timed(|| tapped(&mut tap, tick, at, &frames)));
+            drains_us.push(timed(|| {
+                let number = FrameNo(u32::try_from(tick).expect("few"));
+                (0..LANES).for_each(|lane| reply(&mut acks, lane, number, at));
+                drained(&mut acks, at);
+            }));
+            sends_us.push(timed(|| frames.iter().for_each(|(octets, len)| sockets.send(&octets[..*len]))));
+            sockets.empty();
+            if tick % 20 == 19 {
+                let before = thread_cpu_time();
+                octets += rig.take();
+                cpu += thread_cpu_time().saturating_sub(before);
+            }
+        }
+        assert_eq!(rig.dropped(), (0, 0));
+        let began = Monotonic.now();
+        black_box(rig.incident(&folder.path().join("incident.mcap")).expect("there is room"));
+        let incident_s = Monotonic.now().since(began).as_secs_f64();
+        let median = |figures: &[f64]| Spread::of(figures.iter().copied()).median;
+        let seconds = seconds as f64;
+        Self {
+            tap_us: median(&ticks_us),
+            tap_p99_us: quantile(&mut ticks_us, 0.99),
+            sends_us: median(&sends_us),
+            acks_us: median(&drains_us),
+            share: 100.0 * cpu.as_secs_f64() / seconds,
+            octets_a_s: octets as f64 / seconds,
+            incident_s,
+        }
+    }
+}
+
+fn quantile(figures: &mut [f64], part: f64) -> f64 {
+    figures.sort_by(f64::total_cmp);
+    figures[((figures.len() - 1) as f64 * part) as usize]
+}
+
+fn timed(work: impl FnOnce()) -> f64 {
+    let began = Monotonic.now();
+    work();
+    Monotonic.now().since(began).as_secs_f64() * 1e6
+}
+
+fn seats() -> Vec<RecordedSeat> {
+    let seat = SeatType::bench3(AXES);
+    let window = Window::new((0..AXES).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect());
+    (0..LANES)
+        .map(|lane| RecordedSeat::new(&format!("S{lane}"), &window, FrameKind::Datagram(VibrationPort::Two)))
+        .collect()
+}
+
+/// A tick of sines, each lane at its own level.
+fn frames(tick: u64) -> Vec<([u8; MAX_LEN], usize)> {
+    let frame = |lane: usize| {
+        let place = |axis: usize| {
+            let phase = tick as f64 / 1_000.0 * (0.5 + axis as f64) + lane as f64;
+            kinocue::harness::motion::Pulses(
+                (150_000.0 + (100_000.0 + 500.0 * lane as f64) * phase.sin()) as i32,
+            )
+        };
+        let positions: [_; AXES] = std::array::from_fn(place);
+        let motion = Motion {
+            timing: Timing::Relative,
+            channel: 0,
+            accept: Code(0xffff),
+            reply: Code(1),
+            frame: FrameNo(u32::try_from(tick).expect("few")),
+            time_ms: 1,
+            positions: &positions,
+            outputs: 0,
+            analogue: Analogue::default(),
+            vibration: None,
+        };
+        let mut octets = [0; MAX_LEN];
+        let len = motion.emit(&mut octets).len();
+        (octets, len)
+    };
+    (0..LANES).map(frame).collect()
+}
+
+fn tapped(tap: &mut Tap, tick: u64, at: MonoTime, frames: &[([u8; MAX_LEN], usize)]) {
+    for (lane, (octets, len)) in frames.iter().enumerate() {
+        tap.asked(Asked::of([0.5; MAX_AXES], AXES));
+        tap.frame(lane, &octets[..*len], at, Delivery::Sent);
+    }
+    tap.tick(&TickHead::of(tick, at));
+}
+
+/// A socket to each of as many, on loopback.
+struct Sockets(Vec<[UdpSocket; 2]>);
+
+impl Sockets {
+    fn open() -> Self {
+        let pair = |_| {
+            let [from, to] =
+                [0; 2].map(|_| UdpSocket::bind("127.0.0.1:0").expect("loopback has a free port"));
+            from.connect(to.local_addr().expect("it is bound")).expect("loopback can be reached");
+            to.set_nonblocking(true).expect("any socket can be");
+            [from, to]
+        };
+        Self((0..LANES).map(pair).collect())
+    }
+
+    fn send(&self, octets: &[u8]) {
+        // One each: whoever sends a tick sends to all.
+        thread_local! { static NEXT: std::cell::Cell<usize> = const { std::cell::Cell::new(0) }; }
+        let next = NEXT.get();
+        NEXT.set((next + 1) % LANES);
+        let _ = self.0[next][0].send(octets);
+    }
+
+    fn empty(&self) {
+        let mut buf = [0; MAX_LEN];
+        self.0.iter().for_each(|[_, to]| while to.recv(&mut buf).is_ok() {});
+    }
+}
+
+/// With taps and without, by turns, each in a process of its own.
+fn lateness(rounds: usize, seconds: u64) {
+    let peer = Peer::start(LANES);
+    let ratios: Vec<[f64; 2]> = (0..rounds)
+        .map(|round| {
+            let mut kinds = ["plain", "tapped"];
+            if !round.is_multiple_of(2) {
+                kinds.reverse();
+            }
+            let mut p99 = kinds.map(|kind| {
+                let outcome: Outcome = sender(&[kind, &seconds.to_string()], &peer.addresses);
+                (kind, outcome.lateness.p99)
+            });
+            p99.sort_unstable_by_key(|(kind, _)| *kind);
+            p99.map(|(_, us)| us)
+        })
+        .collect();
+    let column = |at: usize| Spread::of(ratios.iter().map(|pair| pair[at]));
+    let ratio = Spread::of(ratios.iter().map(|[plain, tapped]| tapped / plain));
+    println!("lateness p99 without  {:.1} us", column(0));
+    println!("lateness p99 with     {:.1} us", column(1));
+    println!("with / without        {ratio:.3}  <= 1.05: {}", verdict(ratio, 1.05));
+}
+
+/// The sockets, and a tap.
+struct Tapped {
+    sender: Sender,
+    tap: Option<Tap>,
+}
+
+impl FrameSink for Tapped {
+    fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery {
+        let delivery = FrameSink::send(&mut self.sender, lane, datagram, at);
+        if let Some(tap) = &mut self.tap {
+            tap.frame(lane, datagram, at, delivery);
+        }
+        delivery
+    }
+
+    fn asked(&mut self, asked: Asked) {
+        if let Some(tap) = &mut self.tap {
+            tap.asked(asked);
+        }
+    }
+
+    fn tick_over(&mut self, head: &TickHead) {
+        if let Some(tap) = &mut self.tap {
+            tap.tick(head);
+        }
+    }
+}
+
+/// Plays to controllers that answer, recorded or not: behind the taps is the thread that a hall has.
+fn play(seconds: &str, to: &[&str], is_tapped: bool) -> Outcome {
+    let to: Vec<SocketAddrV4> = to.iter().map(|word| word.parse().expect("an address")).collect();
+    let folder = PathBuf::from("/dev/shm").join(format!("kinocue-bench-{}", std::process::id()));
+    let over = AtomicBool::new(false);
+    let (tap, acks, mut rig) = RecorderRig::new(seats(), Rate::from_hz(RATE_HZ), &folder, 64 << 20);
+    let outcome = std::thread::scope(|scope| {
+        let over = &over;
+        scope.spawn(move || {
+            let _ = normal_priority();
+            while !over.load(Ordering::Acquire) {
+                rig.take();
+                Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(20));
+            }
+        });
+        let taps: Option<(Tap, AckTap)> = is_tapped.then_some((tap, acks));
+        let outcome =
+            ours::run_into(&Monotonic, seconds.parse().expect("a number"), &to, false, |sender, loops| {
+                let tap = taps.map(|(tap, acks)| {
+                    loops.record(acks);
+                    tap
+                });
+                Tapped { sender, tap }
+            });
+        over.store(true, Ordering::Release);
+        outcome
+    });
+    let _ = std::fs::remove_file(&folder);
+    outcome
+}

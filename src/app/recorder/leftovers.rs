@@ -1,0 +1,210 @@
+//! What an earlier program left when it was killed: the flight recorder's file becomes an incident, and recordings that were cut short
+//! are written anew with an index. Each is read back before it takes the place of the other.
+
+use std::fs::{self, File};
+use std::io::{self, BufReader, BufWriter, Read};
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
+
+use super::disk::{Disk, PART};
+use super::link::RecordLink;
+use crate::app::recording::in_io;
+use crate::record::{self, Entry, EntryMaker, IncidentCause, Opening, Recording, Wanted, read_flight};
+use crate::time::MonoTime;
+
+/// How often it is asked whether it may go on.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// What a flight recorder held.
+pub(super) type Leftover = (Opening, Vec<Entry>);
+
+/// What the flight recorder of an earlier program held, if that did not end in order: then there is a file.
+pub(super) fn flight(path: &Path) -> Option<Leftover> {
+    let file = File::open(path).ok()?;
+    let (opening, entries) = read_flight(&file).ok().flatten()?;
+    let opening = Opening::of_octets(&opening)?;
+    (!entries.is_empty()).then_some((opening, entries))
+}
+
+/// Writes all of it anew, while it may.
+pub(super) fn clear_up(
+    disk: &Disk,
+    link: &RecordLink,
+    leftover: Option<Leftover>,
+    cut_short: &[PathBuf],
+    may: &impl Fn() -> bool,
+) {
+    let told = |what: &str, result: io::Result<()>| {
+        if let Err(error) = result {
+            link.trouble(Some(format!("{what} of before the start could not be recovered: {error}")));
+        }
+    };
+    if let Some(leftover) = leftover {
+        told("the flight recorder", incident(disk, &leftover, may));
+        link.tell(|status| {
+            *status.incidents.entry(IncidentCause::Crash.word().to_owned()).or_default() += 1;
+        });
+    }
+    for path in cut_short {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let recovered = recover(path, may);
+        if recovered.is_err() {
+            // It stays, and is not tried at each start again.
+            let _ = fs::rename(path, path.with_extension("unreadable"));
+        }
+        told(&name, recovered);
+    }
+}
+
+fn wait_for(may: &impl Fn() -> bool) {
+    while !may() {
+        thread::park_timeout(PATIENCE);
+    }
+}
+
+/// The last minute before the program was killed, as an incident.
+fn incident(disk: &Disk, (opening, entries): &Leftover, may: &impl Fn() -> bool) -> io::Result<()> {
+    disk.clear_out_for_more()?;
+    let (part, out) = disk.create_incident(IncidentCause::Crash)?;
+    let opening = opening.clone().with("cause", IncidentCause::Crash.word());
+    let mut file =
+        Recording::open(out, &opening, EntryMaker::new(0, (MonoTime::default(), 0))).map_err(in_io)?;
+    for some in entries.chunks(1_000) {
+        wait_for(may);
+        some.iter().try_for_each(|entry| file.put(entry)).map_err(in_io)?;
+        file.flush().map_err(in_io)?;
+    }
+    let end = [("messages", entries.len().to_string())];
+    let out = file.finish(&end, None).map_err(in_io)?;
+    out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    part.close().map(drop)
+}
+
+/// Writes a file anew that was cut short.
+///
+/// # Errors
+/// Where nothing of it can be read, or the new one cannot be written; what was there stays then.
+fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
+    let name = path.to_string_lossy();
+    let whole = PathBuf::from(format!("{}.mcap", name.strip_suffix(PART).unwrap_or(&name)));
+    let fresh = path.with_extension("recovering");
+    if whole.try_exists()? {
+        return Err(io::ErrorKind::AlreadyExists.into());
+    }
+    let result = copy(path, &fresh, may).and_then(|()| {
+        fs::rename(&fresh, &whole)?;
+        fs::remove_file(path)
+    });
+    if result.is_err() {
+        // It is of no use to anybody.
+        let _ = fs::remove_file(&fresh);
+    }
+    result
+}
+
+/// Writes what is whole of it to another file, and reads that back.
+fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
+    let input = Patient { file: BufReader::new(File::open(from)?), may };
+    let (recovered, out) =
+        record::recover(input, BufWriter::new(File::create(to)?)).map_err(io::Error::other)?;
+    if recovered.messages.is_empty() {
+        return Err(io::Error::other("it has no whole message"));
+    }
+    out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+    let again = Patient { file: BufReader::new(File::open(to)?), may };
+    let unwanted = Wanted { samples: false, full: false, ..Wanted::ALL };
+    let read = record::read(again, unwanted, &mut |_, _, _| ()).map_err(io::Error::other)?;
+    if read.trouble.is_some() || read.messages != recovered.messages {
+        return Err(io::Error::other("what was written does not read back; the disk may be failing"));
+    }
+    Ok(())
+}
+
+/// A file of which more is read only while it may.
+struct Patient<'a, F> {
+    file: BufReader<File>,
+    may: &'a F,
+}
+
+impl<F: Fn() -> bool> Read for Patient<'_, F> {
+    fn read(&mut self, octets: &mut [u8]) -> io::Result<usize> {
+        wait_for(self.may);
+        self.file.read(octets)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mcap::MessageStream;
+
+    use super::*;
+    use crate::record::{About, EventNote, Message, Mode, Note};
+
+    fn opening() -> Opening {
+        let about = About {
+            hall: "hall".to_owned(),
+            cue: "ride".to_owned(),
+            title: String::new(),
+            cue_sha256: String::new(),
+            rate_hz: 100.0,
+            mode: Mode::Sampled,
+            clocks: (MonoTime::default(), 0),
+        };
+        Opening::new(&about, &[])
+    }
+
+    fn entry(number: u64) -> Entry {
+        let maker = EntryMaker::new(0, (MonoTime::default(), 0));
+        let note = EventNote { kind: "standing", seat: "A1".to_owned(), text: number.to_string() };
+        maker.entry(MonoTime::from_nanos(number), &Message::Note(Note::Event(note))).unwrap()
+    }
+
+    #[test]
+    fn a_recording_that_was_cut_short_is_whole_after_the_next_start() {
+        let folder = tempfile::tempdir().unwrap();
+        let part = folder.path().join("2026-01-01T10-00-00-show-one.part.mcap");
+        let out = BufWriter::new(File::create(&part).unwrap());
+        let maker = EntryMaker::new(0, (MonoTime::default(), 0));
+        let mut file = Recording::open(out, &opening(), maker).unwrap();
+        file.attach("configuration.toml", "application/toml", b"[show]").unwrap();
+        for number in 0..100 {
+            file.put(&entry(number)).unwrap();
+            file.flush().unwrap();
+        }
+        // Killed in the middle of a record.
+        let octets = fs::read(&part).unwrap();
+        std::mem::forget(file);
+        fs::write(&part, &octets[..octets.len() - 60]).unwrap();
+        recover(&part, &|| true).unwrap();
+        assert!(!part.exists());
+        let whole = fs::read(folder.path().join("2026-01-01T10-00-00-show-one.mcap")).unwrap();
+        let summary = mcap::Summary::read(&whole).unwrap().unwrap();
+        let names: Vec<_> = summary.metadata_indexes.iter().map(|one| one.name.as_str()).collect();
+        assert_eq!((names, summary.attachment_indexes.len()), (vec!["kinocue", "kinocue.recovered"], 1));
+        assert_eq!(MessageStream::new(&whole).unwrap().count(), 99);
+        // Nothing of it is left.
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_recovered_stays_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let part = folder.path().join("2026-01-01T10-00-00-show-one.part.mcap");
+        for octets in [&b""[..], b"no recording at all", &octets_of_a_start()[..40]] {
+            fs::write(&part, octets).unwrap();
+            assert!(recover(&part, &|| true).is_err());
+            assert_eq!(fs::read(&part).unwrap(), octets);
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        }
+    }
+
+    fn octets_of_a_start() -> Vec<u8> {
+        let file = Recording::open(
+            io::Cursor::new(Vec::new()),
+            &opening(),
+            EntryMaker::new(0, (MonoTime::default(), 0)),
+        );
+        file.unwrap().finish(&[], None).unwrap().into_inner()
+    }
+}

@@ -1,0 +1,101 @@
+//! The way to a recorder: what it is told, bounded and never waited for; and how it stands.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::control::RecordStatus;
+use crate::record::{IncidentCause, Note};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+
+/// What waits at the most; more is lost, and counted.
+const WAITING: usize = 1_024;
+
+/// A show, or what else is recorded as one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct ShowStart {
+    /// `show`, `test` or `homing`.
+    pub(crate) kind: &'static str,
+    /// The id of the cue.
+    pub(crate) cue: String,
+    /// Its title.
+    pub(crate) title: String,
+    /// SHA-256 of its file.
+    pub(crate) sha256: String,
+    /// A copy of it that goes with the recording, where one is wanted.
+    pub(crate) attached: Option<std::path::PathBuf>,
+}
+
+/// What a recorder is told.
+#[derive(Debug)]
+pub(crate) enum RecordAsk {
+    /// That is to be kept.
+    Keep(Note),
+    /// A show begins.
+    Begin(ShowStart),
+    /// It is over.
+    End,
+    /// What it came to, as JSON.
+    Report(Vec<u8>),
+    /// Something is worth an incident.
+    Incident(IncidentCause),
+    /// The hall has closed.
+    Close,
+}
+
+/// A surface's end.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RecordLink {
+    /// None where nobody records.
+    asks: Option<SyncSender<(MonoTime, RecordAsk)>>,
+    shared: Arc<SharedFigures>,
+}
+
+#[derive(Debug, Default)]
+struct SharedFigures {
+    dropped: AtomicU64,
+    status: Mutex<RecordStatus>,
+}
+
+impl RecordLink {
+    /// The way to a recorder, and its other end.
+    pub(crate) fn new() -> (Self, Receiver<(MonoTime, RecordAsk)>) {
+        let (asks, end) = sync_channel(WAITING);
+        (Self { asks: Some(asks), shared: Arc::default() }, end)
+    }
+
+    /// Tells the recorder, of now; where it does not keep up that is lost and counted.
+    pub(crate) fn put(&self, ask: RecordAsk) {
+        if let Some(asks) = &self.asks
+            && asks.try_send((Monotonic.now(), ask)).is_err()
+        {
+            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Has that kept.
+    pub(crate) fn keep(&self, note: Note) {
+        self.put(RecordAsk::Keep(note));
+    }
+
+    /// How it stands.
+    pub(crate) fn status(&self) -> RecordStatus {
+        let mut status = self.shared.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        status.dropped_notes = self.shared.dropped.load(Ordering::Relaxed);
+        status
+    }
+
+    /// Changes how it stands.
+    pub(super) fn tell(&self, change: impl FnOnce(&mut RecordStatus)) {
+        change(&mut self.shared.status.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// Says what is wrong; none for nothing.
+    pub(super) fn trouble(&self, trouble: Option<String>) {
+        self.tell(|status| {
+            status.errors += u64::from(trouble.is_some() && status.trouble != trouble);
+            status.trouble = trouble;
+        });
+    }
+}

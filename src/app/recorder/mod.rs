@@ -1,0 +1,217 @@
+//! Recordings of the service: shows, and the flight recorder with its incidents. A thread of its own behind the taps, alone at the
+//! disk; whatever becomes of it, the hall goes on.
+
+mod disk;
+mod leftovers;
+mod link;
+mod worker;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::{self, Builder, JoinHandle};
+
+use sha2::{Digest as _, Sha256};
+
+pub(crate) use link::{RecordAsk, RecordLink, ShowStart};
+
+use super::recording;
+use super::runtime::Runtime;
+use crate::config::RecordMode;
+use crate::record::{About, EntryMaker, Intake, Mode, Opening, octets_a_second};
+use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::sys::realtime;
+use crate::time::{Clock as _, Rate};
+use disk::Disk;
+use worker::Worker;
+
+/// The flight recorder's file in the runtime folder.
+const FLIGHT_FILE: &str = "flight.ring";
+/// Octets that it may have at the most.
+const MOST_FLIGHT: u64 = 128 << 20;
+const LEAST_FLIGHT: u64 = 1 << 20;
+
+/// Where a recorder has its files.
+#[derive(Debug, Clone)]
+pub(crate) struct RecordPlaces {
+    /// The folder of the flight recorder, in memory.
+    pub(crate) runtime: PathBuf,
+    /// The folder of recordings.
+    pub(crate) recordings: PathBuf,
+    /// The configuration.
+    pub(crate) config: PathBuf,
+}
+
+/// The recorder of one hall.
+#[derive(Debug)]
+pub(crate) struct HallRecorder {
+    link: RecordLink,
+    thread: Option<JoinHandle<()>>,
+    flight: PathBuf,
+}
+
+impl HallRecorder {
+    /// Taps a hall that is about to open, and starts the thread behind the taps. Where the system has no thread for it the hall goes on
+    /// without, and says so.
+    pub(crate) fn start(runtime: &mut Runtime, places: &RecordPlaces) -> Self {
+        let config = Arc::clone(runtime.config());
+        let rate = Rate::from_hz(config.show.rate_hz);
+        let seats = recording::seats(&config, runtime.lanes());
+        let clocks = (Monotonic.now(), wall_now_ns());
+        let about = About {
+            hall: config.show.name.clone(),
+            cue: String::new(),
+            title: String::new(),
+            cue_sha256: String::new(),
+            rate_hz: rate.hz(),
+            mode: Mode::Full,
+            clocks,
+        };
+        let text = fs::read(&places.config).unwrap_or_default();
+        let digest: String = Sha256::digest(&text).iter().map(|octet| format!("{octet:02x}")).collect();
+        let opening = Opening::new(&about, &seats)
+            .with("config_sha256", digest)
+            .with("sample_hz", config.record.sample_hz.to_string());
+        let maker = EntryMaker::new(seats.len(), clocks);
+        let octets_a_s = octets_a_second(&seats, rate, config.record.sample_hz);
+        let (taps, intake) = Intake::new(seats, rate, config.record.sample_hz);
+        let (link, asks) = RecordLink::new();
+        let flight = places.runtime.join(FLIGHT_FILE);
+        if config.record.mode == RecordMode::Off && config.record.flight_s == 0 {
+            link.tell(|figures| figures.mode = RecordMode::Off.word().to_owned());
+            return Self { link, thread: None, flight };
+        }
+        let flight_len = (octets_a_s * u64::from(config.record.flight_s)).clamp(LEAST_FLIGHT, MOST_FLIGHT);
+        // Before the new one takes its place.
+        let leftover = leftovers::flight(&flight);
+        let disk = Disk::new(&config.record, &places.recordings);
+        let worker = Worker::new(intake, asks, link.clone(), opening, maker, disk, config.record.clone());
+        let safe = safe_configuration(&text);
+        let told = link.clone();
+        let (live, ring) = (runtime.control().live, flight.clone());
+        let thread = Builder::new().name("recorder".to_owned()).spawn(move || {
+            realtime::stand_back();
+            let _told = TellsOfPanic(told);
+            let worker = worker.attaching(safe).flying(&ring, flight_len);
+            worker.clear_up(leftover, move || !live.is_moving());
+            worker.run(&Monotonic);
+        });
+        if let Err(error) = &thread {
+            link.trouble(Some(format!("nothing is recorded: no thread could be started: {error}")));
+        } else {
+            runtime.record(taps);
+        }
+        Self { link, thread: thread.ok(), flight }
+    }
+
+    /// The way to it.
+    pub(crate) fn link(&self) -> RecordLink {
+        self.link.clone()
+    }
+
+    /// Waits until what came through its taps is written; these are gone by now.
+    pub(crate) fn end(self) {
+        self.link.put(RecordAsk::Close);
+        let Some(thread) = self.thread else { return };
+        // One that panicked has said so, and its files are recovered at the next start.
+        if thread.join().is_ok() {
+            // An end in order leaves nothing to be recovered.
+            let _ = fs::remove_file(&self.flight);
+        }
+    }
+}
+
+/// Says so where the thread that has it panics: the hall goes on.
+struct TellsOfPanic(RecordLink);
+
+impl Drop for TellsOfPanic {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            self.0.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
+            self.0.trouble(Some(
+                "nothing is recorded any more: the recorder failed; restart the service between two shows"
+                    .to_owned(),
+            ));
+        }
+    }
+}
+
+/// Tables of a configuration that nobody is shown.
+const SECRET: [&str; 3] = ["api", "osc", "text"];
+/// Texts of these tables that are shorter are words and addresses, which stand elsewhere, too; a token's hash has 64 characters.
+const SECRET_LEN: usize = 16;
+
+/// A configuration without the tables in which there are secrets; none where it cannot be told apart.
+fn safe_configuration(text: &[u8]) -> Option<String> {
+    let text = str::from_utf8(text).ok()?;
+    let is_secret = |name: &str| {
+        let first = name.trim().trim_matches(['[', '"', '\'', ' ']);
+        let first: &str = first.split(['.', '=', ']', '"', '\'', ' ']).next().unwrap_or_default();
+        SECRET.contains(&first)
+    };
+    let (mut kept, mut skips) = (String::new(), false);
+    for line in text.lines() {
+        if line.trim_start().starts_with('[') {
+            skips = is_secret(line);
+        } else if is_secret(line) {
+            // As a dotted key, or a table in a line.
+            continue;
+        }
+        if !skips {
+            kept.push_str(line);
+            kept.push('\n');
+        }
+    }
+    // Whatever its lines look like: no text of these tables may be left.
+    let (tree, errors) = toml::de::DeTable::parse_recoverable(text);
+    let mut secrets = Vec::new();
+    for (name, value) in tree.get_ref() {
+        if SECRET.contains(&name.get_ref().as_ref()) {
+            texts(value.get_ref(), &mut secrets);
+        }
+    }
+    let is_left = secrets.iter().any(|secret| secret.len() >= SECRET_LEN && kept.contains(secret.as_str()));
+    (errors.is_empty() && !is_left).then_some(kept)
+}
+
+fn texts(value: &toml::de::DeValue<'_>, out: &mut Vec<String>) {
+    use toml::de::DeValue;
+    match value {
+        DeValue::String(text) => out.push(text.to_string()),
+        DeValue::Array(all) => all.iter().for_each(|one| texts(one.get_ref(), out)),
+        DeValue::Table(table) => table.iter().for_each(|(_, one)| texts(one.get_ref(), out)),
+        _ => {}
+    }
+}
+
+/// The name of a file without what no file name may have.
+pub(super) fn plain_name(text: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '_') { c } else { '-' };
+    Path::new(text).file_stem().unwrap_or_default().to_string_lossy().chars().take(60).map(plain).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_is_attached_without_what_opens_its_doors() {
+        let text = "[show]\nname = \"one\"\n[api]\nlisten = \"127.0.0.1:1\"\n[[api.token]]\nsha256 = \"secret-one\"\n\
+            role = \"operate\"\n[osc]\nfrom = [\"10.0.0.1\"]\n[text]\nword = \"secret-two\"\n[log]\nmax_age_days = 3\n";
+        let safe = safe_configuration(text.as_bytes()).unwrap();
+        assert_eq!(safe, "[show]\nname = \"one\"\n[log]\nmax_age_days = 3\n");
+        let safe = safe_configuration(b"api.token = \"secret-one\"\n[show]\nname = \"one\"\n").unwrap();
+        assert_eq!(safe, "[show]\nname = \"one\"\n");
+    }
+
+    #[test]
+    fn one_whose_lines_hide_a_secret_is_not_attached() {
+        let hidden = "[api]\nwords = \"\"\"\n[show]\nsecret-word\n\"\"\"\n[show]\nname = \"one\"\n";
+        let safe = safe_configuration(hidden.as_bytes());
+        assert!(
+            safe.is_none_or(|safe| !safe.contains("secret-word")),
+            "it is cut out, or nothing is attached"
+        );
+        assert_eq!(safe_configuration(b"[api\nx"), None, "it cannot be told apart");
+    }
+}

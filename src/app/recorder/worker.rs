@@ -1,0 +1,470 @@
+//! The thread behind the taps: takes what comes, and writes it to the flight recorder, to the recording of a show and to that of an
+//! incident. What cannot be written is told, and tried again; it never holds up whoever it comes from.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::Path;
+use std::sync::mpsc::Receiver;
+use std::thread::Builder;
+use std::time::Duration;
+
+use super::disk::{Disk, PartFile};
+use super::leftovers::{Leftover, clear_up};
+use super::link::{RecordAsk, RecordLink, ShowStart};
+use crate::app::recording::in_io;
+use crate::config::{Record, RecordMode};
+use crate::record::{
+    Counts, Entry, EntryMaker, EventNote, Flight, IncidentCause, IncidentStep, Incidents, Intake, Message,
+    Note, Opening, Recording,
+};
+use crate::sys::realtime;
+use crate::time::{Clock, MonoTime};
+
+/// How often it looks.
+const LOOK: Duration = Duration::from_millis(20);
+/// How often files get what they have: so much is lost where the program is killed.
+const FLUSH: Duration = Duration::from_millis(500);
+/// How often they are put on the disk, what is free is looked at, and files that are too old or too many go.
+const SYNC: Duration = Duration::from_secs(5);
+/// What failed is tried again after so long.
+const AGAIN: Duration = Duration::from_secs(30);
+/// A recording begins so long before its show, and ends so long after it.
+const BEFORE: Duration = Duration::from_secs(10);
+const AFTER: Duration = Duration::from_secs(5);
+/// Asks that are taken in one look; more wait for the next.
+const ASKS: usize = 256;
+/// The largest cue that is attached, octets.
+const MOST_ATTACHED: u64 = 64 << 20;
+
+/// A recording that is being written.
+struct OpenFile {
+    file: Recording<BufWriter<File>>,
+    disk: PartFile,
+    counts: Counts,
+}
+
+/// A show that is recorded, whether a file of it is open or not.
+struct OpenShow {
+    start: ShowStart,
+    part: u32,
+    file: Option<OpenFile>,
+    /// When the next file is tried, where the last has failed.
+    again_at: Option<MonoTime>,
+    /// Until when it goes on, once it is over.
+    until: Option<MonoTime>,
+    report: Option<Vec<u8>>,
+}
+
+/// What the thread has.
+pub(super) struct Worker {
+    intake: Intake,
+    asks: Receiver<(MonoTime, RecordAsk)>,
+    link: RecordLink,
+    opening: Opening,
+    maker: EntryMaker,
+    disk: Disk,
+    record: Record,
+    safe: Option<String>,
+    flight: Option<Flight>,
+    /// Samples of the last ten seconds.
+    recent: VecDeque<Entry>,
+    /// How the hall stands, for files that are begun later.
+    hall: Option<Entry>,
+    show: Option<OpenShow>,
+    incidents: Incidents,
+    incident: Option<OpenFile>,
+    closes: bool,
+}
+
+impl Worker {
+    pub(super) fn new(
+        intake: Intake,
+        asks: Receiver<(MonoTime, RecordAsk)>,
+        link: RecordLink,
+        opening: Opening,
+        maker: EntryMaker,
+        disk: Disk,
+        record: Record,
+    ) -> Self {
+        link.tell(|status| status.mode = record.mode.word().to_owned());
+        Self {
+            intake: intake.in_full(),
+            asks,
+            link,
+            opening,
+            maker,
+            disk,
+            record,
+            safe: None,
+            flight: None,
+            recent: VecDeque::new(),
+            hall: None,
+            show: None,
+            incidents: Incidents::default(),
+            incident: None,
+            closes: false,
+        }
+    }
+
+    /// The same with a text of the configuration for each file.
+    pub(super) fn attaching(self, safe: Option<String>) -> Self {
+        Self { safe, ..self }
+    }
+
+    /// The same with the flight recorder's file.
+    pub(super) fn flying(mut self, path: &Path, len: u64) -> Self {
+        if self.record.flight_s == 0 {
+            return self;
+        }
+        match Flight::create(path, &self.opening.clone().with("of", "incident").to_octets(), len) {
+            Ok(flight) => self.flight = Some(flight),
+            Err(error) => {
+                let path = path.display();
+                let remedy = "give the service a runtime folder (RuntimeDirectory= in the unit)";
+                self.link.trouble(Some(format!("there is no flight recorder: {path}: {error}; {remedy}")));
+            }
+        }
+        self
+    }
+
+    /// Writes anew what an earlier program left, on a thread of its own that waits while `may` says so.
+    pub(super) fn clear_up(&self, leftover: Option<Leftover>, may: impl Fn() -> bool + Send + 'static) {
+        let (disk, link) = (self.disk.clone(), self.link.clone());
+        let cut_short = disk.cut_short();
+        if leftover.is_none() && cut_short.is_empty() {
+            return;
+        }
+        // Where there is no thread for it, it stays for the next start.
+        let _ = Builder::new().name("recover".to_owned()).spawn(move || {
+            realtime::stand_back();
+            clear_up(&disk, &link, leftover, &cut_short, &may);
+        });
+    }
+
+    /// Records until the taps are gone.
+    pub(super) fn run(mut self, clock: &impl Clock) {
+        let mut flush_at = clock.now() + FLUSH;
+        let mut sync_at = clock.now();
+        loop {
+            // Asked before they are emptied: what was pushed before the end is taken.
+            let is_over = self.intake.is_over();
+            let now = clock.now();
+            self.take_asks(now);
+            self.take_taps();
+            self.mind_ends(now);
+            if now >= flush_at {
+                self.flush(now);
+                flush_at = now + FLUSH;
+            }
+            if now >= sync_at {
+                self.sync(now);
+                sync_at = now + SYNC;
+            }
+            if is_over && self.closes {
+                return self.end(now);
+            }
+            clock.sleep_until(now + LOOK);
+        }
+    }
+
+    fn take_asks(&mut self, now: MonoTime) {
+        for _ in 0..ASKS {
+            let Ok((at, ask)) = self.asks.try_recv() else { return };
+            match ask {
+                RecordAsk::Keep(note) => {
+                    if matches!(note, Note::Mark(_)) {
+                        self.link.tell(|status| status.marks += 1);
+                    }
+                    let is_mark = matches!(note, Note::Mark(_));
+                    self.keep(at, note);
+                    if is_mark {
+                        self.on_incident(IncidentCause::Mark, at, now);
+                    }
+                }
+                RecordAsk::Begin(start) => self.begin(start, now),
+                RecordAsk::End => {
+                    if let Some(show) = &mut self.show {
+                        show.until.get_or_insert(at + AFTER);
+                    }
+                }
+                RecordAsk::Report(report) => {
+                    if let Some(show) = &mut self.show {
+                        show.report = Some(report);
+                    }
+                }
+                RecordAsk::Incident(cause) => self.on_incident(cause, at, now),
+                RecordAsk::Close => self.closes = true,
+            }
+        }
+    }
+
+    fn take_taps(&mut self) {
+        let mut taken = Vec::new();
+        self.intake.take(&mut |at, message| taken.push((at, message)));
+        for (at, message) in &taken {
+            self.write(*at, message);
+        }
+        for (cause, at) in self.intake.take_found() {
+            self.on_incident(cause, at, at);
+        }
+        if let Some(Err(error)) = self.flight.as_mut().map(Flight::write) {
+            self.link.trouble(Some(format!("the flight recorder cannot be written: {error}")));
+        }
+    }
+
+    fn keep(&mut self, at: MonoTime, note: Note) {
+        self.write(at, &Message::Note(note));
+    }
+
+    /// Gives a message to whoever keeps it.
+    fn write(&mut self, at: MonoTime, message: &Message) {
+        let Ok(entry) = self.maker.entry(at, message) else { return };
+        if let Some(flight) = &mut self.flight {
+            flight.put(&entry);
+        }
+        if let Some(Err(error)) = self.incident.as_mut().map(|incident| incident.file.put(&entry)) {
+            self.fail_incident(&in_io(error));
+        }
+        let is_full = self.maker.is_full(entry.channel);
+        if !is_full || self.record.mode == RecordMode::Full {
+            let file = self.show.as_mut().and_then(|show| show.file.as_mut());
+            if let Some(Err(error)) = file.map(|open| open.file.put(&entry)) {
+                self.fail_show(&in_io(error), at);
+            }
+        }
+        if matches!(message, Message::Note(Note::Hall(_))) {
+            self.hall = Some(entry.clone());
+        }
+        if !is_full && self.record.mode != RecordMode::Off {
+            let oldest = entry.log_time.saturating_sub(u64::try_from(BEFORE.as_nanos()).unwrap_or(u64::MAX));
+            while self.recent.front().is_some_and(|one| one.log_time < oldest) {
+                self.recent.pop_front();
+            }
+            self.recent.push_back(entry);
+        }
+    }
+
+    /// A show begins; one that is still open is closed.
+    fn begin(&mut self, start: ShowStart, now: MonoTime) {
+        self.close_show(now);
+        if self.record.mode == RecordMode::Off {
+            return;
+        }
+        self.show = Some(OpenShow { start, part: 0, file: None, again_at: None, until: None, report: None });
+        self.open_part(now);
+    }
+
+    /// Opens the next file of the show that is under way.
+    fn open_part(&mut self, now: MonoTime) {
+        let Some(show) = &mut self.show else { return };
+        let opened = self.disk.clear_out_for_more().and_then(|()| {
+            let ShowStart { kind, cue, title, sha256, attached } = &show.start;
+            let number = show.part + 1;
+            let opening = self.opening.clone();
+            let is_full = self.record.mode == RecordMode::Full;
+            let opening = if is_full { opening } else { opening.sampled() };
+            let opening = opening
+                .with("of", *kind)
+                .with("cue", cue.clone())
+                .with("title", title.clone())
+                .with("cue_sha256", sha256.clone())
+                .with("part", number.to_string());
+            let word = if cue.is_empty() { kind } else { cue.as_str() };
+            let (disk, out) = self.disk.create(kind, word, number)?;
+            let disk = disk.until_begun();
+            let mut file = Recording::open(out, &opening, self.maker).map_err(in_io)?;
+            // The first has what was before the show; those behind it how the hall stands.
+            let first = if number == 1 { self.recent.iter() } else { self.recent.range(..0) };
+            for entry in self.hall.iter().filter(|_| number > 1).chain(first) {
+                file.put(entry).map_err(in_io)?;
+            }
+            if let Some(safe) = &self.safe {
+                file.attach("configuration.toml", "application/toml", safe.as_bytes()).map_err(in_io)?;
+            }
+            if let Some(cue) = attached.as_ref().filter(|_| number == 1)
+                && let Some(octets) = small_file(cue)
+            {
+                let name = cue.file_name().unwrap_or_default().to_string_lossy();
+                file.attach(&name, "application/octet-stream", &octets).map_err(in_io)?;
+            }
+            file.flush().map_err(in_io)?;
+            Ok((number, OpenFile { file, disk: disk.begun(), counts: self.intake.counts() }))
+        });
+        match opened {
+            Ok((number, open)) => {
+                let name = open.disk.name();
+                self.link.tell(|status| status.recording = Some(name));
+                self.link.trouble(None);
+                (show.part, show.file, show.again_at) = (number, Some(open), None);
+            }
+            Err(error) => self.fail_show(&error, now),
+        }
+    }
+
+    /// The recording of a show ends early; the show does not.
+    fn fail_show(&mut self, error: &io::Error, now: MonoTime) {
+        let dir = self.disk.dir().display().to_string();
+        if let Some(show) = &mut self.show {
+            (show.file, show.again_at) = (None, Some(now + AGAIN));
+        }
+        self.link.tell(|status| status.recording = None);
+        let remedy = "make room on that disk, or set [record] dir to a folder that the service may write to";
+        self.link.trouble(Some(format!(
+            "the show is not recorded: {dir}: {error}; the show goes on, and another file is tried every 30 s; {remedy}"
+        )));
+    }
+
+    fn fail_incident(&mut self, error: &io::Error) {
+        self.incident = None;
+        let dir = self.disk.dir().display();
+        self.link.trouble(Some(format!(
+            "an incident is not kept: {dir}: {error}; make room on that disk, or set [record] dir"
+        )));
+    }
+
+    /// Something is worth an incident.
+    fn on_incident(&mut self, cause: IncidentCause, at: MonoTime, now: MonoTime) {
+        if self.flight.is_none() {
+            return;
+        }
+        match self.incidents.on(cause, at) {
+            IncidentStep::TooMany => {}
+            IncidentStep::Join => self.say_incident(cause, now),
+            IncidentStep::Begin => {
+                if let Err(error) = self.begin_incident(cause, at) {
+                    self.fail_incident(&error);
+                }
+                self.say_incident(cause, now);
+            }
+        }
+    }
+
+    fn say_incident(&mut self, cause: IncidentCause, now: MonoTime) {
+        self.link.tell(|status| *status.incidents.entry(cause.word().to_owned()).or_default() += 1);
+        let event = EventNote { kind: "incident", seat: String::new(), text: cause.word().to_owned() };
+        self.keep(now, Note::Event(event));
+    }
+
+    /// Begins a file with all that the flight recorder holds.
+    fn begin_incident(&mut self, cause: IncidentCause, at: MonoTime) -> io::Result<()> {
+        let Some(flight) = &mut self.flight else { return Ok(()) };
+        flight.write()?;
+        self.disk.clear_out_for_more()?;
+        let (disk, out) = self.disk.create_incident(cause)?;
+        let disk = disk.until_begun();
+        let opening = self.opening.clone().with("of", "incident").with("cause", cause.word());
+        let mut file = Recording::open(out, &opening, self.maker).map_err(in_io)?;
+        let oldest = self.maker.wall(at).saturating_sub(1_000_000_000 * u64::from(self.record.flight_s));
+        let held = flight.read()?;
+        for entry in self.hall.iter().chain(held.iter().filter(|entry| entry.log_time >= oldest)) {
+            file.put(entry).map_err(in_io)?;
+        }
+        if let Some(safe) = &self.safe {
+            file.attach("configuration.toml", "application/toml", safe.as_bytes()).map_err(in_io)?;
+        }
+        file.flush().map_err(in_io)?;
+        self.incident = Some(OpenFile { file, disk: disk.begun(), counts: Counts::default() });
+        Ok(())
+    }
+
+    /// Closes what is over.
+    fn mind_ends(&mut self, now: MonoTime) {
+        if self.incidents.take_over(now) {
+            self.close_incident();
+        }
+        let Some(show) = &self.show else { return };
+        if show.until.is_some_and(|until| now >= until) {
+            self.close_show(now);
+        } else if show.again_at.is_some_and(|again| now >= again) {
+            self.open_part(now);
+        } else if show
+            .file
+            .as_ref()
+            .is_some_and(|open| open.disk.len() >> 20 >= u64::from(self.record.part_mib))
+        {
+            // The next is open before the last is closed.
+            let before = self.show.as_mut().and_then(|show| show.file.take());
+            self.open_part(now);
+            if let Some(Err(error)) = before.map(|open| self.close_file(open, None)) {
+                self.link.trouble(Some(format!("a part of a recording is not whole: {error}")));
+            }
+        }
+    }
+
+    fn close_show(&mut self, now: MonoTime) {
+        let Some(OpenShow { file, report, .. }) = self.show.take() else { return };
+        self.link.tell(|status| status.recording = None);
+        if let Some(Err(error)) = file.map(|open| self.close_file(open, report.as_deref())) {
+            self.fail_show(&error, now);
+        }
+    }
+
+    fn close_incident(&mut self) {
+        if let Some(Err(error)) = self.incident.take().map(|open| self.close_file(open, None)) {
+            self.fail_incident(&error);
+        }
+    }
+
+    fn close_file(&self, open: OpenFile, report: Option<&[u8]>) -> io::Result<()> {
+        let OpenFile { file, disk, counts } = open;
+        let end = self.intake.end_since(&counts);
+        let out = file.finish(&end, report).map_err(in_io)?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?;
+        let len = disk.len();
+        let name = disk.name();
+        disk.close()?;
+        self.link.tell(|status| {
+            status.bytes += len;
+            status.last = Some(name);
+        });
+        Ok(())
+    }
+
+    fn flush(&mut self, now: MonoTime) {
+        if let Some(Err(error)) = self.incident.as_mut().map(|open| open.file.flush()) {
+            self.fail_incident(&in_io(error));
+        }
+        let file = self.show.as_mut().and_then(|show| show.file.as_mut());
+        let flushed = file.map(|open| open.file.flush().map_err(in_io).and_then(|()| open.disk.is_there()));
+        if let Some(Err(error)) = flushed {
+            self.fail_show(&error, now);
+        }
+        let counts = self.intake.counts();
+        let flight_s = self.flight.as_ref().map_or(0.0, |_| f64::from(self.record.flight_s));
+        self.link.tell(|status| {
+            (status.dropped_ticks, status.dropped_records) = (counts.dropped, counts.dropped_records);
+            status.flight_s = flight_s;
+        });
+    }
+
+    fn sync(&mut self, now: MonoTime) {
+        let free = self.disk.free();
+        if let Ok(free) = &free {
+            self.link.tell(|status| status.free_bytes = *free);
+        }
+        let file = self.show.as_ref().and_then(|show| show.file.as_ref());
+        let Some(open) = file else { return };
+        let kept = open.disk.sync().and_then(|()| self.disk.clear_out_for_more());
+        if let Err(error) = kept {
+            self.fail_show(&error, now);
+        }
+    }
+
+    fn end(mut self, now: MonoTime) {
+        let mut rest = Vec::new();
+        self.intake.close(&mut |at, message| rest.push((at, message)));
+        for (at, message) in &rest {
+            self.write(*at, message);
+        }
+        self.close_show(now);
+        self.close_incident();
+        self.link.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
+    }
+}
+
+/// A file of a size that is attached.
+fn small_file(path: &Path) -> Option<Vec<u8>> {
+    let is_small = std::fs::metadata(path).is_ok_and(|about| about.len() <= MOST_ATTACHED);
+    is_small.then(|| std::fs::read(path).ok()).flatten()
+}

@@ -1,0 +1,213 @@
+//! What the recorder is told of the hall: how it stands, what happens, what is asked; and which shows are recorded.
+
+use std::time::Duration;
+
+use super::act::{Act, Feature, SupervisorEvent};
+use super::hall::HallContext;
+use crate::app::recorder::{RecordAsk, ShowStart};
+use crate::control::{Code, Problem, Who};
+use crate::film::point::FilmState;
+use crate::health::HealthState;
+use crate::record::{EventNote, HallNote, IncidentCause, MarkNote, Note, TimecodeNote, state_number};
+use crate::rt::Row;
+use crate::settings::{LONGEST_WHY, Out};
+use crate::state::{Cause, State};
+use crate::time::MonoTime;
+
+/// How the hall stands is told so often, even if nothing changes.
+const ANYWAY: Duration = Duration::from_secs(10);
+
+/// What was told so far.
+#[derive(Debug, Default)]
+pub(super) struct HallTeller {
+    standings: Vec<HealthState>,
+    hall: Option<(HallNote, MonoTime)>,
+    /// A show, or a homing, is recorded.
+    is_recording: bool,
+}
+
+impl HallTeller {
+    fn tell_hall(&mut self, hall: &HallContext) {
+        let note = hall_note(hall);
+        let is_old = |told: &(HallNote, MonoTime)| hall.now.since(told.1) >= ANYWAY || told.0 != note;
+        if self.hall.as_ref().is_none_or(is_old) {
+            self.hall = Some((note.clone(), hall.now));
+            hall.recorder.keep(Note::Hall(note));
+        }
+    }
+
+    fn tell_standings(&mut self, table: &[Row], hall: &HallContext) {
+        for (lane, row) in table.iter().enumerate() {
+            let before = self.standings.get(lane).copied();
+            if before == Some(row.standing) {
+                continue;
+            }
+            let seat = hall.config.controllers.get(lane).map(|one| one.name.clone()).unwrap_or_default();
+            let text = format!("{}: {}", row.standing, row.why);
+            hall.recorder.keep(Note::Event(EventNote { kind: "standing", seat, text }));
+        }
+        self.standings = table.iter().map(|row| row.standing).collect();
+    }
+
+    fn enter(&mut self, to: State, hall: &HallContext) {
+        self.tell_hall(hall);
+        if matches!(hall.mirror.cause, Cause::EmergencyStop(_)) && (to.is_latched() || to == State::Stopping)
+        {
+            hall.recorder.put(RecordAsk::Incident(IncidentCause::EmergencyStop));
+        }
+        match to {
+            State::Homing => self.begin(ShowStart { kind: "homing", ..ShowStart::default() }, hall),
+            State::Boot
+            | State::Recovering
+            | State::Parked
+            | State::Armed
+            | State::Stopped
+            | State::Fault
+                if std::mem::take(&mut self.is_recording) =>
+            {
+                hall.recorder.put(RecordAsk::End);
+            }
+            _ => {}
+        }
+    }
+
+    fn begin(&mut self, start: ShowStart, hall: &HallContext) {
+        self.is_recording = true;
+        hall.recorder.put(RecordAsk::Begin(start));
+    }
+}
+
+impl Feature for HallTeller {
+    fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext, _out: &mut Vec<Act>) {
+        match event {
+            SupervisorEvent::Entered(to) => self.enter(*to, hall),
+            SupervisorEvent::Begun(_) => {
+                let Some(cued) = &hall.cued else { return };
+                let wants_cue = hall.config.record.attach_cue && hall.aside.is_none();
+                let start = ShowStart {
+                    kind: if hall.aside.is_some() { "test" } else { "show" },
+                    cue: cued.id.clone(),
+                    title: cued.title.clone().unwrap_or_default(),
+                    sha256: cued.sha256.clone(),
+                    attached: wants_cue.then(|| cued.timeline.cue().path().to_owned()),
+                };
+                self.begin(start, hall);
+            }
+            SupervisorEvent::Round(table) => {
+                self.tell_standings(table, hall);
+                self.tell_hall(hall);
+                tell_film(hall);
+            }
+            _ => {}
+        }
+    }
+}
+
+fn hall_note(hall: &HallContext) -> HallNote {
+    let settings = &hall.settings;
+    let off = settings.levels.effects.iter().filter(|(_, on)| !**on);
+    HallNote {
+        state: state_number(hall.mirror.state),
+        cause: hall.cause(),
+        next: hall.mirror.next.to_string(),
+        cue: hall.cued.as_ref().map(|cued| cued.id.clone()).unwrap_or_default(),
+        level: settings.levels.motion,
+        vibration: settings.levels.vibration,
+        trim_ms: settings.trim_ms,
+        effects_off: off.map(|(name, _)| name.clone()).collect(),
+        seats_out: settings.out.keys().cloned().collect(),
+    }
+}
+
+/// Where the film is that leads, while seats follow it.
+fn tell_film(hall: &HallContext) {
+    let (Some(table), Some(error_s)) = (&hall.film, hall.live.film_error_s()) else { return };
+    let table = table.read();
+    let leads = table.leads.and_then(|place| table.sources.get(place));
+    hall.recorder.keep(Note::Timecode(TimecodeNote {
+        source: leads.map(|row| row.source.clone()).unwrap_or_default(),
+        film_s: hall.live.show().as_secs_f64(),
+        error_ms: error_s * 1e3,
+        locked: leads.is_some_and(|row| row.state == FilmState::Locked),
+    }));
+}
+
+/// Who it is, as recordings have it.
+pub(super) fn name_of(who: &Who, hall: &HallContext) -> String {
+    if hall.config.record.names { who.to_string() } else { who.role.to_string() }
+}
+
+/// Marks this moment.
+///
+/// # Errors
+/// Where nothing is recorded, or the words cannot stand there.
+pub(super) fn mark(text: Option<&str>, who: &Who, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    records(hall)?;
+    let text = text.map_or(Ok(None), Out::reason).map_err(|fault| {
+        Problem::new(Code::Value, fault, format!("say it in a line of {LONGEST_WHY} characters at the most"))
+    })?;
+    let film_s = hall.live.show().as_secs_f64();
+    let note = MarkNote { film_s, text: text.unwrap_or_default(), who: name_of(who, hall) };
+    hall.recorder.keep(Note::Mark(note));
+    Ok(Vec::new())
+}
+
+/// Has what the flight recorder holds written out.
+///
+/// # Errors
+/// Where there is none.
+pub(super) fn dump(hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    records(hall)?;
+    hall.recorder.put(RecordAsk::Incident(IncidentCause::Dump));
+    Ok(Vec::new())
+}
+
+fn records(hall: &HallContext) -> Result<(), Problem> {
+    let status = hall.recorder.status();
+    if status.flight_s > 0.0 || status.recording.is_some() {
+        return Ok(());
+    }
+    let why = status.trouble.unwrap_or_else(|| "nothing is recorded here".to_owned());
+    Err(Problem::new(Code::State, why, "set flight_s and mode in [record], and reload"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{hall, row, told};
+
+    #[test]
+    fn a_moment_cannot_be_marked_where_nothing_is_recorded() {
+        let hall = hall(State::Playing(crate::state::PlayMode::Following), "one");
+        let who = crate::app::supervisor::testing::desired(
+            crate::control::Surface::Http,
+            crate::control::Command::Pause,
+        )
+        .who;
+        let problem = mark(Some("F4 jerked"), &who, &hall).unwrap_err();
+        assert!(problem.remedy.contains("[record]"), "{problem}");
+    }
+
+    #[test]
+    fn what_the_recorder_is_told_does_not_depend_on_how_often_it_is_looked_at() {
+        let mut hall = hall(State::Parked, "one");
+        let (link, told_asks) = crate::app::recorder::RecordLink::new();
+        hall.recorder = link;
+        let mut teller = HallTeller::default();
+        let rows = [row(hall.now), row(hall.now)];
+        for _ in 0..5 {
+            told(&mut teller, &SupervisorEvent::Round(&rows), &hall);
+        }
+        let asks: Vec<_> = told_asks.try_iter().collect();
+        assert_eq!(asks.len(), 2 + 1, "two standings and the hall: {asks:?}");
+        hall.mirror.state = State::Homing;
+        told(&mut teller, &SupervisorEvent::Entered(State::Homing), &hall);
+        hall.mirror.state = State::Parked;
+        told(&mut teller, &SupervisorEvent::Entered(State::Parked), &hall);
+        told(&mut teller, &SupervisorEvent::Entered(State::Armed), &hall);
+        let asks: Vec<_> = told_asks.try_iter().map(|(_, ask)| ask).collect();
+        let ends = asks.iter().filter(|ask| matches!(ask, RecordAsk::End)).count();
+        let begins = asks.iter().filter(|ask| matches!(ask, RecordAsk::Begin(_))).count();
+        assert_eq!((begins, ends), (1, 1), "{asks:?}");
+    }
+}

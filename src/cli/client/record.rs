@@ -1,0 +1,40 @@
+//! `kinocue mark` and `kinocue record dump`: what a person has the running service keep.
+
+use serde_json::json;
+
+use super::server::ServerArgs;
+use crate::cli::{Exit, Failure, print};
+
+/// Marks this moment.
+///
+/// What was before and comes after it is kept as an incident, whatever the hall does. No words are needed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue mark
+  kinocue mark \"F4 jerked\"
+
+Exit codes: 0 marked, 75 nothing is recorded")]
+pub(in crate::cli) struct MarkArgs {
+    /// What was seen.
+    #[arg(value_name = "TEXT")]
+    text: Option<String>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+pub(super) fn mark(args: &MarkArgs) -> Result<Exit, Failure> {
+    let MarkArgs { text, server } = args;
+    let body = text.as_ref().map_or_else(|| json!({}), |text| json!({ "text": text }));
+    let status = server.post("/api/v1/record/mark", &body)?;
+    if !server.json {
+        let at = status.show.as_ref().map(|show| format!(" at {:.1} s of the film", show.position_s));
+        print::tell(&format!("kinocue: marked{}", at.unwrap_or_default()));
+    }
+    Ok(server.tell(&status))
+}
+
+/// Has the running service write out what its flight recorder holds, as an incident.
+pub(in crate::cli) fn dump(server: &ServerArgs) -> Result<Exit, Failure> {
+    server.act("/api/v1/record/dump", &json!({}))
+}

@@ -1,0 +1,44 @@
+//! `kinocue record layout`.
+
+use serde_json::json;
+
+use super::super::{Exit, Failure, print};
+
+/// Prints a layout of one seat for Foxglove and Lichtblick: asked and sent, lateness, states.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue record layout --seat F4 > f4.json")]
+pub(in super::super) struct Args {
+    /// The seat.
+    #[arg(long, value_name = "NAME")]
+    seat: String,
+    /// How many of its axes are drawn.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=12))]
+    axes: u8,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let seat = &args.seat;
+    let path = |value: String| json!({"value": value, "enabled": true, "timestampMethod": "receiveTime"});
+    let places = (0..args.axes)
+        .flat_map(|axis| ["asked", "sent"].map(|what| format!("/seat/{seat}.{what}_mm[{axis}]")));
+    let plot =
+        |title: String, paths: Vec<_>| json!({"title": title, "paths": paths, "xAxisVal": "timestamp"});
+    let late = ["/tick.late_max_us".to_owned(), format!("/seat/{seat}.clamps")];
+    let states = [json!({"value": "/hall.state", "timestampMethod": "receiveTime"})];
+    print::json(&json!({
+        "configById": {
+            "Plot!p": plot(format!("{seat}, mm"), places.map(path).collect()),
+            "Plot!t": plot("late, µs; clamps".to_owned(), late.map(path).to_vec()),
+            "StateTransitions!s": {"paths": states},
+        },
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": 1},
+        "layout": {
+            "direction": "column",
+            "first": "Plot!p",
+            "second": {"direction": "column", "first": "Plot!t", "second": "StateTransitions!s"},
+        },
+    }))?;
+    Ok(Exit::Done)
+}

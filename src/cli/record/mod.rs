@@ -1,0 +1,89 @@
+//! `kinocue record`: recordings looked at, cut and mended.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, anyhow};
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+
+use super::client::{ServerArgs, dump_record as dump};
+use super::{Exit, Failure, OrExit as _};
+use crate::plain;
+use crate::record::{Contents, ReadError};
+
+mod info;
+mod layout;
+mod list;
+mod recover;
+
+/// Looks at recordings of plays and shows.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    List(list::Args),
+    Info(info::Args),
+    Recover(recover::Args),
+    Layout(layout::Args),
+    /// Has the running service write out what its flight recorder holds, as an incident.
+    Dump(ServerArgs),
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    match &args.command {
+        Command::List(args) => list::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Recover(args) => recover::run(args),
+        Command::Layout(args) => layout::run(args),
+        Command::Dump(server) => dump(server),
+    }
+}
+
+/// A recording to be read.
+pub(super) fn open(path: &Path) -> Result<BufReader<File>, Failure> {
+    let file = File::open(path).with_context(|| path.display().to_string()).or_exit(Exit::NoInput)?;
+    let is_folder = file.metadata().is_ok_and(|metadata| metadata.is_dir());
+    if is_folder {
+        return Err(anyhow!("{}: is a folder, not a recording", path.display())).or_exit(Exit::NoInput);
+    }
+    Ok(BufReader::new(file))
+}
+
+/// Why a file is not read, with what ends the program.
+pub(super) fn unread(error: ReadError, path: &Path) -> Failure {
+    Failure { exit: Exit::BadCue, error: anyhow::Error::new(error).context(path.display().to_string()) }
+}
+
+/// Says what is missing in a file.
+pub(super) fn flaws(contents: &Contents) -> Vec<String> {
+    let mut flaws = Vec::new();
+    if let Some(trouble) = &contents.trouble {
+        flaws.push(format!("the file {trouble}; what is told is of what came before that; kinocue record recover writes it anew"));
+    }
+    flaws.extend(contents.faults.iter().map(|fault| format!("not read: {fault}")));
+    flaws
+}
+
+/// A wall time as people here read it.
+pub(super) fn wall(ns: u64) -> String {
+    let at = Timestamp::from_nanosecond(ns.into()).unwrap_or_default().to_zoned(TimeZone::system());
+    at.strftime("%F %T").to_string()
+}
+
+/// The text of a file's entry, as it can be shown.
+pub(super) fn shown(text: &str) -> String {
+    plain::escaped(text, 200).into_owned()
+}
+
+/// The default of a name that is written beside a file: its own, with another end.
+pub(super) fn beside(path: &Path, end: &str) -> PathBuf {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = name.strip_suffix(".mcap").unwrap_or(&name);
+    path.with_file_name(format!("{}{end}", stem.strip_suffix(".part").unwrap_or(stem)))
+}

@@ -1,0 +1,64 @@
+// What is recorded: the badge, the mark of a moment (a button and the key M), and the last recordings.
+
+import { byId, make, onChange, setAttribute, setProperty, setText } from './dom.js';
+import { change, get } from './api.js';
+import { ask, onPress } from './press.js';
+import { hall } from './state.js';
+import { clock } from './words.js';
+
+const SHOWN = 20;
+const KINDS = { show: 'show', test: 'test of seats', homing: 'homing', incident: 'incident' };
+
+/** Makes the button and the key work. */
+export function startRecordings() {
+  onPress(byId('mark'), mark);
+  document.addEventListener('keydown', onKey);
+}
+
+function onKey(event) {
+  if (event.key.toLowerCase() !== 'm' || event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
+  // Whoever writes a word with an m in it marks nothing.
+  if (event.target.closest('input, textarea, select, [contenteditable]')) return;
+  byId('mark').click();
+}
+
+function mark(button) {
+  const at = hall()?.show?.position_s ?? null;
+  ask(button, at === null ? 'mark' : `mark at ${clock(at)}`, () => change('POST', 'record/mark'));
+}
+
+/** Shows whether anything is recorded, and what was. */
+export function showRecordings(status, link) {
+  if (!status?.record) return;
+  const { mode, recording, flight_s: flight, trouble } = status.record;
+  const badge = byId('record-badge');
+  const words = trouble ? 'not recorded' : recording ? `recording, ${mode}` : flight > 0 ? `last ${Math.round(flight)} s kept` : '';
+  setProperty(badge, 'hidden', words === '');
+  setText(badge, words);
+  setAttribute(badge, 'data-is', trouble ? 'trouble' : recording ? 'recording' : 'flight');
+  setProperty(byId('mark'), 'disabled', link !== 'live' || (flight === 0 && !recording));
+  readList(status.record.last);
+}
+
+/** Reads the list anew whenever another file is whole. */
+const readList = onChange(() => {
+  get('recordings').then(showList, () => {});
+});
+
+function showList(list) {
+  const lines = list.slice(0, SHOWN).map(({ name, bytes }) => {
+    const { when, kind, what } = parts(name);
+    return make('tr', {}, ...[when, kind, what, size(bytes), name].map((cell) => make('td', {}, cell)));
+  });
+  setProperty(byId('recordings'), 'hidden', lines.length === 0);
+  setText(byId('recordings-none'), lines.length === 0 ? 'Nothing was recorded yet.' : '');
+  byId('recordings').tBodies[0].replaceChildren(...lines);
+}
+
+/** 2026-01-31T19-00-00-show-coaster.mcap. */
+function parts(name) {
+  const [, day, time, kind, what] = name.match(/^(\d{4}-\d\d-\d\d)T(\d\d-\d\d-\d\d)-([a-z]+)-(.*)\.mcap$/) ?? [null, '', '', '', name];
+  return { when: `${day} ${time.replaceAll('-', ':')}`, kind: KINDS[kind] ?? kind, what };
+}
+
+const size = (bytes) => (bytes < 1e6 ? `${Math.ceil(bytes / 1000)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);

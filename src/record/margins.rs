@@ -1,0 +1,177 @@
+//! What was sent, measured as the proof measures: the greatest speed, acceleration and jerk of each axis, and when.
+
+use serde::{Deserialize, Serialize};
+
+use super::RecordedSeat;
+use super::chunk::{Chunk, Handed};
+use crate::motion::{Measure, Reading, Spacing};
+use crate::time::{MonoTime, Rate, ShowTime};
+
+/// After so long without a frame a seat is taken to rest, and is measured anew.
+const APART_NS: u64 = 500_000_000;
+
+/// What is measured, in the order of [`Margins`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Quantity {
+    /// Speed.
+    Speed,
+    /// Acceleration.
+    Acceleration,
+    /// Jerk.
+    Jerk,
+}
+
+impl Quantity {
+    /// All three.
+    pub(crate) const ALL: [Self; 3] = [Self::Speed, Self::Acceleration, Self::Jerk];
+
+    /// The word for it.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::Acceleration => "acceleration",
+            Self::Jerk => "jerk",
+        }
+    }
+}
+
+/// The most that an axis was sent to do.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Margin {
+    /// The seat.
+    pub(crate) seat: String,
+    /// Its axis, from 1.
+    pub(crate) axis: usize,
+    /// Of what.
+    pub(crate) quantity: Quantity,
+    /// How much, in the axis's unit per second, second squared or second cubed.
+    pub(crate) value: f64,
+    /// What it may do.
+    pub(crate) limit: f64,
+    /// Show time at which it was sent, seconds.
+    pub(crate) film_s: f64,
+}
+
+impl Margin {
+    /// As a part of the limit; 1 is the limit.
+    pub(crate) fn part(&self) -> f64 {
+        self.value / self.limit
+    }
+}
+
+/// A measure of what each seat is sent.
+#[derive(Debug)]
+pub(crate) struct Margins {
+    spacing: Spacing,
+    lanes: Vec<Lane>,
+}
+
+#[derive(Debug)]
+struct Lane {
+    last: Option<MonoTime>,
+    axes: Vec<Axis>,
+}
+
+#[derive(Debug)]
+struct Axis {
+    measure: Measure,
+    /// The greatest so far, and the show time of each.
+    most: [(f64, ShowTime); 3],
+}
+
+/// What one frame showed of an axis, each as a part of its limit, and at which show time that was.
+pub(crate) type Parts = [(ShowTime, f64); 3];
+
+impl Margins {
+    /// A measure of frames at that rate.
+    pub(crate) fn new(seats: &[RecordedSeat], rate: Rate) -> Self {
+        let spacing = Spacing::at_rate(rate.hz());
+        let axis = || Axis { measure: Measure::new(spacing), most: [(0.0, ShowTime::ZERO); 3] };
+        let lane =
+            |seat: &RecordedSeat| Lane { last: None, axes: seat.axes().iter().map(|_| axis()).collect() };
+        Self { spacing, lanes: seats.iter().map(lane).collect() }
+    }
+
+    /// Takes a tick. A seat is measured anew behind ticks that are not there, and behind a frame that no tick asked for.
+    pub(crate) fn take(
+        &mut self,
+        chunk: &Chunk<'_>,
+        seats: &[RecordedSeat],
+        tell: &mut impl FnMut(usize, usize, Parts),
+    ) {
+        let Self { spacing, lanes } = self;
+        let head = chunk.head;
+        if chunk.dropped > 0 {
+            lanes.iter_mut().for_each(|lane| lane.last = None);
+        }
+        for frame in chunk.frames() {
+            let (Some(lane), Some(seat)) = (lanes.get_mut(frame.lane), seats.get(frame.lane)) else {
+                continue;
+            };
+            if frame.handed == Handed::Refused {
+                continue;
+            }
+            if frame.asked.slots == 0 {
+                lane.last = None;
+                continue;
+            }
+            let is_next = |last: MonoTime| {
+                head.deadline > last && head.deadline.since(last).as_nanos() < APART_NS.into()
+            };
+            let goes_on = lane.last.replace(head.deadline).is_some_and(is_next);
+            for (index, (axis, place)) in lane.axes.iter_mut().zip(seat.sent(&frame)).enumerate() {
+                if !goes_on {
+                    axis.measure = Measure::new(*spacing);
+                }
+                let limits = seat.axes()[index].limits();
+                tell(frame.lane, index, axis.push(head.deadline, head.film, place, limits));
+            }
+        }
+    }
+
+    /// The most of each axis.
+    pub(crate) fn most(&self, seats: &[RecordedSeat]) -> Vec<Margin> {
+        let of_axis = |seat: &RecordedSeat, index: usize, axis: &Axis| {
+            let limits = seat.axes()[index].limits();
+            let name = seat.name.clone();
+            let margin = move |(quantity, (value, film)): (Quantity, (f64, ShowTime))| Margin {
+                seat: name.clone(),
+                axis: index + 1,
+                quantity,
+                value,
+                limit: limits[quantity as usize],
+                film_s: film.as_secs_f64(),
+            };
+            Quantity::ALL.into_iter().zip(axis.most).map(margin).collect::<Vec<_>>()
+        };
+        let of_lane = |(lane, seat): (&Lane, &RecordedSeat)| {
+            lane.axes
+                .iter()
+                .enumerate()
+                .flat_map(|(index, axis)| of_axis(seat, index, axis))
+                .collect::<Vec<_>>()
+        };
+        self.lanes.iter().zip(seats).flat_map(of_lane).collect()
+    }
+}
+
+impl Axis {
+    /// Takes a place, and gives what that showed.
+    fn push(&mut self, at: MonoTime, film: ShowTime, place: f64, limits: [f64; 3]) -> Parts {
+        let now = ShowTime::from_nanos(at.as_nanos().cast_signed());
+        let seen = self.measure.push(now, place);
+        let shown = [seen.velocity, seen.acceleration, seen.jerk];
+        // What is shown was half a difference ago, and the film went on since.
+        let then = |reading: Reading| {
+            if reading.value == 0.0 { film } else { film.since(now.since(reading.at)) }
+        };
+        for (most, reading) in self.most.iter_mut().zip(shown) {
+            if reading.value.abs() > most.0 {
+                *most = (reading.value.abs(), then(reading));
+            }
+        }
+        let part = |order: usize| (then(shown[order]), shown[order].value.abs() / limits[order]);
+        [part(0), part(1), part(2)]
+    }
+}

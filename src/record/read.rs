@@ -1,0 +1,330 @@
+//! Recordings read back: record by record, so that a long one takes no more memory than a short one. Control thread; takes any bytes
+//! without a panic. What is complete of a file that is cut short or damaged is read, and why there is no more is said.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+
+use mcap::records::op;
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::full;
+use super::margins::Margin;
+use super::recording::{ACKS, SENT, VERSION};
+use super::sampled::{SeatSample, TickSample};
+use super::seat::RecordedSeat;
+use crate::container::{self, ChannelRecord, Trouble};
+use crate::plain::escaped;
+use crate::time::MonoTime;
+
+/// What a file may unpack to: a day of the largest hall.
+const MOST: u64 = 256 << 30;
+/// The longest metadata or report that is kept, bytes.
+const KEPT: usize = 16 << 20;
+/// Faults that are told; more are counted.
+const FAULTS_TOLD: usize = 20;
+/// Seats of a hall at the most.
+const SEATS: usize = 4_096;
+
+/// Why a file tells nothing.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum ReadError {
+    /// It cannot be read as MCAP, from its beginning on.
+    #[error("{0}")]
+    File(Trouble),
+    /// It is MCAP, and no recording.
+    #[error("is no recording of kinocue: it has no metadata record \"kinocue\" of kind \"recording\"")]
+    Foreign,
+    /// It says something of itself that cannot be.
+    #[error("its metadata record \"kinocue\": {field}: {why}")]
+    Metadata {
+        /// Which entry.
+        field: &'static str,
+        /// What is wrong with it.
+        why: String,
+    },
+}
+
+impl From<Trouble> for ReadError {
+    fn from(trouble: Trouble) -> Self {
+        Self::File(trouble)
+    }
+}
+
+/// What a message tells.
+#[derive(Debug)]
+pub(crate) enum Told<'a> {
+    /// A sample of the seat of that place.
+    Seat(usize, SeatSample),
+    /// A sample of the ticks.
+    Tick(TickSample),
+    /// The number of the hall's state from then on.
+    State(u64),
+    /// Whole ticks: chunks, one behind the other.
+    Chunks(Vec<u8>),
+    /// Drains of the ack thread, one behind the other.
+    Drains(#[expect(dead_code, reason = "for who plays a recording again")] Vec<u8>),
+    /// Anything else, as it stands there: topic and octets.
+    Other(&'a str, &'a [u8]),
+}
+
+/// What a file says of itself, as far as it was read.
+#[derive(Debug, Default)]
+pub(crate) struct Contents {
+    /// The entries of its first metadata record.
+    pub(crate) begin: BTreeMap<String, String>,
+    /// Those of its last; empty where it was not closed.
+    pub(crate) end: BTreeMap<String, String>,
+    /// The seats.
+    pub(crate) seats: Vec<RecordedSeat>,
+    /// Messages of each topic.
+    pub(crate) messages: BTreeMap<String, u64>,
+    /// Names and sizes of what is attached.
+    pub(crate) attachments: BTreeMap<String, usize>,
+    /// The report of the play, if it is attached.
+    pub(crate) report: Option<Vec<u8>>,
+    /// Wall clock of the first and the last message, ns since 1970.
+    pub(crate) span: Option<(u64, u64)>,
+    /// Messages that tell nothing, with why; the first of them.
+    pub(crate) faults: Vec<String>,
+    /// Why there is no more than was read.
+    pub(crate) trouble: Option<Trouble>,
+    clocks: (u64, u64),
+}
+
+impl Contents {
+    /// An entry of the first metadata record; empty where there is none.
+    pub(crate) fn entry(&self, key: &str) -> &str {
+        self.begin.get(key).map_or("", String::as_str)
+    }
+
+    /// The rate of its ticks, Hz.
+    pub(crate) fn rate_hz(&self) -> f64 {
+        self.entry("rate_hz").parse().unwrap_or(100.0)
+    }
+
+    /// The most that each axis was sent to do, as the recorder measured it.
+    pub(crate) fn most(&self) -> Vec<Margin> {
+        self.end.get("most").and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
+    }
+
+    /// The place of a seat.
+    pub(crate) fn seat(&self, name: &str) -> Option<usize> {
+        self.seats.iter().position(|seat| seat.name == name)
+    }
+
+    /// The instant of a message on the clock of the ticks.
+    fn instant(&self, log_time: u64) -> MonoTime {
+        let (mono, wall) = self.clocks;
+        MonoTime::from_nanos(log_time.saturating_add(mono).saturating_sub(wall))
+    }
+
+    /// The wall clock of an instant, ns since 1970.
+    pub(crate) const fn wall(&self, at: MonoTime) -> u64 {
+        let (mono, wall) = self.clocks;
+        at.as_nanos().saturating_add(wall).saturating_sub(mono)
+    }
+
+    fn fault(&mut self, fault: impl FnOnce() -> String) {
+        if self.faults.len() < FAULTS_TOLD {
+            self.faults.push(fault());
+        }
+    }
+
+    fn begun(&mut self, entries: BTreeMap<&str, &str>) -> Result<(), ReadError> {
+        let entry = |key: &str| entries.get(key).copied().unwrap_or_default();
+        let bad = |field, why: String| ReadError::Metadata { field, why: escaped(&why, 200).into_owned() };
+        if entry("kind") != "recording" {
+            return Err(ReadError::Foreign);
+        }
+        if entry("version") != VERSION {
+            let why = format!("{:?}; this program reads version {VERSION}", entry("version"));
+            return Err(bad("version", why));
+        }
+        let seats: Vec<RecordedSeat> =
+            serde_json::from_str(entry("seats")).map_err(|error| bad("seats", error.to_string()))?;
+        let fault = seats.iter().find_map(|seat| seat.fault().map(|fault| format!("{}: {fault}", seat.name)));
+        if let Some(fault) = fault.or_else(|| (seats.len() > SEATS).then(|| "too many".to_owned())) {
+            return Err(bad("seats", fault));
+        }
+        let number =
+            |key: &'static str| entry(key).parse::<u64>().map_err(|_| bad(key, format!("{:?}", entry(key))));
+        let rate = entry("rate_hz").parse::<f64>().ok().filter(|rate| (1.0..=1000.0).contains(rate));
+        rate.ok_or_else(|| bad("rate_hz", format!("{:?} is not 1 to 1000", entry("rate_hz"))))?;
+        self.clocks = (number("monotonic_ns")?, number("wall_ns")?);
+        self.seats = seats;
+        self.begin = owned(entries);
+        Ok(())
+    }
+}
+
+fn owned(entries: BTreeMap<&str, &str>) -> BTreeMap<String, String> {
+    entries.into_iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect()
+}
+
+/// Which messages are taken apart; of others only the number is told.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted<'a> {
+    /// The seat whose samples are; `None` for all.
+    pub(crate) seat: Option<&'a str>,
+    /// Samples of seats.
+    pub(crate) samples: bool,
+    /// Whole ticks.
+    pub(crate) full: bool,
+}
+
+impl Wanted<'_> {
+    /// All there is.
+    pub(crate) const ALL: Self = Self { seat: None, samples: true, full: true };
+}
+
+/// What the messages of a channel are.
+#[derive(Debug, Clone)]
+enum Topic {
+    Seat(usize),
+    Tick,
+    Hall,
+    Sent,
+    Acks,
+    Other(String),
+}
+
+/// Reads a recording, and tells of each message that is wanted in the order of the file.
+///
+/// # Errors
+/// Where it is none. What is complete in one that is cut short or damaged is read; [`Contents::trouble`] says so.
+pub(crate) fn read(
+    input: impl Read,
+    wanted: Wanted<'_>,
+    take: &mut dyn FnMut(&Contents, MonoTime, Told<'_>),
+) -> Result<Contents, ReadError> {
+    let mut reading = Reading { contents: Contents::default(), topics: BTreeMap::new(), wanted, take };
+    let read = container::each(input, MOST, |opcode, body| reading.record(opcode, body));
+    let mut contents = reading.contents;
+    match read {
+        Err((_, ReadError::File(trouble))) if !contents.begin.is_empty() => contents.trouble = Some(trouble),
+        Err((_, error)) => return Err(error),
+        Ok(()) if contents.begin.is_empty() => return Err(ReadError::Foreign),
+        Ok(()) => {}
+    }
+    Ok(contents)
+}
+
+/// The entries of a recording's first metadata record, which stands at its front.
+///
+/// # Errors
+/// Where it is no recording.
+pub(crate) fn beginning(input: impl Read) -> Result<BTreeMap<String, String>, ReadError> {
+    /// Records before it at the most.
+    const BEFORE: u32 = 100;
+    let (mut contents, mut records) = (Contents::default(), 0);
+    let read = container::each(input, MOST, |opcode, body| {
+        records += 1;
+        if let (op::METADATA, Some(("kinocue", entries))) = (opcode, container::metadata(body)) {
+            contents.begun(entries)?;
+        }
+        // That is no fault: there is no need to read on.
+        if contents.begin.is_empty() && records < BEFORE { Ok(()) } else { Err(ReadError::Foreign) }
+    });
+    match read {
+        _ if !contents.begin.is_empty() => Ok(contents.begin),
+        Err((_, error)) => Err(error),
+        Ok(()) => Err(ReadError::Foreign),
+    }
+}
+
+struct Reading<'a, 'b> {
+    contents: Contents,
+    topics: BTreeMap<u16, (String, Topic)>,
+    wanted: Wanted<'a>,
+    take: &'b mut dyn FnMut(&Contents, MonoTime, Told<'_>),
+}
+
+impl Reading<'_, '_> {
+    fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), ReadError> {
+        match opcode {
+            op::METADATA => match container::metadata(body) {
+                Some(("kinocue", entries)) if self.contents.begin.is_empty() => {
+                    self.contents.begun(entries)?
+                }
+                Some(("kinocue.end", entries)) if body.len() <= KEPT => self.contents.end = owned(entries),
+                _ => {}
+            },
+            op::CHANNEL => {
+                if let Some(channel) = ChannelRecord::parse(body) {
+                    let topic = self.topic(channel.topic);
+                    self.topics.insert(channel.id, (channel.topic.to_owned(), topic));
+                }
+            }
+            op::MESSAGE => self.message(body),
+            op::ATTACHMENT => {
+                if let Some((name, data)) = container::attachment(body) {
+                    self.contents.attachments.insert(name.to_owned(), data.len());
+                    if name == "report.json" && data.len() <= KEPT {
+                        self.contents.report = Some(data.to_vec());
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn topic(&self, topic: &str) -> Topic {
+        match topic {
+            "/tick" => Topic::Tick,
+            "/hall" => Topic::Hall,
+            SENT => Topic::Sent,
+            ACKS => Topic::Acks,
+            other => {
+                let seat = other.strip_prefix("/seat/").and_then(|name| self.contents.seat(name));
+                seat.map_or_else(|| Topic::Other(other.to_owned()), Topic::Seat)
+            }
+        }
+    }
+
+    fn message(&mut self, body: &[u8]) {
+        let Self { contents, topics, wanted, take } = self;
+        let Some((channel, log_time, data)) = container::message(body) else { return };
+        let Some((name, topic)) = topics.get(&channel) else { return };
+        match contents.messages.get_mut(name) {
+            Some(count) => *count += 1,
+            None => drop(contents.messages.insert(name.clone(), 1)),
+        }
+        let (first, last) = contents.span.unwrap_or((log_time, log_time));
+        contents.span = Some((first.min(log_time), last.max(log_time)));
+        let told = match topic {
+            Topic::Seat(lane) => {
+                let is_wanted = wanted.seat.is_none_or(|name| contents.seats[*lane].name == name);
+                if !wanted.samples || !is_wanted {
+                    return;
+                }
+                json(data).map(|sample| Told::Seat(*lane, sample))
+            }
+            Topic::Tick => json(data).map(Told::Tick),
+            Topic::Hall => json::<Value>(data).and_then(|hall| {
+                hall["state"].as_u64().map(Told::State).ok_or_else(|| "no state".to_owned())
+            }),
+            Topic::Sent | Topic::Acks if !wanted.full => return,
+            Topic::Acks => full::drains(data).map(Told::Drains).ok_or_else(|| "no drains".to_owned()),
+            Topic::Sent => {
+                let chunks = full::unpack(data, &contents.seats);
+                chunks.map(Told::Chunks).ok_or_else(|| "not a block of ticks".to_owned())
+            }
+            Topic::Other(name) => Ok(Told::Other(name, data)),
+        };
+        match told {
+            Ok(told) => take(contents, contents.instant(log_time), told),
+            Err(why) => {
+                let (name, number) = (escaped(name, 100), contents.messages.get(name).copied().unwrap_or(0));
+                let fault = format!("{name}, message {number}: {}", escaped(&why, 200));
+                contents.fault(|| fault);
+            }
+        }
+    }
+}
+
+fn json<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String> {
+    serde_json::from_slice(data).map_err(|error| error.to_string())
+}

@@ -1,0 +1,216 @@
+//! From the file back to what was played.
+
+use std::io::Cursor;
+
+use proptest::prelude::*;
+
+use super::chunk::{ChunkWriter, Handed, SentFrame};
+use super::full::{Block, unpack};
+use super::tests::{MS, about, asked, frame, head, recorded_as, seat, window};
+use super::*;
+use crate::motion::Pulses;
+use crate::time::{MonoTime, ShowTime};
+use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, Vibration, VibrationPort};
+
+/// A way up and down again: ticks 10 ms apart.
+fn swing(ticks: u32) -> impl Iterator<Item = (f64, f64)> {
+    (0..ticks).map(|tick| {
+        let place = 0.5 + 0.2 * (f64::from(tick) * 0.04).sin();
+        (place, place)
+    })
+}
+
+/// The heads and the frames' octets of some chunks.
+/// The lane of a frame, when it was handed over, what became of it, and its octets.
+type ReadFrame = (usize, MonoTime, Handed, Vec<u8>);
+
+fn told(octets: &[u8]) -> Vec<(TickHead, u32, Vec<ReadFrame>)> {
+    let mut all = Vec::new();
+    each_chunk(octets, |chunk| {
+        let frames = chunk.frames().map(|one| (one.lane, one.at, one.handed, one.datagram.to_vec()));
+        all.push((chunk.head, chunk.dropped, frames.collect()));
+    });
+    all
+}
+
+#[test]
+fn a_whole_recording_gives_back_every_datagram() {
+    let file = recorded_as(Mode::Full, swing(333));
+    let mut datagrams = Vec::new();
+    let contents = read(file.as_slice(), Wanted::ALL, &mut |_, _, one| {
+        if let Told::Chunks(chunks) = one {
+            told(&chunks)
+                .into_iter()
+                .for_each(|(.., frames)| datagrams.extend(frames.into_iter().map(|one| one.3)));
+        }
+    });
+    let contents = contents.unwrap();
+    let sent: Vec<Vec<u8>> = swing(333).map(|(_, sent)| frame(sent, &mut [0; MAX_LEN]).to_vec()).collect();
+    assert_eq!(datagrams, sent);
+    assert_eq!((contents.trouble, contents.faults), (None, vec![]));
+    assert_eq!(contents.messages["/full/sent"], 7, "blocks of half a second");
+}
+
+#[test]
+fn what_came_nearest_to_its_limit_is_the_same_measured_again() {
+    let (contents, summary) = summarize(recorded_as(Mode::Full, swing(400)).as_slice()).unwrap();
+    assert_eq!(contents.most(), summary.most);
+    let speed = summary.most.iter().find(|one| one.quantity == Quantity::Speed).unwrap();
+    // 0.2 of 150 mm at 4 rad/s, between two ticks a little less.
+    assert!((119.0..=120.1).contains(&speed.value), "{speed:?}");
+    let (contents, sampled) = summarize(recorded_as(Mode::Sampled, swing(400)).as_slice()).unwrap();
+    assert_eq!(sampled.most, summary.most, "{:?}", contents.end);
+    assert_eq!((summary.ticks, summary.seats[0].sent, summary.seats[0].name.as_str()), (400, 400, "A1"));
+}
+
+#[test]
+fn a_file_that_is_no_recording_is_refused() {
+    assert!(matches!(read(&b""[..], Wanted::ALL, &mut |_, _, _| ()), Err(ReadError::File(_))));
+    let cue = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/cues/storm.mcap")).unwrap();
+    assert!(matches!(read(cue.as_slice(), Wanted::ALL, &mut |_, _, _| ()), Err(ReadError::Foreign)));
+    assert!(matches!(beginning(cue.as_slice()), Err(ReadError::Foreign)));
+}
+
+#[test]
+fn of_a_cut_file_all_that_is_complete_is_written_anew_with_an_index() {
+    let seats = [seat()];
+    let (Taps { ticks: mut tap, .. }, intake) =
+        Intake::new(seats.to_vec(), crate::time::Rate::from_hz(100.0), SAMPLE_HZ);
+    let about = About { mode: Mode::Full, ..about() };
+    let file = Recording::begin(Cursor::new(Vec::new()), &about, &seats).unwrap();
+    let mut recorder = Recorder::new(intake.in_full(), file);
+    for (tick, (wanted, sent)) in (0_u64..).zip(swing(300)) {
+        tap.asked(asked(wanted));
+        tap.frame(
+            0,
+            frame(sent, &mut [0; MAX_LEN]),
+            MonoTime::from_nanos(tick * 10 * MS),
+            crate::net::Delivery::Sent,
+        );
+        tap.tick(&head(tick * 10));
+        recorder.take().unwrap();
+        if tick % 50 == 0 {
+            recorder.flush().unwrap();
+        }
+    }
+    let whole = recorder.finish(Some(b"{}")).unwrap().into_inner();
+    let cut = &whole[..whole.len() * 2 / 3];
+    let before = read(cut, Wanted::ALL, &mut |_, _, _| ()).unwrap();
+    assert!(before.trouble.is_some() && before.messages["/tick"] > 10, "{:?}", before.messages);
+    assert_eq!(mcap::Summary::read(cut).ok().flatten().map(|_| ()), None, "viewers have no index of it");
+    let (recovered, out) = recover(cut, Cursor::new(Vec::new())).unwrap();
+    let saved = out.into_inner();
+    let after = read(saved.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
+    assert_eq!(
+        (&after.messages, &after.messages, after.trouble),
+        (&before.messages, &recovered.messages, None)
+    );
+    let summary = mcap::Summary::read(&saved).unwrap().unwrap();
+    let names: Vec<_> = summary.metadata_indexes.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names, ["kinocue", "kinocue.recovered"]);
+}
+
+fn motion(
+    window: &crate::motion::Window,
+    place: f64,
+    number: u32,
+    shakes: bool,
+    buf: &mut [u8; MAX_LEN],
+) -> Vec<u8> {
+    let positions: Vec<Pulses> = window.slots().iter().map(|slot| slot.pulses(place)).collect();
+    let vibration = [Vibration { period: 80, amplitude: 200 }; 3];
+    let motion = Motion {
+        timing: Timing::Relative,
+        channel: 0,
+        accept: Code(0xffff),
+        reply: if number.is_multiple_of(4) { Code(1) } else { Code::NONE },
+        frame: FrameNo(number),
+        time_ms: 10 + number % 3,
+        positions: &positions,
+        outputs: 5,
+        analogue: Analogue::default(),
+        vibration: shakes.then_some(&vibration),
+    };
+    motion.emit_as(VibrationPort::Two, buf).to_vec()
+}
+
+proptest! {
+    #[test]
+    fn a_block_gives_back_its_chunks(
+        ticks in prop::collection::vec((0.0_f64..1.0, 0.0_f64..1.0, any::<u32>(), 0_u32..3, prop::collection::vec(any::<u8>(), 0..80), 0_u8..4), 1..60),
+    ) {
+        let seats = [seat(), seat()];
+        let window = window();
+        let (mut block, mut octets) = (Block::default(), Vec::new());
+        for (at, (wanted, sent, number, dropped, noise, kind)) in (0_u64..).zip(&ticks) {
+            let mut writer = ChunkWriter::with_room(2_000);
+            for lane in 0..2 {
+                let datagram = match kind {
+                    0 => noise.clone(),
+                    kind => motion(&window, *sent, *number, *kind == 1, &mut [0; MAX_LEN]),
+                };
+                let handed = Handed::ALL[usize::from(kind % 3)];
+                let at = MonoTime::from_nanos(at * 7 * MS + u64::from(number % 900) * 1_000);
+                let asked = Asked { clamps: (number % 7).into(), level: 0.5, ..asked(*wanted) };
+                writer.frame(&SentFrame { lane, at, handed, asked, datagram: &datagram });
+            }
+            let head = TickHead { film: ShowTime::from_nanos(i64::from(*number) - 9), missed: u64::from(number % 2), ..head(at * 7) };
+            octets.extend_from_slice(writer.close(&head, *dropped).unwrap());
+        }
+        let mut packed = Vec::new();
+        let mut rest = octets.as_slice();
+        while let Some((chunk, behind)) = Chunk::parse(rest) {
+            packed.extend(block.add(&chunk, &rest[..rest.len() - behind.len()], &seats));
+            rest = behind;
+        }
+        packed.extend(block.close(&seats));
+        let back: Vec<u8> = packed.iter().flat_map(|(_, block)| unpack(block, &seats).expect("it is ours")).collect();
+        prop_assert_eq!(told(&back), told(&octets));
+        let mut places = (Vec::new(), Vec::new());
+        let places_of = |chunk: &Chunk<'_>, to: &mut Vec<f64>| chunk.frames().for_each(|one| to.extend(seats[one.lane].asked(&one.asked)));
+        each_chunk(&octets, |chunk| places_of(chunk, &mut places.0));
+        each_chunk(&back, |chunk| places_of(chunk, &mut places.1));
+        prop_assert!(places.0.iter().zip(&places.1).all(|(one, other)| (one - other).abs() <= 0.5001 * seats[0].axes()[0].pulse));
+        prop_assert_eq!(places.0.len(), places.1.len());
+    }
+
+    #[test]
+    fn no_octets_are_a_block_that_panics(octets in prop::collection::vec(any::<u8>(), 0..300)) {
+        let _ = unpack(&octets, &[seat()]);
+    }
+
+    #[test]
+    fn a_block_with_wrong_octets_is_refused_or_read(at in any::<prop::sample::Index>(), octet in any::<u8>()) {
+        let mut block = Block::default();
+        let mut writer = ChunkWriter::with_room(500);
+        for tick in 0..40 {
+            writer.frame(&SentFrame { lane: 0, at: MonoTime::from_nanos(tick), handed: Handed::Taken, asked: asked(0.3), datagram: frame(0.3, &mut [0; MAX_LEN]) });
+            let octets = writer.close(&head(tick * 10), 0).unwrap().to_vec();
+            block.add(&Chunk::parse(&octets).unwrap().0, &octets, &[seat()]);
+            writer.clear();
+        }
+        let (_, mut packed) = block.close(&[seat()]).unwrap();
+        let at = at.index(packed.len());
+        packed[at] = octet;
+        let _ = unpack(&packed, &[seat()]);
+    }
+
+    #[test]
+    fn no_damage_to_a_file_panics(
+        damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+        cut in prop::option::of(any::<prop::sample::Index>()),
+    ) {
+        thread_local!(static WHOLE: Vec<u8> = recorded_as(Mode::Full, swing(120)));
+        let mut file = WHOLE.with(Clone::clone);
+        for (at, octet) in damage {
+            let at = at.index(file.len());
+            file[at] = octet;
+        }
+        if let Some(cut) = cut {
+            file.truncate(cut.index(file.len()));
+        }
+        let _ = summarize(file.as_slice());
+        let _ = beginning(file.as_slice());
+        let _ = recover(file.as_slice(), Cursor::new(Vec::new()));
+    }
+}

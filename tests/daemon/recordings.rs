@@ -1,0 +1,207 @@
+//! What the service records: shows, marked moments, and what was before it was killed.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use kinocue::harness::recording::datagrams;
+use kinocue::harness::sys::clock::wall_now_ns;
+use kinocue::wire::MotionRequest;
+use mcap::{MessageStream, Summary};
+use serde_json::Value;
+
+use crate::hall::Hall;
+use crate::http::Request;
+
+/// A recording as a viewer reads it.
+struct Recorded {
+    octets: Vec<u8>,
+    messages: Vec<(String, u64, Value)>,
+    full: usize,
+}
+
+impl Recorded {
+    fn read(path: &Path) -> Self {
+        let octets = fs::read(path).expect("it is there");
+        let (mut messages, mut full) = (Vec::new(), 0);
+        for message in MessageStream::new(&octets).expect("a recording") {
+            let message = message.expect("it is whole");
+            match serde_json::from_slice(&message.data) {
+                Ok(value) if message.channel.message_encoding == "json" => {
+                    messages.push((message.channel.topic.clone(), message.log_time, value));
+                }
+                _ => full += 1,
+            }
+        }
+        Self { octets, messages, full }
+    }
+
+    fn of<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = &'a (String, u64, Value)> {
+        self.messages.iter().filter(move |(one, ..)| one == topic)
+    }
+
+    fn sum(&self, topic: &str, key: &str) -> u64 {
+        self.of(topic).filter_map(|(_, _, value)| value[key].as_u64()).sum()
+    }
+
+    fn metadata(&self) -> BTreeMap<String, BTreeMap<String, String>> {
+        let summary = Summary::read(&self.octets).expect("an index").expect("an index");
+        let read = |index| mcap::read::metadata(&self.octets, index).expect("it is whole");
+        summary.metadata_indexes.iter().map(|index| (index.name.clone(), read(index).metadata)).collect()
+    }
+
+    fn attachment(&self, name: &str) -> String {
+        let summary = Summary::read(&self.octets).expect("an index").expect("an index");
+        let index = summary.attachment_indexes.iter().find(|one| one.name == name).expect("it is attached");
+        let read = mcap::read::attachment(&self.octets, index).expect("it is whole");
+        String::from_utf8(read.data.into_owned()).expect("text")
+    }
+}
+
+/// Waits until a file with that in its name is whole.
+fn closed(hall: &Hall, what: &str) -> PathBuf {
+    let is_it = |status: &Value| status["record"]["last"].as_str().is_some_and(|name| name.contains(what));
+    let status = hall.wait(is_it);
+    hall.path("state/recordings").join(status["record"]["last"].as_str().expect("a name"))
+}
+
+fn files(hall: &Hall) -> Vec<String> {
+    let all = fs::read_dir(hall.path("state/recordings")).into_iter().flatten().flatten();
+    all.map(|entry| entry.file_name().into_string().expect("text")).collect()
+}
+
+#[test]
+fn a_show_leaves_a_recording_whose_counts_are_those_of_its_report_and_in_which_nothing_is_secret() {
+    let secret = "[api]\nlisten = [\"127.0.0.1:0\"]\n[[api.token]]\nname = \"door\"\nrole = \"operate\"\n\
+        sha256 = \"00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff\"\n";
+    let hall = Hall::open_with(|config| format!("{config}{secret}"));
+    hall.play("ride");
+    hall.comes_to("parked");
+    let recorded = Recorded::read(&closed(&hall, "-show-ride"));
+    let report: Value = serde_json::from_str(&recorded.attachment("report.json")).unwrap();
+    let frames = &report["outcome"];
+    let of_seats = |key| recorded.sum("/seat/A1", key) + recorded.sum("/seat/A2", key);
+    assert_eq!(Value::from(of_seats("sent")), frames["sent"], "{report}");
+    assert_eq!(Value::from(of_seats("acked")), frames["acked"], "{report}");
+    let metadata = recorded.metadata();
+    assert_eq!((&*metadata["kinocue"]["of"], &*metadata["kinocue"]["cue"]), ("show", "ride"));
+    assert_eq!(metadata["kinocue.end"]["dropped"], "0");
+    let configuration = recorded.attachment("configuration.toml");
+    assert!(
+        configuration.contains("rate_hz = 100") && !configuration.contains("0011223344"),
+        "{configuration}"
+    );
+    // From before the show to after it, with what people asked.
+    let states: Vec<_> = recorded.of("/hall").map(|(_, _, value)| value["state"].clone()).collect();
+    assert!(states.len() > 3, "{states:?}");
+    assert!(recorded.of("/action").any(|(_, _, value)| value["what"] == "go"));
+    assert_eq!(recorded.full, 0, "samples alone");
+    assert!(!files(&hall).iter().any(|name| name.contains(".part.")), "{:?}", files(&hall));
+}
+
+#[test]
+fn every_datagram_of_a_show_is_in_its_full_recording_as_the_controllers_received_it() {
+    let hall = Hall::open_with(|config| format!("{config}[record]\nmode = \"full\"\n"));
+    hall.play("ride");
+    hall.comes_to("parked");
+    let file = fs::read(closed(&hall, "-show-ride")).expect("it is there");
+    let mut sent = BTreeMap::<usize, Vec<_>>::new();
+    for (lane, octets, is_taken) in datagrams(&file) {
+        let request = MotionRequest::parse(&octets).expect("a motion frame");
+        let positions: Vec<i32> = request.positions.iter().map(|pulses| pulses.0).collect();
+        assert!(is_taken);
+        sent.entry(lane).or_default().push((request.frame.0, request.time_ms, request.extend, positions));
+    }
+    let mut received = BTreeMap::<String, Vec<_>>::new();
+    for row in hall.end().rows {
+        let positions = row.commanded[..3].to_vec();
+        received.entry(row.controller).or_default().push((row.frame, row.time_ms, row.extend, positions));
+    }
+    let (mut sent, mut received): (Vec<_>, Vec<_>) =
+        (sent.into_values().collect(), received.into_values().collect());
+    sent.sort();
+    received.sort();
+    assert!(sent.len() == 2 && sent[0].len() > 200, "{} frames", sent[0].len());
+    assert_eq!(sent, received);
+}
+
+#[test]
+fn a_marked_moment_is_kept_with_what_was_before_it_at_full_rate() {
+    let hall = Hall::open();
+    hall.play("night");
+    hall.rises(0);
+    let marked = hall.done(&["mark", "A1 jerked"]);
+    assert!(marked.stderr.contains("marked at "), "{marked:?}");
+    let recorded = Recorded::read(&closed(&hall, "-incident-mark"));
+    let (_, at, mark) = recorded.of("/mark").next().expect("it is marked");
+    assert_eq!(mark["text"], "A1 jerked");
+    assert!(mark["film_s"].as_f64().unwrap() > 0.0, "{mark}");
+    let first = recorded.messages.first().expect("there are some").1;
+    let last = recorded.messages.last().expect("there are some").1;
+    assert!(first < *at && last >= at + 9_000_000_000, "{first} {at} {last}");
+    assert!(recorded.full > 10, "{} blocks", recorded.full);
+    assert!(hall.status()["state"] == "playing", "it plays on");
+    assert_eq!(hall.status()["record"]["incidents"]["mark"], 1);
+}
+
+#[test]
+fn what_was_before_a_crash_in_mid_show_is_whole_after_the_next_start_and_nothing_moves() {
+    let mut hall = Hall::open();
+    hall.play("night");
+    hall.rises(0);
+    // What is killed has lost its last second.
+    hall.lives_on(120);
+    hall.kill();
+    let killed = wall_now_ns();
+    assert!(files(&hall).iter().any(|name| name.ends_with("-show-night.part.mcap")), "{:?}", files(&hall));
+    hall.relay(0).count();
+    hall.serve();
+    hall.wait(|_| {
+        let files = files(&hall);
+        !files.iter().any(|name| name.contains(".part.")) && files.len() >= 2
+    });
+    assert_eq!(hall.relay(0).count(), 0, "no motion frame");
+    for what in ["-show-night.mcap", "-incident-crash.mcap"] {
+        let name = files(&hall).into_iter().find(|name| name.ends_with(what)).expect("it was recovered");
+        let recorded = Recorded::read(&hall.path("state/recordings").join(name));
+        let last = recorded.of("/tick").last().expect("there are some").1;
+        assert!(killed - last < 1_000_000_000, "{what}: {} ms were lost", (killed - last) / 1_000_000);
+        assert!(recorded.sum("/seat/A1", "acked") > 0, "{what}");
+    }
+}
+
+#[test]
+fn where_nothing_can_be_written_the_show_goes_on_and_it_is_said_what_to_do() {
+    let hall = Hall::open_with(|config| {
+        let dir = config.lines().find_map(|line| line.strip_prefix("library = \"")).unwrap();
+        let dir = dir.trim_end_matches("cues\"");
+        format!("{config}[record]\ndir = \"{dir}hall.toml\"\n")
+    });
+    hall.play("ride");
+    let told = hall.wait(|status| status["record"]["trouble"].is_string());
+    let trouble = told["record"]["trouble"].as_str().unwrap();
+    assert!(trouble.contains("hall.toml") && trouble.contains("[record] dir"), "{trouble}");
+    let warnings = told["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|one| one["id"] == "record"), "{warnings:?}");
+    let parked = hall.comes_to("parked");
+    assert_eq!(parked["missed_ticks"], 0, "{parked}");
+}
+
+#[test]
+fn recordings_are_listed_and_taken_away_by_their_names_alone() {
+    let hall = Hall::open();
+    hall.done(&["mark"]);
+    let path = closed(&hall, "-incident-mark");
+    let name = path.file_name().unwrap().to_str().unwrap();
+    let list = hall.socket().get("/api/v1/recordings").value();
+    assert_eq!((&list[0]["name"], list.as_array().unwrap().len()), (&Value::from(name), 1));
+    let file = hall.socket().get(&format!("/api/v1/recordings/{name}"));
+    assert_eq!(file.header("content-length").unwrap(), fs::metadata(&path).unwrap().len().to_string());
+    for other in ["hall.toml", "..%2Fhall.toml", "..%2F..%2Fcontrol.sock"] {
+        let reply = hall.socket().get(&format!("/api/v1/recordings/{other}"));
+        assert_eq!(reply.problem().0, 404, "{other}");
+    }
+    let reply = Request::new("DELETE", &format!("/api/v1/recordings/{name}")).send(&hall.socket());
+    assert_eq!(reply.value().as_array().unwrap().len(), 0);
+    assert!(!path.exists());
+}
