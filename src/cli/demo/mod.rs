@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let host = SocketAddrV4::new(Ipv4Addr::LOCALHOST, port.number);
     let seats = VirtualHall::start(args.dialect, host, &folder)?;
     let token = Token::new("visitor", Role::Engineer).or_exit(Exit::System)?;
-    let mut hall = seats::hall(args.rate, host, &seats, &token.config, &folder);
+    let mut hall = seats::hall(args.rate, host, &seats.tables(&folder), &token.config, &folder);
     hall.extend(film.iter().map(DemoFilm::tables));
     let places = furnish(&folder, &hall, film.as_ref(), &seats)?;
     let (load, cue_name) = film.as_ref().map_or_else(|| bench_ride(&seats), DemoFilm::load);
