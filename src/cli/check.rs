@@ -10,7 +10,7 @@ use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::config::{self, Config, ConfigFault, ConfigFaults, parse_level};
 use crate::cue::{self, CueFaults, Fault, Place};
-use crate::drive::rates;
+use crate::drive::terms;
 use crate::plain;
 use crate::proof::{Breach, Proof, Violation};
 use crate::time::parse_trim;
@@ -49,7 +49,7 @@ pub(super) struct Args {
     #[command(flatten)]
     drives: DriveArgs,
 
-    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. What passes at a level passes below it.
+    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. A cue that passes at one level passes at every lower one.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 
@@ -212,7 +212,7 @@ impl CheckReport {
 
     /// Notes how often the links of a hall play, and those that are to play more often than they can.
     fn links(&mut self, path: &Path, hall: &Config) {
-        let (told, faults) = rates::in_words(hall);
+        let (told, faults) = terms::in_words(hall);
         for text in told {
             let note = format!("{}: {text}", plain::path(path));
             if !self.notes.contains(&note) {

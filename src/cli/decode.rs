@@ -43,7 +43,7 @@ Examples:
   printf '0.5 > 40 31 36 20 30 0d\\n0.6 < 2a 20 31 30 0d\\n' | kinocue decode --dialect silvermax -
   kinocue decode --dialect sixpack2 01 24 00 40 1f 00 00 00 00
 
-Exit codes: 0 all of it was read, 64 the hex is none, 65 something is malformed, cut short or
+Exit codes: 0 all of it was read, 64 not hex, 65 something is malformed, cut short or
 no capture, 66 no such file")]
 pub(super) struct Args {
     /// Hex, a capture, or - for the standard input
@@ -54,8 +54,8 @@ pub(super) struct Args {
     #[arg(value_name = "HEX|FILE")]
     input: Vec<OsString>,
 
-    /// Which family's manual messages are read by: imax is the layout as its manual prints it, which no known program
-    /// sends. Of serial drives a file, or the standard input, is their octets, lines of hex, or a log of lines
+    /// Family whose manual the messages follow; imax is the layout as its manual prints it, which no known
+    /// program sends. Of serial drives a file, or the standard input, is their octets, lines of hex, or a log of lines
     /// "seconds > hex" to the drive and "seconds < hex" from it.
     #[arg(long, value_enum, default_value_t = MessageReading::Smc)]
     dialect: MessageReading,
@@ -64,11 +64,11 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
     vibration_port_octets: VibrationPort,
 
-    /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; repeatable.
+    /// In a capture, read the datagrams from or to this port rather than 7408 and 8410; repeatable.
     #[arg(long, value_name = "N", conflicts_with = "all")]
     port: Vec<u16>,
 
-    /// Of a capture, read the datagrams of all ports that open like a message.
+    /// In a capture, read every datagram that begins like a message, whatever its port.
     #[arg(long)]
     all: bool,
 

@@ -22,7 +22,7 @@ use crate::sys::realtime::normal_priority;
 
 /// Checks if this machine is fit for real-time use, and says what to change if it is not.
 ///
-/// First it looks: each line has what was found, whether that will do, and the exact fix. Then it measures: a bare loop on
+/// First come checks: each line has the finding, a verdict, and the exact fix. Then comes a measurement: a bare loop on
 /// the clock and with the scheduling of `play`, 1,000 ticks a second. It changes nothing and sends nothing.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -55,11 +55,11 @@ pub(super) struct Args {
     #[arg(long)]
     load: bool,
 
-    /// Number of controllers it is to play to.
+    /// Number of controllers to be played to.
     #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "config", value_parser = clap::value_parser!(u32).range(1..=65535))]
     controllers: u32,
 
-    /// The configuration whose controllers it is to play to.
+    /// The configuration whose controllers are to be played to.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 

@@ -23,14 +23,14 @@ const MOST_HZ: f64 = 500.0;
 /// Serial drives that a cue is judged for as well.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct DriveArgs {
-    /// Judge also what serial drives of this family execute of a cue; pulses of the seat are their counts or microsteps.
+    /// Also check what serial drives of this family execute of a cue; the seat's pulses are their counts or microsteps.
     ///
     /// A SilverMax is judged by segments of its timed queue, a SIXpack 2 by targets on the fly, with clock_divider 3 and propdiv as its
     /// seat needs it.
     #[arg(long, value_name = "FAMILY", requires = "link_rate", value_parser = drive_family())]
     drive: Option<DriveFamily>,
 
-    /// Segments, or targets, that their link carries for each axis, a second: 10 to 500.
+    /// Segments or targets per second that their link carries for each axis: 10 to 500.
     #[arg(long, value_name = "HZ", requires = "drive", value_parser = parse_link_rate)]
     link_rate: Option<f64>,
 

@@ -17,12 +17,11 @@ use crate::timeline::Timeline;
 
 /// Fits a cue into the limits of its seats.
 ///
-/// Lowers its amplitude about the neutral pose just as far as needed, and never its time.
-/// A cue that ends in motion, without a way to rest from there, is brought to rest in its last stretch where that changes less.
-/// What amplitude cannot cure, as the steps of coarse sources and the corners of straight lines, --smooth takes out with a
-/// low-pass that moves nothing in time; of low-pass and amplitude it takes the pair that changes the cue least. Vibration
-/// that is more than the seat stands on top of that is lowered too. What serial links of the hall miss it tells, and does not mend. What
-/// is written passes `kinocue check` on the same terms.
+/// Scales the motion down about the neutral pose just as far as needed, and never changes its timing. A cue that ends in motion, with no
+/// way to come to rest from there, is brought to rest over its last stretch where that changes less. What scaling cannot cure, such as the
+/// steps of coarse sources and the corners of straight lines, --smooth removes with a low-pass filter that moves nothing in time; of filter
+/// and scaling, it uses the pair that changes the cue least. Vibration that the seat cannot take on top of that is lowered too. It reports,
+/// but does not fix, what the serial links of the hall cannot carry. The result passes `kinocue check` on the same terms.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue fit ride.csv -o fitted.csv",
@@ -48,11 +47,11 @@ pub(super) struct Args {
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 
-    /// Scale each axis by itself; without it all are scaled alike, and the seat moves as it was meant to, but less.
+    /// Scale each axis by itself; otherwise all axes are scaled alike, which keeps the shape of the motion.
     #[arg(long)]
     per_axis: bool,
 
-    /// Allow a low-pass without delay.
+    /// Allow a low-pass filter (zero phase, so nothing moves in time).
     #[arg(long)]
     smooth: bool,
 

@@ -20,12 +20,12 @@ use drives::HomingResult;
 
 /// Homes empty seats.
 ///
-/// Starts the reference search (DPF0) of their controllers, and waits until each is home.
+/// Starts the reference search (DPF0) of their controllers, and waits until each has found its home position.
 ///
-/// Without --to and --config the daemon homes all seats of its hall; see `kinocue watch` for how far they are.
+/// Without --to and --config the daemon homes all seats of its hall; `kinocue watch` shows their progress.
 ///
 /// The seats move by themselves, over their whole stroke, at a speed that the controllers set. Ctrl-C ends the command,
-/// not the movement: to stop that is the emergency stop's, which is hard-wired. Seats with serial drives are led by this command, at the
+/// not the movement: only the hard-wired emergency stop ends that. Seats with serial drives are led by this command, at the
 /// speed of [seat.NAME.drive] and within its travel; there Ctrl-C has the axes brake.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -37,7 +37,7 @@ Examples:
   kinocue home --to 192.168.15.201:7408 --timeout 120
 
 PA0e decides what a controller does: 0 searches zero; 1 goes to zero without a search,
-which is right only where it has found zero since it was switched on.")]
+which is right only if it has found zero since power-on.")]
 pub(super) struct Args {
     /// The controllers [default: all].
     #[arg(value_name = "NAME")]

@@ -10,7 +10,7 @@ use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::cue::Vibration;
-use crate::drive::rates;
+use crate::drive::terms;
 use crate::motion::AxisUnit;
 use crate::plain;
 use crate::proof::{self, AxisFigures};
@@ -155,7 +155,7 @@ impl Info {
         let name = cue.path().display().to_string();
         let stroke = judge.stroke(timeline);
         let notes = stroke.held.iter().filter_map(|held| note(held, &figures, timeline));
-        let (told, faults) = judge.hall.as_ref().map(rates::in_words).unwrap_or_default();
+        let (told, faults) = judge.hall.as_ref().map(terms::in_words).unwrap_or_default();
         let driven = judge.links(timeline, 1.0);
         let plays = drives::links_in_words(&driven.plays);
         let mut links: Vec<_> = told.into_iter().chain(plays).chain(faults).collect();

@@ -35,7 +35,7 @@ const AXES: &str = "axes=3";
 
 /// Measures how late frames leave and how soon their acks come.
 ///
-/// It sends as `play` does, from the same loop, and moves nothing: each frame holds the seat where it stands, effects off.
+/// Sends as `play` does, from the same loop, and moves nothing: each frame holds the seat where it stands, effects off.
 /// Where each seat stands is read first, twice, and again just before the first frame. A controller is left out unless its
 /// seat stands still, inside its stroke, and nothing about it (axes, PA95, PA55, PA0d, an emergency stop, an error) would
 /// make something else of a position than it says. Without --to and --config it measures against virtual controllers of its
@@ -43,9 +43,9 @@ const AXES: &str = "axes=3";
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Lateness is from a tick's deadline to the instant before its first frame is handed to the kernel;
-ack latency from that instant, of each frame, to the kernel's receive time of its ack. The first
-tells of this machine, the second of the network and the controllers too; with virtual
-controllers, of this machine twice.
+ack latency from that instant, of each frame, to the kernel's receive time of its ack. Lateness measures this machine; ack latency also
+the network and the controllers, or with
+virtual controllers this machine again.
 
 --out writes an interval log of HdrHistogram (format 1.3, nanoseconds): a line a second for each of
 the tags lateness and ack_latency. Any program that reads such logs can plot it.
@@ -60,7 +60,7 @@ Examples:
   kinocue latency                                                    to four virtual controllers
   kinocue latency --count 64 --seconds 60 --out before.hlog          sixty-four of them, kept
   kinocue latency --count 64 --seconds 60 --spin-us 100 --out after.hlog
-  kinocue latency --compare before.hlog after.hlog                   what the spin has brought
+  kinocue latency --compare before.hlog after.hlog                   the effect of spinning
   kinocue latency --to 192.168.15.201:7408 --rate 250                a controller of three axes on the network
   kinocue latency --config hall.toml --ack-every 10 --json | jq .lateness_us")]
 pub(super) struct Args {

@@ -65,11 +65,11 @@ pub(super) struct SeatArgs {
     #[arg(long, value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
 
-    /// The seat type to judge for [default: of each axis that of its controller; bench3 without a configuration].
+    /// The seat type to check against [default: each axis that of its controller; bench3 without a configuration].
     #[arg(long, value_name = "NAME")]
     pub(super) seat: Option<String>,
 
-    /// Frames a second [default: those of the configuration; 100 without].
+    /// Frames per second [default: the configuration's, else 100].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
 }

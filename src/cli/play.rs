@@ -91,7 +91,7 @@ pub(super) struct Args {
     /// Follow a coarse source as well: positions by OSC or HTTP that may be tens of milliseconds off.
     #[arg(long, requires = "chase")]
     allow_coarse: bool,
-    /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].
+    /// Frame rate of the film: 23.976, 24, 25, 29.97 or 30 [default: as received].
     #[arg(long, value_name = "N", requires = "chase")]
     film_fps: Option<String>,
     /// The film's timecode at which the cue begins, HH:MM:SS:FF [default: 00:00:00:00].

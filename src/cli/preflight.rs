@@ -28,10 +28,9 @@ use report::{ControllerChecks, PreflightReport};
 
 /// Checks every controller before anyone sits down.
 ///
-/// Who answers, how fast, and whether its settings are right and safe.
+/// Checks which controllers answer, how fast, and if their settings are right and safe.
 ///
-/// Reads only; nothing moves and nothing is changed; seats on serial links are looked at over their ports. Controllers are asked side by side: 64 of them take seconds, also
-/// where some are dead. Ends with 0 only where nothing fails. Without --to and --config the daemon checks its own hall.
+/// Reads only; nothing moves and nothing is changed; seats on serial links are read over their ports. Controllers are asked side by side: 64 of them take seconds, even if some are dead. Exits with 0 only if nothing fails. Without --to and --config the daemon checks its own hall.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -64,7 +63,7 @@ pub(super) struct Args {
     cue: Option<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
-    /// Frames a second [default: those of the configuration; 100 without].
+    /// Frames per second [default: the configuration's, else 100].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
     #[command(flatten)]

@@ -13,12 +13,13 @@ use crate::sys::clock::local_now;
 mod csv;
 mod table;
 
-/// Reports what was played, or what was requested.
+/// Reports what was played, or what operators requested.
 ///
-/// Every show of a day with its cue, levels, seats, frames and end, and all together.
+/// Lists every show of a day with its cue, levels, seats, frames and end, and the totals.
 ///
-/// Reads the journal that `kinocue serve` writes, also while it does. A show that neither ended nor goes on is named as
-/// interrupted. Lines of the journal that were cut short are passed over with a note.
+/// Reads the journal that `kinocue serve` writes, even while the service runs. A show that neither
+/// ended nor is still running is reported as interrupted. Truncated journal lines are skipped with a
+/// note.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -27,7 +28,7 @@ Examples:
   kinocue report --from 2026-11-01 --to 2026-11-30 --csv > november.csv
   kinocue report --day today --actions
 
-Exit codes: 0 shown, also where nothing was played, 66 there is no journal, 77 it may not be read")]
+Exit codes: 0 shown, even if nothing was played, 66 there is no journal, 77 no permission to read it")]
 pub(super) struct Args {
     /// The day: today, yesterday, or a date as 2026-11-21 [default: today].
     #[arg(long, value_name = "DAY", value_parser = parse_day, conflicts_with_all = ["from", "to"])]

@@ -23,7 +23,7 @@ Examples:
   kinocue serve --config hall.toml --socket ./control.sock --state ./state
 
 Exit codes:
-  0   told to end; whatever moved has parked
+  0   ended by a signal; whatever moved has parked
   71  the system refused a socket, a thread or a folder
   75  another program holds the frame port
   78  the configuration is bad")]
@@ -37,7 +37,7 @@ pub(super) struct Args {
     /// The socket that takes a stop alone [default: stop.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     stop_socket: Option<PathBuf>,
-    /// The folder of what is kept from one start to the next.
+    /// The folder for what outlasts a restart.
     #[arg(long, value_name = "DIR", default_value = "/var/lib/kinocue")]
     state: PathBuf,
 }

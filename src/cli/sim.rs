@@ -54,29 +54,29 @@ Commands of --script, each with TIME: before it (seconds from the start), and of
   err=12, err=0  an error comes (1 to 7, 10 to 15, 17, 20, 21), or all go with their causes
   reboot         the power goes and comes back
   estop=1        an emergency stop comes that no input asks for; estop=0: it goes
-  mute=1         obeys, but says nothing; mute=0: speaks again
-  pa95=3         somebody sets a parameter at its keys: register in hex, value decimal or 0x
-  loss=0.1, duplicate=0.1, delay=50ms   what the network does from now on
+  mute=1         requests are carried out but not answered; mute=0: answered again
+  pa95=3         a parameter is set at the controller's keys: register in hex, value decimal or 0x
+  loss=0.1, duplicate=0.1, delay=50ms   network faults from now on
 A number or name and @ before a command means that controller alone: 2@err=12, c2@err=12.
 
 Commands of serial drives, in --faults too, without a time:
-  lost=0.1, doubled=0.1, flipped=0.1   what becomes of octets, by chance
-  late=0.1/30ms    octets come so much later, by chance
-  answer_lost=0.1, lose=2   answers are lost after what was asked has been done: by chance, or the next ones
-  held=16ms        the adapter holds back what has come; held=0ms: no more
-  echo=1           the adapter returns what is sent; echo=0: no more
+  lost=0.1, doubled=0.1, flipped=0.1   bytes lost, doubled or flipped at random
+  late=0.1/30ms    bytes arrive this much later, at random
+  answer_lost=0.1, lose=2   answers are lost after the request was carried out: at random, or the next N
+  held=16ms        the adapter holds received bytes back this long; held=0ms ends it
+  echo=1           the adapter echoes what is sent; echo=0 ends it
   unplug=1         the adapter is unplugged, and the link is gone; unplug=0: back under the same name
   break            the host sends a break, which a pseudo-terminal does not carry
 and of a SilverMax, of all units or, with 17@ before it, of unit 17:
   reset            the power goes and comes back
-  hot=1, blocked=1, dead=1   too hot; held by something; neither hears nor answers; 0: no more
-  X2=0, X2=1       an input is low, or high; X1 to X7, of which X1 is the switch of home
+  hot=1, blocked=1, dead=1   overheated; mechanically blocked; no communication at all; 0 ends it
+  X2=0, X2=1       an input is low, or high; X1 (the home switch) to X7
   as=16, as=0      answers as another unit, or as itself
-  ppm=200          its crystal runs so much faster, millionths
+  ppm=200          its clock runs fast by this many parts per million
 and of a SIXpack 2, which wakes at 19200 baud and is switched by its host, with 1@ before it of unit 1 alone:
   reset, dead=1    as above; dead=0: its power comes back
   celsius=80, volts=51   its temperature and its supply
-  jump=14400       its motors lose steps where their speed changes by more at once, microsteps a second
+  jump=14400       its motors lose steps if their speed changes by more than this at once, microsteps per second
   blocked2=1, broken2=1   motor 2, of 0 to 5, is held by something; its switch does not close any more; 0: no more")]
 pub(super) struct Args {
     /// Where the first controller listens; with port 0 each gets a free one.
@@ -95,11 +95,11 @@ pub(super) struct Args {
     #[arg(long = "pa", value_name = "HEX=VALUE", value_parser = parse::parameter, conflicts_with = "tty")]
     parameters: Vec<(u8, u16)>,
 
-    /// Which family they belong to: smc, mbox for MBOX and IMAX, or serial drives, which need --tty.
+    /// Family to simulate: smc, mbox for MBOX and IMAX, or serial drives, which need --tty.
     #[arg(long, value_enum, default_value_t = SimFamily::Smc)]
     dialect: SimFamily,
 
-    /// Probability that a datagram goes unanswered, 0..1: half of those never arrive, of the others the answer is lost.
+    /// Probability that a datagram goes unanswered, 0..1: half of them never arrive, and the answers of the other half are lost.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance, conflicts_with = "tty")]
     loss: f64,
 
@@ -111,7 +111,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "SPAN", default_value = "0ms", value_parser = parse_duration, conflicts_with = "tty")]
     delay: Duration,
 
-    /// Obey, but never answer.
+    /// Carry out requests, but never answer.
     #[arg(long, conflicts_with = "tty")]
     mute: bool,
 

@@ -55,7 +55,7 @@ enum SyncCommand {
 /// How a film is labelled.
 #[derive(Debug, clap::Args)]
 struct LabelArgs {
-    /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].
+    /// Frame rate of the film: 23.976, 24, 25, 29.97 or 30 [default: as received].
     #[arg(long, value_name = "N")]
     film_fps: Option<String>,
     /// The timecode at which the cue, or the reel, begins, HH:MM:SS:FF [default: 00:00:00:00].

@@ -18,7 +18,7 @@ use crate::wire::ReplyCode;
 /// Which controllers are meant.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct TargetArgs {
-    /// A controller: HOST:PORT, and behind commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
+    /// A controller: HOST:PORT, and after commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
     /// mbox, vibration_port_octets=2 or 4; repeatable.
     #[arg(long, value_name = "ADDR", conflicts_with = "config")]
     to: Vec<String>,

@@ -18,10 +18,11 @@ const MAX_NAME: usize = 64;
 
 /// Creates an access token for HTTP.
 ///
-/// The lines of the configuration that let them in come with it.
+/// Prints the token, and the configuration lines that admit its holder.
 ///
-/// The token is shown this once, on standard output, and is kept nowhere: the configuration holds its SHA-256 alone. Hand it
-/// over as you would a key. Taking its lines out of the configuration, and starting the service again, takes it back.
+/// The token is shown once, on standard output, and stored nowhere: the configuration holds only its
+/// SHA-256. Treat it like a key. To revoke it, remove its lines from the configuration and restart the
+/// service.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -11,18 +11,10 @@ mod mbox;
 pub(crate) mod rates;
 mod rounds;
 mod segments;
-#[cfg_attr(
-    not(test),
-    expect(
-        dead_code,
-        reason = "figures of axes, a homing in a show and two of a family on the page come next"
-    )
-)]
 pub(crate) mod silvermax;
-#[cfg_attr(not(test), expect(dead_code, reason = "a look is for preflight"))]
 pub(crate) mod sixpack2;
 mod stream;
-mod terms;
+pub(crate) mod terms;
 
 pub use lane::Lane;
 pub(crate) use lane::Stamped;

@@ -29,8 +29,6 @@ const CAN_BITS: u32 = 135;
 /// The part of a line that motion may take; polls take the rest, over USB a quarter.
 const SHARE: f64 = 0.80;
 const USB_SHARE: f64 = 0.75;
-/// Below this a hard ride is half a millimetre beside its cue.
-const LEAST_HZ: f64 = 15.0;
 
 /// Baud rates that are worth changing to.
 const SILVERMAX_BAUDS: [u32; 3] = [57_600, 115_200, 230_400];
@@ -49,6 +47,10 @@ pub(crate) struct LinkLoad {
     pub(crate) octet_bits: u32,
     /// Axes that it moves, at least one.
     pub(crate) axes: u32,
+    /// Those of its largest seat, none of which two lines may share.
+    pub(crate) seat_axes: u32,
+    /// Its seats, at least one.
+    pub(crate) seats: u32,
     /// Octets of a SilverMax segment and its ack.
     pub(crate) exchange_octets: u32,
     /// From the end of a request to the beginning of its answer.
@@ -64,7 +66,8 @@ impl LinkLoad {
     pub(crate) fn of(link: &Link, config: &Config) -> Option<Self> {
         let is_on_it = |one: &&Controller| one.drives().is_some_and(|drives| drives.link == link.name);
         let on_it = config.named().filter(is_on_it);
-        let axes = on_it.map(|one| u32::try_from(one.seat.axes).unwrap_or(u32::MAX)).sum();
+        let each: Vec<u32> = on_it.map(|one| u32::try_from(one.seat.axes).unwrap_or(u32::MAX)).collect();
+        let axes = each.iter().sum();
         let family = link.family.filter(|_| axes > 0)?;
         let is_usb = is_usb(&link.port);
         let delay = match (family, link.wiring) {
@@ -78,6 +81,8 @@ impl LinkLoad {
             baud: link.baud,
             octet_bits: 9 + u32::from(link.stop_bits),
             axes,
+            seat_axes: each.iter().copied().max().unwrap_or(axes),
+            seats: u32::try_from(each.len()).unwrap_or(u32::MAX),
             exchange_octets: USUAL_EXCHANGE,
             answer_delay: delay + if is_usb { USB_TURN } else { UART_TURN },
             share: if is_usb && family == DriveFamily::SilverMax { USB_SHARE } else { SHARE },
@@ -126,26 +131,30 @@ impl LinkLoad {
         if period >= self.period() { Ok(period) } else { Err(TooSlow { load: *self, wanted_hz }) }
     }
 
-    /// What would make it faster, with `seats` on it, none of which two lines may share: times a second, and the words of it, the
-    /// slowest first.
+    /// What would make it faster: times a second, and the words of it, the slowest first.
     #[must_use]
-    pub(crate) fn changes(&self, seats: u32) -> Vec<(f64, String)> {
+    pub(crate) fn changes(&self) -> Vec<(f64, String)> {
         let bauds = self.bauds().iter().copied().filter(|baud| *baud > self.baud);
         let bauds: Vec<u32> = std::iter::once(self.baud).chain(bauds).collect();
         let mut changes = Vec::new();
-        for links in 1..=seats.max(1) {
-            let axes = self.axes / seats.max(1) * seats.div_ceil(links);
+        for links in 1..=self.seats {
             for &baud in &bauds {
                 let apart = (links > 1).then(|| format!("{links} links"));
                 let quicker = (baud > self.baud).then(|| format!("baud = {baud}"));
                 let words: Vec<_> = quicker.into_iter().chain(apart).collect();
                 let words =
                     if words.is_empty() { "rate_hz = \"auto\"".to_owned() } else { words.join(" and ") };
-                changes.push((Self { axes: axes.max(1), baud, ..*self }.rate_hz(), words));
+                changes.push((Self { baud, ..self.shared_by(links) }.rate_hz(), words));
             }
         }
         changes.sort_by(|one, other| one.0.total_cmp(&other.0));
         changes
+    }
+
+    /// What the fullest of so many links carries, where its seats are shared out over them.
+    fn shared_by(&self, links: u32) -> Self {
+        let seats = self.seats.div_ceil(links);
+        Self { axes: self.axes.min(seats * self.seat_axes), seats, ..*self }
     }
 
     /// Baud rates that are worth changing to.
@@ -163,8 +172,7 @@ impl LinkLoad {
         let fits = |load: &Self| load.rate_hz() >= wanted_hz;
         let baud = self.bauds().iter().copied().filter(|baud| *baud > self.baud);
         let baud = baud.into_iter().find(|baud| fits(&Self { baud: *baud, ..*self }));
-        let axes = (1..self.axes).rev().find(|axes| fits(&Self { axes: *axes, ..*self }));
-        let links = axes.map(|axes| self.axes.div_ceil(axes));
+        let links = (2..=self.seats).find(|links| fits(&self.shared_by(*links)));
         match (baud, links) {
             (Some(baud), Some(links)) => format!("use baud = {baud}, or {links} links"),
             (Some(baud), None) => format!("use baud = {baud}"),
@@ -192,43 +200,6 @@ impl fmt::Display for TooSlow {
     }
 }
 
-/// What the links of a hall play at, in words, and which of them are to play more often than they can.
-#[must_use]
-pub(crate) fn in_words(config: &Config) -> (Vec<String>, Vec<String>) {
-    let (mut told, mut faults) = (Vec::new(), Vec::new());
-    for link in &config.links {
-        told.extend(other_baud(link));
-        let Some(load) = LinkLoad::of(link, config) else {
-            told.push(format!("link {} has no controller", link.name));
-            continue;
-        };
-        match load.period_for(link.rate_hz) {
-            Ok(period) => told.push(plays_at(link, &load, period)),
-            Err(slow) => faults.push(format!("rate_hz of [link.{}]: {slow}", link.name)),
-        }
-    }
-    (told, faults)
-}
-
-/// What became of the baud rate that the file asks for, where that is another.
-fn other_baud(Link { name, baud, asked_baud, .. }: &Link) -> Option<String> {
-    (baud != asked_baud)
-        .then(|| format!("link {name} runs at {baud} baud, what its drives make of {asked_baud}"))
-}
-
-fn plays_at(link: &Link, load: &LinkLoad, period: Duration) -> String {
-    let hz = 1.0 / period.as_secs_f64();
-    let noun = if load.axes == 1 { "axis" } else { "axes" };
-    let mut words = format!("plays at {} Hz on link {}, {} {noun}", short(hz), link.name, load.axes);
-    if is_usb(&link.port) {
-        words += ", by a USB adapter whose latency timer is 1 ms";
-    }
-    if hz < LEAST_HZ {
-        words += &format!("; that is rough, for {LEAST_HZ} Hz {}", load.remedy(LEAST_HZ));
-    }
-    words
-}
-
 /// Rounded down to hundredths, whole from 100 on: what is told can also be asked for.
 pub(crate) fn short(hz: f64) -> String {
     let steps = if hz < 100.0 { 100.0 } else { 1.0 };
@@ -237,7 +208,7 @@ pub(crate) fn short(hz: f64) -> String {
 }
 
 /// True if the port is a USB adapter, by its name.
-fn is_usb(port: &Path) -> bool {
+pub(super) fn is_usb(port: &Path) -> bool {
     let name = port.to_string_lossy();
     ["ttyUSB", "ttyACM", "/usb-"].iter().any(|mark| name.contains(mark))
 }
@@ -263,6 +234,8 @@ mod tests {
             baud,
             octet_bits: 11,
             axes,
+            seat_axes: 1,
+            seats: axes,
             exchange_octets: USUAL_EXCHANGE,
             answer_delay: delay,
             share: SHARE,
@@ -356,6 +329,19 @@ mod tests {
             let remedied = LinkLoad { baud: 230_400, ..load };
             assert!(remedied.period_for(Some(hz)).is_ok(), "{hz}");
         }
+    }
+
+    #[test]
+    fn no_remedy_shares_a_seat_between_two_links() {
+        let seats = |axes: u32| LinkLoad { seat_axes: axes, seats: 6 / axes, ..silver(57_600, UART_TURN, 6) };
+        assert_eq!(seats(3).remedy(25.0), "use baud = 115200, or 2 links");
+        assert_eq!(seats(3).remedy(50.0), "use baud = 230400");
+        assert_eq!(seats(6).remedy(25.0), "use baud = 115200");
+        assert_eq!(seats(3).remedy(80.0), "no link carries so much; at the most 14.99 Hz fit here");
+        // Two seats of two axes and one of one: one line has two of them.
+        let uneven = LinkLoad { seat_axes: 2, seats: 3, ..silver(57_600, UART_TURN, 5) };
+        assert_eq!(uneven.remedy(25.0), "use baud = 115200, or 3 links");
+        assert_eq!(uneven.remedy(20.0), "use baud = 115200, or 2 links");
     }
 
     #[test]

@@ -1,34 +1,25 @@
-//! A play on one link, whatever its drives: what its thread and the control plane ask of the streams of all families.
+//! A play on one link, whatever its drives: the family is found out once, and homing is its own.
 
 use std::time::Duration;
 
 use rtrb::{Consumer, Producer};
 
 use super::link::{
-    AxisFigures, LedPose, LinkFault, LinkFigures, LinkPort, StreamEvent, StreamTerms, TalkTerms, canary,
+    LedPose, LinkPlay, LinkPort, LinkTalk as _, Stream, StreamEvent, StreamTerms, TalkTerms, canary,
 };
-use super::{silvermax, sixpack2};
+use super::silvermax::{self, SilverMax};
+use super::sixpack2::{self, Sixpack2};
 use crate::config::drive::DriveFamily;
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Drives, Link};
 
 /// A play on one link. A variant for each family, matched and never boxed.
 #[derive(Debug)]
-pub(crate) enum LinkStream<P> {
+pub(crate) enum LinkStream<P: LinkPort> {
     /// SilverMax units.
-    SilverMax(silvermax::Stream<P>),
+    SilverMax(Stream<SilverMax, P>),
     /// SIXpack 2 units.
-    Sixpack2(sixpack2::Stream<P>),
-}
-
-/// The same of either.
-macro_rules! of_either {
-    ($stream:ident in $of:expr => $what:expr) => {
-        match $of {
-            LinkStream::SilverMax($stream) => $what,
-            LinkStream::Sixpack2($stream) => $what,
-        }
-    };
+    Sixpack2(Stream<Sixpack2, P>),
 }
 
 impl<P: LinkPort> LinkStream<P> {
@@ -47,64 +38,29 @@ impl<P: LinkPort> LinkStream<P> {
         if link.family == Some(DriveFamily::Sixpack2) {
             let lanes = seats.iter().map(|seat| motors_of(seat, terms.period)).collect::<Option<Vec<_>>>();
             let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, sixpack2::Talk::new(port, talk));
-            let stream = sixpack2::Stream::new(talk, terms, &lanes, poses, events);
+            let stream = Stream::new(talk, terms, &lanes, poses, events);
             return stream.map(Self::Sixpack2).map_err(|error| error.to_string());
         }
-        let lanes =
-            seats.iter().map(|seat| Some(silvermax::LaneUnits { seat: units_of(seat)?, canary: None }));
-        let lanes = lanes.collect::<Option<Vec<_>>>();
+        let lanes = seats.iter().map(|seat| units_of(seat)).collect::<Option<Vec<_>>>();
         let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, silvermax::Talk::new(port, talk));
-        let stream = silvermax::Stream::new(talk, terms, &lanes, poses, events);
+        let stream = Stream::new(talk, terms, &lanes, poses, events);
         stream.map(Self::SilverMax).map_err(|error| error.to_string())
     }
 
-    /// Takes what poses came, and does what is due next; nothing due: waits a millisecond.
-    ///
-    /// # Errors
-    /// A [`LinkFault`] where the port is gone: all lanes are lost by then. It may be called again.
-    pub(crate) fn round(&mut self) -> Result<(), LinkFault> {
-        of_either!(stream in self => stream.round())
-    }
-
-    /// Brakes all lanes.
-    ///
-    /// # Errors
-    /// A [`LinkFault`] where the port is gone.
-    pub(crate) fn stop(&mut self) -> Result<(), LinkFault> {
-        of_either!(stream in self => stream.stop(None))
-    }
-
-    /// Has a lane's axes read as soon as there is time.
-    pub(crate) fn locate(&mut self, lane: u16) {
-        of_either!(stream in self => stream.locate(lane));
-    }
-
-    /// Has it looked whether the units of a lane are home; one that is out comes back then.
-    pub(crate) fn look(&mut self, lane: u16) {
-        of_either!(stream in self => stream.look(lane));
-    }
-
-    /// True if a lane moves, or may.
-    #[must_use]
-    pub(crate) fn is_busy(&self) -> bool {
-        of_either!(stream in self => stream.is_busy())
-    }
-
-    /// How an axis of a lane stands.
-    #[must_use]
-    pub(crate) fn axis(&self, lane: u16, axis: usize) -> Option<AxisFigures> {
-        of_either!(stream in self => stream.axis(lane, axis))
-    }
-
-    /// How the link stands.
-    #[must_use]
-    pub(crate) fn figures(&self) -> LinkFigures {
-        of_either!(stream in self => stream.figures())
+    /// What is asked of either.
+    pub(crate) fn play(&mut self) -> &mut dyn LinkPlay {
+        match self {
+            Self::SilverMax(stream) => stream,
+            Self::Sixpack2(stream) => stream,
+        }
     }
 
     /// The port.
     pub(crate) fn port(&mut self) -> &mut P {
-        of_either!(stream in self => stream.port())
+        match self {
+            Self::SilverMax(stream) => stream.talk.port(),
+            Self::Sixpack2(stream) => stream.talk.port(),
+        }
     }
 
     /// Homes the seat of a lane while no lane moves, as long as it `goes_on`. Whatever came of it, the lane looks anew at its units.
@@ -122,16 +78,17 @@ impl<P: LinkPort> LinkStream<P> {
             Self::SilverMax(stream) => {
                 let seat = units_of(controller).ok_or(NO_DRIVES)?;
                 let canary = canary().map_err(|error| format!("the system gives no chance: {error}"))?;
-                let homed = silvermax::home(stream.talk(), seat, silvermax::Homing { canary, goes_on, told });
+                let homed =
+                    silvermax::home(&mut stream.talk, seat, silvermax::Homing { canary, goes_on, told });
                 homed.map(|()| stream.rejoin(lane, canary)).map_err(|error| error.to_string())
             }
             Self::Sixpack2(stream) => {
                 let seat = motors_of(controller, terms.period).ok_or(NO_DRIVES)?;
-                let homed = sixpack2::home(stream.talk(), seat, sixpack2::Homing { goes_on, told });
+                let homed = sixpack2::home(&mut stream.talk, seat, sixpack2::Homing { goes_on, told });
                 homed.map(|()| stream.rejoin(lane)).map_err(|error| error.to_string())
             }
         };
-        self.look(lane);
+        self.play().look(lane);
         homed
     }
 }

@@ -1,14 +1,18 @@
-//! How the links of a hall play: on which grid, and how far ahead.
+//! How the links of a hall play: on which grid, and how far ahead; and that in words.
 
 use std::time::Duration;
 
-use super::link::StreamTerms;
-use super::rates::LinkLoad;
-use super::{silvermax, sixpack2};
+use super::link::{Family as _, Lead, StreamTerms};
+use super::rates::{LinkLoad, is_usb, short};
+use super::silvermax::SilverMax;
+use super::sixpack2::Sixpack2;
 use crate::config::drive::DriveFamily;
 use crate::config::{Config, Link};
 use crate::motion::MAX_LEAD;
 use crate::time::Rate;
+
+/// Below this a hard ride is half a millimetre beside its cue.
+const LEAST_HZ: f64 = 15.0;
 
 impl StreamTerms {
     /// Those of a link of a hall that has seats on it; none where it has none.
@@ -32,25 +36,54 @@ impl StreamTerms {
 
     /// How long before a seat is there its poses have to come.
     pub(crate) fn lead(self, family: DriveFamily) -> Duration {
-        let Lead { periods, ticks } = Lead::of(family);
-        periods * self.period + ticks * self.tick
+        Lead::of(family).over(self)
     }
-}
-
-/// How long before a seat is there its poses have to come: so many periods of its link, and so many ticks.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Lead {
-    /// Periods.
-    pub(crate) periods: u32,
-    /// Ticks.
-    pub(crate) ticks: u32,
 }
 
 impl Lead {
     const fn of(family: DriveFamily) -> Self {
         match family {
-            DriveFamily::SilverMax => silvermax::LEAD,
-            DriveFamily::Sixpack2 => sixpack2::LEAD,
+            DriveFamily::SilverMax => SilverMax::LEAD,
+            DriveFamily::Sixpack2 => Sixpack2::LEAD,
         }
     }
+}
+
+/// What the links of a hall play at, in words, and which of them cannot play so: they are to play more often than they can, or
+/// would lead their seats too far ahead.
+#[must_use]
+pub(crate) fn in_words(config: &Config) -> (Vec<String>, Vec<String>) {
+    let (mut told, mut faults) = (Vec::new(), Vec::new());
+    for link in &config.links {
+        told.extend(other_baud(link));
+        let Some(load) = LinkLoad::of(link, config) else {
+            told.push(format!("link {} has no controller", link.name));
+            continue;
+        };
+        match (load.period_for(link.rate_hz), StreamTerms::of(link, config)) {
+            (Err(slow), _) => faults.push(format!("rate_hz of [link.{}]: {slow}", link.name)),
+            (_, Err(why)) => faults.push(why),
+            (Ok(period), Ok(_)) => told.push(plays_at(link, &load, period)),
+        }
+    }
+    (told, faults)
+}
+
+/// What became of the baud rate that the file asks for, where that is another.
+fn other_baud(Link { name, baud, asked_baud, .. }: &Link) -> Option<String> {
+    (baud != asked_baud)
+        .then(|| format!("link {name} runs at {baud} baud, what its drives make of {asked_baud}"))
+}
+
+fn plays_at(link: &Link, load: &LinkLoad, period: Duration) -> String {
+    let hz = 1.0 / period.as_secs_f64();
+    let noun = if load.axes == 1 { "axis" } else { "axes" };
+    let mut words = format!("plays at {} Hz on link {}, {} {noun}", short(hz), link.name, load.axes);
+    if is_usb(&link.port) {
+        words += ", by a USB adapter whose latency timer is 1 ms";
+    }
+    if hz < LEAST_HZ {
+        words += &format!("; that is rough, for {LEAST_HZ} Hz {}", load.remedy(LEAST_HZ));
+    }
+    words
 }

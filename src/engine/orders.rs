@@ -43,7 +43,8 @@ impl Engine {
     /// Does to a lane what has to be done whatever the hall wants.
     pub(crate) fn order(&mut self, lane: usize, order: LaneOrder) {
         match order {
-            LaneOrder::Leave if self.sends_nothing() => {
+            // Nothing goes to one of which nobody knows where it stands: it is out at once, and not led again as soon as it is read.
+            LaneOrder::Leave if self.sends_nothing() || self.lane(lane).is_unseen() => {
                 if self.lane(lane).takes_part() {
                     self.lanes.all[lane].step_out();
                 }

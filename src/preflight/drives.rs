@@ -7,7 +7,7 @@ use super::{Check, Notes};
 use crate::config::drive_controller::Motors;
 use crate::config::link::LinkWiring;
 use crate::config::{Controller, Drives, Link};
-use crate::drive::link::{LinkPort, TalkCounts};
+use crate::drive::link::{LinkPort, LinkTalk as _, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
 use crate::drive::{motors_of, silvermax, sixpack2};

@@ -65,9 +65,7 @@ pub(crate) fn prove_links(config: &Config, timeline: &Timeline, terms: &Terms) -
         match StreamTerms::of(link, config) {
             Ok(None) => {}
             Ok(Some(StreamTerms { period, .. })) => {
-                let count = seats.iter().map(Vec::len).sum::<usize>();
-                let count = u32::try_from(count).unwrap_or(u32::MAX);
-                let line = Line { link, load, period, seats: count, timeline, terms };
+                let line = Line { link, load, period, timeline, terms };
                 seats.iter().for_each(|seats| line.prove(seats, &mut all));
             }
             Err(why) => all.violations.push(too_slow(why)),
@@ -100,8 +98,6 @@ struct Line<'a> {
     link: &'a Link,
     load: LinkLoad,
     period: Duration,
-    /// How many seats are on it.
-    seats: u32,
     timeline: &'a Timeline,
     terms: &'a Terms,
 }
@@ -185,7 +181,7 @@ impl Line<'_> {
         if !proof.violations.iter().all(is_of_rate) {
             return None;
         }
-        let mut changes = self.load.changes(self.seats);
+        let mut changes = self.load.changes();
         changes.retain(|(hz, _)| hz * self.period.as_secs_f64() > 1.0);
         // Proofs of a long film take a while: the least is looked for by halves.
         let passes = |(hz, _): &(f64, String)| {

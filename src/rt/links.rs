@@ -228,7 +228,7 @@ impl LinkLoop {
         let lanes = wants.into_iter().map(lane).collect();
         let mut link = Self { stream, lanes, live, stopped: false, told, tell_at: MonoTime::default() };
         // Those that are home are made ready at once.
-        (0..link.lanes.len()).for_each(|lane| link.stream.look(number(lane)));
+        (0..link.lanes.len()).for_each(|lane| link.stream.play().look(number(lane)));
         link
     }
 
@@ -238,24 +238,24 @@ impl LinkLoop {
         let is_new = stops && !self.stopped;
         self.stopped = stops;
         // Where the port is gone there is nobody to be told; the drives brake by themselves.
-        let told = if is_new { self.stream.stop() } else { Ok(()) };
+        let told = if is_new { self.stream.play().stop() } else { Ok(()) };
         for (index, lane) in self.lanes.iter_mut().enumerate() {
             let (located, looks) = (lane.wants.located(), lane.wants.looks());
             if std::mem::replace(&mut lane.located, located) != located {
-                self.stream.locate(number(index));
+                self.stream.play().locate(number(index));
             }
             if std::mem::replace(&mut lane.looks, looks) != looks {
-                self.stream.look(number(index));
+                self.stream.play().look(number(index));
             }
         }
         // Nothing moves, and nothing is about to.
         if !self.live.is_moving()
-            && !self.stream.is_busy()
+            && !self.stream.play().is_busy()
             && let Ok(errand) = self.told.errands.try_recv()
         {
             errand(&mut self.stream);
         }
-        let is_gone = told.and_then(|()| self.stream.round()).is_err();
+        let is_gone = told.and_then(|()| self.stream.play().round()).is_err();
         let fault = if is_gone {
             let port = self.stream.port();
             port.sleep_until(port.now() + GONE);
@@ -276,12 +276,12 @@ impl LinkLoop {
         let Ok(mut standing) = self.told.standing.try_lock() else { return };
         self.tell_at = now + TELL;
         let Self { stream, lanes, .. } = self;
-        standing.figures = stream.figures();
+        standing.figures = stream.play().figures();
         standing.fault = fault;
         standing.lanes.resize_with(lanes.len(), Vec::new);
         for (lane, axes) in standing.lanes.iter_mut().enumerate() {
             axes.clear();
-            axes.extend((0..).map_while(|axis| stream.axis(number(lane), axis)));
+            axes.extend((0..).map_while(|axis| stream.play().axis(number(lane), axis)));
         }
     }
 
@@ -298,7 +298,7 @@ impl LinkLoop {
             if over.load(Ordering::Acquire) {
                 let now = self.now();
                 let until = *until.get_or_insert(now + ENDS_WITHIN);
-                if !self.stream.is_busy() || now >= until {
+                if !self.stream.play().is_busy() || now >= until {
                     return;
                 }
             }

@@ -5,6 +5,7 @@ use std::net::TcpStream;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Stdio;
+use std::sync::{Mutex, PoisonError};
 
 use kinocue::harness::sys::clock::{Monotonic, wall_now_ns};
 use kinocue::harness::time::Clock as _;
@@ -203,9 +204,13 @@ fn on_a_terminal_the_console_stays_after_the_ride_to_go_again_until_ctrl_c() {
     assert!(is_empty(&folder.path("")));
 }
 
+/// One at a time: units that hear of nothing for too long are not home, and nobody rides on them.
+static DRIVES: Mutex<()> = Mutex::new(());
+
 /// A ride on drives, and each line about a unit at its end. True with it if all frames were confirmed: a busy machine may keep a
 /// unit from being asked for so long that its seat is lost for a while.
 fn ride_on_drives(dialect: &str) -> (Vec<String>, bool) {
+    let _one = DRIVES.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = Folder::new();
     let args = ["--json", "--dialect", dialect];
     let mut demo = Playing::demo(&folder.path(""), &args, Stdio::null(), Stdio::piped());

@@ -126,12 +126,12 @@ pub(crate) fn compositions(files: &[File]) -> Found {
 fn type_names(files: &[File]) -> BTreeMap<&str, usize> {
     let mut counts = BTreeMap::new();
     for line in files.iter().flat_map(File::code) {
+        // An associated type bears the trait's name for it.
+        let is_associated = indent(line) == 4 && line.trim_start().starts_with("type ");
         let (item, _) = item(line);
         let named = ["struct ", "enum ", "trait ", "type "].iter().find_map(|kind| item.strip_prefix(kind));
-        // `Args` is what clap wants; an associated type bears the trait's name for it.
-        if let Some(name) =
-            named.map(name_of).filter(|name| !["Args", "Err", "Item", "Output"].contains(name))
-        {
+        // `Args` is what clap wants.
+        if let Some(name) = named.map(name_of).filter(|name| !is_associated && *name != "Args") {
             *counts.entry(name).or_default() += 1;
         }
     }

@@ -98,6 +98,7 @@ impl Feature for Homing {
             SupervisorEvent::Entered(to) => {
                 self.call_off();
                 if *to == State::Homing {
+                    out.extend(new_zeros(hall));
                     out.extend(self.begin(hall));
                 }
             }
@@ -108,6 +109,18 @@ impl Feature for Homing {
     }
 }
 
+/// What a person has to know of axes that search no zero (PA03): nobody puts them where they ought to be.
+fn new_zeros(hall: &HallContext) -> impl Iterator<Item = Act> {
+    hall.lanes_on().filter_map(|lane| {
+        let controller = &hall.config.controllers[lane];
+        let (name, axis) = (&controller.name, controller.seat.rotary_axis()? + 1);
+        Some(Act::Note(format!(
+            "{name}: axis {axis} does not search its zero: where it stands now becomes its 0; stop if that is wrong, turn it, and home \
+             again"
+        )))
+    })
+}
+
 const fn tell(event: Event) -> Act {
     Act::Tick(TickCommand::Event(event))
 }
@@ -116,6 +129,7 @@ const fn tell(event: Event) -> Act {
 mod tests {
     use super::*;
     use crate::app::supervisor::testing::{hall, row, told};
+    use crate::motion::AxisUnit;
 
     /// One under way, and the flag that calls it off.
     fn begun(hall: &mut HallContext) -> (Homing, Arc<AtomicBool>) {
@@ -188,6 +202,17 @@ mod tests {
             matches!(trouble, Act::Tick(TickCommand::Event(Event::Trouble(Trouble::Homing(1))))),
             "{trouble:?}"
         );
+    }
+
+    #[test]
+    fn of_an_axis_that_searches_no_zero_it_is_said_that_it_takes_its_place_for_that_before_anything_homes() {
+        let mut hall = hall(State::Homing, "one");
+        let config = Arc::make_mut(&mut hall.config);
+        Arc::make_mut(&mut config.controllers[1].seat).each[0].unit = AxisUnit::Degree;
+        let mut homing = Homing::default();
+        let acts = told(&mut homing, &SupervisorEvent::Entered(State::Homing), &hall);
+        let [Act::Note(note), Act::Start(_)] = &acts[..] else { panic!("{acts:?}") };
+        assert!(note.starts_with("B1: axis 1 does not search its zero: where it stands now"), "{note}");
     }
 
     #[test]

@@ -37,10 +37,10 @@ const CUE: &str = include_str!("../../../cues/bench-ride.csv");
 
 /// Plays the bench ride to virtual seats, with nothing to set up.
 ///
-/// It is the daemon itself, with its web console, whose address is printed at once. On a terminal the console stays up after the
+/// Runs the daemon itself with its web console, and prints the console's address at once. On a terminal the console stays up after the
 /// ride until Ctrl-C, to arm and go again there. There are four controllers, two of them a pair that shares one frame (PA95); or,
 /// by --dialect, two seats on serial drives, which the demo homes first, as a person has to with real ones. Everything stays on this
-/// machine, in a folder that is gone at the end.
+/// machine, in a temporary folder that is removed at the end.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json\n  kinocue demo --film film.mkv\n  \
@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let host = SocketAddrV4::new(Ipv4Addr::LOCALHOST, port.number);
     let seats = VirtualHall::start(args.dialect, host, &folder)?;
     let token = Token::new("visitor", Role::Engineer).or_exit(Exit::System)?;
-    let mut hall = seats::hall(args.rate, host, &seats, &token.config, &folder);
+    let mut hall = seats::hall(args.rate, host, &seats.tables(&folder), &token.config, &folder);
     hall.extend(film.iter().map(DemoFilm::tables));
     let places = furnish(&folder, &hall, film.as_ref(), &seats)?;
     let (load, cue_name) = film.as_ref().map_or_else(|| bench_ride(&seats), DemoFilm::load);

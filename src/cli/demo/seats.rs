@@ -1,8 +1,8 @@
 //! The hall of the demo: its seats, as virtual controllers and as a configuration.
 
 use std::net::SocketAddrV4;
+use std::path::PathBuf;
 
-use super::virtual_hall::{VirtualHall, port};
 use crate::sim::{Setup, pa};
 use crate::sys::own_folder::OwnFolder;
 use crate::wire::Dialect;
@@ -35,7 +35,7 @@ impl DemoSeat {
     }
 
     /// Its seat type and its controller, as the configuration has them.
-    fn tables(&self, address: SocketAddrV4, dialect: &str) -> String {
+    pub(super) fn tables(&self, address: SocketAddrV4, dialect: &str) -> String {
         let Self { name, row, axes, offset, fan_out } = self;
         let neutral = vec!["0.5"; usize::from(*axes)].join(", ");
         format!(
@@ -48,10 +48,13 @@ impl DemoSeat {
     }
 }
 
+/// What a line of drives is: baud, rate, and what is said of type, drives and motors.
+pub(super) type DrivenSeat = (u32, u32, &'static str, &'static str, &'static str);
+
 /// What a line with SilverMax units is in the configuration: its baud and its rate, and what is said of type, drives and motors.
 ///
 /// Neither plays as often as its line could: where this machine is busy virtual units answer late.
-const SILVERMAX: (u32, u32, &str, &str, &str) = (
+pub(super) const SILVERMAX: DrivenSeat = (
     115_200,
     25,
     "pulses_per_rev = 4000",
@@ -60,7 +63,7 @@ const SILVERMAX: (u32, u32, &str, &str, &str) = (
     "dialect = \"silvermax\"\nunits = [16, 17, 18]",
 );
 /// The same of a line with a SIXpack 2.
-const SIXPACK2: (u32, u32, &str, &str, &str) = (
+pub(super) const SIXPACK2: DrivenSeat = (
     115_200,
     80,
     "pulses_per_rev = 3200",
@@ -70,11 +73,8 @@ const SIXPACK2: (u32, u32, &str, &str, &str) = (
 );
 
 /// Seats on drives: each a link, a seat type and a controller.
-fn driven(
-    folder: &OwnFolder,
-    (baud, rate_hz, seat, drive, controller): (u32, u32, &str, &str, &str),
-) -> impl Iterator<Item = String> {
-    DRIVEN.into_iter().map(move |name| {
+pub(super) fn driven(folder: &OwnFolder, (baud, rate_hz, seat, drive, controller): DrivenSeat) -> String {
+    let tables = |name: &&str| {
         let port = quoted(&port(folder, name).to_string_lossy());
         format!(
             "[link.{name}]\nport = {port}\nbaud = {baud}\nrate_hz = {rate_hz}\n\
@@ -83,38 +83,27 @@ fn driven(
              [seat.{name}.drive]\n{drive}\n\
              [[controller]]\nname = \"{name}\"\nrow = \"A\"\nseat = \"{name}\"\naddress = \"link:{name}\"\n{controller}\n"
         )
-    })
+    };
+    DRIVEN.iter().map(tables).collect()
 }
 
-/// The configuration: the seats of this hall, whose controllers answer to `host`; the API listens on a port that the system gives it
-/// and knows the token of these lines, and all files are in `folder`.
-pub(super) fn hall(
-    rate_hz: f64,
-    host: SocketAddrV4,
-    seats: &VirtualHall,
-    token: &str,
-    folder: &OwnFolder,
-) -> String {
+/// The port of the line of a seat.
+pub(super) fn port(folder: &OwnFolder, seat: &str) -> PathBuf {
+    folder.path(format!("line-{seat}"))
+}
+
+/// The configuration: these seats, whose controllers answer to `host`; the API listens on a port that the system gives it and knows
+/// the token of these lines, and all files are in `folder`.
+pub(super) fn hall(rate_hz: f64, host: SocketAddrV4, seats: &str, token: &str, folder: &OwnFolder) -> String {
     let path = |name: &str| quoted(&folder.path(name).to_string_lossy());
     let (cues, log) = (path("cues"), path("log"));
-    let mut hall = format!(
+    format!(
         "[show]\nname = \"demo\"\nrate_hz = {rate_hz:?}\nbind = \"{host}\"\nlibrary = {cues}\n\
          [log]\ndir = {log}\n\
          [effects]\nair = 1\nwater = 2\nwind = 3\nleg = 4\nsmoke = 5\nlight = 6\n\
-         [api]\nlisten = [\"{}:0\"]\nopen_role = \"view\"\n{token}\n",
+         [api]\nlisten = [\"{}:0\"]\nopen_role = \"view\"\n{token}\n{seats}",
         host.ip()
-    );
-    let stations = |dialect: &'static str| {
-        let addressed = SEATS.iter().zip(seats.addresses());
-        addressed.map(move |(seat, address)| seat.tables(address, dialect))
-    };
-    match seats {
-        VirtualHall::Stations(Dialect::Smc, _) => hall.extend(stations("smc")),
-        VirtualHall::Stations(Dialect::Mbox, _) => hall.extend(stations("mbox")),
-        VirtualHall::SilverMax(_) => hall.extend(driven(folder, SILVERMAX)),
-        VirtualHall::Sixpack2(_) => hall.extend(driven(folder, SIXPACK2)),
-    }
-    hall
+    )
 }
 
 /// A text of JSON is one of TOML.

@@ -1,11 +1,10 @@
 //! What moves the seats of the demo, all of it virtual: controllers on the network, or drives at the far ends of lines.
 
 use std::net::SocketAddrV4;
-use std::path::Path;
 
 use anyhow::Context as _;
 
-use super::seats::{DRIVEN, SEATS};
+use super::seats::{DRIVEN, SEATS, SILVERMAX, SIXPACK2, driven, port};
 use crate::cli::sim::{Drives, SimFamily};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::sim::serial::{LineFaults, PtyError, PtyLoop, SerialLine};
@@ -61,11 +60,17 @@ impl VirtualHall {
         }
     }
 
-    /// Where the controllers listen; none where there are drives.
-    pub(super) fn addresses(&self) -> Vec<SocketAddrV4> {
+    /// The seats as the configuration has them.
+    pub(super) fn tables(&self, folder: &OwnFolder) -> String {
+        let stations = |dialect: &str, farm: &Farm| {
+            let all = SEATS.iter().zip(farm.addresses());
+            all.map(|(seat, address)| seat.tables(address, dialect)).collect()
+        };
         match self {
-            Self::Stations(_, farm) => farm.addresses(),
-            Self::SilverMax(_) | Self::Sixpack2(_) => Vec::new(),
+            Self::Stations(Dialect::Smc, farm) => stations("smc", farm),
+            Self::Stations(Dialect::Mbox, farm) => stations("mbox", farm),
+            Self::SilverMax(_) => driven(folder, SILVERMAX),
+            Self::Sixpack2(_) => driven(folder, SIXPACK2),
         }
     }
 
@@ -111,11 +116,6 @@ fn lines<B: Drives>(folder: &OwnFolder, bus: impl Fn() -> B) -> Result<Vec<PtyLo
     };
     let lines: Result<_, _> = DRIVEN.iter().map(line).collect();
     lines.context("no lines for the virtual drives").or_exit(Exit::System)
-}
-
-/// The port of the line of a seat.
-pub(super) fn port(folder: &OwnFolder, seat: &str) -> std::path::PathBuf {
-    folder.path(Path::new(&format!("line-{seat}")))
 }
 
 fn tell_executed<B: Drives>(lines: Vec<PtyLoop<B>>) {

@@ -195,10 +195,7 @@ fn text(targets: &Targets, found: &[Found]) -> Table {
             ]);
         }
     }
-    for column in table.column_iter_mut().skip(2).take(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
+    aligned(table)
 }
 
 fn text_of_drives(driven: &DrivenTargets, found: &[DriveFound]) -> Table {
@@ -211,6 +208,11 @@ fn text_of_drives(driven: &DrivenTargets, found: &[DriveFound]) -> Table {
             table.add_row([controller.name.clone(), register.clone(), value.to_string(), name.clone(), says]);
         }
     }
+    aligned(table)
+}
+
+/// With the values at the right of their column.
+fn aligned(mut table: Table) -> Table {
     for column in table.column_iter_mut().skip(2).take(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }

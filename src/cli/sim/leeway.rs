@@ -20,7 +20,7 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "MS", default_value_t = 500)]
     homing_ms: u32,
 
-    /// How much of its time a command takes while more than two wait (PA06 = 1).
+    /// Fraction of its Time that a command takes while more than two wait (PA06 = 1).
     #[arg(long, value_enum, default_value_t = FastForward::Half)]
     fast_forward: FastForward,
 
@@ -32,15 +32,15 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..))]
     udp_memory: u32,
 
-    /// What the automatic reset (PA0d) counts in.
+    /// Unit of the automatic reset's time (PA0d).
     #[arg(long, value_name = "SPAN", default_value = "1ms", value_parser = parse_duration)]
     auto_reset_unit: Duration,
 
-    /// Which requests put off the automatic reset (PA0d).
+    /// Requests that postpone the automatic reset (PA0d).
     #[arg(long, value_enum, default_value_t = Requests::Motion)]
     auto_reset_counts: Requests,
 
-    /// True if registers not named in the manuals read 0 or are refused.
+    /// Reads of registers that the manuals do not name: 0, or refused.
     #[arg(long, value_enum, default_value_t = Unused::Zero)]
     unused_registers: Unused,
 

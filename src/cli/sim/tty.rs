@@ -26,12 +26,12 @@ pub(super) struct TtyArgs {
     #[arg(value_parser = clap::value_parser!(u8).range(1..=254))]
     units: Vec<u8>,
 
-    /// Bits a second of a SilverMax's line, which a pseudo-terminal does not keep to by itself [default: 57600].
+    /// Baud rate of a SilverMax line; the simulator paces bytes by it, as a pseudo-terminal does not [default: 57600].
     #[arg(long, value_name = "BAUD", requires = "tty")]
     #[arg(value_parser = clap::value_parser!(u32).range(300..=1_000_000))]
     pub(super) baud: Option<u32>,
 
-    /// What is wrong from the start, as "lost=0.001, 17@dead=1"; see below.
+    /// Faults present from the start, as "lost=0.001, 17@dead=1"; see below.
     #[arg(long, value_name = "COMMAND, …", default_value = "", hide_default_value = true, requires = "tty")]
     faults: String,
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::{Delays, LinkFault, LinkPort};
 use crate::config::Link;
 use crate::config::link::LinkWiring;
 use crate::time::MonoTime;
@@ -75,5 +76,94 @@ impl Moment {
     /// How long the answer took to begin.
     pub(crate) const fn delay(&self) -> Duration {
         self.answered.since(self.sent)
+    }
+}
+
+/// What a conversation over a port has come to.
+#[derive(Debug)]
+pub(crate) struct TalkState<P> {
+    pub(crate) port: P,
+    pub(crate) terms: TalkTerms,
+    pub(crate) delays: Delays,
+    pub(crate) counts: TalkCounts,
+    pub(crate) moment: Moment,
+}
+
+impl<P> TalkState<P> {
+    /// Of one that has not begun.
+    pub(crate) fn over(port: P, terms: TalkTerms) -> Self {
+        let counts = TalkCounts::default();
+        Self { port, terms, delays: Delays::new(), counts, moment: Moment::default() }
+    }
+}
+
+/// A conversation with the drives of a line, whatever they speak.
+pub(crate) trait LinkTalk {
+    /// What it goes over.
+    type Port: LinkPort;
+
+    /// What it has come to.
+    fn state(&self) -> &TalkState<Self::Port>;
+
+    /// The same, to be changed.
+    fn state_mut(&mut self) -> &mut TalkState<Self::Port>;
+
+    /// The present instant.
+    fn now(&self) -> MonoTime {
+        self.state().port.now()
+    }
+
+    /// The port.
+    fn port(&mut self) -> &mut Self::Port {
+        &mut self.state_mut().port
+    }
+
+    /// Bits a second.
+    fn baud(&self) -> u32 {
+        self.state().terms.baud
+    }
+
+    /// What came so far.
+    fn counts(&self) -> TalkCounts {
+        self.state().counts
+    }
+
+    /// What 99 of 100 answers take to begin.
+    fn delay_p99(&self) -> Duration {
+        self.state().delays.p99()
+    }
+
+    /// What nine of ten answers took to begin at the most; none where there were none.
+    fn usual_delay(&self) -> Option<Duration> {
+        self.state().delays.most_of(90)
+    }
+
+    /// When the last exchange was.
+    fn moment(&self) -> Moment {
+        self.state().moment
+    }
+
+    /// How long so many octets take.
+    fn octets(&self, count: u32) -> Duration {
+        let TalkTerms { baud, octet_bits, .. } = self.state().terms;
+        Duration::from_nanos(u64::from(count * octet_bits) * 1_000_000_000 / u64::from(baud.max(1)))
+    }
+
+    /// Takes the echo of what was sent back, where there is one; it has to be there at the deadline.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    fn take_echo(&mut self, sent: &[u8], deadline: MonoTime) -> Result<(), LinkFault> {
+        let TalkState { port, counts, .. } = self.state_mut();
+        let (mut octet, mut same) = ([0], true);
+        for wanted in sent {
+            if port.receive(&mut octet, deadline)? == 0 {
+                same = false;
+                break;
+            }
+            same &= octet[0] == *wanted;
+        }
+        counts.echo_differs += u64::from(!same);
+        Ok(())
     }
 }

@@ -6,22 +6,31 @@
 mod delays;
 mod exchange;
 mod homing;
+mod led_lane;
 mod line;
 mod peer;
 mod port;
+mod stream;
 mod streaming;
+#[cfg(test)]
+mod virtual_play;
 #[cfg(test)]
 mod virtual_port;
 
 pub(crate) use delays::Delays;
-pub(crate) use exchange::{Moment, TalkCounts, TalkTerms};
+pub(crate) use exchange::{LinkTalk, Moment, TalkCounts, TalkState, TalkTerms};
 pub(crate) use homing::{Step, canary};
+pub(crate) use led_lane::{LedLane, LinkAxis, STANDS_MM};
 pub(crate) use line::LinkLine;
 pub(crate) use peer::{LaneWants, LinkPeer};
 pub(crate) use port::{LinkFault, LinkPort};
+pub(crate) use stream::{Family, IDLE, LinkPlay, Stream};
 pub(crate) use streaming::{
-    Account, AxisFigures, BrakeReason, LinkFigures, Stage, StreamEvent, StreamTerms, axis_number, lane_number,
+    Account, AxisFigures, BrakeReason, Lead, LinkFigures, Stage, StreamEvent, StreamTerms, axis_number,
+    lane_number,
 };
+#[cfg(test)]
+pub(crate) use virtual_play::{TICK, VirtualPlay, back, ride_about, there};
 #[cfg(test)]
 pub(crate) use virtual_port::VirtualPort;
 

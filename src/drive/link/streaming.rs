@@ -18,6 +18,22 @@ pub(crate) struct StreamTerms {
     pub(crate) tick: Duration,
 }
 
+/// How long before a seat is there its poses have to come: so many periods of its link, and so many ticks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lead {
+    /// Periods.
+    pub(crate) periods: u32,
+    /// Ticks.
+    pub(crate) ticks: u32,
+}
+
+impl Lead {
+    /// On a link that plays so.
+    pub(crate) fn over(self, terms: StreamTerms) -> Duration {
+        self.periods * terms.period + self.ticks * terms.tick
+    }
+}
+
 /// What a lane does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stage {

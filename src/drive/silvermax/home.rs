@@ -9,7 +9,7 @@ use std::time::Duration;
 use super::set_up::{HomeError, SeatUnits, UnitAxis, write, write_once};
 use super::talk::Talk;
 use crate::config::drive::homing::{HomeWay, Side};
-use crate::drive::link::{LinkPort, Step};
+use crate::drive::link::{LinkPort, LinkTalk as _, Step};
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{ACCUMULATOR, INPUT_POSITION, POSITION};
 use crate::wire::silvermax::{Internal, Io, Poll, Request, StatusWord, StopOn};

@@ -20,5 +20,5 @@ mod tests;
 pub(crate) use home::{Homing, home};
 pub(crate) use look::{UnitFacts, look};
 pub(crate) use set_up::{HomeError, SeatUnits, UnitSettings, kill_names};
-pub(crate) use stream::{LEAD, LaneUnits, Stream};
+pub(crate) use stream::SilverMax;
 pub(crate) use talk::{Talk, TalkFault};

@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use crate::drive::link::{Delays, LinkFault, LinkPort, Moment, TalkCounts, TalkTerms};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk, Moment, TalkState, TalkTerms};
 use crate::time::MonoTime;
 use crate::wire::silvermax::{
     ALL_UNITS, Collected, Internal, LineCollector, MAX_LINE, NakReason, Reply, Request, Words,
@@ -67,55 +67,25 @@ pub(crate) enum TalkFault {
 /// A conversation with the units of a line.
 #[derive(Debug)]
 pub(crate) struct Talk<P> {
-    port: P,
-    terms: TalkTerms,
-    delays: Delays,
-    counts: TalkCounts,
-    moment: Moment,
+    state: TalkState<P>,
+}
+
+impl<P: LinkPort> LinkTalk for Talk<P> {
+    type Port = P;
+
+    fn state(&self) -> &TalkState<P> {
+        &self.state
+    }
+
+    fn state_mut(&mut self) -> &mut TalkState<P> {
+        &mut self.state
+    }
 }
 
 impl<P: LinkPort> Talk<P> {
     /// Over a port that is open.
     pub(crate) fn new(port: P, terms: TalkTerms) -> Self {
-        let counts = TalkCounts::default();
-        Self { port, terms, delays: Delays::new(), counts, moment: Moment::default() }
-    }
-
-    /// The present instant.
-    pub(crate) fn now(&self) -> MonoTime {
-        self.port.now()
-    }
-
-    /// The port.
-    pub(crate) const fn port(&mut self) -> &mut P {
-        &mut self.port
-    }
-
-    /// What came so far.
-    pub(crate) const fn counts(&self) -> TalkCounts {
-        self.counts
-    }
-
-    /// What 99 of 100 answers take to begin.
-    pub(crate) fn delay_p99(&self) -> Duration {
-        self.delays.p99()
-    }
-
-    /// What nine of ten answers took to begin at the most; none where there were none.
-    pub(crate) fn usual_delay(&self) -> Option<Duration> {
-        self.delays.most_of(90)
-    }
-
-    /// When the last exchange was.
-    pub(crate) const fn moment(&self) -> Moment {
-        self.moment
-    }
-
-    /// How long so many octets take.
-    pub(crate) fn octets(&self, count: u32) -> Duration {
-        Duration::from_nanos(
-            u64::from(count * self.terms.octet_bits) * 1_000_000_000 / u64::from(self.terms.baud.max(1)),
-        )
+        Self { state: TalkState::over(port, terms) }
     }
 
     /// Tells all units something; none answers.
@@ -125,9 +95,9 @@ impl<P: LinkPort> Talk<P> {
     pub(crate) fn tell_all(&mut self, request: Request) -> Result<(), LinkFault> {
         let octets = self.send(ALL_UNITS, request)?;
         let sent = self.now() + octets;
-        self.port.sleep_until(sent);
-        if self.terms.has_echo {
-            self.port.flush();
+        self.state.port.sleep_until(sent);
+        if self.state.terms.has_echo {
+            self.state.port.flush();
         }
         Ok(())
     }
@@ -137,22 +107,22 @@ impl<P: LinkPort> Talk<P> {
     /// # Errors
     /// A [`TalkFault`]; [`Talk::fence`] has to follow where that is not the port.
     pub(crate) fn exchange(&mut self, unit: u8, request: Request) -> Result<Answer, TalkFault> {
-        let stale = self.port.flush();
-        self.counts.doubled += u64::from(stale > 0);
+        let stale = self.state.port.flush();
+        self.state.counts.doubled += u64::from(stale > 0);
         let sending = self.send(unit, request)?;
-        self.counts.asked += 1;
+        self.state.counts.asked += 1;
         let sent = self.now() + sending;
         let octets = if matches!(request, Request::ImmediateSegment { .. }) { REFUSAL } else { ANSWER };
-        let deadline = sent + self.octets(octets) + 2 * self.delays.p99() + SLACK;
+        let deadline = sent + self.octets(octets) + 2 * self.state.delays.p99() + SLACK;
         let command = u16::from(request.number());
         let fits = |reply: &Reply| reply.command().is_none_or(|told| told == command);
         match self.answer(sent, deadline)? {
             Some(reply) if reply.unit() == unit && fits(&reply) => {
-                self.counts.answered += 1;
+                self.state.counts.answered += 1;
                 Ok(Answer::of(reply))
             }
             Some(reply) => {
-                self.counts.foreign += 1;
+                self.state.counts.foreign += 1;
                 // Of the right unit, and to another command: late, and no answer to this.
                 Err(match reply.unit() {
                     by if by == unit => TalkFault::Silent { unit },
@@ -176,25 +146,25 @@ impl<P: LinkPort> Talk<P> {
         let (mut late, mut waited) = (None, 0);
         for open in 1..=2 {
             let sending = self.send(unit, Request::Revision)?;
-            self.counts.asked += 1;
+            self.state.counts.asked += 1;
             let sent = self.now() + sending;
-            let deadline = sent + self.octets(2 * ANSWER) + 2 * self.delays.p99() + SLACK;
+            let deadline = sent + self.octets(2 * ANSWER) + 2 * self.state.delays.p99() + SLACK;
             // The answers to all reads that were sent, so that none is left over.
             while waited < open
                 && let Some(reply) = self.answer(sent, deadline)?
             {
                 if reply.unit() != unit {
-                    self.counts.foreign += 1;
+                    self.state.counts.foreign += 1;
                 } else if reply.command() == Some(fence) {
                     waited += 1;
                 } else {
-                    self.counts.late += 1;
+                    self.state.counts.late += 1;
                     let is_of_it = reply.command().is_none_or(|command| command == number);
                     late = late.or(is_of_it.then(|| Answer::of(reply)));
                 }
             }
             if waited > 0 {
-                self.counts.answered += 1;
+                self.state.counts.answered += 1;
                 return Ok(late);
             }
         }
@@ -256,18 +226,12 @@ impl<P: LinkPort> Talk<P> {
         let mut buf = [0; MAX_LINE];
         let line = request.emit(unit, &mut buf);
         let takes = self.octets(u32::try_from(line.len()).unwrap_or(u32::MAX));
-        self.port.send(line)?;
-        if !self.terms.has_echo {
+        self.state.port.send(line)?;
+        if !self.state.terms.has_echo {
             return Ok(takes);
         }
-        let (deadline, mut echo, mut at) = (self.now() + takes + SLACK, [0; MAX_LINE], 0);
-        while at < line.len() {
-            match self.port.receive(&mut echo[at..line.len()], deadline)? {
-                0 => break,
-                count => at += count,
-            }
-        }
-        self.counts.echo_differs += u64::from(echo[..at] != *line);
+        let deadline = self.now() + takes + SLACK;
+        self.take_echo(line, deadline)?;
         Ok(Duration::ZERO)
     }
 
@@ -276,15 +240,15 @@ impl<P: LinkPort> Talk<P> {
         let mut collector = LineCollector::of_replies();
         let mut octet = [0];
         let mut begun = None;
-        while self.port.receive(&mut octet, deadline)? > 0 {
+        while self.state.port.receive(&mut octet, deadline)? > 0 {
             begun.get_or_insert(self.now());
             let malformed = match collector.push(octet[0]) {
                 Some(Collected::Line(line)) => match Reply::parse(line) {
                     Ok(reply) => {
                         // An octet is there when its last bit is.
                         let first = begun.unwrap_or(sent).before(self.octets(1));
-                        self.moment = Moment { sent, answered: first.max(sent) };
-                        self.delays.push(first.since(sent));
+                        self.state.moment = Moment { sent, answered: first.max(sent) };
+                        self.state.delays.push(first.since(sent));
                         return Ok(Some(reply));
                     }
                     Err(_) => true,
@@ -293,11 +257,11 @@ impl<P: LinkPort> Talk<P> {
                 None => false,
             };
             if malformed {
-                self.counts.malformed += 1;
+                self.state.counts.malformed += 1;
                 begun = None;
             }
         }
-        self.counts.malformed += u64::from(!collector.rest().is_empty());
+        self.state.counts.malformed += u64::from(!collector.rest().is_empty());
         Ok(None)
     }
 }

@@ -1,11 +1,6 @@
 //! Homings and plays in virtual time, against virtual units; judged by where their axes really were.
 
-#![expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "numbers of axes, ticks and seeds"
-)]
+#![expect(clippy::cast_possible_truncation, reason = "numbers of axes, ticks and seeds")]
 
 mod bench;
 mod homing;

@@ -3,14 +3,13 @@
 
 use std::time::Duration;
 
-use super::talk::{ANSWER, Talk, TalkFault};
-use crate::drive::link::{LinkFault, LinkPort};
-use crate::wire::sixpack2::{SixpackOrder, SixpackReply, UnitQuery, UnitTold, WAKING_DIVISOR, baud_of};
+use super::ask::{waking_baud, who};
+use super::talk::Talk;
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _};
+use crate::wire::sixpack2::UnitTold;
 
 /// How often all that are silent are looked for at either rate.
 const ROUNDS: u32 = 3;
-/// How often a unit is asked at a rate before it counts as silent there.
-const TRIES: u32 = 2;
 /// What a unit is given to change its rate.
 const CHANGE: Duration = Duration::from_millis(20);
 
@@ -47,14 +46,6 @@ pub(crate) enum FindError {
         waking: u32,
     },
 }
-
-/// The rate with which units wake.
-pub(super) fn waking_baud() -> u32 {
-    baud_of(WAKING_DIVISOR).unwrap_or(19_200)
-}
-
-/// Who it is; asking clears its reset flag.
-pub(super) const WHO: SixpackOrder = SixpackOrder::AskUnit(UnitQuery { response: ANSWER });
 
 /// Finds units of a line, and has all of them talk at its rate; with what each said of itself first, so that its reset flag is
 /// not lost. In the order of `units`.
@@ -121,16 +112,4 @@ fn wake<P: LinkPort>(
     }
     talk.pause(CHANGE);
     Ok(())
-}
-
-/// Who a unit is, if it is there.
-pub(super) fn who<P: LinkPort>(talk: &mut Talk<P>, unit: u8) -> Result<Option<UnitTold>, LinkFault> {
-    for _ in 0..TRIES {
-        match talk.ask(unit, WHO) {
-            Ok(SixpackReply::UnitTold(told)) => return Ok(Some(told)),
-            Err(TalkFault::Link(fault)) => return Err(fault),
-            Ok(_) | Err(TalkFault::Silent { .. }) => {}
-        }
-    }
-    Ok(None)
 }

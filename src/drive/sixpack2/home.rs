@@ -5,12 +5,12 @@
 
 use std::time::Duration;
 
-use super::find::{WHO, find};
-use super::look::{position, searches};
+use super::ask::{WHO, position, searches};
+use super::find::find;
 use super::set_up::{HomeError, MotorAxis, Purpose, SeatMotors};
 use super::talk::Talk;
 use crate::config::drive::homing::HomeWay;
-use crate::drive::link::{LinkPort, Step};
+use crate::drive::link::{LinkPort, LinkTalk as _, Step};
 use crate::wire::sixpack2::{
     AbortSearch, ClockDivider, JointStart, JointTarget, PacketTimeout, PositionPreset, PositionTold,
     ReferenceSearch, SixpackOrder, SixpackReply, action,

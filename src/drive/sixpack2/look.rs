@@ -1,10 +1,10 @@
 //! What a unit says of itself; nothing is written and nothing moves. Asking clears its reset flag, and the stop flag of a motor.
 
-use super::find::{WHO, waking_baud, who};
+use super::ask::{WHO, position, searches, waking_baud, who};
 use super::set_up::{MotorAxis, SeatMotors};
 use super::talk::{ANSWER, Talk, TalkFault};
-use crate::drive::link::LinkPort;
-use crate::wire::sixpack2::{InputQuery, PositionQuery, PositionTold, SixpackOrder, SixpackReply, action};
+use crate::drive::link::{LinkPort, LinkTalk as _};
+use crate::wire::sixpack2::{InputQuery, PositionTold, SixpackOrder, SixpackReply};
 
 /// How far outside its stroke a seat that is home may stand, mm.
 pub(super) const OUTSIDE_MM: f64 = 0.5;
@@ -107,34 +107,5 @@ impl MotorFacts {
     /// True while it looks for its zero.
     pub(crate) const fn searches(&self) -> bool {
         searches(self.action)
-    }
-}
-
-/// True where a motor that does this looks for its zero.
-pub(super) const fn searches(does: u8) -> bool {
-    matches!(does, action::SEARCH..=action::LAST_SEARCH | action::MECHANICAL)
-}
-
-/// Where a motor is.
-pub(super) fn position<P: LinkPort>(
-    talk: &mut Talk<P>,
-    unit: u8,
-    motor: u8,
-) -> Result<PositionTold, TalkFault> {
-    let reply = talk.insist(unit, where_is(motor))?;
-    told_place(reply, TalkFault::Silent { unit, baud: talk.baud() })
-}
-
-/// Where is it?
-pub(super) const fn where_is(motor: u8) -> SixpackOrder {
-    SixpackOrder::AskPosition(PositionQuery { motor, response: ANSWER })
-}
-
-/// What was answered to that.
-pub(super) fn told_place(reply: SixpackReply, other: TalkFault) -> Result<PositionTold, TalkFault> {
-    match reply {
-        SixpackReply::PositionTold(told) => Ok(told),
-        // Cannot be: an answer is one to the question.
-        _ => Err(other),
     }
 }

@@ -8,6 +8,7 @@
 //!                     '--events--> ring
 //! ```
 
+mod ask;
 mod find;
 mod home;
 mod look;
@@ -26,5 +27,5 @@ pub(crate) use home::{Homing, home};
 pub(crate) use look::MotorFacts;
 pub(crate) use look::{UnitFacts, look_for};
 pub(crate) use set_up::{HomeError, SeatMotors};
-pub(crate) use stream::{LEAD, Stream, read_every};
+pub(crate) use stream::{Sixpack2, read_every};
 pub(crate) use talk::{Talk, TalkFault};

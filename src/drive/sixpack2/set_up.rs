@@ -2,15 +2,15 @@
 
 use std::time::Duration;
 
+use super::ask::{told_place, where_is};
 use super::find::FindError;
-use super::look::{told_place, where_is};
 use super::scale::MotorScale;
 use super::talk::{Talk, TalkFault};
 use crate::config::drive::homing::{HomeWay, Side};
 use crate::config::drive::sixpack2::{MotorCurrent, PropDiv, SHARES, Sixpack2Drive};
 use crate::config::drive::{SeatDrive, homing::DriveHoming};
 use crate::drive::Lag;
-use crate::drive::link::{LinkFault, LinkPort};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _};
 use crate::motion::{AxisGeometry, SeatType};
 use crate::wire::sixpack2::{
     CurrentSettings, MotorSettings, PeakCurrent, PiSettings, PositionTold, RampSettings, ReferenceSettings,

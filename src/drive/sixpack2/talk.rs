@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use crate::drive::link::{Delays, LinkFault, LinkPort, Moment, TalkCounts, TalkTerms};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk, Moment, TalkState, TalkTerms};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{
     BAUD_CLOCK, BaudSwitch, FRAME_LEN, SixpackFrame, SixpackOrder, SixpackReply, baud_of,
@@ -45,56 +45,28 @@ pub(crate) enum TalkFault {
 /// A conversation with the units of a line.
 #[derive(Debug)]
 pub(crate) struct Talk<P> {
-    port: P,
-    terms: TalkTerms,
-    delays: Delays,
-    counts: TalkCounts,
-    moment: Moment,
+    state: TalkState<P>,
     /// Until when somebody drives the line.
     busy: MonoTime,
+}
+
+impl<P: LinkPort> LinkTalk for Talk<P> {
+    type Port = P;
+
+    fn state(&self) -> &TalkState<P> {
+        &self.state
+    }
+
+    fn state_mut(&mut self) -> &mut TalkState<P> {
+        &mut self.state
+    }
 }
 
 impl<P: LinkPort> Talk<P> {
     /// Over a port that is open.
     pub(crate) fn new(port: P, terms: TalkTerms) -> Self {
         let busy = port.now();
-        let (counts, moment) = (TalkCounts::default(), Moment::default());
-        Self { port, terms, delays: Delays::new(), counts, moment, busy }
-    }
-
-    /// The present instant.
-    pub(crate) fn now(&self) -> MonoTime {
-        self.port.now()
-    }
-
-    /// The port.
-    pub(crate) fn port(&mut self) -> &mut P {
-        &mut self.port
-    }
-
-    /// Bits a second.
-    pub(crate) const fn baud(&self) -> u32 {
-        self.terms.baud
-    }
-
-    /// What came so far.
-    pub(crate) const fn counts(&self) -> TalkCounts {
-        self.counts
-    }
-
-    /// What 99 of 100 answers take to begin.
-    pub(crate) fn delay_p99(&self) -> Duration {
-        self.delays.p99()
-    }
-
-    /// What nine of ten answers took to begin at the most; none where none came.
-    pub(crate) fn usual_delay(&self) -> Option<Duration> {
-        self.delays.most_of(90)
-    }
-
-    /// When the last question was asked and answered.
-    pub(crate) const fn moment(&self) -> Moment {
-        self.moment
+        Self { state: TalkState::over(port, terms), busy }
     }
 
     /// When a frame that is sent now has wholly arrived, and how long one takes.
@@ -103,16 +75,10 @@ impl<P: LinkPort> Talk<P> {
         (self.now().max(self.busy) + self.octets(BREAK) + frame, frame)
     }
 
-    /// How long so many octets take.
-    pub(crate) fn octets(&self, count: u32) -> Duration {
-        let bits = u64::from(count * self.terms.octet_bits);
-        Duration::from_nanos(bits * 1_000_000_000 / u64::from(self.terms.baud.max(1)))
-    }
-
     /// How long a question holds up what is said next.
     pub(crate) fn question(&self) -> Duration {
-        let delay = self.delays.p99();
-        let hold = if self.terms.is_two_wires { delay.min(LONGEST_HOLD) } else { Duration::ZERO };
+        let delay = self.state.delays.p99();
+        let hold = if self.state.terms.is_two_wires { delay.min(LONGEST_HOLD) } else { Duration::ZERO };
         self.octets(BREAK + 2 * NINE) + delay + hold
     }
 
@@ -124,7 +90,7 @@ impl<P: LinkPort> Talk<P> {
     /// Does nothing for so long.
     pub(crate) fn pause(&mut self, span: Duration) {
         let until = self.now() + span;
-        self.port.sleep_until(until);
+        self.state.port.sleep_until(until);
     }
 
     /// Sends and listens at another rate from now on; what units make of it is theirs.
@@ -132,9 +98,9 @@ impl<P: LinkPort> Talk<P> {
     /// # Errors
     /// A [`LinkFault`] where the port is gone.
     pub(super) fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
-        self.port.sleep_until(self.busy);
-        self.port.set_baud(baud)?;
-        self.terms.baud = baud;
+        self.state.port.sleep_until(self.busy);
+        self.state.port.set_baud(baud)?;
+        self.state.terms.baud = baud;
         Ok(())
     }
 
@@ -155,7 +121,7 @@ impl<P: LinkPort> Talk<P> {
     /// A [`LinkFault`] where the port is gone.
     pub(crate) fn tell(&mut self, unit: u8, order: SixpackOrder) -> Result<(), LinkFault> {
         self.send(&[order.frame(unit)])?;
-        self.port.sleep_until(self.busy);
+        self.state.port.sleep_until(self.busy);
         Ok(())
     }
 
@@ -211,19 +177,19 @@ impl<P: LinkPort> Talk<P> {
         frames: &[SixpackFrame],
         question: SixpackOrder,
     ) -> Result<SixpackReply, TalkFault> {
-        self.counts.doubled += u64::from(self.port.flush() > 0);
+        self.state.counts.doubled += u64::from(self.state.port.flush() > 0);
         self.send(frames)?;
-        self.counts.asked += 1;
+        self.state.counts.asked += 1;
         let sent = self.busy;
-        let deadline = sent + self.octets(NINE) + 2 * self.delays.p99() + SLACK;
+        let deadline = sent + self.octets(NINE) + 2 * self.state.delays.p99() + SLACK;
         let Some((reply, begun)) = self.answer(question, deadline)? else {
-            return Err(TalkFault::Silent { unit, baud: self.terms.baud });
+            return Err(TalkFault::Silent { unit, baud: self.state.terms.baud });
         };
-        self.counts.answered += 1;
-        self.moment = Moment { sent, answered: begun.max(sent) };
-        let delay = self.moment.delay();
-        self.delays.push(delay);
-        if self.terms.is_two_wires {
+        self.state.counts.answered += 1;
+        self.state.moment = Moment { sent, answered: begun.max(sent) };
+        let delay = self.state.moment.delay();
+        self.state.delays.push(delay);
+        if self.state.terms.is_two_wires {
             self.busy = self.now() + delay.min(LONGEST_HOLD);
         }
         Ok(reply)
@@ -234,24 +200,18 @@ impl<P: LinkPort> Talk<P> {
     /// # Errors
     /// A [`LinkFault`] where the port is gone.
     pub(super) fn send(&mut self, frames: &[SixpackFrame]) -> Result<(), LinkFault> {
-        self.port.sleep_until(self.busy);
-        self.port.send_break(self.octets(BREAK))?;
-        if self.terms.has_echo {
-            self.port.flush();
+        self.state.port.sleep_until(self.busy);
+        self.state.port.send_break(self.octets(BREAK))?;
+        if self.state.terms.has_echo {
+            self.state.port.flush();
         }
         let octets: Vec<u8> = frames.iter().flat_map(|frame| frame.octets()).collect();
         let takes = self.octets(u32::try_from(octets.len()).unwrap_or(u32::MAX));
-        self.port.send(&octets)?;
+        self.state.port.send(&octets)?;
         self.busy = self.now() + takes;
-        if self.terms.has_echo {
-            let (deadline, mut echo, mut at) = (self.busy + SLACK, vec![0; octets.len()], 0);
-            while at < echo.len() {
-                match self.port.receive(&mut echo[at..], deadline)? {
-                    0 => break,
-                    count => at += count,
-                }
-            }
-            self.counts.echo_differs += u64::from(echo[..at] != octets);
+        if self.state.terms.has_echo {
+            let deadline = self.busy + SLACK;
+            self.take_echo(&octets, deadline)?;
             self.busy = self.now();
         }
         Ok(())
@@ -264,10 +224,10 @@ impl<P: LinkPort> Talk<P> {
         deadline: MonoTime,
     ) -> Result<Option<(SixpackReply, MonoTime)>, LinkFault> {
         let (mut window, mut count, mut octet) = ([0; FRAME_LEN], 0, [0]);
-        while self.port.receive(&mut octet, deadline)? > 0 {
+        while self.state.port.receive(&mut octet, deadline)? > 0 {
             if count == FRAME_LEN {
                 window.rotate_left(1);
-                self.counts.malformed += 1;
+                self.state.counts.malformed += 1;
                 count -= 1;
             }
             window[count] = octet[0];
@@ -282,13 +242,13 @@ impl<P: LinkPort> Talk<P> {
             match SixpackReply::of(frame) {
                 SixpackReply::Other { .. } => {}
                 _ if frame.address == ANSWER => {
-                    self.counts.late += 1;
+                    self.state.counts.late += 1;
                     count = 0;
                 }
-                _ => self.counts.foreign += 1,
+                _ => self.state.counts.foreign += 1,
             }
         }
-        self.counts.malformed += u64::from(count > 0);
+        self.state.counts.malformed += u64::from(count > 0);
         Ok(None)
     }
 }

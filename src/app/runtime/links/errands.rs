@@ -63,8 +63,8 @@ pub(in super::super) fn survey(links: &[LinkEnd], config: &Arc<Config>) -> Recei
             let drives = lanes.iter().filter_map(|lane| config.controllers[*lane].drives());
             let motors: Vec<_> = drives.map(|drives| &drives.motors).collect();
             let survey = match stream {
-                LinkStream::SilverMax(stream) => LinkSurvey::of_units(stream.talk(), &motors),
-                LinkStream::Sixpack2(stream) => LinkSurvey::of_sixpacks(stream.talk(), &motors),
+                LinkStream::SilverMax(stream) => LinkSurvey::of_units(&mut stream.talk, &motors),
+                LinkStream::Sixpack2(stream) => LinkSurvey::of_sixpacks(&mut stream.talk, &motors),
             };
             let fault = end.standing().fault;
             drop(tell.send((end.name.clone(), LinkSurvey { fault, ..survey })));

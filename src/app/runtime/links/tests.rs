@@ -19,6 +19,7 @@ use crate::drive::link::{LinkFault, LinkPort, TalkTerms, VirtualPort};
 use crate::drive::silvermax::{Homing, Talk, home};
 use crate::drive::{Manner, units_of};
 use crate::engine::{Mix, Show};
+use crate::health::HealthState;
 use crate::net::{Delivery, DrainGrid, Network, Origin};
 use crate::rt::{Command, Ticked};
 use crate::sim::serial::{Bus, LineFaults, SerialLine};
@@ -167,6 +168,34 @@ impl<B: Bus> Hall<'_, '_, B> {
                 each(self);
             }
         }
+    }
+
+    /// The whole program is held up for so long, while its line and drives go on.
+    fn hold_up(&mut self, span: Duration) {
+        let until = NOW.get() + span;
+        self.line.lock().sleep_until(until);
+        NOW.set(until);
+    }
+
+    fn is_led(&self) -> bool {
+        self.loops.ticks.engine.lane(0).gets_a_frame()
+    }
+
+    /// That a seat which is held up for a second is read before it is led again, and not led while it is said to be lost.
+    fn comes_back_after_a_second(&mut self, show: StagedShow, later: Duration) {
+        self.go(show);
+        self.run(6.0, |_| {});
+        self.hold_up(Duration::from_secs(1) + later);
+        let (mut led, mut lost) = (0, 0);
+        self.run(6.0, |hall| {
+            let is_lost = hall.runtime.live.table()[0].standing == HealthState::Lost;
+            lost = if is_lost && hall.is_led() { lost + 1 } else { 0 };
+            led += u32::from(hall.is_led());
+            // Its last hold frames apart.
+            assert!(lost < 30, "it is led by {lost} frames though it is lost");
+        });
+        let row = self.runtime.live.table().swap_remove(0);
+        assert!(led > 200 && row.standing == HealthState::Ok, "{led} {row:?}");
     }
 
     fn ask(&mut self, commands: impl IntoIterator<Item = Command>) {
@@ -344,6 +373,16 @@ fn a_stop_brakes_the_drives_at_once_and_no_pose_that_was_under_way_moves_them_on
 }
 
 #[test]
+fn a_seat_of_a_program_that_was_held_up_for_a_second_is_led_again_once_it_was_found() {
+    for ms in [0, 3, 5, 8, 11] {
+        hall(|hall, show, _| {
+            hall.comes_back_after_a_second(show, Duration::from_millis(ms));
+            assert_gentle(hall);
+        });
+    }
+}
+
+#[test]
 fn a_line_that_is_cut_brings_the_seat_to_rest_within_the_lead_and_puts_its_lane_out() {
     hall(|hall, show, _| {
         let lead = show.lanes[0].window.lead();
@@ -354,7 +393,7 @@ fn a_line_that_is_cut_brings_the_seat_to_rest_within_the_lead_and_puts_its_lane_
         let places = hall.places_mm();
         hall.run(1.0, |_| {});
         assert_eq!(hall.places_mm(), places);
-        assert!(!hall.loops.ticks.engine.lane(0).gets_a_frame(), "no pose goes to it");
+        assert!(!hall.is_led(), "no pose goes to it");
         assert_gentle(hall);
     });
 }

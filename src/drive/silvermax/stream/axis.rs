@@ -7,7 +7,7 @@ use super::super::scale::DriveScale;
 use super::clock::{UnitClock, seconds};
 use super::polls::Polls;
 use crate::cue::Vibration;
-use crate::drive::link::{Account, AxisFigures};
+use crate::drive::link::{Account, AxisFigures, LinkAxis};
 use crate::drive::{DriveCourse, Knots, Middles, Segment, SegmentFit, Shaker, TICK_NS};
 use crate::time::MonoTime;
 use crate::wire::silvermax::Request;
@@ -81,7 +81,7 @@ pub(super) struct AxisTerms {
 
 /// One axis.
 #[derive(Debug)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     pub(super) terms: AxisTerms,
     middles: Middles,
     shaker: Shaker,
@@ -116,6 +116,21 @@ pub(super) struct Axis {
     pub(super) stood_at: Option<i32>,
     pub(super) polls: Polls,
     pub(super) figures: AxisFigures,
+}
+
+impl LinkAxis for Axis {
+    fn place(&self) -> f64 {
+        self.terms.scale.fraction(self.course.position())
+    }
+
+    fn off_mm(&self, place: f64) -> f64 {
+        let scale = self.terms.scale;
+        scale.mm(scale.at(place) - self.course.position()).abs()
+    }
+
+    fn figures(&self, now: MonoTime) -> AxisFigures {
+        AxisFigures { queued: self.waiting(now), ..self.figures }
+    }
 }
 
 impl Axis {

@@ -1,12 +1,10 @@
 //! The axes of one seat: they begin at one instant, share a grid, and stop together.
 
-use std::time::Duration;
-
+use super::SilverMax;
 use super::axis::{Axis, Kind};
 use super::clock::{after, seconds};
 use crate::drive::Segment;
-use crate::drive::link::{LedPose, LinkPose, Stage, StreamEvent};
-use crate::motion::{MAX_AXES, Pose};
+use crate::drive::link::{LedLane, LedPose, LinkPose, STANDS_MM, Stage, StreamEvent};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
@@ -14,80 +12,49 @@ use crate::wire::FrameNo;
 const FRAMES: usize = 64;
 /// How much of each tick the grid is stretched at most to come back to when poses are to be there.
 const STRETCH: f64 = 0.01;
-/// A seat stands where it is led from so near, mm: as far as a loaded motor may be beside its target.
-const STANDS_MM: f64 = 0.1;
 /// Poses that differ by less, in strokes, stand still.
 const STILL: f64 = 1e-7;
 
-/// The axes of one seat.
+/// The axes of one seat on SilverMax units.
+pub(super) type SilverLane = LedLane<SilverMax>;
+
+/// What such a lane is beside its axes and stage.
 #[derive(Debug)]
-pub(super) struct Lane {
-    pub(super) axes: Vec<Axis>,
-    pub(super) stage: Stage,
+pub(crate) struct LaneState {
     /// What register 40 of its units holds while they are home; none before it was seen.
     pub(super) canary: Option<i32>,
     /// One that is out comes back as soon as its units are seen to be home.
     pub(super) returns: bool,
-    period: Duration,
-    tick: Duration,
     /// When its first slice begins.
     pub(super) origin: MonoTime,
     /// Poses since then.
     poses: u32,
     /// How much later its knots are than an even grid from the origin, seconds.
     shift: f64,
-    /// The first frame that is not confirmed, and the last one in each slice.
-    unconfirmed: FrameNo,
+    /// The last frame in each slice.
     frames: [Option<FrameNo>; FRAMES],
     /// Slices that all axes have, and that were told.
     told: u32,
-    /// Told last.
-    pub(super) moves: bool,
-    last: Option<LinkPose>,
     /// The last two poses differ.
     still_moves: bool,
-    /// When the last pose came.
-    heard: MonoTime,
 }
 
-impl Lane {
-    pub(super) fn new(
-        axes: Vec<Axis>,
-        canary: Option<i32>,
-        period: Duration,
-        tick: Duration,
-        now: MonoTime,
-    ) -> Self {
+impl LaneState {
+    pub(super) const fn new(now: MonoTime) -> Self {
         Self {
-            axes,
-            stage: if canary.is_some() { Stage::Readying } else { Stage::Out },
-            canary,
+            canary: None,
             returns: false,
-            period,
-            tick,
             origin: now,
             poses: 0,
             shift: 0.0,
-            unconfirmed: FrameNo::FIRST,
             frames: [None; FRAMES],
             told: 0,
-            moves: true,
-            last: None,
             still_moves: false,
-            heard: now,
         }
     }
+}
 
-    /// The first axis that is farther from a pose than so many mm, and how far.
-    pub(super) fn off(&self, pose: &LinkPose, most_mm: f64) -> Option<(usize, f64)> {
-        let off = self.axes.iter().zip(pose.axes).map(|(axis, place)| {
-            let scale = axis.terms.scale;
-            scale.mm(scale.at(place) - axis.course.position()).abs()
-        });
-        // What is no number is nowhere near.
-        off.enumerate().find(|(_, off)| off.is_nan() || *off > most_mm)
-    }
-
+impl SilverLane {
     /// True if it stands where a pose leads, which goes on nowhere.
     pub(super) fn stands_at(&self, pose: &LinkPose) -> bool {
         !self.moves_to(pose) && self.off(pose, STANDS_MM).is_none()
@@ -102,33 +69,21 @@ impl Lane {
         self.last.is_some_and(differs) || pose.vibration.iter().any(|swing| swing.amplitude > 0.0)
     }
 
-    /// Hears a pose that leads it nowhere.
-    pub(super) const fn hear(&mut self, pose: LinkPose, now: MonoTime) {
-        (self.last, self.heard) = (Some(pose), now);
-    }
-
-    /// True if a pose that comes now is the first of a motion: one that was cut off while it moved is over before another begins.
-    pub(super) fn may_begin(&self, now: MonoTime) -> bool {
-        self.is_left_alone(now) || self.last.is_some_and(|last| self.off(&last, STANDS_MM).is_none())
-    }
-
     /// Whether its units are home, once all have told: they hold the one number that homing wrote.
     pub(super) fn is_home(&self) -> Option<bool> {
         let mut told = self.axes.iter().map(|axis| axis.canary);
         let first = told.next()??;
-        let mut is_home = first != 0 && self.canary.is_none_or(|canary| canary == first);
+        let mut is_home = first != 0 && self.own.canary.is_none_or(|canary| canary == first);
         for canary in told {
             is_home &= canary? == first;
         }
         Some(is_home)
     }
 
-    /// All axes rest until the first pose is to be there, or later where that is too soon.
-    pub(super) fn begin(&mut self, pose: &LedPose, soonest: MonoTime) {
-        self.origin = pose.at.max(soonest);
-        (self.poses, self.shift, self.told, self.stage) = (0, 0.0, 0, Stage::Runs);
-        (self.last, self.still_moves, self.moves) = (None, false, false);
-        self.unconfirmed = pose.pose.frame;
+    /// All axes rest until then, when the first pose is to be there.
+    pub(super) fn rest_until(&mut self, origin: MonoTime) {
+        let own = &mut self.own;
+        (own.origin, own.poses, own.shift, own.told, own.still_moves) = (origin, 0, 0.0, 0, false);
         for axis in &mut self.axes {
             let place = axis.last().position;
             axis.make(Segment::resting(1, place), Kind::Start);
@@ -137,39 +92,32 @@ impl Lane {
 
     /// Takes the next pose. Poses go on in stream time, one tick after the other: where ticks were missed, and `at` leaps, what was
     /// ahead shrinks by that, and the grid is stretched by up to 1 % until it is regained.
-    pub(super) fn push(&mut self, led: LedPose, now: MonoTime) {
-        let stream = f64::from(self.poses) * self.tick.as_secs_f64();
-        let slice = whole(stream / self.period.as_secs_f64());
-        let LedPose { at, pose, .. } = led;
-        self.frames[slice % FRAMES] = Some(pose.frame);
-        let wanted = seconds(at, self.origin) - stream;
-        let most = STRETCH * self.tick.as_secs_f64();
-        self.shift += (wanted - self.shift).clamp(-most, most);
-        self.poses += 1;
-        self.still_moves = self.moves_to(&pose);
-        self.hear(pose, now);
+    pub(super) fn push(&mut self, led: &LedPose) {
+        let stream = f64::from(self.own.poses) * self.terms.tick.as_secs_f64();
+        let slice = whole(stream / self.terms.period.as_secs_f64());
+        let LedPose { at, pose, .. } = *led;
+        self.own.frames[slice % FRAMES] = Some(pose.frame);
+        let wanted = seconds(at, self.own.origin) - stream;
+        let most = STRETCH * self.terms.tick.as_secs_f64();
+        self.own.shift += (wanted - self.own.shift).clamp(-most, most);
+        self.own.poses += 1;
+        self.own.still_moves = self.moves_to(&pose);
         self.feed(&pose);
     }
 
     fn feed(&mut self, pose: &LinkPose) {
-        let (origin, period, shift) = (self.origin, self.period.as_secs_f64(), self.shift);
+        let (origin, period, shift) = (self.own.origin, self.terms.period.as_secs_f64(), self.own.shift);
         let knot = |index: u32| after(origin, f64::from(index) * period + shift);
         for ((axis, place), swing) in self.axes.iter_mut().zip(pose.axes).zip(pose.vibration) {
             axis.push(place, swing, knot);
         }
     }
 
-    /// True if no pose came for so long that none will.
-    pub(super) fn is_left_alone(&self, now: MonoTime) -> bool {
-        let lasts = self.last.map_or(self.tick, |pose| Duration::from_millis(pose.lasts_ms.into()));
-        now.since(self.heard) > (3 * lasts).max(self.period)
-    }
-
     /// The poses have ended: what is still to be made of them, up to rest. False where they ended in motion.
     pub(super) fn end(&mut self) -> bool {
-        let Some(last) = self.last.filter(|_| !self.still_moves) else { return false };
+        let Some(last) = self.last.filter(|_| !self.own.still_moves) else { return false };
         // What was fitted is two slices and a half behind the poses.
-        let ticks = whole(4.0 * self.period.as_secs_f64() / self.tick.as_secs_f64()) + 4;
+        let ticks = whole(4.0 * self.terms.period.as_secs_f64() / self.terms.tick.as_secs_f64()) + 4;
         (0..ticks).for_each(|_| self.feed(&last));
         if !self.axes.iter().all(Axis::fit_rests) {
             return false;
@@ -183,34 +131,27 @@ impl Lane {
     }
 
     /// What all axes have taken since it was told.
-    pub(super) fn confirm(&mut self, lane: u16, mut tell: impl FnMut(StreamEvent)) {
+    pub(super) fn confirm(&mut self, lane: u16) -> [Option<StreamEvent>; 2] {
         let confirmed = self.axes.iter().map(|axis| axis.confirmed).min().unwrap_or(0);
-        let told = self.told;
-        self.told = confirmed.max(told);
-        let newest = (told..confirmed).rev().find_map(|slice| self.frames[slice as usize % FRAMES].take());
-        if let Some(last) = newest {
+        let told = self.own.told;
+        self.own.told = confirmed.max(told);
+        let newest =
+            (told..confirmed).rev().find_map(|slice| self.own.frames[slice as usize % FRAMES].take());
+        let confirms = newest.map(|last| {
             let first = std::mem::replace(&mut self.unconfirmed, last.next());
-            tell(StreamEvent::Confirmed { lane, first, last });
-        }
+            StreamEvent::Confirmed { lane, first, last }
+        });
         let moves = self.axes.iter().any(Axis::ends_moving);
-        if confirmed > told && moves != self.moves {
+        let turns = (confirmed > told && moves != self.moves).then(|| {
             self.moves = moves;
-            let ends = self.axes.iter().map(Axis::ends).max().unwrap_or(self.origin);
-            tell(if moves {
-                StreamEvent::Moves { lane, at: after(ends, -self.period.as_secs_f64()) }
+            let ends = self.axes.iter().map(Axis::ends).max().unwrap_or(self.own.origin);
+            if moves {
+                StreamEvent::Moves { lane, at: after(ends, -self.terms.period.as_secs_f64()) }
             } else {
                 StreamEvent::Rests { lane, axes: self.places(), at: ends }
-            });
-        }
-    }
-
-    /// Where it is behind all that is queued, in strokes.
-    pub(super) fn places(&self) -> Pose {
-        let mut places = [0.0; MAX_AXES];
-        for (place, axis) in places.iter_mut().zip(&self.axes) {
-            *place = axis.terms.scale.fraction(axis.course.position());
-        }
-        places
+            }
+        });
+        [confirms, turns]
     }
 
     /// True if an axis has nothing left to execute, and is still to move or rest on.
@@ -220,7 +161,7 @@ impl Lane {
 
     /// True if the first slice begins, and an axis has not begun.
     pub(super) fn is_late(&self, now: MonoTime) -> bool {
-        now > self.origin && !self.axes.iter().all(Axis::has_started)
+        now > self.own.origin && !self.axes.iter().all(Axis::has_started)
     }
 }
 

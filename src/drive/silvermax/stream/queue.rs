@@ -5,9 +5,8 @@ use std::time::Duration;
 use super::axis::{Axis, Doubt, Kind, QUEUE};
 use super::clock::after;
 use super::polls::Question;
-use super::{BrakeReason, Stream, StreamEvent, axis_number, number};
-use crate::drive::link::LinkPort;
-use crate::drive::link::Stage;
+use super::{SilverMax, number};
+use crate::drive::link::{BrakeReason, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
 use crate::drive::silvermax::talk::{Answer, TalkFault};
 use crate::drive::{Segment, TICK_NS};
 use crate::wire::silvermax::{NakReason, Request, register};
@@ -17,10 +16,10 @@ const UNCLEAR: Duration = Duration::from_millis(3);
 /// How long a queue that is full, against what was reckoned, is left alone.
 const FULL: Duration = Duration::from_millis(5);
 
-impl<P: LinkPort> Stream<P> {
+impl<P: LinkPort> Stream<SilverMax, P> {
     /// Sends the next segment of an axis.
     pub(super) fn send_segment(&mut self, l: usize, a: usize) -> Result<(), TalkFault> {
-        let origin = self.lanes[l].origin;
+        let origin = self.lanes[l].own.origin;
         let Some(mut made) = self.lanes[l].axes[a].outbox.front().copied() else { return Ok(()) };
         if made.kind == Kind::Start {
             let received = self.talk.now() + self.talk.octets(START);
@@ -73,10 +72,9 @@ impl<P: LinkPort> Stream<P> {
     }
 
     fn confirm(&mut self, l: usize) {
-        let (figures, events) = (&mut self.figures, &mut self.events);
-        self.lanes[l].confirm(number(l), |event| {
-            figures.events_lost += u64::from(events.push(event).is_err());
-        });
+        for event in self.lanes[l].confirm(number(l)).into_iter().flatten() {
+            self.tell(event);
+        }
     }
 
     /// Finds out what a unit has taken that did not say so.

@@ -2,10 +2,9 @@
 
 use std::time::Duration;
 
-use super::Stream;
+use super::SilverMax;
 use super::axis::Axis;
-use crate::drive::link::LinkPort;
-use crate::drive::link::Stage;
+use crate::drive::link::{LinkPort, LinkTalk as _, Stage, Stream};
 use crate::drive::silvermax::talk::{Answer, TalkFault};
 use crate::wire::silvermax::Request;
 use crate::wire::silvermax::register::{QUEUE_SOURCE, TARGET};
@@ -35,7 +34,7 @@ impl Axis {
     }
 }
 
-impl<P: LinkPort> Stream<P> {
+impl<P: LinkPort> Stream<SilverMax, P> {
     /// Brakes an axis.
     pub(super) fn stop_axis(&mut self, l: usize, a: usize) -> Result<(), TalkFault> {
         let axis = &self.lanes[l].axes[a];

@@ -2,9 +2,8 @@
 
 use super::axis::Doubt;
 use super::polls::Question;
-use super::{BrakeReason, LOST, PROBES, Stream, StreamEvent, axis_number, number};
-use crate::drive::link::LinkPort;
-use crate::drive::link::Stage;
+use super::{LOST, PROBES, SilverMax, number};
+use crate::drive::link::{BrakeReason, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
 use crate::drive::silvermax::talk::{Answer, TalkFault, internal_word};
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{CANARY, KILL_CAUSE};
@@ -15,7 +14,7 @@ const OFF_COURSE_MM: f64 = 0.5;
 /// When exactly a unit reads its registers is not known to better than this, seconds.
 const READING: f64 = 0.000_5;
 
-impl<P: LinkPort> Stream<P> {
+impl<P: LinkPort> Stream<SilverMax, P> {
     /// Asks, and believes what is answered.
     pub(super) fn ask(&mut self, l: usize, a: usize, question: Question) -> Result<(), TalkFault> {
         let now = self.talk.now();
@@ -63,7 +62,7 @@ impl<P: LinkPort> Stream<P> {
     fn compare_canary(&mut self, l: usize, a: usize, value: i32) {
         let now = self.talk.now();
         let lane = &mut self.lanes[l];
-        let (canary, axis) = (lane.canary, &mut lane.axes[a]);
+        let (canary, axis) = (lane.own.canary, &mut lane.axes[a]);
         axis.canary = Some(value);
         let is_wrong = canary.is_some_and(|canary| value != canary) && lane.stage != Stage::Out;
         axis.strikes = if is_wrong { axis.strikes + 1 } else { 0 };
@@ -78,8 +77,8 @@ impl<P: LinkPort> Stream<P> {
     fn mind_home(&mut self, l: usize) {
         let lane = &mut self.lanes[l];
         let Some(homed) = lane.is_home() else { return };
-        if homed && lane.stage == Stage::Out && std::mem::take(&mut lane.returns) {
-            lane.canary = lane.axes.first().and_then(|axis| axis.canary);
+        if homed && lane.stage == Stage::Out && std::mem::take(&mut lane.own.returns) {
+            lane.own.canary = lane.axes.first().and_then(|axis| axis.canary);
             lane.make_ready(true);
         }
         let homed = homed && lane.stage != Stage::Out;
@@ -153,27 +152,6 @@ impl<P: LinkPort> Stream<P> {
         }
     }
 
-    /// An axis of a lane does not answer any more: the others brake.
-    pub(super) fn lose(&mut self, l: usize, a: usize) {
-        let lane = &mut self.lanes[l];
-        if matches!(lane.stage, Stage::Lost | Stage::Out) {
-            return;
-        }
-        lane.stage = Stage::Lost;
-        lane.let_go(true);
-        self.tell(StreamEvent::Lost { lane: number(l), axis: axis_number(a) });
-    }
-
-    /// Out until a person has looked: braked, and only watched.
-    fn put_out(&mut self, l: usize, event: StreamEvent) {
-        let lane = &mut self.lanes[l];
-        if lane.stage != Stage::Out {
-            lane.stage = Stage::Out;
-            lane.let_go(true);
-            self.tell(event);
-        }
-    }
-
     /// Whether a unit of a lost lane answers: those that do brake.
     pub(super) fn probe(&mut self, l: usize, a: usize) -> Result<(), TalkFault> {
         let now = self.talk.now();
@@ -193,7 +171,7 @@ impl<P: LinkPort> Stream<P> {
         self.heard(l, a, read, &answer);
         let Answer::Data(words) = answer? else { return Ok(()) };
         let lane = &mut self.lanes[l];
-        if words.value() != lane.canary {
+        if words.value() != lane.own.canary {
             self.compare_canary(l, a, words.value().unwrap_or_default());
         } else if lane.axes.iter().all(|axis| axis.failing_since.is_none() && !axis.owes_stop) {
             lane.make_ready(true);

@@ -2,19 +2,14 @@
 
 use std::time::Duration;
 
-use rtrb::{Consumer, Producer, RingBuffer};
-
 use super::super::*;
-use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive::{SeatDrive, SilverMaxDrive, Torque};
-use crate::cue::Vibration;
 use crate::drive::link::*;
 use crate::motion::{AxisGeometry, MAX_AXES, SeatType};
 use crate::sim::serial::{LineFaults, SerialLine};
 use crate::sim::silvermax::{SilverBus, Unit, UnitSetup};
 use crate::time::MonoTime;
-use crate::wire::FrameNo;
 
 pub(super) const CANARY: i32 = 20_251_123;
 pub(super) const BAUD: u32 = 57_600;
@@ -91,26 +86,9 @@ pub(super) fn unit(talk: &mut Talk<VirtualPort>, index: usize) -> &Unit {
     &talk.port().line.bus().units()[index]
 }
 
-/// A seat that is home, and a play to it.
-pub(super) struct Play {
-    pub(super) stream: Stream<VirtualPort>,
-    poses: Producer<LedPose>,
-    pub(super) events: Consumer<StreamEvent>,
-    pub(super) terms: StreamTerms,
-    /// Ticks so far, and when the first was.
-    ticks: u32,
-    begin: MonoTime,
-    pub(super) told: Vec<(MonoTime, StreamEvent)>,
-    /// The farthest that each axis was beside its poses, mm.
-    pub(super) worst: [f64; 3],
-    /// Poses as a function of seconds, in mm.
-    pub(super) course: fn(f64, usize) -> f64,
-    /// When the first pose was to be executed.
-    pub(super) origin: MonoTime,
-    pub(super) judged: bool,
-}
+/// A play to a seat that is home.
+pub(super) type Play = VirtualPlay<SilverMax, SilverBus>;
 
-pub(super) const TICK: Duration = Duration::from_millis(10);
 pub(super) const PERIOD: Duration = Duration::from_micros(33_352);
 
 impl Play {
@@ -126,96 +104,20 @@ impl Play {
         let (homed, _) = home_as(&mut talk, &drive, &[16, 17, 18]);
         assert_eq!(homed, Ok(()));
         talk.port().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
-        let (poses, from_tick) = RingBuffer::new(64);
-        let (to_health, events) = RingBuffer::new(4_096);
-        let terms = StreamTerms { period: PERIOD, tick: TICK };
         let (seat, silvermax) = (seat(), drive.silvermax.clone().unwrap());
         let seat = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16, 17, 18] };
-        let lanes = [LaneUnits { seat, canary: Some(CANARY) }];
-        let stream = Stream::new(talk, terms, &lanes, from_tick, to_health).unwrap();
-        let mut play = Self {
-            stream,
-            poses,
-            events,
-            terms,
-            ticks: 0,
-            begin: MonoTime::from_nanos(0),
-            told: Vec::new(),
-            worst: [0.0; 3],
-            course: |_, _| 0.0,
-            origin: MonoTime::from_nanos(0),
-            judged: true,
-        };
+        let mut play = Self::over(talk, PERIOD, &[seat], Self::judge).unwrap();
         play.wait(1.0);
-        assert!(play.stream.is_ready(0));
+        assert!(play.all_ready());
         play
     }
 
-    pub(super) fn now(&mut self) -> MonoTime {
-        self.stream.talk().now()
-    }
-
-    pub(super) fn line(&mut self) -> &mut SerialLine<SilverBus> {
-        &mut self.stream.talk().port().line
-    }
-
     pub(super) fn unit(&mut self, index: usize) -> &Unit {
-        unit(self.stream.talk(), index)
-    }
-
-    /// Rounds without poses.
-    pub(super) fn wait(&mut self, seconds: f64) {
-        let until = self.now() + Duration::from_secs_f64(seconds);
-        while self.now() < until {
-            let _ = self.stream.round();
-            self.hear();
-        }
-    }
-
-    fn hear(&mut self) {
-        let now = self.now();
-        while let Ok(event) = self.events.pop() {
-            self.told.push((now, event));
-        }
-    }
-
-    /// Begins to play a course, from now on.
-    pub(super) fn begin(&mut self, course: fn(f64, usize) -> f64) {
-        (self.course, self.ticks, self.begin) = (course, 0, self.now());
-        self.origin = self.begin + self.terms.lead(DriveFamily::SilverMax);
-    }
-
-    /// Ticks of so many seconds; `missed` of them, at the beginning, are slept through.
-    pub(super) fn play(&mut self, seconds: f64, missed: u32) {
-        self.begin = self.begin + TICK * missed;
-        let count = (seconds / TICK.as_secs_f64()).round() as u32;
-        for _ in 0..count {
-            let due = self.begin + TICK * self.ticks;
-            while self.now() < due {
-                let _ = self.stream.round();
-                self.hear();
-                self.judge();
-            }
-            let stream = f64::from(self.ticks) * TICK.as_secs_f64();
-            let mut axes = [0.0; MAX_AXES];
-            for (index, place) in axes.iter_mut().take(3).enumerate() {
-                *place = (self.course)(stream, index) / 150.0;
-            }
-            let vibration = [Vibration { hz: 0.0, amplitude: 0.0 }; MAX_AXES];
-            let pose = LinkPose { frame: FrameNo(self.ticks), lasts_ms: 10, axes, vibration };
-            let _ =
-                self.poses.push(LedPose { lane: 0, at: due + self.terms.lead(DriveFamily::SilverMax), pose });
-            self.ticks += 1;
-        }
+        unit(&mut self.stream.talk, index)
     }
 
     /// How far the axes are beside where they should be by now.
-    fn judge(&mut self) {
-        let now = self.now();
-        if !self.judged || now < self.origin || self.ticks == 0 {
-            return;
-        }
-        let at = now.since(self.origin).as_secs_f64();
+    fn judge(&mut self, at: f64) {
         for index in 0..3 {
             let wanted = (self.course)(at, index);
             let off = (self.place(index) - wanted).abs();
@@ -254,11 +156,5 @@ impl Play {
 
 /// Swings of up to some 190 mm/s and 1,900 mm/s² that begin gently, in mm.
 pub(super) fn ride(at: f64, axis: usize) -> f64 {
-    use std::f64::consts::TAU;
-    let phase = 0.4 * axis as f64;
-    let at = (at - 0.5).max(0.0);
-    let grown = (at / 3.0).min(1.0);
-    let grown = grown * grown * grown * (10.0 - grown * (15.0 - 6.0 * grown));
-    let swing = |hz: f64, mm: f64| mm * (TAU * hz * at + phase).sin();
-    grown * (60.0 + swing(0.31, 35.0) + swing(0.83, 12.0) + swing(1.7, 7.0))
+    ride_about(60.0, at, axis)
 }

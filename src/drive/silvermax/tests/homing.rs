@@ -2,7 +2,7 @@
 
 use super::bench::*;
 use crate::config::drive::homing::HomeWay;
-use crate::drive::link::Step;
+use crate::drive::link::{LinkTalk as _, Step};
 use crate::drive::silvermax::*;
 use crate::sim::silvermax::{Action, UnitSetup};
 

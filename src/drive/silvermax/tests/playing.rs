@@ -40,13 +40,6 @@ fn frames_are_confirmed_once_all_axes_have_them_before_they_are_executed() {
 
 #[test]
 fn it_ends_at_rest_where_the_poses_ended_and_begins_again_from_there() {
-    fn there(at: f64, axis: usize) -> f64 {
-        let part = (at / 2.0).clamp(0.0, 1.0);
-        (40.0 + 10.0 * axis as f64) * part * part * part * (10.0 - part * (15.0 - 6.0 * part))
-    }
-    fn back(at: f64, axis: usize) -> f64 {
-        there(2.0 - at, axis)
-    }
     let mut play = Play::with_ppm([200, 0, -200]);
     play.begin(there);
     play.play(2.5, 0);

@@ -3,29 +3,9 @@
 use std::time::Duration;
 
 use super::bench::*;
-use crate::config::drive::DriveFamily;
 use crate::drive::link::*;
 use crate::sim::serial::LineFaults;
 use crate::sim::silvermax::Action;
-
-/// The reasons for which a lane braked or went out, as words.
-fn told(play: &Play) -> Vec<String> {
-    let rare = |event: &&(_, StreamEvent)| {
-        !matches!(
-            event.1,
-            StreamEvent::Confirmed { .. }
-                | StreamEvent::Read { .. }
-                | StreamEvent::Homed { .. }
-                | StreamEvent::Moves { .. }
-                | StreamEvent::Rests { .. }
-        )
-    };
-    play.told.iter().filter(rare).map(|(_, event)| format!("{event:?}")).collect()
-}
-
-fn has(play: &Play, word: &str) -> bool {
-    told(play).iter().any(|event| event.contains(word))
-}
 
 /// Rides for a while over a line with faults; whatever happens to the lane, no axis leaves its course.
 fn ride_over(faults: LineFaults, seconds: f64) -> Play {
@@ -46,12 +26,12 @@ fn segments_in_doubt_are_found_out_and_none_is_executed_twice() {
         let doubts: u64 = figures.iter().map(|axis| axis.account.in_doubt).sum();
         assert!(doubts > 3, "{lost}: {figures:?}");
         let off = figures.iter().map(|axis| axis.off_course_mm).fold(0.0, f64::max);
-        assert!(off < 0.3 && !has(&play, "OffCourse"), "{lost}: {off} {:?}", told(&play));
+        assert!(off < 0.3 && !play.has("OffCourse"), "{lost}: {off} {:?}", play.rare());
         // Answers that are lost one after the other may cost more time than is queued: then the seat brakes, and says so.
         let is_through = figures
             .iter()
             .all(|axis| axis.account.made > 1_770 && axis.account.acked + 5 > axis.account.made);
-        assert!(is_through || (lost > 0.001 && has(&play, "Braked")), "{figures:?} {:?}", told(&play));
+        assert!(is_through || (lost > 0.001 && play.has("Braked")), "{figures:?} {:?}", play.rare());
     }
 }
 
@@ -89,12 +69,12 @@ fn a_stop_is_on_the_line_after_one_exchange_and_each_unit_has_acked_it() {
     let mut play = Play::with_ppm([0; 3]);
     play.begin(ride);
     play.play(10.0, 0);
-    let before = play.stream.talk().port().sent.len();
+    let before = play.stream.talk.port().sent.len();
     let _ = play.stream.round();
-    play.stream.stop(None).unwrap();
+    play.stream.stop().unwrap();
     play.judged = false;
     play.wait(0.03);
-    let sent: Vec<_> = play.stream.talk().port().sent[before..]
+    let sent: Vec<_> = play.stream.talk.port().sent[before..]
         .iter()
         .map(|(_, line)| String::from_utf8_lossy(line).into_owned())
         .collect();
@@ -103,7 +83,7 @@ fn a_stop_is_on_the_line_after_one_exchange_and_each_unit_has_acked_it() {
     assert_eq!(sent[at + 1..at + 4], ["@16 3 2319282\r", "@17 3 2319282\r", "@18 3 2319282\r"]);
     play.wait(1.0);
     assert!((0..3).all(|axis| !play.unit(axis).is_moving() || play.unit(axis).queued() == 0));
-    assert!(play.stream.is_ready(0) && has(&play, "Stopped"), "{:?}", told(&play));
+    assert!(play.stream.is_ready(0) && play.has("Stopped"), "{:?}", play.rare());
     play.assert_gentle();
 }
 
@@ -115,14 +95,14 @@ fn unplugged_in_mid_course_it_is_at_rest_within_the_lead_and_comes_back_where_it
     play.play(10.0, 0);
     play.line().faults.unplugged = true;
     let brake = 0.1;
-    play.play(play.terms.lead(DriveFamily::SilverMax).as_secs_f64() + brake, 0);
+    play.play(play.lead().as_secs_f64() + brake, 0);
     let rest = [0, 1, 2].map(|axis| play.place(axis));
     play.play(1.0, 0);
     assert_eq!([0, 1, 2].map(|axis| play.place(axis)), rest);
-    assert!(has(&play, "Lost"), "{:?}", told(&play));
+    assert!(play.has("Lost"), "{:?}", play.rare());
     play.line().faults.unplugged = false;
     play.wait(2.0);
-    assert!(has(&play, "Back") && play.stream.is_ready(0), "{:?}", told(&play));
+    assert!(play.has("Back") && play.stream.is_ready(0), "{:?}", play.rare());
     assert_eq!([0, 1, 2].map(|axis| play.place(axis)), rest);
     play.assert_gentle();
 }
@@ -130,13 +110,13 @@ fn unplugged_in_mid_course_it_is_at_rest_within_the_lead_and_comes_back_where_it
 #[test]
 fn a_port_that_is_gone_is_an_error_and_all_lanes_are_lost() {
     let mut play = Play::with_ppm([0; 3]);
-    play.stream.talk().port().is_gone = true;
+    play.stream.talk.port().is_gone = true;
     let rounds: Vec<_> = (0..300).map(|_| play.stream.round()).collect();
     play.wait(0.0);
-    assert!(rounds.contains(&Err(LinkFault)), "{:?}", told(&play));
+    assert!(rounds.contains(&Err(LinkFault)), "{:?}", play.rare());
     assert!(
         play.events.pop().is_ok_and(|event| matches!(event, StreamEvent::Lost { lane: 0, .. }))
-            || has(&play, "Lost")
+            || play.has("Lost")
     );
 }
 
@@ -149,12 +129,12 @@ fn a_unit_that_was_restarted_is_told_and_its_seat_stays_out_until_it_is_homed() 
     let now = play.now();
     play.line().bus_mut().act(Some(17), Action::Reset, now);
     play.play(3.0, 0);
-    assert!(has(&play, "Restarted { lane: 0, axis: 1 }"), "{:?}", told(&play));
+    assert!(play.has("Restarted { lane: 0, axis: 1 }"), "{:?}", play.rare());
     let rest = [0, 2].map(|axis| play.place(axis));
     play.play(2.0, 0);
     assert_eq!([0, 2].map(|axis| play.place(axis)), rest);
     assert!(!play.stream.is_ready(0));
-    let homed = home_as(play.stream.talk(), &drive(SWITCH), &[16, 17, 18]).0;
+    let homed = home_as(&mut play.stream.talk, &drive(SWITCH), &[16, 17, 18]).0;
     assert_eq!(homed, Ok(()));
     play.stream.rejoin(0, CANARY);
     play.wait(1.0);
@@ -170,6 +150,6 @@ fn a_blocked_axis_is_killed_and_told_by_what() {
     let now = play.now();
     play.line().bus_mut().act(Some(18), Action::Blocked(true), now);
     play.play(2.0, 0);
-    assert!(has(&play, "Killed { lane: 0, axis: 2, cause: "), "{:?}", told(&play));
+    assert!(play.has("Killed { lane: 0, axis: 2, cause: "), "{:?}", play.rare());
     assert!((0..2).all(|axis| !play.unit(axis).is_moving()));
 }

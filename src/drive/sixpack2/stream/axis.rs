@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::super::scale::MotorScale;
 use super::super::set_up::MotorAxis;
-use crate::drive::link::AxisFigures;
+use crate::drive::link::{AxisFigures, LinkAxis};
 use crate::drive::{LOOP, Lag, Middle, Motor, Shaker, TargetMaker};
 use crate::motion::Limits;
 use crate::time::MonoTime;
@@ -14,7 +14,7 @@ const STRAYED: Duration = Duration::from_millis(250);
 
 /// One axis.
 #[derive(Debug)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     pub(super) motor: u8,
     pub(super) scale: MotorScale,
     pub(super) limits: Limits,
@@ -32,6 +32,20 @@ pub(super) struct Axis {
     pub(super) strayed: u32,
     pub(super) strays_since: MonoTime,
     pub(super) figures: AxisFigures,
+}
+
+impl LinkAxis for Axis {
+    fn place(&self) -> f64 {
+        self.scale.fraction(self.model.position())
+    }
+
+    fn off_mm(&self, place: f64) -> f64 {
+        self.scale.mm_of(self.scale.way_of(place - self.place())).abs()
+    }
+
+    fn figures(&self, _: MonoTime) -> AxisFigures {
+        self.figures
+    }
 }
 
 impl Axis {
@@ -93,11 +107,6 @@ impl Axis {
     /// True if its motor follows something.
     pub(super) fn moves(&self) -> bool {
         self.model.velocity() != 0.0
-    }
-
-    /// Where its motor is, in strokes.
-    pub(super) fn place(&self) -> f64 {
-        self.scale.fraction(self.model.position())
     }
 
     /// How far a reading is beside where its motor should be by now, and how fast that is, mm and mm/s.

@@ -2,12 +2,11 @@
 
 use std::time::Duration;
 
-use super::lane::Lane;
-use super::{Stream, StreamEvent, TARGETS, Track, axis_number, number};
-use crate::drive::link::Stage;
-use crate::drive::link::{LinkFault, LinkPort};
-use crate::drive::sixpack2::find::{WHO, waking_baud, who};
-use crate::drive::sixpack2::look::{OUTSIDE_MM, searches, where_is};
+use super::lane::SixpackLane;
+use super::{PROBES, Sixpack2, TARGETS, Track, number};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
+use crate::drive::sixpack2::ask::{WHO, searches, waking_baud, where_is, who};
+use crate::drive::sixpack2::look::OUTSIDE_MM;
 use crate::drive::sixpack2::talk::TalkFault;
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackReply, UnitTold, action};
@@ -16,8 +15,6 @@ use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackRepl
 const IDENTITY: Duration = Duration::from_secs(10);
 /// From one look whether a motor still moves to the next.
 const LOOKS: Duration = Duration::from_millis(20);
-/// How often a unit that is lost is asked.
-const PROBES: Duration = Duration::from_millis(250);
 /// How far a motor may be from where its targets lead, mm.
 const OFF_COURSE_MM: f64 = 0.5;
 /// When exactly a unit reads its counter is not known to better than this, seconds: its loop, and when that falls.
@@ -25,28 +22,29 @@ const READING: f64 = 0.004;
 /// What is so far outside the stroke is no place of the seat at all, mm.
 const LOST_ZERO_MM: f64 = 10.0;
 
-impl<P: LinkPort> Stream<P> {
+impl<P: LinkPort> Stream<Sixpack2, P> {
     /// True if a question does not make the next slice later than it has to: there is one after each slice that leaves room for it.
     pub(super) fn has_time(&self) -> bool {
         let is_led = self.lanes.iter().any(|lane| lane.is_led());
-        let has_room = !self.lanes.iter().any(Lane::plays) || self.talk.question_over() <= self.next_slice;
-        !is_led || self.targets >= TARGETS || (self.targets > 0 && has_room)
+        let has_room =
+            !self.lanes.iter().any(SixpackLane::plays) || self.talk.question_over() <= self.own.next_slice;
+        !is_led || self.own.targets >= TARGETS || (self.own.targets > 0 && has_room)
     }
 
     /// Asks what is due; false where nothing is.
     pub(super) fn ask_next(&mut self, now: MonoTime) -> Result<bool, LinkFault> {
         let count = self.lanes.len();
         for step in 0..count {
-            let index = (self.next_asked + step) % count;
+            let index = (self.own.next_asked + step) % count;
             let lane = &self.lanes[index];
-            let (is_due, targets) = (lane.not_before <= now, std::mem::take(&mut self.targets));
+            let (is_due, targets) = (lane.own.not_before <= now, std::mem::take(&mut self.own.targets));
             match lane.stage {
                 Stage::Lost if is_due => self.probe(index, now)?,
-                Stage::Out if is_due && lane.known.is_none() => self.probe(index, now)?,
+                Stage::Out if is_due && lane.own.known.is_none() => self.probe(index, now)?,
                 Stage::Readying if is_due => self.look_at(index, now)?,
                 Stage::Ready | Stage::Runs | Stage::Ends => self.ask(index, now)?,
                 _ => {
-                    self.targets = targets;
+                    self.own.targets = targets;
                     continue;
                 }
             }
@@ -57,16 +55,16 @@ impl<P: LinkPort> Stream<P> {
 
     /// Asks a lane that is led: its next motor, or who it is.
     fn ask(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
-        self.next_asked = (index + 1) % self.lanes.len();
+        self.own.next_asked = (index + 1) % self.lanes.len();
         let lane = &mut self.lanes[index];
-        let axis = lane.next_axis;
+        let axis = lane.own.next_axis;
         // Once for all of its motors: whoever wants to know again and again keeps none of them from being read.
-        if axis == 0 && !lane.asked_who && lane.known.is_none_or(|at| now.since(at) >= IDENTITY) {
-            lane.asked_who = true;
+        if axis == 0 && !lane.own.asked_who && lane.own.known.is_none_or(|at| now.since(at) >= IDENTITY) {
+            lane.own.asked_who = true;
             return self.ask_who(index, now);
         }
-        lane.asked_who = false;
-        lane.next_axis = (axis + 1) % lane.axes.len();
+        lane.own.asked_who = false;
+        lane.own.next_axis = (axis + 1) % lane.axes.len();
         if let Some(told) = self.place_of(index, axis)? {
             self.judge(index, axis, told)?;
         }
@@ -75,9 +73,9 @@ impl<P: LinkPort> Stream<P> {
 
     /// Who it is, which tells that it was restarted.
     fn ask_who(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
-        let answer = self.talk.ask(self.lanes[index].unit, WHO);
+        let answer = self.talk.ask(self.lanes[index].own.unit, WHO);
         if let Some(SixpackReply::UnitTold(told)) = self.heard(index, answer)? {
-            self.lanes[index].known = Some(now);
+            self.lanes[index].own.known = Some(now);
             if told.reset != 0 {
                 return self.is_not_home(index, 0);
             }
@@ -90,7 +88,7 @@ impl<P: LinkPort> Stream<P> {
 
     /// Where a motor is, if it answers.
     fn place_of(&mut self, index: usize, axis: usize) -> Result<Option<PositionTold>, LinkFault> {
-        let (unit, motor) = (self.lanes[index].unit, self.lanes[index].axes[axis].motor);
+        let (unit, motor) = (self.lanes[index].own.unit, self.lanes[index].axes[axis].motor);
         let answer = self.talk.ask(unit, where_is(motor));
         let Some(SixpackReply::PositionTold(told)) = self.heard(index, answer)? else {
             // By one bit the question is the order to search; nothing else is ended by this.
@@ -138,10 +136,10 @@ impl<P: LinkPort> Stream<P> {
                 return self.is_not_home(index, a);
             }
             let (lane, axis) = (number(index), axis_number(a));
-            return self.put_out(index, StreamEvent::OffCourse { lane, axis, by_mm });
+            return self.put_out_and_stop(index, StreamEvent::OffCourse { lane, axis, by_mm });
         }
         // It is asked again next.
-        (self.next_asked, self.lanes[index].next_axis) = (index, a);
+        (self.own.next_asked, self.lanes[index].own.next_axis) = (index, a);
         Ok(())
     }
 
@@ -155,7 +153,7 @@ impl<P: LinkPort> Stream<P> {
     /// Looks whether all motors of a lane stand, and where.
     fn look_at(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
         let lane = &mut self.lanes[index];
-        if lane.known.is_none() {
+        if lane.own.known.is_none() {
             return self.ask_who(index, now);
         }
         let Some(a) = lane.axes.iter().position(|axis| !axis.rests) else {
@@ -168,7 +166,7 @@ impl<P: LinkPort> Stream<P> {
         let is_idle = matches!(told.action, action::IDLE | action::PI);
         if !is_idle || axis.stood_at != Some(told.position) {
             axis.stood_at = is_idle.then_some(told.position);
-            lane.not_before = now + LOOKS;
+            lane.own.not_before = now + LOOKS;
             // Nobody has it search: a search has no end by itself.
             return if searches(told.action) { self.stop_motors(index) } else { Ok(()) };
         }
@@ -190,8 +188,8 @@ impl<P: LinkPort> Stream<P> {
         let tick = self.terms.tick;
         let lane = &mut self.lanes[index];
         let axes = lane.places();
-        lane.track = Track::at_rest(tick, axes, now);
-        (lane.stage, lane.moves, lane.is_home) = (Stage::Ready, false, true);
+        lane.own.track = Track::at_rest(tick, axes, now);
+        (lane.stage, lane.moves, lane.own.is_home) = (Stage::Ready, false, true);
         self.tell(StreamEvent::Rests { lane: number(index), axes, at: now });
         self.tell(StreamEvent::Homed { lane: number(index), homed: true });
     }
@@ -205,60 +203,44 @@ impl<P: LinkPort> Stream<P> {
         let lane = &mut self.lanes[index];
         match answer {
             Ok(reply) => {
-                lane.is_failing = false;
+                lane.own.is_failing = false;
                 Ok(Some(reply))
             }
             Err(TalkFault::Link(fault)) => Err(fault),
             Err(TalkFault::Silent { .. }) => {
                 // One answer may be lost. Whoever hears no targets stands, and would make up for all of them at once by the next that it
                 // hears: so it is asked again next, and told none without an answer.
-                if std::mem::replace(&mut lane.is_failing, true) {
-                    self.lose(index);
+                if std::mem::replace(&mut lane.own.is_failing, true) {
+                    self.lose(index, 0);
                 } else {
-                    (self.next_asked, self.targets) = (index, TARGETS);
+                    (self.own.next_asked, self.own.targets) = (index, TARGETS);
                 }
                 Ok(None)
             }
         }
     }
 
-    /// A lane's unit does not answer any more. Its motors go where the last target led them, and rest there.
-    pub(super) fn lose(&mut self, index: usize) {
-        let now = self.talk.now();
-        let lane = &mut self.lanes[index];
-        if matches!(lane.stage, Stage::Lost | Stage::Out) {
-            return;
-        }
-        lane.let_go(Stage::Lost, now);
-        lane.not_before = now + PROBES;
-        self.tell(StreamEvent::Lost { lane: number(index), axis: 0 });
-    }
-
-    /// Out until a person has looked: stopped, and led no more.
-    fn put_out(&mut self, index: usize, event: StreamEvent) -> Result<(), LinkFault> {
-        let now = self.talk.now();
-        let lane = &mut self.lanes[index];
-        lane.let_go(Stage::Out, now);
-        lane.known = Some(now);
-        self.tell(event);
+    /// Out until a person has looked, and stopped.
+    fn put_out_and_stop(&mut self, index: usize, event: StreamEvent) -> Result<(), LinkFault> {
+        self.put_out(index, event);
         self.stop_motors(index)
     }
 
     /// A unit that was restarted, or never homed: none of its motors knows its place.
     fn is_not_home(&mut self, index: usize, axis: usize) -> Result<(), LinkFault> {
         let (lane, axis) = (number(index), axis_number(axis));
-        let was_home = std::mem::take(&mut self.lanes[index].is_home);
+        let was_home = std::mem::take(&mut self.lanes[index].own.is_home);
         let event = if was_home {
             StreamEvent::Restarted { lane, axis }
         } else {
             StreamEvent::Homed { lane, homed: false }
         };
-        self.put_out(index, event)
+        self.put_out_and_stop(index, event)
     }
 
     /// Ends what each motor may search, and stops it by its ramp. Nobody answers, so it is said twice.
     pub(super) fn stop_motors(&mut self, index: usize) -> Result<(), LinkFault> {
-        let unit = self.lanes[index].unit;
+        let unit = self.lanes[index].own.unit;
         for motor in self.lanes[index].axes.iter().map(|axis| axis.motor) {
             for _ in 0..2 {
                 self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
@@ -270,14 +252,14 @@ impl<P: LinkPort> Stream<P> {
 
     /// Looks for the unit of a lane that is lost or out.
     fn probe(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
-        self.lanes[index].not_before = now + PROBES;
-        let Some(told) = self.seek(self.lanes[index].unit)? else { return Ok(()) };
+        self.lanes[index].own.not_before = now + PROBES;
+        let Some(told) = self.seek(self.lanes[index].own.unit)? else { return Ok(()) };
         if told.reset != 0 {
             return self.is_not_home(index, 0);
         }
         let lane = &mut self.lanes[index];
         let was_lost = lane.stage == Stage::Lost;
-        (lane.is_failing, lane.not_before) = (false, now);
+        (lane.own.is_failing, lane.own.not_before) = (false, now);
         lane.make_ready();
         if was_lost {
             self.tell(StreamEvent::Back { lane: number(index) });
@@ -288,7 +270,7 @@ impl<P: LinkPort> Stream<P> {
     /// Who a unit is, if it is there; one that woke is switched to the rate of the link, but only while nobody plays on it.
     fn seek(&mut self, unit: u8) -> Result<Option<UnitTold>, LinkFault> {
         let told = who(&mut self.talk, unit)?;
-        if told.is_some() || self.lanes.iter().any(Lane::plays) {
+        if told.is_some() || self.lanes.iter().any(SixpackLane::plays) {
             return Ok(told);
         }
         let baud = self.talk.baud();
@@ -302,7 +284,7 @@ impl<P: LinkPort> Stream<P> {
     }
 }
 
-impl Lane {
+impl SixpackLane {
     /// True if poses move it, or may at once.
     const fn plays(&self) -> bool {
         matches!(self.stage, Stage::Runs | Stage::Ends)

@@ -6,7 +6,7 @@ use super::super::*;
 use crate::config::drive::SeatDrive;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive::sixpack2::{MotorCurrent, PropDiv, Sixpack2Drive};
-use crate::drive::link::{Step, TalkTerms};
+use crate::drive::link::{LinkTalk as _, Step, TalkTerms};
 use crate::motion::{AxisGeometry, MAX_AXES, SeatType};
 use crate::sim::serial::{LineFaults, SerialLine};
 use crate::sim::sixpack2::{

@@ -4,7 +4,7 @@ use crate::drive::sixpack2::look::look;
 use std::time::Duration;
 
 use super::bench::*;
-use crate::drive::link::{LinkFault, LinkPort, TalkTerms};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, TalkTerms};
 use crate::drive::sixpack2::*;
 use crate::sim::serial::{LineFaults, SerialLine};
 use crate::sim::sixpack2::SixpackFault;

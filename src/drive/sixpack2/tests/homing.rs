@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::bench::*;
 use crate::config::drive::homing::{HomeWay, Side};
 use crate::config::drive::sixpack2::PropDiv;
-use crate::drive::link::Step;
+use crate::drive::link::{LinkTalk as _, Step};
 use crate::drive::sixpack2::*;
 use crate::motion::SeatType;
 use crate::sim::serial::LineFaults;

@@ -4,13 +4,13 @@ use super::bench::*;
 use super::play::*;
 use std::time::Duration;
 
-use crate::drive::link::{BrakeReason, StreamEvent};
+use crate::drive::link::*;
 use crate::drive::sixpack2::read_every;
 
 #[test]
 fn a_ride_is_executed_within_a_fifth_of_a_millimetre_by_axes_that_do_not_wait_for_each_other() {
     for (baud, is_two_wires) in [(BAUD, false), (113_636, false), (BAUD, true)] {
-        let mut play = Play::over(&[wired(1, is_two_wires)], baud);
+        let mut play = Play::homed(&[wired(1, is_two_wires)], baud);
         play.begin(ride);
         play.play(30.0, 0);
         assert!(play.worst.iter().all(|worst| *worst <= 0.2), "{baud} {is_two_wires}: {:?}", play.worst);
@@ -28,7 +28,7 @@ fn a_ride_is_executed_within_a_fifth_of_a_millimetre_by_axes_that_do_not_wait_fo
 fn frames_are_confirmed_once_they_are_executed_and_a_motor_was_read_where_they_lead() {
     for (units, wires) in [(1, false), (2, true)] {
         let setups: Vec<_> = (1..=units).map(|unit| wired(unit, wires)).collect();
-        let mut play = Play::over(&setups, if units > 1 { 113_636 } else { BAUD });
+        let mut play = Play::homed(&setups, if units > 1 { 113_636 } else { BAUD });
         play.begin(ride);
         play.play(10.0, 0);
         play.judged = false;
@@ -49,7 +49,7 @@ fn frames_are_confirmed_once_they_are_executed_and_a_motor_was_read_where_they_l
 
 #[test]
 fn it_moves_once_and_says_so() {
-    let mut play = Play::over(&[wired(1, false)], BAUD);
+    let mut play = Play::homed(&[wired(1, false)], BAUD);
     play.begin(ride);
     play.play(10.0, 0);
     let moves = play.told.iter().filter(|(_, event)| matches!(event, StreamEvent::Moves { .. })).count();
@@ -58,14 +58,7 @@ fn it_moves_once_and_says_so() {
 
 #[test]
 fn it_ends_at_rest_where_the_poses_ended_and_begins_again_from_there() {
-    fn there(at: f64, axis: usize) -> f64 {
-        let part = (at / 2.0).clamp(0.0, 1.0);
-        (40.0 + 10.0 * axis as f64) * part * part * part * (10.0 - part * (15.0 - 6.0 * part))
-    }
-    fn back(at: f64, axis: usize) -> f64 {
-        there(2.0 - at, axis)
-    }
-    let mut play = Play::over(&[wired(1, false)], BAUD);
+    let mut play = Play::homed(&[wired(1, false)], BAUD);
     play.begin(there);
     play.play(2.5, 0);
     play.judged = false;
@@ -87,7 +80,7 @@ fn it_ends_at_rest_where_the_poses_ended_and_begins_again_from_there() {
 
 #[test]
 fn poses_that_end_in_motion_brake_it_within_the_limits() {
-    let mut play = Play::over(&[wired(1, false)], BAUD);
+    let mut play = Play::homed(&[wired(1, false)], BAUD);
     play.begin(ride);
     play.play(8.0, 0);
     play.judged = false;
@@ -101,7 +94,7 @@ fn poses_that_end_in_motion_brake_it_within_the_limits() {
 
 #[test]
 fn missed_ticks_cost_lead_that_is_regained() {
-    let mut play = Play::over(&[wired(1, false)], BAUD);
+    let mut play = Play::homed(&[wired(1, false)], BAUD);
     play.begin(ride);
     play.play(8.0, 0);
     play.play(12.0, 2);
@@ -114,7 +107,7 @@ fn missed_ticks_cost_lead_that_is_regained() {
 
 #[test]
 fn a_first_pose_elsewhere_moves_nothing() {
-    let mut play = Play::over(&[wired(1, false)], BAUD);
+    let mut play = Play::homed(&[wired(1, false)], BAUD);
     play.judged = false;
     play.begin(|_, _| 70.0);
     play.play(1.0, 0);
@@ -125,7 +118,7 @@ fn a_first_pose_elsewhere_moves_nothing() {
 
 #[test]
 fn two_units_on_two_wires_ride_together() {
-    let mut play = Play::over(&[wired(1, true), wired(2, true)], 113_636);
+    let mut play = Play::homed(&[wired(1, true), wired(2, true)], 113_636);
     play.begin(ride);
     play.play(20.0, 0);
     assert!(play.worst.iter().all(|worst| *worst <= 0.2), "{:?}", play.worst);

@@ -4,13 +4,13 @@ use super::bench::*;
 use super::play::*;
 use std::time::Duration;
 
-use crate::drive::link::LinkFault;
+use crate::drive::link::*;
 use crate::sim::serial::LineFaults;
 use crate::sim::sixpack2::SixpackFault;
 use crate::wire::sixpack2::{ReferenceSearch, SixpackOrder, action};
 
 fn riding(seconds: f64) -> Play {
-    let mut play = Play::over(&[wired(1, false)], BAUD);
+    let mut play = Play::homed(&[wired(1, false)], BAUD);
     play.begin(ride);
     play.play(seconds, 0);
     play.judged = false;
@@ -20,11 +20,11 @@ fn riding(seconds: f64) -> Play {
 #[test]
 fn a_stop_is_in_the_very_next_slice_and_ends_at_rest_within_the_limits() {
     let mut play = riding(10.0);
-    let sent = play.stream.talk().port().sent.len();
-    play.stream.stop(None).unwrap();
+    let sent = play.stream.talk.port().sent.len();
+    play.stream.stop().unwrap();
     let speed = play.speed();
     play.wait(0.03);
-    let next = play.stream.talk().port().sent[sent].1.clone();
+    let next = play.stream.talk.port().sent[sent].1.clone();
     assert_eq!((next.len(), next[1]), (27, 0x24));
     play.wait(0.1);
     assert!(speed > 20.0 && play.speed() < speed, "{speed} {}", play.speed());
@@ -61,7 +61,7 @@ fn where_only_its_answers_are_lost_a_seat_comes_to_rest_all_the_same() {
 #[test]
 fn a_port_that_is_gone_is_an_error_and_all_lanes_are_lost() {
     let mut play = riding(2.0);
-    play.stream.talk().port().is_gone = true;
+    play.stream.talk.port().is_gone = true;
     let rounds: Vec<_> = (0..50).map(|_| play.stream.round()).collect();
     play.hear();
     assert!(rounds.contains(&Err(LinkFault)) && play.has("Lost"), "{:?}", play.rare());
@@ -77,7 +77,7 @@ fn a_unit_that_restarted_is_told_and_stands_until_it_is_homed_again() {
     assert!(play.has("Lost") && play.has("Restarted"), "{:?}", play.rare());
     assert_eq!(play.places(), rest, "it heard nothing that it could follow");
     assert!(!play.stream.is_ready(0));
-    let homed = home_as(play.stream.talk(), &drive(SWITCH), &[0, 1, 2]).0;
+    let homed = home_as(&mut play.stream.talk, &drive(SWITCH), &[0, 1, 2]).0;
     assert_eq!(homed, Ok(()));
     play.stream.rejoin(0);
     play.wait(1.0);
@@ -87,24 +87,24 @@ fn a_unit_that_restarted_is_told_and_stands_until_it_is_homed_again() {
 #[test]
 fn at_the_rate_of_a_unit_that_restarted_nothing_is_played() {
     let talk = talk_at(&[unit_with(1, shaft())], 19_231);
-    let refused = Play::stream_over(talk, 1).map(|_| ()).unwrap_err().to_string();
+    let refused = Play::to(talk, 1).map(|_| ()).unwrap_err().to_string();
     assert!(refused.starts_with("19231 baud is what a unit that was restarted talks at"), "{refused}");
 }
 
 #[test]
 fn a_seat_that_is_not_home_is_told_so_at_each_look_and_never_led() {
     let talk = talk_to(&[unit_with(1, shaft())]);
-    let (mut stream, _poses, mut events, _) = Play::stream_over(talk, 1).unwrap();
+    let mut play = Play::to(talk, 1).unwrap();
     // As it woke: told by its flag, which is gone then; and by its counters.
     for look in 0..2 {
-        stream.look(0);
-        (0..500).for_each(|_| stream.round().unwrap());
-        let told = std::iter::from_fn(|| events.pop().ok()).map(|event| format!("{event:?}"));
+        play.stream.look(0);
+        (0..500).for_each(|_| play.stream.round().unwrap());
+        let told = std::iter::from_fn(|| play.events.pop().ok()).map(|event| format!("{event:?}"));
         let told: Vec<_> = told.filter(|event| !event.starts_with("Read")).collect();
         assert_eq!(told, ["Homed { lane: 0, homed: false }"], "{look}");
     }
-    let sent = stream.talk().port().sent.clone();
-    assert!(!stream.is_ready(0) && sent.iter().all(|(_, octets)| octets[1] != 0x24), "{sent:?}");
+    let sent = play.stream.talk.port().sent.clone();
+    assert!(!play.stream.is_ready(0) && sent.iter().all(|(_, octets)| octets[1] != 0x24), "{sent:?}");
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn octets_that_are_damaged_lead_no_axis_out_of_its_stroke() {
     .into_iter()
     .enumerate()
     {
-        let mut play = Play::over(&[wired(1, false)], BAUD);
+        let mut play = Play::homed(&[wired(1, false)], BAUD);
         play.begin(ride);
         play.play(6.0, 0);
         play.judged = false;
@@ -176,6 +176,23 @@ fn what_was_not_heard_while_a_line_was_cut_is_not_made_up_for_at_once() {
                 "{ms} ms: {jump} mm/s {:?}",
                 play.rare()
             );
+        }
+    }
+}
+
+#[test]
+fn what_a_seat_was_not_told_while_its_thread_was_held_up_is_not_made_up_for_at_once() {
+    for ms in [60, 100, 400, 1_000] {
+        for phase in [0, 3, 6] {
+            let mut play = riding(8.0 + 0.173 * f64::from(phase));
+            play.bus_mut().forget();
+            let until = play.now() + Duration::from_millis(ms);
+            play.stream.talk.port().sleep_until(until);
+            play.play(3.0, 0);
+            let motors = play.bus().units()[0].motors[..3].iter();
+            let jump = motors.map(|motor| motor.shaft.executed().jump / MM).fold(0.0, f64::max);
+            assert!(jump <= 32.0 && play.has("Dry"), "{ms} ms: {jump} mm/s {:?}", play.rare());
+            play.assert_inside();
         }
     }
 }

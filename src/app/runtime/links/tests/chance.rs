@@ -2,9 +2,12 @@
 //!
 //! `KINOCUE_FAULTS` is how many faults there are at least, `KINOCUE_SEED` the first seed.
 
+use std::collections::BTreeMap;
+
 use super::*;
 use crate::sim::chance::Chance;
 use crate::sim::silvermax::Action;
+use crate::sim::sixpack2::{SixpackBus, SixpackFault};
 
 /// What fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,8 +27,23 @@ enum Harm {
     RequestTwice,
     /// The octet so far on in what is sent is lost, is there twice, or has another bit.
     RequestOctet(usize, OctetHarm),
-    AnswerLost,
+    /// So many octets of the answer, or all up to the end of its line.
+    AnswerLost(Option<usize>),
     AnswerOctet(usize, OctetHarm),
+}
+
+impl Harm {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::RequestLost => "request lost",
+            Self::RequestTwice => "request twice",
+            Self::RequestOctet(_, harm) => ["octet lost", "octet twice", "octet flipped"][harm.kind()],
+            Self::AnswerLost(_) => "answer lost",
+            Self::AnswerOctet(_, harm) => {
+                ["answer's octet lost", "answer's octet twice", "answer's octet flipped"][harm.kind()]
+            }
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,6 +54,14 @@ enum OctetHarm {
 }
 
 impl OctetHarm {
+    const fn kind(self) -> usize {
+        match self {
+            Self::Lost => 0,
+            Self::Twice => 1,
+            Self::Flipped(_) => 2,
+        }
+    }
+
     fn of(self, octet: u8) -> impl Iterator<Item = u8> {
         let (times, bit) = match self {
             Self::Lost => (0, 0),
@@ -47,17 +73,17 @@ impl OctetHarm {
 }
 
 /// A line that harms what goes over it.
-struct BadLine {
-    line: SharedLine,
+struct BadLine<B> {
+    line: SharedLine<B>,
     harm: Arc<Mutex<Option<Harm>>>,
     /// What came already and was not taken.
     back: Vec<u8>,
 }
 
-impl BadLine {
+impl<B> BadLine<B> {
     /// The harm, if it is for what goes this way.
     fn take(&self, is_out: bool) -> Option<Harm> {
-        let is_for = |harm: &mut Harm| is_out != matches!(harm, Harm::AnswerLost | Harm::AnswerOctet(..));
+        let is_for = |harm: &mut Harm| is_out != matches!(harm, Harm::AnswerLost(_) | Harm::AnswerOctet(..));
         self.harm.lock().unwrap().take_if(is_for)
     }
 
@@ -66,7 +92,7 @@ impl BadLine {
     }
 }
 
-impl LinkPort for BadLine {
+impl<B: Bus> LinkPort for BadLine<B> {
     fn now(&self) -> MonoTime {
         self.line.now()
     }
@@ -99,9 +125,9 @@ impl LinkPort for BadLine {
                 return Ok(0);
             }
             match self.take(false) {
-                // Up to the end of the line.
-                Some(harm @ Harm::AnswerLost) if buf[0] != b'\r' => self.put_back(harm),
-                Some(Harm::AnswerLost) => {}
+                Some(harm @ Harm::AnswerLost(None)) if buf[0] != b'\r' => self.put_back(harm),
+                Some(Harm::AnswerLost(Some(left @ 2..))) => self.put_back(Harm::AnswerLost(Some(left - 1))),
+                Some(Harm::AnswerLost(_)) => {}
                 Some(Harm::AnswerOctet(0, harm)) => self.back.extend(harm.of(buf[0])),
                 Some(Harm::AnswerOctet(at, harm)) => {
                     self.put_back(Harm::AnswerOctet(at - 1, harm));
@@ -129,6 +155,147 @@ impl LinkPort for BadLine {
     }
 }
 
+/// What an axis executed.
+#[derive(Debug)]
+pub(super) struct Done {
+    /// mm.
+    lowest: f64,
+    highest: f64,
+    /// mm/s.
+    velocity: f64,
+    /// mm/s² of a drive that ramps; of a motor that is told its speeds, by how many mm/s that changed at once.
+    hardest: f64,
+    /// Steps that were not made, leaps in no time, and searches that nobody asked for.
+    wrong: f64,
+    restarts: u32,
+}
+
+/// Drives of one family that fail.
+pub(super) trait Rig: Bus + Send + Sized + 'static {
+    /// The octets of an answer; those of a line where that is none.
+    const ANSWER: Option<usize>;
+    /// The most of [`Done::hardest`] that a seat may do.
+    const HARDEST: f64;
+    /// How far beyond its stroke what is damaged on the way may lead it, mm.
+    const DAMAGED: f64;
+
+    /// Something happens to a unit; what, and whether it restarts one.
+    fn fail(&mut self, kind: u64, fate: &mut Chance, at: MonoTime) -> (&'static str, bool);
+
+    /// All is well again.
+    fn mend(&mut self, at: MonoTime);
+
+    fn places_mm(&self) -> Vec<f64>;
+
+    fn done(&self) -> Vec<Done>;
+
+    /// Opens a hall whose seat was homed, where its play has the line by a port of this kind.
+    fn hall_over(
+        over: impl FnOnce(SharedLine<Self>) -> Port,
+        lead: impl FnOnce(&mut Hall<'_, '_, Self>, StagedShow, &Timeline),
+    );
+}
+
+impl Rig for SilverBus {
+    const ANSWER: Option<usize> = None;
+    const HARDEST: f64 = 3_030.0;
+    /// The margin of its soft limits.
+    const DAMAGED: f64 = 1.01;
+
+    fn fail(&mut self, kind: u64, chance: &mut Chance, at: MonoTime) -> (&'static str, bool) {
+        let (index, number) = (chance.bits() % 3, 16 + (chance.bits() % 3) as u8);
+        let is_reset = kind == 8 && chance.bits().is_multiple_of(8);
+        let (what, action) = match kind {
+            8 if is_reset => ("unit restarted", Action::Reset),
+            8 | 9 => ("unit silent", Action::Dead(true)),
+            10 => ("unit answers as another", Action::AnswersAs(Some(16 + index as u8))),
+            _ => ("crystal off", Action::Crystal(300 * (index as i32 - 1))),
+        };
+        self.act(Some(number), action, at);
+        (what, is_reset)
+    }
+
+    fn mend(&mut self, at: MonoTime) {
+        for action in [Action::Dead(false), Action::AnswersAs(None)] {
+            self.act(None, action, at);
+        }
+    }
+
+    fn places_mm(&self) -> Vec<f64> {
+        self.units().iter().map(|unit| (unit.place() - ZERO) / MM).collect()
+    }
+
+    fn done(&self) -> Vec<Done> {
+        let done = |unit: &Unit| {
+            let executed = unit.executed();
+            Done {
+                lowest: (executed.lowest - ZERO) / MM,
+                highest: (executed.highest - ZERO) / MM,
+                velocity: executed.velocity / MM,
+                hardest: executed.acceleration / MM,
+                wrong: f64::from(executed.jumps.saturating_sub(unit.tally().resets)),
+                restarts: unit.tally().resets,
+            }
+        };
+        self.units().iter().map(done).collect()
+    }
+
+    fn hall_over(
+        over: impl FnOnce(SharedLine<Self>) -> Port,
+        lead: impl FnOnce(&mut Hall<'_, '_, Self>, StagedShow, &Timeline),
+    ) {
+        hall_over(over, lead);
+    }
+}
+
+impl Rig for SixpackBus {
+    const ANSWER: Option<usize> = Some(9);
+    /// What its acceleration makes in a slice, and the whole units of speed add.
+    const HARDEST: f64 = 32.0;
+    /// What an axis can go until the next target comes, twice: beside the way there it overtakes that once.
+    const DAMAGED: f64 = 4.0;
+
+    fn fail(&mut self, kind: u64, chance: &mut Chance, at: MonoTime) -> (&'static str, bool) {
+        let is_reset = kind == 8 && chance.bits().is_multiple_of(8);
+        let (what, fault) = match kind {
+            8 if is_reset => ("unit restarted", SixpackFault::Reset),
+            8 | 9 => ("unit hot", SixpackFault::Celsius(90)),
+            _ => ("supply low", SixpackFault::Volts(11)),
+        };
+        self.suffer(None, fault, at);
+        (what, is_reset)
+    }
+
+    fn mend(&mut self, _: MonoTime) {}
+
+    fn places_mm(&self) -> Vec<f64> {
+        self.units()[0].motors[..3].iter().map(|motor| motor.shaft.place() / sixpack::MM).collect()
+    }
+
+    fn done(&self) -> Vec<Done> {
+        let motors = self.units()[0].motors[..3].iter();
+        let done = motors.map(|motor| {
+            let executed = motor.shaft.executed();
+            Done {
+                lowest: executed.lowest / sixpack::MM,
+                highest: executed.highest / sixpack::MM,
+                velocity: executed.velocity / sixpack::MM,
+                hardest: executed.jump / sixpack::MM,
+                wrong: executed.lost + f64::from(motor.own_searches),
+                restarts: 0,
+            }
+        });
+        done.collect()
+    }
+
+    fn hall_over(
+        over: impl FnOnce(SharedLine<Self>) -> Port,
+        lead: impl FnOnce(&mut Hall<'_, '_, Self>, StagedShow, &Timeline),
+    ) {
+        sixpack::hall_over(over, lead);
+    }
+}
+
 /// Who lets things fail.
 struct Fate {
     chance: Chance,
@@ -144,6 +311,7 @@ struct Fate {
     in_motion: u64,
     places: Vec<f64>,
     resets: u32,
+    kinds: BTreeMap<&'static str, u64>,
 }
 
 impl Fate {
@@ -162,6 +330,7 @@ impl Fate {
             in_motion: 0,
             places: Vec::new(),
             resets: 0,
+            kinds: BTreeMap::new(),
         }
     }
 
@@ -184,8 +353,8 @@ impl Fate {
     }
 
     /// At each tick.
-    fn pass(&mut self, hall: &mut Hall<'_, '_>) {
-        let (now, places) = (NOW.get(), hall.places_mm());
+    fn pass<B: Rig>(&mut self, hall: &mut Hall<'_, '_, B>) {
+        let (now, places) = (NOW.get(), hall.really_mm());
         let places = std::mem::replace(&mut self.places, places);
         if now >= self.mends && self.mends > MonoTime::default() {
             self.mend(hall);
@@ -204,7 +373,7 @@ impl Fate {
                 self.harm_next(if twice { Harm::RequestTwice } else { Harm::RequestOctet(at, harm) });
             }
             0 | 1 => self.harm_next(Harm::RequestLost),
-            2 => self.harm_next(Harm::AnswerLost),
+            2 => self.harm_next(Harm::AnswerLost(B::ANSWER)),
             3 | 4 => {
                 let (at, harm) = self.octet();
                 self.harm_next(Harm::AnswerOctet(at, harm));
@@ -213,42 +382,57 @@ impl Fate {
         }
     }
 
-    fn harm_next(&self, harm: Harm) {
+    fn harm_next(&mut self, harm: Harm) {
+        *self.kinds.entry(harm.name()).or_default() += 1;
         *self.harm.lock().unwrap() = Some(harm);
     }
 
-    fn break_for_a_while(&mut self, hall: &Hall<'_, '_>, kind: u64) {
+    fn break_for_a_while<B: Rig>(&mut self, hall: &Hall<'_, '_, B>, kind: u64) {
         let span = self.span(0.003, 0.6);
-        let (index, number) = (self.below(3) as usize, 16 + self.below(3) as u8);
+        let is_held = self.below(3) == 0;
         let mut port = hall.line.lock();
         let at = port.now;
         self.mends = NOW.get().max(self.mends) + span;
-        let mut act = |action| port.line.bus_mut().act(Some(number), action, at);
-        match kind {
-            5 => port.line.faults.unplugged = true,
-            6 => port.is_gone = true,
-            // Nobody runs the thread of the link meanwhile; the adapter holds back what it has.
-            7 if index == 0 => port.sleep_until(at + span / 2),
-            7 => (port.line.faults.late, port.line.faults.late_by) = (0.05, span / 8),
-            8 if self.chance.bits().is_multiple_of(8) => {
-                act(Action::Reset);
-                self.resets += 1;
+        let what = match kind {
+            5 => {
+                port.line.faults.unplugged = true;
+                "line cut"
             }
-            8 | 9 => act(Action::Dead(true)),
-            10 => act(Action::AnswersAs(Some(16 + index as u8))),
-            _ => act(Action::Crystal(300 * (index as i32 - 1))),
-        }
+            6 => {
+                port.is_gone = true;
+                "port gone"
+            }
+            // Nobody runs the thread of the link meanwhile; the adapter holds back what it has.
+            7 if is_held => {
+                port.sleep_until(at + span / 2);
+                "thread held up"
+            }
+            7 => {
+                (port.line.faults.late, port.line.faults.late_by) = (0.05, span / 8);
+                "octets late"
+            }
+            kind => {
+                let (what, is_reset) = port.line.bus_mut().fail(kind, &mut self.chance, at);
+                self.resets += u32::from(is_reset);
+                what
+            }
+        };
+        *self.kinds.entry(what).or_default() += 1;
     }
 
-    fn mend(&mut self, hall: &Hall<'_, '_>) {
+    fn mend<B: Rig>(&mut self, hall: &Hall<'_, '_, B>) {
         let mut port = hall.line.lock();
         let at = port.now;
         port.line.faults = LineFaults::default();
         port.is_gone = false;
-        for action in [Action::Dead(false), Action::AnswersAs(None)] {
-            port.line.bus_mut().act(None, action, at);
-        }
+        port.line.bus_mut().mend(at);
         self.mends = MonoTime::default();
+    }
+}
+
+impl<B: Rig> Hall<'_, '_, B> {
+    fn really_mm(&self) -> Vec<f64> {
+        self.line.lock().line.bus().places_mm()
     }
 }
 
@@ -257,18 +441,22 @@ impl Fate {
 struct Sum {
     faults: u64,
     in_motion: u64,
+    kinds: BTreeMap<&'static str, u64>,
+    plays: u64,
     /// Plays in which an axis moved faster or harder than a seat may.
     hard: u64,
+    /// The farthest beyond a stroke, mm.
+    beyond: f64,
     velocity: f64,
-    acceleration: f64,
+    hardest: f64,
 }
 
 impl Sum {
     /// Plays to a seat while things fail, then stops it.
-    fn play(&mut self, seed: u64, failing: Failing) {
+    fn play<B: Rig>(&mut self, seed: u64, failing: Failing) {
         let harm: Arc<Mutex<Option<Harm>>> = Arc::default();
         let bad = Arc::clone(&harm);
-        hall_over(
+        B::hall_over(
             |line| Box::new(BadLine { line, harm: bad, back: Vec::new() }),
             |hall, show, _| {
                 let lead = show.lanes[0].window.lead();
@@ -279,37 +467,41 @@ impl Sum {
                 hall.runtime.desk.stop();
                 // What it has braked by itself is over by then, too, if nobody could tell it to stop.
                 hall.run(lead.as_secs_f64() + 0.3, |hall| fate.pass(hall));
-                let places = hall.places_mm();
+                let places = hall.really_mm();
                 hall.run(1.0, |hall| fate.pass(hall));
                 if failing == Failing::Line {
-                    assert_eq!(hall.places_mm(), places, "seed {seed}: it rests after a stop");
+                    assert_eq!(hall.really_mm(), places, "seed {seed}: it rests after a stop");
                 }
-                self.judge(hall, &fate, seed);
+                self.judge(hall, fate, seed);
             },
         );
     }
 
-    fn judge(&mut self, hall: &Hall<'_, '_>, fate: &Fate, seed: u64) {
+    fn judge<B: Rig>(&mut self, hall: &Hall<'_, '_, B>, fate: Fate, seed: u64) {
         let failing = fate.failing;
-        for (unit, resets) in hall.units(|unit| (unit.executed().clone(), unit.tally().resets)) {
-            let mm = |counts: f64| counts / MM;
-            let (low, high) = (mm(unit.lowest - ZERO), mm(unit.highest - ZERO));
-            let room = if failing == Failing::Digits { 1.01 } else { 0.1 };
-            let (velocity, acceleration) = (mm(unit.velocity), mm(unit.acceleration));
-            let what = format!(
-                "seed {seed}, {failing:?}: {low} to {high} mm, {velocity} mm/s, {acceleration} mm/s2, {resets} restarts"
-            );
-            assert!(low > -room && high < 150.0 + room, "{what}");
-            assert!(unit.jumps <= resets && (resets <= fate.resets || failing == Failing::Digits), "{what}");
-            let is_hard = velocity > 241.0 || acceleration > 3_030.0;
-            // A unit that is restarted stops as no seat does, by itself.
-            assert!(!is_hard || failing == Failing::Digits || resets > 0, "{what}");
-            self.hard += u64::from(is_hard && resets == 0);
-            self.velocity = self.velocity.max(velocity);
-            self.acceleration = self.acceleration.max(acceleration);
+        let mut is_hard = false;
+        for done in hall.line.lock().line.bus().done() {
+            let what = format!("seed {seed}, {failing:?}: {done:?}");
+            let room = if failing == Failing::Digits { B::DAMAGED } else { 0.1 };
+            let beyond = (-done.lowest).max(done.highest - 150.0);
+            assert!(beyond < room && done.wrong == 0.0, "{what}");
+            assert!(done.restarts <= fate.resets || failing == Failing::Digits, "{what}");
+            let exceeds = done.velocity > 241.0 || done.hardest > B::HARDEST;
+            // A unit that is restarted stops as no seat does, by itself; whoever missed targets makes up for them with the next.
+            let may = failing == Failing::Digits || done.restarts > 0 || B::ANSWER.is_some();
+            assert!(!exceeds || may, "{what}");
+            is_hard |= exceeds && done.restarts == 0;
+            self.beyond = self.beyond.max(beyond);
+            self.velocity = self.velocity.max(done.velocity);
+            self.hardest = self.hardest.max(done.hardest);
         }
+        self.hard += u64::from(is_hard);
+        self.plays += 1;
         self.faults += fate.faults;
         self.in_motion += fate.in_motion;
+        for (kind, count) in fate.kinds {
+            *self.kinds.entry(kind).or_default() += count;
+        }
     }
 }
 
@@ -319,11 +511,11 @@ fn setting(name: &str) -> Option<u64> {
 
 /// As many plays as there are faults to be, or enough of them for a quick look.
 #[expect(clippy::print_stdout, reason = "the figures are for who asks to see them")]
-fn plays(failing: Failing) {
+fn plays<B: Rig>(failing: Failing) {
     let (faults, mut seed) = (setting("KINOCUE_FAULTS").unwrap_or(60), setting("KINOCUE_SEED").unwrap_or(1));
     let (first, mut sum) = (seed, Sum::default());
     while sum.faults < faults {
-        sum.play(seed, failing);
+        sum.play::<B>(seed, failing);
         seed += 1;
     }
     println!("{failing:?}, seeds {first} to {}: {sum:?}", seed - 1);
@@ -331,15 +523,31 @@ fn plays(failing: Failing) {
 
 #[test]
 fn whatever_fails_on_a_line_no_axis_leaves_its_stroke_or_moves_harder_than_a_seat_may() {
-    plays(Failing::Line);
+    plays::<SilverBus>(Failing::Line);
 }
 
 #[test]
 fn whatever_units_do_beside_no_axis_leaves_its_stroke_or_moves_harder_than_a_seat_may() {
-    plays(Failing::Units);
+    plays::<SilverBus>(Failing::Units);
 }
 
 #[test]
 fn digits_that_units_hear_wrongly_lead_no_axis_beyond_its_soft_limits() {
-    plays(Failing::Digits);
+    plays::<SilverBus>(Failing::Digits);
+}
+
+#[test]
+fn whatever_fails_on_a_line_no_motor_leaves_its_stroke_loses_a_step_or_moves_on_after_a_stop() {
+    plays::<SixpackBus>(Failing::Line);
+}
+
+#[test]
+fn whatever_a_unit_of_motors_does_beside_no_motor_leaves_its_stroke_or_loses_a_step() {
+    plays::<SixpackBus>(Failing::Units);
+}
+
+/// Not for every seed: with 1,008 and 7,000 a motor turns on into its stop, by an order that a changed bit made of another (docs/drives.md).
+#[test]
+fn targets_that_are_damaged_lead_no_motor_farther_than_it_goes_until_the_next() {
+    plays::<SixpackBus>(Failing::Digits);
 }

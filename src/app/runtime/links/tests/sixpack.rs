@@ -5,7 +5,7 @@ use crate::drive::{motors_of, sixpack2};
 use crate::sim::sixpack2::{MOTORS, ShaftSetup, SixpackBus, SixpackFault, SixpackSetup};
 
 /// Microsteps of a millimetre.
-const MM: f64 = 640.0;
+pub(super) const MM: f64 = 640.0;
 
 const HALL: &str = "[show]\nrate_hz = 100\n[link.stalls]\nport = \"/dev/ttyUSB0\"\n\
     [seat.s]\naxes = 3\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 3200\n\
@@ -23,6 +23,14 @@ const LEVEL: f64 = 0.4;
 
 /// Opens a hall whose seat was homed, with a cue on it.
 fn hall(lead: impl FnOnce(&mut SixHall<'_, '_>, StagedShow, &Timeline)) {
+    hall_over(|line| Box::new(line), lead);
+}
+
+/// The same, where its play has the line by a port of this kind.
+pub(super) fn hall_over(
+    over: impl FnOnce(SharedLine<SixpackBus>) -> Port,
+    lead: impl FnOnce(&mut SixHall<'_, '_>, StagedShow, &Timeline),
+) {
     NOW.set(MonoTime::from_nanos(3_000_000_000));
     let config = Arc::new(read(HALL));
     let shaft = ShaftSetup { switch: Some(-2.0 * MM), ..ShaftSetup::default() };
@@ -36,7 +44,8 @@ fn hall(lead: impl FnOnce(&mut SixHall<'_, '_>, StagedShow, &Timeline)) {
     let homing = sixpack2::Homing { goes_on: &|| true, told: &mut |_| {} };
     sixpack2::home(&mut talk, seat, homing).expect("it finds its zero");
     line.lock().line.bus_mut().forget();
-    homed((config, LEVEL), line.clone(), Box::new(line), lead);
+    let port = over(line.clone());
+    homed((config, LEVEL), line, port, lead);
 }
 
 impl SixHall<'_, '_> {
@@ -56,10 +65,6 @@ impl SixHall<'_, '_> {
             assert!(executed.jump / MM < 32.0, "{} mm/s at once", executed.jump / MM);
             assert_eq!((executed.lost, motor.own_searches), (0.0, 0));
         }
-    }
-
-    fn is_led(&self) -> bool {
-        self.loops.ticks.engine.lane(0).gets_a_frame()
     }
 
     /// That nothing moves any more.
@@ -124,6 +129,16 @@ fn a_stop_brakes_the_motors_at_once_and_no_pose_that_was_under_way_moves_them_on
         assert!(reading.rests && (150.0 * reading.pose[0] - places[0]).abs() < 0.1, "{reading:?} {places:?}");
         hall.assert_gentle();
     });
+}
+
+#[test]
+fn a_seat_of_a_program_that_was_held_up_for_a_second_is_led_again_once_it_was_found() {
+    for ms in [0, 3, 5, 8, 11] {
+        hall(|hall, show, _| {
+            hall.comes_back_after_a_second(show, Duration::from_millis(ms));
+            hall.assert_gentle();
+        });
+    }
 }
 
 #[test]

@@ -1,0 +1,60 @@
+//! What any procedure asks of a unit: who it is, and where a motor of it is.
+
+use super::talk::{ANSWER, Talk, TalkFault};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _};
+use crate::wire::sixpack2::{
+    PositionQuery, PositionTold, SixpackOrder, SixpackReply, UnitQuery, UnitTold, WAKING_DIVISOR, action,
+    baud_of,
+};
+
+/// How often a unit is asked at a rate before it counts as silent there.
+const TRIES: u32 = 2;
+
+/// The rate with which units wake.
+pub(super) fn waking_baud() -> u32 {
+    baud_of(WAKING_DIVISOR).unwrap_or(19_200)
+}
+
+/// Who it is; asking clears its reset flag.
+pub(super) const WHO: SixpackOrder = SixpackOrder::AskUnit(UnitQuery { response: ANSWER });
+
+/// Who a unit is, if it is there.
+pub(super) fn who<P: LinkPort>(talk: &mut Talk<P>, unit: u8) -> Result<Option<UnitTold>, LinkFault> {
+    for _ in 0..TRIES {
+        match talk.ask(unit, WHO) {
+            Ok(SixpackReply::UnitTold(told)) => return Ok(Some(told)),
+            Err(TalkFault::Link(fault)) => return Err(fault),
+            Ok(_) | Err(TalkFault::Silent { .. }) => {}
+        }
+    }
+    Ok(None)
+}
+
+/// True where a motor that does this looks for its zero.
+pub(super) const fn searches(does: u8) -> bool {
+    matches!(does, action::SEARCH..=action::LAST_SEARCH | action::MECHANICAL)
+}
+
+/// Where a motor is.
+pub(super) fn position<P: LinkPort>(
+    talk: &mut Talk<P>,
+    unit: u8,
+    motor: u8,
+) -> Result<PositionTold, TalkFault> {
+    let reply = talk.insist(unit, where_is(motor))?;
+    told_place(reply, TalkFault::Silent { unit, baud: talk.baud() })
+}
+
+/// Where is it?
+pub(super) const fn where_is(motor: u8) -> SixpackOrder {
+    SixpackOrder::AskPosition(PositionQuery { motor, response: ANSWER })
+}
+
+/// What was answered to that.
+pub(super) fn told_place(reply: SixpackReply, other: TalkFault) -> Result<PositionTold, TalkFault> {
+    match reply {
+        SixpackReply::PositionTold(told) => Ok(told),
+        // Cannot be: an answer is one to the question.
+        _ => Err(other),
+    }
+}
