@@ -8,10 +8,12 @@ use anyhow::{Context as _, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::load::cue_exit;
+use super::record::{open, unread};
 use super::{Exit, Failure, OrExit as _, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
+use crate::record::{Places, RecordedAxis, tracks};
 
-/// Converts a cue from one format to another.
+/// Converts a cue from one format to another, or what a seat was sent in a recording into a cue.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("\
 Examples:
@@ -19,6 +21,7 @@ Examples:
   kinocue convert ride.csv storm.csv --from rows --units mm --title Storm
   kinocue convert ride.bin storm.csv --from u8 --axes 3 --rate 20
   kinocue convert --recover cut.mcap saved.mcap
+  kinocue convert tuesday.mcap ride.csv --seat F4 --take sent
 
 A cue may have {}.", limits::IN_WORDS))]
 pub(super) struct Args {
@@ -42,6 +45,12 @@ pub(super) struct Args {
     /// Recover the complete messages of a truncated or damaged MCAP.
     #[arg(long, conflicts_with = "from")]
     recover: bool,
+    /// Of a recording, the seat.
+    #[arg(long, value_name = "NAME", requires = "take", conflicts_with_all = ["from", "recover"])]
+    seat: Option<String>,
+    /// Of a recording, what is taken: where the seat was sent, or where it was measured to be.
+    #[arg(long, value_enum, value_name = "WHAT", requires = "seat")]
+    take: Option<Take>,
     /// Give the cue this title.
     #[arg(long, value_name = "TEXT")]
     title: Option<String>,
@@ -56,6 +65,13 @@ enum ConvertFormat {
     U8,
 }
 
+/// What of a recording becomes a cue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Take {
+    Sent,
+    Measured,
+}
+
 /// What is written, by the name of the output.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum ConvertTarget {
@@ -66,7 +82,11 @@ pub(super) enum ConvertTarget {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let target = target(&args.output).or_exit(Exit::Usage)?;
     refuse_to_replace(&args.output, args.force)?;
-    let mut cue = match read(args) {
+    let read = match (&args.seat, args.take) {
+        (Some(seat), Some(take)) => of_recording(&args.input, seat, take)?,
+        _ => read(args),
+    };
+    let mut cue = match read {
         Ok((cue, lost)) => {
             tell_lost(&cue, lost.as_ref());
             cue
@@ -127,6 +147,37 @@ fn read(args: &Args) -> Result<(Cue, Option<Problem>), CueFaults> {
     };
     bar.finish_and_clear();
     cue
+}
+
+/// A seat of a recording as a cue from its first instant on, checked like any other.
+fn of_recording(
+    path: &Path,
+    name: &str,
+    take: Take,
+) -> Result<Result<(Cue, Option<Problem>), CueFaults>, Failure> {
+    let from = if take == Take::Sent { Places::Sent } else { Places::Measured };
+    let (contents, mut tracks, _) = tracks(open(path)?, from).map_err(|error| unread(error, path))?;
+    let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
+    let error = || anyhow!("--seat {name}: the seats are {}", names.join(", "));
+    let lane = contents.seat(name).ok_or_else(error).or_exit(Exit::Usage)?;
+    let track = tracks.remove(name).unwrap_or_default();
+    let (Some((first, places)), axes) = (track.first(), contents.seats[lane].axes()) else {
+        let error = anyhow!("{}: nothing of {name} was recorded while the film ran", path.display());
+        return Err(error).or_exit(Exit::BadCue);
+    };
+    let units: Vec<&str> = axes.iter().map(|axis| axis.unit.name()).collect();
+    let names = (1..=places.len()).map(|axis| format!(",a{axis}")).collect::<String>();
+    let mut text = format!("# units: {}\n# interpolation: linear\ntime_s{names}\n", units.join(","));
+    for (at, places) in &track {
+        // A pulse that lies outside of the stroke by rounding is at its end.
+        let place = |(place, axis): (&f32, &RecordedAxis)| {
+            format!(",{:.4}", f64::from(*place).clamp(axis.low, axis.low + axis.stroke))
+        };
+        text += &format!("{:.6}{}\n", at - first, places.iter().zip(axes).map(place).collect::<String>());
+    }
+    // As text it is, whatever the recording is called.
+    let named = PathBuf::from(format!("{} of {}", name, path.display())).with_extension("csv");
+    Ok(cue::read(&named, text.as_bytes(), &Source::Native).map(|cue| (cue, None)))
 }
 
 fn tell_lost(cue: &Cue, lost: Option<&Problem>) {

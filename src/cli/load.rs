@@ -67,7 +67,7 @@ pub(super) struct SeatArgs {
 
     /// The seat type to check against [default: each axis that of its controller; bench3 without a configuration].
     #[arg(long, value_name = "NAME")]
-    seat: Option<String>,
+    pub(super) seat: Option<String>,
 
     /// Frames per second [default: the configuration's, else 100].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]

@@ -29,6 +29,7 @@ mod load;
 mod man;
 mod play;
 mod plot;
+mod plot_recording;
 mod preflight;
 mod print;
 mod prove;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 
 use super::load::{self, SeatArgs};
-use super::{Exit, Failure, OrExit as _, convert, figures, print};
+use super::{Exit, Failure, OrExit as _, convert, figures, plot_recording, print};
 use crate::cue::Source;
 use crate::motion::SeatAxis;
 use crate::plot::{self, Columns, Picture, Subject, Theme};
@@ -20,23 +20,31 @@ const AROUND: ShowTime = ShowTime::from_millis(5_000);
 const WIDTH: u16 = 100;
 /// Columns of a file, shared out among the axes: what keeps it under 500 kB.
 const FILE_COLUMNS: usize = 7_200;
+/// The same of a recording, which has more lines.
+const RECORDING_COLUMNS: usize = 900;
 /// The greatest width of a terminal that is used, characters.
 const WIDEST: u16 = 240;
 
-/// Draws a cue: where it goes, and what that asks of a seat.
+/// Draws a cue, where it goes and what that asks of a seat; or a recording, what a seat was asked and sent, and what went wrong.
 ///
 /// On a terminal in braille; with -o as a page or an SVG that stand alone. Speed, acceleration and jerk are those of `kinocue
-/// info` and `kinocue check`, as parts of their limits.
+/// info` and `kinocue check`, as parts of their limits. Of a recording, --seat is the seat's name; without it that is drawn which was
+/// held back farthest.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue plot cues/coaster.csv",
     "kinocue plot cues/storm.mcap -o storm.html",
     "kinocue plot cues/coaster.csv --at 00:32.5 --theme print -o jerk.svg",
     "kinocue plot cues/voyage.csv --config hall.toml --from 0:10 --to 0:20",
+    "kinocue plot last --seat F4 --at 47:10",
+    "kinocue plot tuesday.mcap monday.mcap --seat F4 -o both.html",
 ]))]
 pub(super) struct Args {
-    /// The cue, CSV or MCAP.
+    /// The cue, CSV or MCAP; or a recording; or the word last, for the newest recording of this folder.
     cue: PathBuf,
+
+    /// Another recording, whose sent positions are laid over.
+    other: Option<PathBuf>,
 
     #[command(flatten)]
     seat: SeatArgs,
@@ -82,6 +90,28 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if let Some((path, _)) = file {
         convert::refuse_to_replace(path, args.force)?;
     }
+    if let Some(recording) = plot_recording::meant(&args.cue)? {
+        let (from, until) = args.stretch();
+        let asked = plot_recording::Asked {
+            file: &recording,
+            other: args.other.as_deref(),
+            seat: args.seat.seat.as_deref(),
+            from,
+            until,
+            columns: if file.is_some() {
+                RECORDING_COLUMNS
+            } else {
+                2 * plot::cells(usize::from(width())) - 1
+            },
+            is_detailed: file.is_some() || args.json,
+        };
+        tell(&plot_recording::picture(&asked)?, file, args)?;
+        return Ok(Exit::Done);
+    }
+    if let Some(other) = &args.other {
+        let error = anyhow!("{}: only a recording is laid over another", other.display());
+        return Err(error).or_exit(Exit::Usage);
+    }
     let hall = args.seat.config.as_deref().map(load::config).transpose()?;
     let judge = args.seat.judge(hall)?;
     let timeline = Timeline::new(load::cue(&args.cue, &Source::Native)?);
@@ -102,15 +132,20 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 impl Args {
+    /// The ends of what is asked for.
+    fn stretch(&self) -> (Option<ShowTime>, Option<ShowTime>) {
+        match self.at {
+            Some(at) => {
+                (Some(at.since(AROUND)), Some(ShowTime::from_nanos(at.as_nanos() + AROUND.as_nanos())))
+            }
+            None => (self.from, self.to),
+        }
+    }
+
     /// What is shown of a cue that lasts so long.
     fn window(&self, end: ShowTime) -> Result<(ShowTime, ShowTime), Failure> {
-        let (from, until) = match self.at {
-            Some(at) => (
-                at.since(AROUND).max(ShowTime::ZERO),
-                ShowTime::from_nanos(at.as_nanos() + AROUND.as_nanos()),
-            ),
-            None => (self.from.unwrap_or(ShowTime::ZERO), self.to.unwrap_or(end)),
-        };
+        let (from, until) = self.stretch();
+        let (from, until) = (from.unwrap_or(ShowTime::ZERO).max(ShowTime::ZERO), until.unwrap_or(end));
         let until = until.min(end);
         if from >= until {
             let error = anyhow!("nothing to show from {from} to {until}; the cue is {end} long");

@@ -28,9 +28,9 @@ pub(crate) fn braille(picture: &Picture) -> String {
     let mut lines = vec![plain::escaped(&picture.title, 200).into_owned(), picture.sentence.clone()];
     for panel in &picture.panels {
         match panel.scale {
-            Scale::Range => {
-                (0..panel.bands.len()).for_each(|band| lines.extend(position(panel, band, cells)))
-            }
+            Scale::Range => (0..panel.bands.len())
+                .filter(|band| !panel.bands[*band].name.is_empty())
+                .for_each(|band| lines.extend(position(panel, band, cells))),
             Scale::Limit => lines.extend(measured(panel, cells)),
         }
     }
@@ -38,6 +38,11 @@ pub(crate) fn braille(picture: &Picture) -> String {
     lines.push(times(picture, cells));
     for flag in &picture.flags {
         lines.push(format!("{:BEFORE$}{} {}", "", clock(flag.at_s, 0.0), plain::escaped(&flag.name, 200)));
+    }
+    for one in &picture.histograms {
+        let bar = |(end, count): &(String, u64)| (*count > 0).then(|| format!("to {end}: {count}"));
+        let bars: Vec<String> = one.bins.iter().filter_map(bar).collect();
+        lines.push(format!("{}  {}", one.name, bars.join("  ")));
     }
     lines.extend(picture.facts.iter().map(|fact| plain::escaped(fact, 400).into_owned()));
     lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()

@@ -1,10 +1,11 @@
 //! Pictures of motion over time: a [`Picture`] into braille for a terminal, into SVG, and into a page. Control thread; pure.
 //!
 //! The picture knows neither cue nor recording: bands over columns of time, lanes of what is on, flags and marks. What is drawn of
-//! a cue is made in `of_cue`; asked, sent and measured positions, lateness and states of a recording are more bands and lanes.
+//! a cue is made in `of_cue`, what is drawn of a recording in `of_recording`.
 
 mod braille;
 mod of_cue;
+mod of_recording;
 mod page;
 mod path;
 mod scale;
@@ -16,6 +17,7 @@ mod theme;
 
 pub(crate) use braille::{braille, cells};
 pub(crate) use of_cue::{Columns, Subject, of_cue};
+pub(crate) use of_recording::{Gathered, Look, of_recording};
 pub(crate) use page::page;
 pub(crate) use svg::svg;
 pub(crate) use theme::Theme;
@@ -39,8 +41,41 @@ pub(crate) struct Picture {
     pub(crate) lanes: Vec<Lane>,
     /// Named instants.
     pub(crate) flags: Vec<Flag>,
-    /// The figures as words, a row each.
-    pub(crate) table: Vec<[String; 6]>,
+    /// How often what, as bars.
+    pub(crate) histograms: Vec<Histogram>,
+    /// The figures as words.
+    pub(crate) table: Table,
+}
+
+/// Figures as words, a row each.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(crate) struct Table {
+    /// What they are of.
+    pub(crate) name: &'static str,
+    /// What stands in each column.
+    pub(crate) head: [&'static str; 6],
+    /// The rows.
+    pub(crate) rows: Vec<[String; 6]>,
+}
+
+/// How often something was in each of some bins.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Histogram {
+    /// Of what.
+    pub(crate) name: &'static str,
+    /// The upper end of each bin in words, and how often it was met.
+    pub(crate) bins: Vec<(String, u64)>,
+}
+
+impl Histogram {
+    /// How high the bar of a bin is, 0 to 1: by the logarithm, so that what was met once shows beside what was met a million times.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "a picture is no finer")]
+    pub(crate) fn height(&self, count: u64) -> f64 {
+        let most = self.bins.iter().map(|(_, count)| *count).max().unwrap_or(0);
+        let log = |count: u64| (1.0 + count as f64).ln();
+        if most == 0 { 0.0 } else { log(count) / log(most) }
+    }
 }
 
 /// Columns of time, all equally long.

@@ -1,7 +1,7 @@
 //! A cue on its seats as a picture: positions in the stroke, what they come to of the limits, vibration, outputs and markers.
 
 use super::text::number;
-use super::{Band, Flag, Lane, Mark, Panel, Picture, Scale, Shade, TimeAxis};
+use super::{Band, Flag, Lane, Mark, Panel, Picture, Scale, Shade, Table, TimeAxis};
 use crate::channel;
 use crate::cue::{Effects, Place, TrackStep, Vibration};
 use crate::motion::{AxisGeometry, SeatAxis};
@@ -82,7 +82,12 @@ pub(crate) fn of_cue(subject: Subject<'_>, columns: Columns) -> Picture {
         panels: view.positions().into_iter().chain((0..3).map(|order| view.measured(order))).collect(),
         lanes: view.vibration().into_iter().chain(view.outputs()).collect(),
         flags: flags.filter(|flag| time.part(flag.at_s).is_some()).collect(),
-        table: view.table(),
+        histograms: Vec::new(),
+        table: Table {
+            name: "Most of each axis",
+            head: ["axis", "what", "most", "of limit", "at", "in the file"],
+            rows: view.table(),
+        },
     }
 }
 

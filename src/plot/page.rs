@@ -9,7 +9,7 @@ use super::path::{self, HEIGHT};
 use super::svg::names;
 use super::text::{clock, number, safe};
 use super::theme::{Theme, classes};
-use super::{Lane, Panel, Picture, Scale, TimeAxis, scale};
+use super::{Histogram, Lane, Panel, Picture, Scale, TimeAxis, scale};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -25,7 +25,7 @@ pub(crate) fn page(picture: &Picture, theme: Theme) -> String {
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{}'\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>{}\n{STYLE}</style></head>\n\
          <body><main data-from=\"{}\" data-until=\"{}\" data-columns=\"{}\">\n<h1>{title}</h1>\n<p class=\"sentence\">{}</p>\n{TOOLS}\n\
-         {}{}{}{}\n{}<footer>{facts}</footer></main>\n<script>{SCRIPT}</script></body></html>\n",
+         {}{}{}{}\n{}{}<footer>{facts}</footer></main>\n<script>{SCRIPT}</script></body></html>\n",
         STANDARD.encode(Sha256::digest(SCRIPT)),
         theme.css(),
         time.from_s,
@@ -36,6 +36,7 @@ pub(crate) fn page(picture: &Picture, theme: Theme) -> String {
         picture.panels.iter().map(|panel| section(panel, time)).collect::<String>(),
         picture.lanes.iter().map(|one| lane(one, time)).collect::<String>(),
         times(time),
+        picture.histograms.iter().map(histogram).collect::<String>(),
         table(picture),
     )
 }
@@ -152,16 +153,30 @@ fn times(time: &TimeAxis) -> String {
     format!("<div class=\"box times ticks\">{}</div>", ticks.at.iter().map(tick).collect::<String>())
 }
 
+/// Bars of equal width, each over the end of its bin.
+fn histogram(histogram: &Histogram) -> String {
+    let bar = |(end, count): &(String, u64)| {
+        let high = 100.0 * histogram.height(*count);
+        let (end, count) = (safe(end), if *count > 0 { count.to_string() } else { String::new() });
+        format!("<li><b>{count}</b><i style=\"height:{high:.1}%\"></i><span>{end}</span></li>")
+    };
+    let bars: String = histogram.bins.iter().map(bar).collect();
+    format!(
+        "<section>{}<ul class=\"bars\">{bars}</ul></section>\n",
+        head(histogram.name, "how often, up to; heights by the logarithm")
+    )
+}
+
 fn table(picture: &Picture) -> String {
-    if picture.table.is_empty() {
+    let super::Table { name, head, rows } = &picture.table;
+    if rows.is_empty() {
         return String::new();
     }
     let row = |row: &[String; 6]| {
         let cells: String = row.iter().map(|cell| format!("<td>{}</td>", safe(cell))).collect();
         format!("<tr>{cells}</tr>\n")
     };
-    let rows: String = picture.table.iter().map(row).collect();
-    format!(
-        "<section class=\"scrolls\"><h2>Most of each axis</h2><table><tr><th>axis<th>what<th>most<th>of limit<th>at<th>in the file</tr>\n{rows}</table></section>\n"
-    )
+    let head: String = head.iter().map(|cell| format!("<th>{cell}")).collect();
+    let rows: String = rows.iter().map(row).collect();
+    format!("<section class=\"scrolls\"><h2>{name}</h2><table><tr>{head}</tr>\n{rows}</table></section>\n")
 }

@@ -3,7 +3,7 @@
 use super::path::{self, HEIGHT};
 use super::text::{clock, number, safe};
 use super::theme::{Theme, classes};
-use super::{Lane, Panel, Picture, Scale, TimeAxis, scale};
+use super::{Histogram, Lane, Panel, Picture, Scale, TimeAxis, scale};
 
 /// The whole, px.
 const WIDTH: f64 = 1200.0;
@@ -42,11 +42,14 @@ pub(crate) fn svg(picture: &Picture, theme: Theme) -> String {
     body += &flags;
     body += &times(&picture.time, y + 6.0);
     y += 2.0 * LINE;
+    for one in &picture.histograms {
+        body += &histogram(one, &mut y);
+    }
     for fact in &picture.facts {
         y += 18.0;
         body += &words(LEFT, y, "quiet", &safe(fact));
     }
-    let rows: String = picture.table.iter().map(|row| safe(&row.join(" ")) + "\n").collect();
+    let rows: String = picture.table.rows.iter().map(|row| safe(&row.join(" ")) + "\n").collect();
     let (title, sentence, height) = (safe(&picture.title), safe(&picture.sentence), y + 16.0);
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" role=\"img\" width=\"{WIDTH}\" height=\"{height}\" \
@@ -156,6 +159,7 @@ pub(super) fn names(panel: &Panel, high: f64, apart: f64) -> Vec<(usize, &str, f
     let mut names: Vec<_> = panel
         .bands
         .iter()
+        .filter(|band| !band.name.is_empty())
         .filter_map(|band| {
             let [least, most] = band.last()?.map(f64::from);
             let end = if panel.scale == Scale::Limit { most } else { f64::midpoint(least, most) };
@@ -197,6 +201,31 @@ fn lane(lane: &Lane, columns: usize, y: &mut f64) -> String {
     }
     *y += 18.0;
     out + "</g>"
+}
+
+/// Bars of equal width, each over the end of its bin.
+#[expect(clippy::cast_precision_loss, reason = "some bins")]
+fn histogram(histogram: &Histogram, y: &mut f64) -> String {
+    const HIGH: f64 = 80.0;
+    *y += 26.0;
+    let mut out = format!(
+        "<text x=\"{LEFT}\" y=\"{:.1}\"><tspan class=\"head\">{}</tspan> <tspan class=\"quiet\" dx=\"8\">how often, up to; heights by the \
+         logarithm</tspan></text><g class=\"lane\">",
+        *y, histogram.name
+    );
+    let wide = LENGTH / histogram.bins.len().max(1) as f64;
+    let ground = *y + 24.0 + HIGH;
+    let mut words_ = String::new();
+    for (index, (end, count)) in histogram.bins.iter().enumerate() {
+        let (x, high) = (LEFT + wide * index as f64, HIGH * histogram.height(*count));
+        out += &format!("<path d=\"M{:.1} {ground:.1}v-{high:.1}h{:.1}v{high:.1}z\"/>", x + 2.0, wide - 4.0);
+        words_ += &words(x + 4.0, ground + 15.0, "quiet", &safe(end));
+        if *count > 0 {
+            words_ += &words(x + 4.0, ground - high - 4.0, "", &count.to_string());
+        }
+    }
+    *y = ground + 22.0;
+    format!("{out}</g>{words_}<path class=\"grid\" d=\"M{LEFT} {ground:.1}h{LENGTH}\"/>")
 }
 
 /// The names of flags in rows that do not run into each other, and how deep they are.

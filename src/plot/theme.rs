@@ -29,7 +29,8 @@ const SHAPES: &str = ".curve{fill:none;stroke-width:1.4;stroke-linejoin:round;ve
 .range{fill-opacity:.22}.dashed{stroke-dasharray:6 4}\
 .s0{--line:var(--s0)}.s1{--line:var(--s1)}.s2{--line:var(--s2)}.s3{--line:var(--s3)}.s4{--line:var(--s4)}.s5{--line:var(--s5)}\
 .curve{stroke:var(--line)}.range{fill:var(--line)}.name{fill:var(--line);color:var(--line);font-weight:600}\
-.lane{fill:var(--s0)}.t0{fill-opacity:.35}.t1{fill-opacity:.55}.t2{fill-opacity:.78}";
+.lane{fill:var(--s0)}.t0{fill-opacity:.35}.t1{fill-opacity:.55}.t2{fill-opacity:.78}\
+path.t3{stroke:var(--s0);stroke-width:1px;vector-effect:non-scaling-stroke}";
 
 impl Theme {
     /// The style sheet, for whatever has the class `plot` and is in it.

@@ -79,6 +79,13 @@ impl Handed {
     pub(super) const ALL: [Self; 3] = [Self::Taken, Self::TakenAfterRefusal, Self::Refused];
 }
 
+impl Handed {
+    /// Whether the kernel has it.
+    pub(crate) const fn is_taken(self) -> bool {
+        !matches!(self, Self::Refused)
+    }
+}
+
 impl From<Delivery> for Handed {
     fn from(delivery: Delivery) -> Self {
         match delivery {

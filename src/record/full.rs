@@ -99,11 +99,6 @@ pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
     Acks { drains: drains.to_vec() }.encode_to_vec()
 }
 
-/// The drains of a message.
-pub(super) fn drains(message: &[u8]) -> Option<Vec<u8>> {
-    Acks::decode(message).ok().map(|acks| acks.drains)
-}
-
 /// Ticks that become a block.
 #[derive(Debug, Default)]
 pub(crate) struct Block {

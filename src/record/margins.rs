@@ -1,11 +1,15 @@
 //! What was sent, measured as the proof measures: the greatest speed, acceleration and jerk of each axis, and when.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Serialize};
 
 use super::RecordedSeat;
 use super::chunk::{Chunk, Handed};
 use crate::motion::{Measure, Reading, Spacing};
+use crate::plain::escaped;
 use crate::time::{MonoTime, Rate, ShowTime};
+use crate::wire::Timing;
 
 /// After so long without a frame a seat is taken to rest, and is measured anew.
 const APART_NS: u64 = 500_000_000;
@@ -58,6 +62,14 @@ impl Margin {
     pub(crate) fn part(&self) -> f64 {
         self.value / self.limit
     }
+
+    /// In words: which axis of which seat, when, and how near.
+    pub(crate) fn in_words(&self) -> String {
+        let Self { seat, axis, quantity, value, limit, film_s } = self;
+        let (seat, at) = (escaped(seat, 200), ShowTime::from_secs_f64(*film_s));
+        let (word, percent) = (quantity.word(), 100.0 * self.part());
+        format!("{word} of {seat} a{axis} at {at}, {value:.0} of {limit:.0}, {percent:.0} %")
+    }
 }
 
 /// A measure of what each seat is sent.
@@ -70,6 +82,9 @@ pub(crate) struct Margins {
 #[derive(Debug)]
 struct Lane {
     last: Option<MonoTime>,
+    /// When its last frame is reached by the Times of its frames, which seats go by; and the Time of that.
+    reached: ShowTime,
+    time_ms: u32,
     axes: Vec<Axis>,
 }
 
@@ -88,8 +103,12 @@ impl Margins {
     pub(crate) fn new(seats: &[RecordedSeat], rate: Rate) -> Self {
         let spacing = Spacing::at_rate(rate.hz());
         let axis = || Axis { measure: Measure::new(spacing), most: [(0.0, ShowTime::ZERO); 3] };
-        let lane =
-            |seat: &RecordedSeat| Lane { last: None, axes: seat.axes().iter().map(|_| axis()).collect() };
+        let lane = |seat: &RecordedSeat| Lane {
+            last: None,
+            reached: ShowTime::ZERO,
+            time_ms: 0,
+            axes: seat.axes().iter().map(|_| axis()).collect(),
+        };
         Self { spacing, lanes: seats.iter().map(lane).collect() }
     }
 
@@ -120,12 +139,16 @@ impl Margins {
                 head.deadline > last && head.deadline.since(last).as_nanos() < APART_NS.into()
             };
             let goes_on = lane.last.replace(head.deadline).is_some_and(is_next);
-            for (index, (axis, place)) in lane.axes.iter_mut().zip(seat.sent(&frame)).enumerate() {
+            let Some((places, timing, time_ms)) = seat.motion(&frame) else { continue };
+            let before = std::mem::replace(&mut lane.time_ms, time_ms);
+            let lasts = if timing == Timing::Relative { time_ms } else { time_ms.saturating_sub(before) };
+            lane.reached += Duration::from_millis(u64::from(lasts.max(1)));
+            for (index, (axis, place)) in lane.axes.iter_mut().zip(places).enumerate() {
                 if !goes_on {
                     axis.measure = Measure::new(*spacing);
                 }
                 let limits = seat.axes()[index].limits();
-                tell(frame.lane, index, axis.push(head.deadline, head.film, place, limits));
+                tell(frame.lane, index, axis.push(lane.reached, head.film, place, limits));
             }
         }
     }
@@ -158,8 +181,7 @@ impl Margins {
 
 impl Axis {
     /// Takes a place, and gives what that showed.
-    fn push(&mut self, at: MonoTime, film: ShowTime, place: f64, limits: [f64; 3]) -> Parts {
-        let now = ShowTime::from_nanos(at.as_nanos().cast_signed());
+    fn push(&mut self, now: ShowTime, film: ShowTime, place: f64, limits: [f64; 3]) -> Parts {
         let seen = self.measure.push(now, place);
         let shown = [seen.velocity, seen.acceleration, seen.jerk];
         // What is shown was half a difference ago, and the film went on since.

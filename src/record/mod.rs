@@ -8,7 +8,9 @@
 mod acks;
 mod chunk;
 mod columns;
+mod compare;
 mod cursor;
+mod cut;
 mod descriptors;
 mod flight;
 mod full;
@@ -35,21 +37,22 @@ pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
 #[cfg(feature = "harness")]
 pub(crate) use chunk::{Handed, SentFrame};
+pub(crate) use compare::{Comparison, Places, compare, tracks};
+pub(crate) use cut::{CutError, Manner as CutManner, Stretch, cut, each_tick};
 pub(crate) use flight::{Entry, Flight, read as read_flight};
 pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
 pub(crate) use intake::{Counts, Intake, Taps};
 pub(crate) use margins::{Margin, Margins, Quantity};
 pub(crate) use notes::{ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote};
-#[cfg(any(test, feature = "harness"))]
-pub(crate) use read::Told;
-pub(crate) use read::{Contents, ReadError, Wanted, beginning, read};
+pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;
 pub(crate) use recording::{About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ, state_number};
 pub(crate) use recover::{RecoverError, Recovered, recover};
-pub(crate) use sampled::{Message, Sampled};
+pub(crate) use sampled::{Message, Sampled, SeatSample, TickSample};
+pub(crate) use seat::RecordedAxis;
 pub use seat::{FrameKind, RecordedSeat};
-#[cfg(test)]
-pub(crate) use summary::each_chunk;
-pub(crate) use summary::{Summary, summarize};
+pub(crate) use summary::{SeatTotals, Summary, each_chunk, state_word, summarize};
 pub(crate) use tap::octets_a_second;
 pub use tap::{Tap, tap};
+#[cfg(test)]
+pub(crate) use tests::recorded_as;

@@ -20,11 +20,11 @@ fn swing(ticks: u32) -> impl Iterator<Item = (f64, f64)> {
     })
 }
 
-/// The heads and the frames' octets of some chunks.
-/// The lane of a frame, when it was handed over, what became of it, and its octets.
-type ReadFrame = (usize, MonoTime, Handed, Vec<u8>);
+/// Lane, instant, fate and octets of a frame.
+type Frame = (usize, MonoTime, Handed, Vec<u8>);
 
-fn told(octets: &[u8]) -> Vec<(TickHead, u32, Vec<ReadFrame>)> {
+/// The heads and the frames of some chunks.
+fn told(octets: &[u8]) -> Vec<(TickHead, u32, Vec<Frame>)> {
     let mut all = Vec::new();
     each_chunk(octets, |chunk| {
         let frames = chunk.frames().map(|one| (one.lane, one.at, one.handed, one.datagram.to_vec()));

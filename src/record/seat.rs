@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::chunk::{Asked, SentFrame, longest_frame};
 use crate::drive::link::{LinkPose, RECORD_LEN};
 use crate::motion::{AxisUnit, MAX_AXES, Pulses, Window};
-use crate::wire::{MotionRequest, VibrationPort, motion_len};
+use crate::wire::{MotionRequest, Timing, VibrationPort, motion_len};
 
 /// What the frames of a lane are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -111,6 +111,11 @@ impl RecordedSeat {
         Self { address: Some(address), ..self }
     }
 
+    /// The same without name and address, which nobody knows again.
+    pub(super) fn without_names(&self, index: usize) -> Self {
+        Self { name: format!("S{}", index + 1), address: None, ..self.clone() }
+    }
+
     /// Its axes, in their order.
     pub(crate) fn axes(&self) -> &[RecordedAxis] {
         &self.axes
@@ -164,21 +169,23 @@ impl RecordedSeat {
 
     /// Where its axes were sent, millimetres or degrees; none where that is no frame of its kind.
     pub(crate) fn sent(&self, frame: &SentFrame<'_>) -> Vec<f64> {
+        self.motion(frame).map(|(places, ..)| places).unwrap_or_default()
+    }
+
+    /// The same, with what its Time counts from, and that Time in ms.
+    pub(super) fn motion(&self, frame: &SentFrame<'_>) -> Option<(Vec<f64>, Timing, u32)> {
         match self.frames {
             FrameKind::Datagram(port) => {
-                let request = MotionRequest::parse_as(port, frame.datagram).ok();
-                let place = |request: &MotionRequest, axis: &RecordedAxis| {
+                let request = MotionRequest::parse_as(port, frame.datagram).ok()?;
+                let place = |axis: &RecordedAxis| {
                     request.positions.get(axis.slot).map(|at| f64::from(at.0) * axis.pulse)
                 };
-                let places =
-                    |request| self.axes.iter().map_while(move |axis| place(&request, axis)).collect();
-                request.map(places).unwrap_or_default()
+                Some((self.axes.iter().map_while(place).collect(), request.timing, request.time_ms))
             }
             FrameKind::Pose => {
-                let pose = frame.datagram.try_into().map(LinkPose::parse);
-                let place =
-                    |pose: &LinkPose, axis: &RecordedAxis| axis.low + pose.axes[axis.slot] * axis.stroke;
-                pose.map(|pose| self.axes.iter().map(|axis| place(&pose, axis)).collect()).unwrap_or_default()
+                let pose = LinkPose::parse(frame.datagram.try_into().ok()?);
+                let place = |axis: &RecordedAxis| axis.low + pose.axes[axis.slot] * axis.stroke;
+                Some((self.axes.iter().map(place).collect(), Timing::Relative, pose.lasts_ms))
             }
         }
     }

@@ -72,7 +72,7 @@ fn recorded(ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
     recorded_as(Mode::Sampled, ticks)
 }
 
-pub(super) fn recorded_as(mode: Mode, ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
+pub(crate) fn recorded_as(mode: Mode, ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
     let seats = [seat()];
     let (Taps { ticks: mut tap, mut acks }, intake) =
         Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);

@@ -23,6 +23,18 @@ pub(crate) fn is_installed(program: &str) -> bool {
     installed
 }
 
+/// The same of something that is no program of the path: whether it is there, and how to get it.
+///
+/// # Panics
+/// Where it is not there and nobody asked for that.
+#[allow(dead_code, reason = "each test uses its own part")]
+pub(crate) fn is_there(name: &str, there: bool, remedy: &str) -> bool {
+    if !there {
+        let _ = writeln!(std::io::stderr(), "{name} is not there: {remedy}");
+    }
+    is_wanted(name, there, &std::env::var(WITHOUT).unwrap_or_default())
+}
+
 fn is_wanted(program: &str, installed: bool, without: &str) -> bool {
     assert!(
         installed || without.split_whitespace().any(|name| name == program),

@@ -1,10 +1,14 @@
 //! `--record`: the file that a play leaves, read by the library that viewers read with.
 
+use std::net::UdpSocket;
+use std::path::Path;
+use std::process::Command;
+
 use mcap::{MessageStream, Summary};
 use serde_json::Value;
 
-use super::process::{Sim, play};
-use super::{Folder, STROKE};
+use super::process::{Sim, kinocue, play};
+use super::{Folder, STROKE, programs};
 
 /// All messages of a topic.
 fn messages(file: &[u8], topic: &str) -> Vec<Value> {
@@ -55,4 +59,141 @@ fn a_file_that_is_there_is_not_recorded_over_and_nothing_is_played() {
     assert!(run.stderr.contains("yesterday.mcap"), "{}", run.stderr);
     assert_eq!(std::fs::read(&path).expect("it is there"), b"yesterday");
     assert!(sim.end().rows.is_empty());
+}
+
+/// Records a nod in full, to whoever is there.
+fn recorded_in_full(folder: &Folder, to: &str, more: &[&str]) -> (std::path::PathBuf, Value) {
+    let path = folder.path("nod.mcap");
+    let args = [&["--json", "--record", text(&path), "--record-mode", "full"], more].concat();
+    let report = play(&folder.nod(&[0.1]), &[format!("{to},name=F4")], &args).report_of(0);
+    (path, report)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("UTF-8")
+}
+
+/// The datagrams of a capture of raw IPv4.
+fn datagrams(pcap: &[u8]) -> Vec<Vec<u8>> {
+    let (mut rest, mut all) = (&pcap[24..], Vec::new());
+    while let Some((head, behind)) = rest.split_first_chunk::<16>() {
+        let length = u32::from_le_bytes(head[8..12].try_into().expect("four octets")) as usize;
+        all.push(behind[28..length].to_vec());
+        rest = &behind[length..];
+    }
+    all
+}
+
+#[test]
+fn every_datagram_comes_back_from_a_whole_recording_as_the_controller_received_it() {
+    let folder = Folder::new();
+    let controller = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    let address = controller.local_addr().expect("it is bound");
+    let received = std::thread::spawn(move || {
+        let (mut all, mut octets) = (Vec::new(), [0; 2_000]);
+        loop {
+            let (length, _) = controller.recv_from(&mut octets).expect("loopback works");
+            if &octets[..length] == b"end" {
+                return all;
+            }
+            all.push(octets[..length].to_vec());
+        }
+    });
+    let (path, report) = recorded_in_full(&folder, &address.to_string(), &["--no-acks"]);
+    UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.send_to(b"end", address)).expect("sent");
+    let received = received.join().expect("it ends");
+    let pcap = folder.path("nod.pcap");
+    let run = kinocue(&["record", "cut", text(&path), "--pcap", "-o", text(&pcap)]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let kept = datagrams(&std::fs::read(&pcap).expect("it is there"));
+    assert_eq!(Value::from(kept.len()), report["controllers"][0]["sent"]);
+    assert!(kept == received, "{} kept, {} received", kept.len(), received.len());
+    let run = kinocue(&["decode", text(&pcap), "--all"]);
+    assert!(run.code == Some(0) && run.stdout.lines().count() >= kept.len(), "{run:?}");
+}
+
+#[test]
+fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let (path, report) = recorded_in_full(&folder, &sim.addresses[0], &[]);
+    let of = |arguments: &[&str]| {
+        let run = kinocue(arguments);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        run.stdout
+    };
+    let info: Value = serde_json::from_str(&of(&["record", "info", text(&path), "--json"])).expect("JSON");
+    assert_eq!(info["seats"][0]["sent"], report["controllers"][0]["sent"]);
+    assert_eq!(
+        info["end"]["frames"].as_str().map(str::to_owned),
+        Some(report["controllers"][0]["sent"].to_string())
+    );
+    let most: Value = serde_json::from_str(info["end"]["most"].as_str().expect("JSON in it")).expect("JSON");
+    assert_eq!(most, info["most"], "measured again, the same comes nearest");
+    assert!(of(&["record", "list", text(path.parent().expect("a folder"))]).contains("nod.mcap"));
+    let said = of(&["plot", text(&path), "--seat", "F4"]);
+    let sentence = said.lines().nth(1).expect("a sentence");
+    assert!(sentence.starts_with("F4: sent as it was asked for; "), "{sentence}");
+    let picture: Value = serde_json::from_str(&of(&["plot", text(&path), "--json"])).expect("JSON");
+    let speed = picture["panels"]
+        .as_array()
+        .expect("panels")
+        .iter()
+        .find(|one| one["name"] == "Speed")
+        .expect("of limits");
+    let of_info = info["most"].as_array().expect("all").iter().filter(|one| one["quantity"] == "speed");
+    let of_info = of_info
+        .map(|one| one["value"].as_f64().expect("a number") / one["limit"].as_f64().expect("a number"));
+    let worst = of_info.fold(0.0, f64::max);
+    assert!(
+        (speed["marks"][0]["value"].as_f64().expect("a number") / 100.0 - worst).abs() < 1e-12,
+        "{speed}"
+    );
+    let cut = folder.path("cut.mcap");
+    of(&["record", "cut", text(&path), "--film", "0..0.5", "--anonymous", "--whole", "-o", text(&cut)]);
+    let octets = std::fs::read(&cut).expect("it is there");
+    assert!(!octets.windows(2).any(|pair| pair == b"F4"), "no name is in it");
+    let seat = messages(&octets, "/seat/S1");
+    assert!(
+        seat.len() >= 50
+            && seat.iter().all(|one| (0.0..=0.5).contains(&one["film_s"].as_f64().expect("a time")))
+    );
+    let rows = folder.path("rows.csv");
+    of(&["record", "cut", text(&path), "--seat", "F4", "--csv", "-o", text(&rows)]);
+    let rows = std::fs::read_to_string(rows).expect("it is there");
+    let frames = report["controllers"][0]["sent"].as_u64().expect("a count");
+    assert_eq!(rows.lines().count() as u64, frames + 1);
+    of(&["record", "compare", text(&path), text(&path), "--tolerance", "0mm"]);
+    let again = folder.path("again.csv");
+    of(&["convert", text(&path), text(&again), "--seat", "F4", "--take", "sent"]);
+    of(&["info", text(&again)]);
+    assert_eq!(kinocue(&["plot", text(&path), "--seat", "nobody"]).code, Some(64));
+    drop(sim.end());
+}
+
+#[test]
+fn the_official_python_reader_reads_a_recording_with_the_counts_that_we_tell() {
+    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers/bin/python");
+    if !programs::is_there("python-mcap", python.is_file(), "tests/readers.sh installs it") {
+        return;
+    }
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let (path, report) = recorded_in_full(&folder, &sim.addresses[0], &[]);
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/play/read_recording.py");
+    let run = Command::new(python).args([script, text(&path)]).output().expect("it runs");
+    assert!(run.status.success(), "{run:?}");
+    let theirs: Value = serde_json::from_slice(&run.stdout).expect("JSON");
+    let ours = kinocue(&["record", "info", text(&path), "--json"]);
+    let ours: Value = serde_json::from_str(&ours.stdout).expect("JSON");
+    assert_eq!(theirs["messages"], ours["messages"]);
+    let all: u64 = ours["messages"].as_object().expect("topics").values().filter_map(Value::as_u64).sum();
+    assert_eq!(theirs["statistics"], Value::from(all));
+    assert_eq!(theirs["metadata"]["kinocue"], ours["metadata"]);
+    assert_eq!(theirs["metadata"]["kinocue.end"], ours["end"]);
+    assert_eq!(theirs["attachments"], ours["attachments"]);
+    assert_eq!(theirs["ticks"], ours["ticks"]);
+    assert_eq!(theirs["frames"]["0"], report["controllers"][0]["sent"]);
+    let numbers: Vec<i64> =
+        theirs["numbers"].as_array().expect("of frames").iter().filter_map(Value::as_i64).collect();
+    assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "two running sums give frame numbers");
+    drop(sim.end());
 }

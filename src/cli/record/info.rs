@@ -89,7 +89,7 @@ fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
     line(format_args!("  ticks     {ticks}, {missed} missed, {dropped} not recorded"));
     line(format_args!("  latest    {late_max_us:.0} µs at {}", film(*late_film_s)));
     if let Some(margin) = summary.nearest() {
-        line(format_args!("  nearest   {}", nearest(margin)));
+        line(format_args!("  nearest   {}", margin.in_words()));
     }
     line(format_args!(
         "  {:<12}{:>10}{:>8}{:>8}{:>10}  {:>7}{:>7}{:>7}",
@@ -128,13 +128,6 @@ fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
         line(format_args!("  {flaw}"));
     }
     out
-}
-
-/// What comes nearest to its limit, in words.
-fn nearest(margin: &Margin) -> String {
-    let Margin { seat, axis, quantity, value, limit, film_s } = margin;
-    let (seat, word, at) = (shown(seat), quantity.word(), film(*film_s));
-    format!("{word} of {seat} a{axis} at {at}, {value:.0} of {limit:.0}, {:.0} %", 100.0 * margin.part())
 }
 
 fn film(seconds: f64) -> ShowTime {

@@ -13,6 +13,8 @@ use super::{Exit, Failure, OrExit as _};
 use crate::plain;
 use crate::record::{Contents, ReadError};
 
+mod compare;
+mod cut;
 mod info;
 mod layout;
 mod list;
@@ -28,6 +30,8 @@ pub(super) struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     List(list::Args),
+    Cut(cut::Args),
+    Compare(compare::Args),
     Info(info::Args),
     Recover(recover::Args),
     Layout(layout::Args),
@@ -38,6 +42,8 @@ enum Command {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     match &args.command {
         Command::List(args) => list::run(args),
+        Command::Cut(args) => cut::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Info(args) => info::run(args),
         Command::Recover(args) => recover::run(args),
         Command::Layout(args) => layout::run(args),

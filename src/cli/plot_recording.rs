@@ -1,0 +1,113 @@
+//! `kinocue plot` of a recording.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+
+use super::record::{open, unread};
+use super::{Exit, Failure, OrExit as _};
+use crate::plot::{self, Gathered, Look, Picture, TimeAxis};
+use crate::record::{Contents, Summary, Wanted, beginning, read, summarize};
+use crate::time::ShowTime;
+
+/// What is drawn of a recording.
+pub(super) struct Asked<'a> {
+    /// The file, or `last`.
+    pub(super) file: &'a Path,
+    /// Another, whose sent positions are laid over it.
+    pub(super) other: Option<&'a Path>,
+    /// The seat; by itself the one whose asked and sent positions are farthest apart.
+    pub(super) seat: Option<&'a str>,
+    /// The stretch of show time.
+    pub(super) from: Option<ShowTime>,
+    /// Its end.
+    pub(super) until: Option<ShowTime>,
+    /// Columns at the most.
+    pub(super) columns: usize,
+    /// For a file, not a terminal.
+    pub(super) is_detailed: bool,
+}
+
+/// The recording that a path means: `last` is the newest of the folder here. `None` where it is something else.
+pub(super) fn meant(path: &Path) -> Result<Option<PathBuf>, Failure> {
+    if path == Path::new("last") && !path.exists() {
+        return newest(Path::new(".")).map(Some);
+    }
+    let is_one = path.is_file() && beginning(open(path)?).is_ok();
+    Ok(is_one.then(|| path.to_owned()))
+}
+
+fn newest(dir: &Path) -> Result<PathBuf, Failure> {
+    let entries = fs::read_dir(dir).or_exit(Exit::NoInput)?.flatten().map(|entry| entry.path());
+    let recordings =
+        entries.filter(|path| path.extension().is_some_and(|end| end == "mcap")).filter_map(|path| {
+            let begun = beginning(open(&path).ok()?).ok()?.get("wall_ns")?.parse::<u64>().ok()?;
+            Some((begun, path))
+        });
+    let newest = recordings.max().map(|(_, path)| path);
+    newest
+        .ok_or_else(|| anyhow!("no recording in this folder; kinocue plot FILE names one"))
+        .or_exit(Exit::NoInput)
+}
+
+/// The picture.
+pub(super) fn picture(asked: &Asked<'_>) -> Result<Picture, Failure> {
+    let (contents, summary) = summarize(open(asked.file)?).map_err(|error| unread(error, asked.file))?;
+    let lane = lane(asked, &contents, &summary)?;
+    let time = axis(asked, &summary)?;
+    let look = Look { lane, time, is_detailed: asked.is_detailed };
+    let gathered = gathered(asked.file, look, &contents)?;
+    let other = match asked.other {
+        Some(path) => {
+            let (contents, _) = summarize(open(path)?).map_err(|error| unread(error, path))?;
+            let name = &summary.seats[lane].name;
+            let lane = contents
+                .seat(name)
+                .ok_or_else(|| anyhow!("{}: no seat {name}", path.display()))
+                .or_exit(Exit::Usage)?;
+            Some(self::gathered(path, Look { lane, ..look }, &contents)?)
+        }
+        None => None,
+    };
+    Ok(plot::of_recording(&contents, &summary, gathered, other))
+}
+
+fn gathered(path: &Path, look: Look, contents: &Contents) -> Result<Gathered, Failure> {
+    let seat = contents.seats[look.lane].name.as_str();
+    let is_whole = contents.messages.contains_key("/full/sent");
+    let mut gathered = Gathered::new(contents, look, is_whole);
+    let wanted = Wanted { seat: Some(seat), ..Wanted::ALL };
+    read(open(path)?, wanted, &mut |contents, at, told| gathered.take(contents, at, told))
+        .map_err(|error| unread(error, path))?;
+    Ok(gathered)
+}
+
+fn lane(asked: &Asked<'_>, contents: &Contents, summary: &Summary) -> Result<usize, Failure> {
+    if let Some(name) = asked.seat {
+        let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
+        let error = || anyhow!("--seat {name}: the seats are {}", names.join(", "));
+        return contents.seat(name).ok_or_else(error).or_exit(Exit::Usage);
+    }
+    let farthest = summary
+        .seats
+        .iter()
+        .enumerate()
+        .max_by(|one, other| one.1.apart.total_cmp(&other.1.apart).then(other.0.cmp(&one.0)));
+    farthest
+        .map(|(lane, _)| lane)
+        .ok_or_else(|| anyhow!("{}: it has no samples", asked.file.display()))
+        .or_exit(Exit::BadCue)
+}
+
+fn axis(asked: &Asked<'_>, summary: &Summary) -> Result<TimeAxis, Failure> {
+    let (first, last) = summary.film.unwrap_or((0.0, 1.0));
+    let from_s = asked.from.map_or(first, |from| from.as_secs_f64().max(first));
+    let until_s = asked.until.map_or(last, |until| until.as_secs_f64().min(last));
+    if from_s >= until_s {
+        let [first, last] = [first, last].map(ShowTime::from_secs_f64);
+        let error = anyhow!("nothing to show there; the film ran from {first} to {last}");
+        return Err(error).or_exit(Exit::Usage);
+    }
+    Ok(TimeAxis { from_s, until_s, columns: asked.columns })
+}

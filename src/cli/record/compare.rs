@@ -1,0 +1,70 @@
+//! `kinocue record compare`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use super::super::{Exit, Failure, print};
+use super::{open, shown, unread};
+use crate::record::{Comparison, compare};
+use crate::time::ShowTime;
+
+/// Holds two recordings against each other by show time: how far what was sent differs, seat by seat and axis by axis.
+///
+/// Ends with 1 where an axis differs by more than the tolerance.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue record compare monday.mcap tuesday.mcap --tolerance 0.1mm")]
+pub(in super::super) struct Args {
+    /// The one.
+    one: PathBuf,
+    /// The other.
+    other: PathBuf,
+    /// How far an axis may differ, mm or degrees.
+    #[arg(long, value_name = "LENGTH", default_value = "0.1mm", value_parser = tolerance)]
+    tolerance: f64,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let number = text.trim_end_matches("mm").trim_end_matches("deg").trim();
+    let length = number.parse().ok().filter(|length: &f64| length.is_finite() && *length >= 0.0);
+    length.ok_or_else(|| "a tolerance is a length such as 0.1mm".to_owned())
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let (one, other) = (open(&args.one)?, open(&args.other)?);
+    let comparison = compare(one, other).map_err(|error| unread(error, &args.one))?;
+    if args.json {
+        print::json(&comparison)?;
+    } else {
+        print::out(&text(&comparison))?;
+    }
+    let is_over = comparison.axes.iter().any(|axis| axis.greatest > args.tolerance);
+    let nothing = comparison.axes.iter().all(|axis| axis.compared == 0);
+    Ok(if is_over || nothing || !comparison.alone.is_empty() { Exit::CheckFailed } else { Exit::Done })
+}
+
+fn text(comparison: &Comparison) -> String {
+    let mut out = String::new();
+    for axis in &comparison.axes {
+        let at = ShowTime::from_secs_f64(axis.film_s);
+        let name = shown(&axis.seat);
+        writeln!(
+            out,
+            "{name} a{}: {:.3} at {at} at most, {:.4} rms, {} instants",
+            axis.axis, axis.greatest, axis.rms, axis.compared
+        )
+        .expect("a String takes all text");
+    }
+    for seat in &comparison.alone {
+        out += &format!("{}: in one of them alone\n", shown(seat));
+    }
+    if comparison.axes.is_empty() {
+        out += "no seat is in both\n";
+    }
+    if !comparison.whole {
+        out += "samples alone were compared, 20 a second and each the worst of its window; recordings in full have every tick\n";
+    }
+    out
+}

@@ -1,0 +1,219 @@
+//! A stretch of a whole recording as plain topics: a sample for every tick, which every viewer draws.
+
+use std::io::{Read, Seek, Write};
+
+use mcap::McapError;
+
+use super::full::Block;
+use super::read::{Contents, ReadError, Told, Wanted, read};
+use super::{About, Chunk, Message, Mode, RecordedSeat, Recording, Sampled};
+use crate::time::{MonoTime, ShowTime};
+
+/// What is taken.
+#[derive(Debug, Clone)]
+pub(crate) struct Stretch {
+    /// Show times of its ends.
+    pub(crate) from: ShowTime,
+    /// The end, in it.
+    pub(crate) until: ShowTime,
+    /// The seat; `None` for all.
+    pub(crate) seat: Option<String>,
+}
+
+impl Stretch {
+    /// True if a tick is in it.
+    fn holds(&self, film: ShowTime) -> bool {
+        self.from <= film && film <= self.until
+    }
+
+    /// True if a seat is in it.
+    pub(crate) fn has(&self, seat: &RecordedSeat) -> bool {
+        self.seat.as_ref().is_none_or(|name| *name == seat.name)
+    }
+}
+
+/// How it is written.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Manner {
+    /// Times are those of the film, and not of the clock.
+    pub(crate) film_time: bool,
+    /// Without names of seats, hall and cue, and without addresses.
+    pub(crate) anonymous: bool,
+    /// With whole ticks as well.
+    pub(crate) whole: bool,
+}
+
+/// Why nothing was cut.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum CutError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file has no ticks.
+    #[error("is a sampled recording; only one in full (play --record-mode full) has every tick")]
+    Sampled,
+    /// There is no such seat.
+    #[error("no seat {0:?}; its seats are {1}")]
+    Seat(String, String),
+    /// None of its ticks is in the stretch.
+    #[error("no tick between {0} and {1}")]
+    Nothing(ShowTime, ShowTime),
+    /// Writing failed.
+    #[error("writing failed: {0}")]
+    Write(#[from] McapError),
+}
+
+/// Hands over each tick of a stretch, with all its frames.
+///
+/// # Errors
+/// Where the file is no whole recording, or has no such seat or stretch.
+pub(crate) fn each_tick(
+    input: impl Read,
+    stretch: &Stretch,
+    take: &mut dyn FnMut(&Contents, &Chunk<'_>, &[u8]),
+) -> Result<Contents, CutError> {
+    let (mut ticks, mut is_whole) = (0_u64, false);
+    let wanted = Wanted { samples: false, ..Wanted::ALL };
+    let contents = read(input, wanted, &mut |contents, _, told| {
+        let Told::Chunks(chunks) = told else { return };
+        is_whole = true;
+        let mut rest = chunks.as_slice();
+        while let Some((chunk, behind)) = Chunk::parse(rest) {
+            let octets = &rest[..rest.len() - behind.len()];
+            rest = behind;
+            if stretch.holds(chunk.head.film) {
+                ticks += 1;
+                take(contents, &chunk, octets);
+            }
+        }
+    })?;
+    if let Some(name) = stretch.seat.as_ref().filter(|name| contents.seat(name).is_none()) {
+        let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
+        return Err(CutError::Seat(name.clone(), names.join(", ")));
+    }
+    match (is_whole, ticks) {
+        (false, _) => Err(CutError::Sampled),
+        (true, 0) => Err(CutError::Nothing(stretch.from, stretch.until)),
+        _ => Ok(contents),
+    }
+}
+
+/// Cuts a stretch out into a file of its own.
+///
+/// # Errors
+/// As [`each_tick`], and where writing fails.
+pub(crate) fn cut<W: Write + Seek>(
+    input: impl Read,
+    stretch: &Stretch,
+    manner: Manner,
+    out: W,
+) -> Result<W, CutError> {
+    let mut out = Some(out);
+    let mut file: Option<Cutting<W>> = None;
+    let mut result = Ok(());
+    each_tick(input, stretch, &mut |contents, chunk, octets| {
+        if result.is_err() {
+            return;
+        }
+        if let Some(out) = out.take() {
+            match Cutting::begin(contents, stretch, manner, out) {
+                Ok(cutting) => file = Some(cutting),
+                Err(error) => result = Err(error),
+            }
+        }
+        if let (Some(cutting), Ok(())) = (&mut file, &result) {
+            result = cutting.take(chunk, octets);
+        }
+    })?;
+    result?;
+    // There was a tick, or it had said so.
+    let cutting = file.ok_or(CutError::Nothing(stretch.from, stretch.until))?;
+    Ok(cutting.finish()?)
+}
+
+struct Cutting<W: Write + Seek> {
+    file: Recording<W>,
+    fold: Sampled,
+    seats: Vec<RecordedSeat>,
+    /// Which seats are taken.
+    taken: Vec<bool>,
+    block: Option<Block>,
+    film_time: bool,
+    ticks: u64,
+}
+
+impl<W: Write + Seek> Cutting<W> {
+    fn begin(contents: &Contents, stretch: &Stretch, manner: Manner, out: W) -> Result<Self, McapError> {
+        let anonymous = |(index, seat): (usize, &RecordedSeat)| seat.without_names(index);
+        let seats: Vec<RecordedSeat> = if manner.anonymous {
+            contents.seats.iter().enumerate().map(anonymous).collect()
+        } else {
+            contents.seats.clone()
+        };
+        let entry = |key: &str| if manner.anonymous { String::new() } else { contents.entry(key).to_owned() };
+        let origin = contents.wall(MonoTime::default());
+        let about = About {
+            hall: entry("hall"),
+            cue: entry("cue"),
+            title: entry("title"),
+            cue_sha256: contents.entry("cue_sha256").to_owned(),
+            rate_hz: contents.rate_hz(),
+            mode: if manner.whole { Mode::Full } else { Mode::Sampled },
+            clocks: (MonoTime::default(), if manner.film_time { 0 } else { origin }),
+        };
+        let taken = contents.seats.iter().map(|seat| stretch.has(seat)).collect();
+        let file = Recording::begin(out, &about, &seats)?;
+        // A window for each tick, whatever the rate.
+        let fold = Sampled::new(seats.clone(), 1_000_000);
+        let block = manner.whole.then(Block::default);
+        Ok(Self { file, fold, seats, taken, block, film_time: manner.film_time, ticks: 0 })
+    }
+
+    fn take(&mut self, chunk: &Chunk<'_>, octets: &[u8]) -> Result<(), McapError> {
+        let Self { file, fold, seats, taken, block, film_time, ticks } = self;
+        *ticks += 1;
+        let mut result = Ok(());
+        fold.take(chunk, &mut writer(file, taken, *film_time, &mut result));
+        result?;
+        match block.as_mut().and_then(|block| block.add(chunk, octets, seats)) {
+            Some((at, block)) => file.write(at, &Message::Ticks(block)),
+            None => Ok(()),
+        }
+    }
+
+    fn finish(mut self) -> Result<W, McapError> {
+        let mut result = Ok(());
+        self.fold.close(&mut writer(&mut self.file, &self.taken, self.film_time, &mut result));
+        result?;
+        if let Some((at, block)) = self.block.as_mut().and_then(|block| block.close(&self.seats)) {
+            self.file.write(at, &Message::Ticks(block))?;
+        }
+        self.file.finish(&[("ticks", self.ticks.to_string())], None)
+    }
+}
+
+/// Writes what is of a seat that was asked for, on the axis of time that was.
+fn writer<'a, W: Write + Seek>(
+    file: &'a mut Recording<W>,
+    taken: &'a [bool],
+    film_time: bool,
+    result: &'a mut Result<(), McapError>,
+) -> impl FnMut(MonoTime, Message) + 'a {
+    let mut film = MonoTime::default();
+    move |at, message| {
+        let film_s = match &message {
+            Message::Seat(lane, _) if !taken[*lane] => return,
+            Message::Seat(_, sample) => Some(sample.film_s),
+            Message::Tick(sample) => Some(sample.film_s),
+            _ => None,
+        };
+        if let Some(film_s) = film_s {
+            let ns = ShowTime::from_secs_f64(film_s).as_nanos().max(0);
+            film = MonoTime::from_nanos(ns.cast_unsigned());
+        }
+        if result.is_ok() {
+            *result = file.write(if film_time { film } else { at }, &message);
+        }
+    }
+}
