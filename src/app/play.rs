@@ -112,8 +112,8 @@ impl Play {
             clocks: (Monotonic.now(), wall_now_ns()),
         };
         let seats = recording::seats(&config, &staged.lanes);
-        let (tap, recording) = PlayRecording::start(path, &about, seats, staged.show.rate)?;
-        runtime.record(tap);
+        let (taps, recording) = PlayRecording::start(path, &about, seats, staged.show.rate)?;
+        runtime.record(taps);
         Ok(Self { recording: Some(recording), ..self })
     }
 

@@ -11,7 +11,7 @@ use mcap::{McapError, McapResult};
 use super::Report;
 use crate::config::{Config, Connection};
 use crate::drive::Lane;
-use crate::record::{About, FrameKind, RecordedSeat, Recorder, Recording, SAMPLE_HZ, Sampled, Tap, tap};
+use crate::record::{About, FrameKind, Intake, RecordedSeat, Recorder, Recording, SAMPLE_HZ, Taps};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::Rate;
@@ -28,7 +28,7 @@ pub(super) struct PlayRecording {
 }
 
 impl PlayRecording {
-    /// Begins a file, and has a thread write to it what comes through the tap.
+    /// Begins a file, and has a thread write to it what comes through the taps.
     ///
     /// # Errors
     /// Where there is such a file, or what an earlier recording to it left, and where the system refuses.
@@ -37,20 +37,20 @@ impl PlayRecording {
         about: &About,
         seats: Vec<RecordedSeat>,
         rate: Rate,
-    ) -> io::Result<(Tap, Self)> {
+    ) -> io::Result<(Taps, Self)> {
         if path.try_exists()? {
             return Err(io::ErrorKind::AlreadyExists.into());
         }
         let part = path.with_extension("part.mcap");
         let out = BufWriter::new(File::create_new(&part)?);
-        let (tap, ring) = tap(&seats, rate);
         let file = Recording::begin(out, about, &seats).map_err(in_io)?;
-        let recorder = Recorder::new(ring, Sampled::new(seats, SAMPLE_HZ), file);
+        let (taps, intake) = Intake::new(seats, rate, SAMPLE_HZ);
+        let recorder = Recorder::new(intake, file);
         let thread = Builder::new().name("recorder".to_owned()).spawn(move || {
             realtime::stand_back();
             recorder.run(&Monotonic)
         })?;
-        Ok((tap, Self { path: path.to_owned(), part, thread }))
+        Ok((taps, Self { path: path.to_owned(), part, thread }))
     }
 
     /// Ends the file, the tick thread having ended, with the report if there is one.

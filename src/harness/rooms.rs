@@ -89,7 +89,7 @@ pub mod proof {
     pub use crate::proof::{Digest, DriveTerms, Proof, Terms, figures, prove, prove_driven};
 }
 pub mod record {
-    pub use crate::record::{Asked, FrameKind, RecordedSeat, Tap, TickHead, tap};
+    pub use crate::record::{AckTap, Asked, FrameKind, RecordedSeat, Tap, TickHead, ack_tap, tap};
 }
 pub mod rt {
     pub use crate::rt::{

@@ -1,6 +1,7 @@
 //! One tick as it crosses to the recorder: a head, then each frame with what was asked of it and its octets as they left. All
 //! numbers are little-endian, as on the machines that this runs on.
 
+use super::cursor::Cursor;
 use crate::motion::{MAX_AXES, Pose};
 use crate::net::Delivery;
 use crate::state::State;
@@ -201,28 +202,7 @@ impl<'a> Chunk<'a> {
     }
 }
 
-/// What is left to be read.
-struct Cursor<'a>(&'a [u8]);
-
 impl<'a> Cursor<'a> {
-    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (octets, rest) = self.0.split_first_chunk()?;
-        self.0 = rest;
-        Some(*octets)
-    }
-
-    fn u8(&mut self) -> Option<u8> {
-        self.take().map(u8::from_le_bytes)
-    }
-
-    fn u16(&mut self) -> Option<u16> {
-        self.take().map(u16::from_le_bytes)
-    }
-
-    fn u64(&mut self) -> Option<u64> {
-        self.take().map(u64::from_le_bytes)
-    }
-
     fn frame(&mut self) -> Option<SentFrame<'a>> {
         let at = MonoTime::from_nanos(self.u64()?);
         let clamps = self.take().map(u32::from_le_bytes)?.into();
@@ -234,8 +214,7 @@ impl<'a> Cursor<'a> {
         for place in pose.get_mut(..slots)? {
             *place = f64::from_le_bytes(self.take()?);
         }
-        let (datagram, rest) = self.0.split_at_checked(len)?;
-        self.0 = rest;
+        let datagram = self.slice(len)?;
         let asked = Asked { pose, slots, level, clamps };
         Some(SentFrame { lane, at, handed, asked, datagram })
     }

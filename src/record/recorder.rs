@@ -1,12 +1,11 @@
-//! The other end of the ring: takes ticks as they come, folds them, and writes. A thread of its own, alone at the disk.
+//! What comes through the rings into a file. A thread of its own, alone at the disk.
 
 use std::io::{Seek, Write};
 use std::time::Duration;
 
 use mcap::McapResult;
-use rtrb::Consumer;
 
-use super::{Chunk, Recording, Sampled};
+use super::{Intake, Message, Recording};
 use crate::time::{Clock, MonoTime};
 
 /// How often it looks for ticks.
@@ -14,32 +13,27 @@ const LOOK: Duration = Duration::from_millis(20);
 /// How often what it has is given to the disk: so much is lost where the program is killed.
 const FLUSH: Duration = Duration::from_millis(500);
 
-/// Ticks into a file.
+/// Ticks and drains into a file.
 pub(crate) struct Recorder<W: Write + Seek> {
-    ring: Consumer<u8>,
-    held: Vec<u8>,
-    fold: Sampled,
+    intake: Intake,
     file: Recording<W>,
-    ticks: u64,
-    frames: u64,
-    dropped: u64,
 }
 
 impl<W: Write + Seek> Recorder<W> {
-    /// One of the ring's ticks.
-    pub(crate) const fn new(ring: Consumer<u8>, fold: Sampled, file: Recording<W>) -> Self {
-        Self { ring, held: Vec::new(), fold, file, ticks: 0, frames: 0, dropped: 0 }
+    /// One of what comes in.
+    pub(crate) const fn new(intake: Intake, file: Recording<W>) -> Self {
+        Self { intake, file }
     }
 
-    /// Records until the tick thread is over.
+    /// Records until tick and ack thread are over.
     ///
     /// # Errors
-    /// Where writing fails; the ring fills then, and the tick thread drops what it has, as it does where nobody keeps up.
+    /// Where writing fails; the rings fill then, and the threads drop what they have, as they do where nobody keeps up.
     pub(crate) fn run(mut self, clock: &impl Clock) -> McapResult<Self> {
         let mut flush_at = clock.now() + FLUSH;
         loop {
-            // Asked before it is emptied: what was pushed before the end is taken.
-            let is_over = self.ring.is_abandoned();
+            // Asked before they are emptied: what was pushed before the end is taken.
+            let is_over = self.intake.is_over();
             self.take()?;
             if is_over {
                 return Ok(self);
@@ -53,23 +47,13 @@ impl<W: Write + Seek> Recorder<W> {
         }
     }
 
-    /// Takes all ticks that are there.
+    /// Takes all that is there.
     ///
     /// # Errors
     /// Where writing fails.
     pub(crate) fn take(&mut self) -> McapResult<()> {
-        let Self { ring, held, fold, file, ticks, frames, dropped } = self;
-        held.resize(ring.slots(), 0);
-        // Chunks are pushed whole, so whole ones are there.
-        ring.pop_entire_slice(held).unwrap_or_default();
-        let (mut rest, mut result) = (held.as_slice(), Ok(()));
-        while let Some((chunk, behind)) = Chunk::parse(rest) {
-            rest = behind;
-            *ticks += 1;
-            *dropped += u64::from(chunk.dropped);
-            *frames += chunk.frames().count() as u64;
-            fold.take(&chunk, &mut writer(file, &mut result));
-        }
+        let mut result = Ok(());
+        self.intake.take(&mut writer(&mut self.file, &mut result));
         result
     }
 
@@ -87,10 +71,9 @@ impl<W: Write + Seek> Recorder<W> {
     /// Where writing fails.
     pub(crate) fn finish(mut self, report: Option<&[u8]>) -> McapResult<W> {
         let mut result = Ok(());
-        self.fold.close(&mut writer(&mut self.file, &mut result));
+        self.intake.close(&mut writer(&mut self.file, &mut result));
         result?;
-        let end = [("ticks", self.ticks), ("frames", self.frames), ("dropped", self.dropped)];
-        self.file.finish(end, report)
+        self.file.finish(&self.intake.counts().named(), report)
     }
 }
 
@@ -98,7 +81,7 @@ impl<W: Write + Seek> Recorder<W> {
 fn writer<'a, W: Write + Seek>(
     file: &'a mut Recording<W>,
     result: &'a mut McapResult<()>,
-) -> impl FnMut(MonoTime, super::Message) + 'a {
+) -> impl FnMut(MonoTime, Message) + 'a {
     move |at, message| {
         if result.is_ok() {
             *result = file.write(at, &message);

@@ -7,6 +7,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
 use serde_json::{Value, json};
 
+use super::acks::standing_words;
 use super::{Message, RecordedSeat};
 use crate::motion::AxisUnit;
 use crate::state::State;
@@ -88,15 +89,15 @@ impl<W: Write + Seek> Recording<W> {
     }
 
     /// Ends the file with these figures, and a report if there is one; gives what was written to.
-    pub(crate) fn finish(mut self, end: [(&str, u64); 3], report: Option<&[u8]>) -> McapResult<W> {
+    pub(crate) fn finish(mut self, end: &[(&str, u64)], report: Option<&[u8]>) -> McapResult<W> {
         if let Some(report) = report {
             let (name, media_type) = ("report.json".to_owned(), "application/json".to_owned());
             let log_time = self.clocks.1;
             let data = report.into();
             self.writer.attach(&Attachment { log_time, create_time: log_time, name, media_type, data })?;
         }
-        let end = end.map(|(key, value)| (key.to_owned(), value.to_string()));
-        write_metadata(&mut self.writer, "kinocue.end", end.into())?;
+        let end = end.iter().map(|(key, value)| ((*key).to_owned(), value.to_string()));
+        write_metadata(&mut self.writer, "kinocue.end", end.collect())?;
         self.writer.finish()?;
         Ok(self.writer.into_inner())
     }
@@ -140,26 +141,38 @@ fn number(state: State) -> usize {
 }
 
 /// Viewers take one type a property, never null, arrays of scalars, and `oneOf` only to name numbers.
-fn schema(title: &str, properties: &[(&str, Value)]) -> Value {
-    let required: Vec<&str> = properties.iter().map(|(name, _)| *name).collect();
+fn schema(title: &str, always: &[(&str, Value)], at_times: &[(&str, Value)]) -> Value {
+    let required: Vec<&str> = always.iter().map(|(name, _)| *name).collect();
+    let all = always.iter().chain(at_times);
     let properties: serde_json::Map<String, Value> =
-        properties.iter().map(|(name, kind)| ((*name).to_owned(), kind.clone())).collect();
+        all.map(|(name, kind)| ((*name).to_owned(), kind.clone())).collect();
     json!({"title": title, "type": "object", "required": required, "properties": properties})
 }
 
 fn schema_of_seat() -> Value {
     let [number, count] = [json!({"type": "number"}), json!({"type": "integer"})];
     let places = json!({"type": "array", "items": {"type": "number"}});
+    let standings =
+        (0..).zip(standing_words()).map(|(at, word): (u8, _)| json!({"title": word, "const": at}));
     schema(
         "kinocue.seat",
         &[
             ("film_s", number.clone()),
             ("asked_mm", places.clone()),
-            ("sent_mm", places),
-            ("level", number),
+            ("sent_mm", places.clone()),
+            ("level", number.clone()),
             ("sent", count.clone()),
             ("unsent", count.clone()),
-            ("clamps", count),
+            ("clamps", count.clone()),
+            ("measured_mm", places),
+            ("acked", count.clone()),
+            ("refused", count.clone()),
+            ("lost", count),
+        ],
+        &[
+            ("ack_us", number.clone()),
+            ("ack_max_us", number),
+            ("standing", json!({"type": "integer", "oneOf": standings.collect::<Vec<_>>()})),
         ],
     )
 }
@@ -176,10 +189,11 @@ fn schema_of_tick() -> Value {
             ("missed", count.clone()),
             ("dropped", count),
         ],
+        &[],
     )
 }
 
 fn schema_of_hall() -> Value {
     let named = State::ALL.map(|state| json!({"title": state.word(), "const": number(state)}));
-    schema("kinocue.hall", &[("state", json!({"type": "integer", "oneOf": named}))])
+    schema("kinocue.hall", &[("state", json!({"type": "integer", "oneOf": named}))], &[])
 }

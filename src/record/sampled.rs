@@ -2,10 +2,13 @@
 
 use serde::Serialize;
 
+use super::acks::{AckChunk, AckRecord, standing_number};
 use super::chunk::{Chunk, Handed, SentFrame};
 use super::{RecordedSeat, TickHead};
 use crate::state::State;
 use crate::time::MonoTime;
+use crate::tracker::Fate;
+use crate::wire::ReplyCode;
 
 /// A seat in a window: its frame in which asked and sent differ most, the last of these, and sums of all its frames.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -24,6 +27,23 @@ pub(crate) struct SeatSample {
     pub(crate) unsent: u32,
     /// How often the limiter held the seat back.
     pub(crate) clamps: u64,
+    /// Where its axes were measured to be last; none where nobody was asked.
+    pub(crate) measured_mm: Vec<f64>,
+    /// Frames that were acked.
+    pub(crate) acked: u32,
+    /// Frames that were refused.
+    pub(crate) refused: u32,
+    /// Frames that were given up as lost.
+    pub(crate) lost: u64,
+    /// Latency of the last ack, µs; none where there was none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) ack_us: Option<f64>,
+    /// The greatest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) ack_max_us: Option<f64>,
+    /// How its group stands, by number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) standing: Option<u8>,
 }
 
 /// All ticks of a window.
@@ -62,6 +82,11 @@ struct SeatWindow {
     sample: SeatSample,
     /// Clamps until the window before.
     clamps: u64,
+    /// Lost frames until the window before.
+    lost: u64,
+    /// What lasts: how its group stands, and where its axes were measured to be.
+    standing: Option<u8>,
+    measured_mm: Vec<f64>,
 }
 
 /// The fold of ticks into samples.
@@ -111,9 +136,44 @@ impl Sampled {
         let Some(last) = self.last.take() else { return };
         tell(last.deadline, Message::Tick(std::mem::take(&mut self.tick)));
         for (lane, window) in self.windows.iter_mut().enumerate() {
-            let sample = std::mem::take(&mut window.sample);
-            if let Some((at, _)) = window.worst.take() {
+            let mut sample = std::mem::take(&mut window.sample);
+            let worst = window.worst.take();
+            let is_heard = sample.acked > 0 || sample.refused > 0 || sample.lost > 0;
+            if let Some(at) = worst.map(|(at, _)| at).or_else(|| is_heard.then_some(last.deadline)) {
+                (sample.standing, sample.measured_mm) = (window.standing, window.measured_mm.clone());
                 tell(at, Message::Seat(lane, sample));
+            }
+        }
+    }
+
+    /// Takes what the ack thread took before the next tick.
+    pub(crate) fn take_acks(&mut self, chunk: &AckChunk<'_>) {
+        for record in chunk.records() {
+            let (AckRecord::Fate(controller, ..)
+            | AckRecord::Lost(controller, _)
+            | AckRecord::Measured(controller, ..)
+            | AckRecord::Standing(controller, _)) = record
+            else {
+                continue;
+            };
+            let (Some(seat), Some(window)) = (self.seats.get(controller), self.windows.get_mut(controller))
+            else {
+                continue;
+            };
+            let SeatWindow { sample, lost, standing, measured_mm, .. } = window;
+            match record {
+                AckRecord::Fate(_, _, Fate::Answered(ReplyCode::Running), latency_ns) => {
+                    sample.acked += 1;
+                    let us = Some(micros(latency_ns.into())).filter(|us| *us > 0.0);
+                    (sample.ack_us, sample.ack_max_us) = (us.or(sample.ack_us), max(us, sample.ack_max_us));
+                }
+                AckRecord::Fate(_, _, Fate::Answered(_), _) => sample.refused += 1,
+                AckRecord::Lost(_, total) => {
+                    sample.lost += total.saturating_sub(std::mem::replace(lost, total));
+                }
+                AckRecord::Measured(_, _, pulses) => *measured_mm = round(seat.measured(&pulses)),
+                AckRecord::Standing(_, now) => *standing = Some(standing_number(now)),
+                _ => {}
             }
         }
     }
@@ -127,7 +187,7 @@ impl Sampled {
         else {
             return;
         };
-        let SeatWindow { worst, sample, clamps } = window;
+        let SeatWindow { worst, sample, clamps, .. } = window;
         let is_taken = frame.handed != Handed::Refused;
         sample.sent += u32::from(is_taken);
         sample.unsent += u32::from(!is_taken);
@@ -143,6 +203,10 @@ impl Sampled {
             (sample.asked_mm, sample.sent_mm) = (round(asked), round(sent));
         }
     }
+}
+
+fn max(one: Option<f64>, other: Option<f64>) -> Option<f64> {
+    one.map_or(other, |one| Some(other.map_or(one, |other| one.max(other))))
 }
 
 #[expect(clippy::cast_precision_loss, reason = "less than an hour")]

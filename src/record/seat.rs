@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::chunk::{Asked, SentFrame, longest_frame};
 use crate::drive::link::{LinkPose, RECORD_LEN};
-use crate::motion::{AxisUnit, Window};
+use crate::motion::{AxisUnit, Pulses, Window};
 use crate::wire::{MotionRequest, VibrationPort, motion_len};
 
 /// What the frames of a lane are.
@@ -68,6 +68,12 @@ impl RecordedSeat {
     pub(super) fn asked(&self, asked: &Asked) -> Vec<f64> {
         let axes = self.axes.iter().take_while(|axis| axis.slot < asked.slots);
         axes.map(|axis| axis.low + asked.pose[axis.slot] * axis.stroke).collect()
+    }
+
+    /// Where its axes are that stand at these places, millimetres or degrees.
+    pub(super) fn measured(&self, pulses: &[Pulses]) -> Vec<f64> {
+        let place = |axis: &RecordedAxis| pulses.get(axis.slot).map(|at| f64::from(at.0) * axis.pulse);
+        self.axes.iter().map_while(place).collect()
     }
 
     /// Where its axes were sent, millimetres or degrees; none where that is no frame of its kind.

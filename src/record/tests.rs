@@ -12,7 +12,8 @@ use crate::motion::{MAX_AXES, SeatType, Slot, Window};
 use crate::net::{Delivery, SendFault};
 use crate::state::{PlayMode, State};
 use crate::time::{MonoTime, Rate, ShowTime};
-use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, VibrationPort};
+use crate::tracker::Fate;
+use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, ReplyCode, Timing, VibrationPort};
 
 const MS: u64 = 1_000_000;
 const PLAYING: State = State::Playing(PlayMode::Following);
@@ -68,14 +69,21 @@ fn about() -> About {
 /// What a play of these ticks, each of a place asked for and one sent, comes to as a file; ticks 10 ms apart.
 fn recorded(ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
     let seats = [seat()];
-    let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
+    let (Taps { ticks: mut tap, mut acks }, intake) =
+        Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);
     let file = Recording::begin(Cursor::new(Vec::new()), &about(), &seats).unwrap();
-    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    let mut recorder = Recorder::new(intake, file);
     for (tick, (wanted, sent)) in (0_u64..).zip(ticks) {
         let mut buf = [0; MAX_LEN];
         tap.asked(asked(wanted));
         tap.frame(0, frame(sent, &mut buf), MonoTime::from_nanos(tick * 10 * MS), Delivery::Sent);
         tap.tick(&head(tick * 10));
+        // Every second frame is acked, 2 ms after it was sent.
+        if tick % 2 == 0 {
+            let fate = Fate::Answered(ReplyCode::Running);
+            acks.take(&AckRecord::Fate(0, FrameNo(u32::try_from(tick).unwrap()), fate, 2_000_000));
+        }
+        acks.drained(MonoTime::from_nanos((tick * 10 + 5) * MS));
         recorder.take().unwrap();
     }
     recorder.finish(Some(b"{}")).unwrap().into_inner()
@@ -99,6 +107,8 @@ fn a_sample_is_the_worst_of_its_window_and_its_counts_are_of_all() {
     let (_, at, sample) = seats[1];
     assert_eq!(*at, (1_000_000 + 70) * MS, "it is of the tick in which they differed");
     assert_eq!((&sample["film_s"], &sample["sent"]), (&Value::from(0.07), &Value::from(5)));
+    let (acked, ack_us) = (&sample["acked"], &sample["ack_max_us"]);
+    assert_eq!((acked, ack_us), (&Value::from(2), &Value::from(2_000.0)), "its acks are of the same window");
     assert_eq!((&sample["asked_mm"][2], &sample["sent_mm"][2]), (&Value::from(90.0), &Value::from(75.0)));
     let ticks: Vec<_> = all.iter().filter(|(topic, ..)| topic == "/tick").collect();
     assert_eq!((ticks.len(), &ticks[1].2["ticks"], &ticks[1].2["late_max_us"]), (2, &5.into(), &90.0.into()));
@@ -113,7 +123,8 @@ fn a_file_says_what_it_is_of_first_and_what_it_came_to_last() {
     let names: Vec<_> = summary.metadata_indexes.iter().map(|one| one.name.as_str()).collect();
     assert_eq!((names, summary.attachment_indexes.len()), (vec!["kinocue", "kinocue.end"], 1));
     let end = mcap::read::metadata(&file, &summary.metadata_indexes[1]).unwrap().metadata;
-    assert_eq!([&end["ticks"], &end["frames"], &end["dropped"]], ["10", "10", "0"]);
+    let counts = ["ticks", "frames", "dropped", "acked", "refused", "dropped_records"].map(|key| &*end[key]);
+    assert_eq!(counts, ["10", "10", "0", "5", "0", "0"]);
 }
 
 #[test]
@@ -185,9 +196,9 @@ impl Seek for Full {
 #[test]
 fn a_disk_that_is_full_ends_the_recording_and_not_the_ticks() {
     let seats = [seat()];
-    let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
+    let (Taps { ticks: mut tap, .. }, intake) = Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);
     let file = Recording::begin(Full(Cursor::default(), 4_000), &about(), &seats).unwrap();
-    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    let mut recorder = Recorder::new(intake, file);
     let ended = (0..1_000).find_map(|tick| {
         let mut buf = [0; MAX_LEN];
         tap.asked(asked(0.5));
@@ -205,10 +216,10 @@ fn a_disk_that_is_full_ends_the_recording_and_not_the_ticks() {
 fn what_was_flushed_is_read_of_a_file_whose_writer_was_killed() {
     let on_disk = tempfile::NamedTempFile::new().unwrap();
     let seats = [seat()];
-    let (mut tap, ring) = tap(&seats, Rate::from_hz(100.0));
+    let (Taps { ticks: mut tap, .. }, intake) = Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);
     let out = io::BufWriter::new(on_disk.reopen().unwrap());
     let file = Recording::begin(out, &about(), &seats).unwrap();
-    let mut recorder = Recorder::new(ring, Sampled::new(seats.to_vec(), SAMPLE_HZ), file);
+    let mut recorder = Recorder::new(intake, file);
     for tick in 0..100 {
         tap.tick(&head(10 * tick));
     }
@@ -237,7 +248,9 @@ fn schemas_keep_to_what_viewers_draw() {
         let named: Vec<&String> = properties.keys().collect();
         for (_, _, value) in all.iter().filter(|(topic, ..)| *topic == channel.topic) {
             let fields: Vec<&String> = value.as_object().unwrap().keys().collect();
-            assert_eq!(fields, named, "what is written is what the schema has");
+            assert!(fields.iter().all(|field| named.contains(field)), "{fields:?} of {named:?}");
+            let required = schema["required"].as_array().unwrap();
+            assert!(required.iter().all(|key| value.get(key.as_str().unwrap()).is_some()), "{value}");
             assert!(value.as_object().unwrap().values().all(|field| !field.is_null()));
         }
     }

@@ -12,6 +12,7 @@ use crate::drive::link::StreamEvent;
 use crate::health::Change;
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Answer, Observer, Watched};
+use crate::record::{AckRecord, AckStanding, AckTap, latency_ns};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
 use crate::wire::{FrameNo, FromController, MotionReply, ReplyCode};
@@ -82,6 +83,8 @@ pub struct AckLoop {
     watch: Option<Watch>,
     /// Whom to tell which frames were acked, and the times so far.
     live: Option<Arc<Live>>,
+    /// Whom to give a copy of all that is taken.
+    tap: Option<AckTap>,
     hangs_after: Duration,
 }
 
@@ -105,6 +108,7 @@ impl AckLoop {
             watch: None,
             last_sent: MonoTime::default(),
             live: None,
+            tap: None,
             hangs_after: HANGS_AFTER,
         }
     }
@@ -126,6 +130,11 @@ impl AckLoop {
     /// Tells `live` which frames were acked, and the times so far, again and again while it runs.
     pub fn tell(&mut self, live: Arc<Live>) {
         self.live = Some(live);
+    }
+
+    /// Has whatever is taken copied to `tap`.
+    pub fn record(&mut self, tap: AckTap) {
+        self.tap = Some(tap);
     }
 
     /// Its thread has no real-time service: a busy machine holds it up, as it does the tick thread.
@@ -194,12 +203,14 @@ impl AckLoop {
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, Incoming<'_>) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, links, ack_every, .. } = self;
+        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, links, ack_every, tap, .. } =
+            self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
             let controller = match origin {
                 Origin::Controller(controller) => controller,
                 Origin::Stranger(from) => {
+                    copy(tap, &AckRecord::Heard(origin, at, octets));
                     *strangers += u64::from(!observer.hear_elsewhere(from, octets, at));
                     return;
                 }
@@ -212,8 +223,10 @@ impl AckLoop {
                 observer.on_reply(controller, &reply, at);
                 let MotionReply { frame, code, error, inputs, .. } = reply;
                 let reply = Reply { controller, frame, code, error, inputs, at };
-                return books.on_reply(reply, &mut Records { sent, last_sent, watch, observer, live });
+                copy(tap, &AckRecord::Reply(reply));
+                return books.on_reply(reply, &mut Records { sent, last_sent, watch, observer, live, tap });
             }
+            copy(tap, &AckRecord::Heard(origin, at, octets));
             let is_report = observer.hear(controller, &message, at);
             let is_known = is_report
                 || watch.as_mut().is_some_and(|watch| {
@@ -226,7 +239,7 @@ impl AckLoop {
                 books.tracker_mut().on_stray(controller);
             }
         });
-        let mut records = Records { sent, last_sent, watch, observer, live };
+        let mut records = Records { sent, last_sent, watch, observer, live, tap };
         for (controller, event) in links.iter_mut().flat_map(LinkNews::take) {
             records.hear_link(books, controller, &event, *ack_every, began);
         }
@@ -241,6 +254,10 @@ impl AckLoop {
         if let Some(watch) = watch {
             watch.look(observer, began);
         }
+        if let Some(tap) = tap {
+            tell_standings(tap, receiver, accounts, watch.as_ref());
+            tap.drained(began);
+        }
     }
 
     /// The accounts, still open, once nothing more is to be drained.
@@ -248,6 +265,21 @@ impl AckLoop {
     pub fn into_accounts(self) -> Accounts {
         let (changes, gone) = self.watch.map(Watch::into_outcome).unwrap_or_default();
         Accounts { changes, gone, ..self.accounts }
+    }
+}
+
+/// Copies to `tap` what has changed of how controllers stand.
+fn tell_standings(tap: &mut AckTap, receiver: &Receiver, accounts: &Accounts, watch: Option<&Watch>) {
+    let Accounts { books, observer, .. } = accounts;
+    for (controller, state) in observer.states().iter().enumerate() {
+        let is_station = controller < receiver.lanes();
+        let standing = AckStanding {
+            lost: books.tracker().counts(controller).lost,
+            closed: if is_station { receiver.port_closed(controller) } else { 0 },
+            measured: state.measured.map(|heard| (heard.at, heard.value)),
+            standing: watch.map(|watch| watch.stands(controller)),
+        };
+        tap.stands(controller, standing);
     }
 }
 
@@ -269,9 +301,16 @@ struct Records<'a> {
     watch: &'a mut Option<Watch>,
     live: &'a Option<Arc<Live>>,
     observer: &'a mut Observer,
+    tap: &'a mut Option<AckTap>,
 }
 
 impl Records<'_> {
+    fn note_posted(&mut self, posted: &mut u32) {
+        if let frames @ 1.. = std::mem::take(posted) {
+            copy(self.tap, &AckRecord::Posted(frames));
+        }
+    }
+
     /// Hears what a link tells of a controller: the frames that it confirms count as acked by now.
     fn hear_link(
         &mut self,
@@ -285,6 +324,7 @@ impl Records<'_> {
             live.on_heard(controller);
         }
         if let StreamEvent::Confirmed { first, last, .. } = *event {
+            copy(self.tap, &AckRecord::Confirmed(controller, first, last));
             let next = |frame: &FrameNo| (frame.since(last) < 0).then(|| frame.next());
             let asked = |frame: &FrameNo| frame.asks(ack_every);
             for frame in std::iter::successors(Some(first), next).filter(asked) {
@@ -299,15 +339,25 @@ impl Records<'_> {
 
 impl Ledger for Records<'_> {
     fn bring_up_to_date(&mut self, tracker: &mut Tracker) {
+        let mut posted = 0;
         while let Ok(sent) = self.sent.pop() {
             record(sent, tracker, self.last_sent);
             if let Some(watch) = self.watch {
                 watch.on_sent(sent);
             }
+            match copy_of(sent) {
+                Some(record) => {
+                    self.note_posted(&mut posted);
+                    copy(self.tap, &record);
+                }
+                None => posted += 1,
+            }
         }
+        self.note_posted(&mut posted);
     }
 
-    fn on_fate(&mut self, reply: &Reply, fate: Fate) {
+    fn on_fate(&mut self, reply: &Reply, fate: Fate, sent_at: Option<MonoTime>) {
+        copy(self.tap, &AckRecord::Fate(reply.controller, reply.frame, fate, latency_ns(sent_at, reply.at)));
         if let Fate::Answered(code) = fate {
             let Reply { controller, frame, error, inputs, at, .. } = *reply;
             self.observer.on_answer(controller, &Answer { frame, code, error, inputs }, at);
@@ -322,6 +372,23 @@ impl Ledger for Records<'_> {
             watch.on_fate(reply, fate);
         }
     }
+}
+
+fn copy(tap: &mut Option<AckTap>, record: &AckRecord<'_>) {
+    if let Some(tap) = tap {
+        tap.take(record);
+    }
+}
+
+/// A record of a lane as it is copied; of frames only how many there were.
+fn copy_of(sent: Sent) -> Option<AckRecord<'static>> {
+    Some(match sent {
+        Sent::Posted { .. } => return None,
+        Sent::Failed { lane, frame } => AckRecord::Failed(usize::from(lane), frame),
+        Sent::Joined { lane } => AckRecord::Joined(usize::from(lane)),
+        Sent::FellOut { lane, why, shakes } => AckRecord::FellOut(usize::from(lane), why, shakes),
+        Sent::Unread { lane } => AckRecord::Unread(usize::from(lane)),
+    })
 }
 
 fn record(sent: Sent, tracker: &mut Tracker, last_sent: &mut MonoTime) {

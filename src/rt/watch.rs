@@ -329,7 +329,8 @@ impl Watch {
         self.standby.as_ref().is_some_and(Standby::is_hushed) && !self.live.is_moving()
     }
 
-    fn stands(&self, controller: usize) -> HealthState {
+    /// How the group of a controller stands.
+    pub(super) fn stands(&self, controller: usize) -> HealthState {
         self.health.standing(self.health.groups().group_of(controller))
     }
 

@@ -51,6 +51,14 @@ impl Account {
         matches!(self.ring.find(frame), Place::Kept(index) if self.ring.get(index).state == State::InFlight)
     }
 
+    /// When a frame was sent, at the latest; `None` where it is not remembered.
+    pub(super) fn sent_at(&self, frame: FrameNo) -> Option<MonoTime> {
+        match self.ring.find(frame) {
+            Place::Kept(index) => Some(self.ring.get(index).at),
+            _ => None,
+        }
+    }
+
     pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
         let Some(unrecorded) = self.ring.ahead(frame).checked_sub(1) else { return };
         self.recorded_at = at;

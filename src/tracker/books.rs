@@ -30,8 +30,8 @@ pub trait Ledger {
     /// Passes every record that has come to the tracker.
     fn bring_up_to_date(&mut self, tracker: &mut Tracker);
 
-    /// Hears what a reply turned out to be.
-    fn on_fate(&mut self, _reply: &Reply, _fate: Fate) {}
+    /// Hears what a reply turned out to be, and when its frame was sent, as far as that is known.
+    fn on_fate(&mut self, _reply: &Reply, _fate: Fate, _sent_at: Option<MonoTime>) {}
 }
 
 /// What passes the records on, for nobody who wants to know.
@@ -113,7 +113,7 @@ impl Books {
             } else {
                 tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at)
             };
-            ledger.on_fate(reply, fate);
+            ledger.on_fate(reply, fate, tracker.sent_at(reply.controller, reply.frame));
             false
         });
     }
@@ -121,7 +121,7 @@ impl Books {
     fn give_up_waiting(&mut self, ledger: &mut impl Ledger) {
         for (reply, _) in self.waiting.drain(..) {
             let fate = self.tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at);
-            ledger.on_fate(&reply, fate);
+            ledger.on_fate(&reply, fate, self.tracker.sent_at(reply.controller, reply.frame));
         }
     }
 }

@@ -96,6 +96,11 @@ impl Tracker {
         Fate::Stray
     }
 
+    /// When a frame of a controller was sent, at the latest; `None` where it is not remembered.
+    fn sent_at(&self, controller: usize, frame: FrameNo) -> Option<MonoTime> {
+        self.accounts[controller].sent_at(frame)
+    }
+
     /// A datagram from a controller that is no reply to a frame.
     pub(crate) fn on_stray(&mut self, controller: usize) {
         self.accounts[controller].counts.stray += 1;

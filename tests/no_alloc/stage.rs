@@ -19,7 +19,7 @@ use kinocue::harness::film::point::{FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
 use kinocue::harness::net::{Delivery, DrainGrid, Ports, Sender};
 use kinocue::harness::observe::Watched;
-use kinocue::harness::record::{Asked, FrameKind, RecordedSeat, Tap, TickHead, tap};
+use kinocue::harness::record::{Asked, FrameKind, RecordedSeat, Tap, TickHead, ack_tap, tap};
 use kinocue::harness::rt::{
     Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FilmLead, FrameSink, Live, Loaded, MailEnds,
     News, Places, PlanLoop, Planning, Spinning, TickLoop, mailboxes,
@@ -351,6 +351,8 @@ fn play_to(
             let over = || pace.over.load(Ordering::Acquire);
             let mut acks = AckLoop::new(receiver, watched, 1, sent, ticks);
             acks.tell(seen);
+            let (tap, _recorder) = ack_tap(CONTROLLERS, rate);
+            acks.record(tap);
             acks.run(&clock, DrainGrid::new(origin, PERIOD), over)
         });
         let plan_thread = scope.spawn(move || pace.serve(&mut plans));

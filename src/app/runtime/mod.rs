@@ -28,7 +28,7 @@ use crate::health::{Groups, HealthTable};
 use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
-use crate::record::Tap;
+use crate::record::Taps;
 use crate::rt::{
     AckLoop, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds, NewsIn,
     Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line, mailboxes,
@@ -244,9 +244,10 @@ impl Runtime {
         self
     }
 
-    /// Has whatever leaves copied to `tap`.
-    pub(super) fn record(&mut self, tap: Tap) {
-        self.ticks.sink.record(tap);
+    /// Has whatever leaves, and whatever is heard, copied.
+    pub(super) fn record(&mut self, taps: Taps) {
+        self.ticks.sink.record(taps.ticks);
+        self.acks.record(taps.acks);
     }
 
     /// What it is led and watched by.
