@@ -406,12 +406,12 @@ fn a_film_that_is_found_by_its_sound_leads_the_seat_through_its_cue_and_back_to_
 }
 
 /// Serves positions of a film that runs as it should for 4 s, and then lies about everything, a while each.
-fn lie(stream: UnixStream, seed: u64) {
+fn lie(stream: UnixStream, seed: u32) {
     let mut out = stream.try_clone().expect("it can be cloned");
     let (mut lines, mut line, mut dice) = (BufReader::new(stream), String::new(), seed);
-    let mut throw = |sides: u64| {
-        dice = dice.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (dice >> 33) % sides
+    let mut throw = |sides: u32| {
+        dice = dice.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (dice >> 8) % sides
     };
     let (begun, mut from, mut rate, mut lie, mut until_s) = (Monotonic.now(), (0.0, 5.0), 1.0, 99, 4.0);
     while lines.read_line(&mut line).is_ok_and(|count| count > 0) {
@@ -423,7 +423,7 @@ fn lie(stream: UnixStream, seed: u64) {
         let media_s = from.1 + rate * (now_s - from.0);
         if now_s > until_s {
             let step_s = [0.0, 0.03, -0.04, 0.3, -5.0, 9.0][throw(6) as usize];
-            (from, lie, until_s) = ((now_s, media_s + step_s), throw(9), now_s + 0.1 * throw(12) as f64);
+            (from, lie, until_s) = ((now_s, media_s + step_s), throw(9), now_s + 0.1 * f64::from(throw(12)));
             rate = [1.0, 1.0, 1.0, 1.02, 0.9, 3.0, -1.0, 0.0][throw(8) as usize];
             let speed = [1.0, 0.99, 1e300, -2.0][throw(4) as usize];
             let told = [
@@ -440,7 +440,7 @@ fn lie(stream: UnixStream, seed: u64) {
         let asked: Value = serde_json::from_str(&line).expect("JSON");
         line.clear();
         let said = match lie {
-            0 => json!(media_s + 1e-3 * throw(100) as f64),
+            0 => json!(media_s + 1e-3 * f64::from(throw(100))),
             1 => json!(throw(100_000)),
             2 => json!("soon"),
             3 => json!(media_s.floor()),
