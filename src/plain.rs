@@ -7,6 +7,18 @@ use std::path::Path;
 /// The longest name of a file that is shown whole, bytes: no path may be longer.
 const PATH_LEN: usize = 4_096;
 
+/// Displays an enum by a word or a phrase for each of its variants.
+macro_rules! displayed {
+    ($name:ty { $($variant:pat => $words:expr),+ $(,)? }) => {
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(match self { $($variant => $words),+ })
+            }
+        }
+    };
+}
+pub(crate) use displayed;
+
 /// The text with its control characters, and those that change the direction of writing, escaped as Rust writes them, and
 /// cut after `limit` bytes: whatever a file, a network or a person gives makes one line, and looks like what it is.
 #[must_use]

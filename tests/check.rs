@@ -471,14 +471,26 @@ fn nothing_that_plays_takes_a_hall_with_drives_that_it_cannot_lead() {
         .replace("rs485", "can");
     let on_can = write(folder.path(), "can.toml", &on_can);
     let serve = ["serve", "--config", &on_can, "--socket", &socket, "--state", &socket];
-    for (args, names) in [
-        (&["play", CUE, "--config", &on_can][..], "D2 on"),
-        (&["latency", "--config", DRIVES], "D1, D2 on"),
-        (&serve, "D2 on"),
+    for (args, refused) in [
+        (&["play", CUE, "--config", &on_can][..], "no CAN bus is opened yet: D2 on one"),
+        (&["latency", "--config", DRIVES], "D1, D2 on serial links, which this does not reach"),
+        (
+            &["register", "write", "PA95=6", "--config", DRIVES],
+            "D1, D2 on serial links, which this does not reach",
+        ),
+        (&serve, "no CAN bus is opened yet: D2 on one"),
     ] {
         let run = kinocue(args);
-        let refused = format!("drives are not played yet: {names}");
-        assert!(run.stderr.contains(&refused), "{args:?}: {}", run.stderr);
+        assert!(run.stderr.contains(refused), "{args:?}: {}", run.stderr);
         assert_eq!(run.code, Some(78), "{args:?}");
+    }
+}
+
+#[test]
+fn the_bench_ride_fits_the_seats_of_all_examples() {
+    for example in ["silvermax", "sixpack2", "chair"] {
+        let config = format!("{}/examples/{example}.toml", env!("CARGO_MANIFEST_DIR"));
+        let run = kinocue(&["check", "cues/bench-ride.csv", "--config", &config]);
+        assert_eq!(run.code, Some(0), "{example}: {}{}", run.stdout, run.stderr);
     }
 }

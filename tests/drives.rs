@@ -379,3 +379,75 @@ fn preflight_tells_a_port_that_is_missing_and_one_that_another_program_has() {
     sim.signal(Signal::TERM);
     sim.finish();
 }
+
+/// What `kinocue register` says of a hall: what it prints, what else it says, and how it ends.
+fn register(args: &[&str], hall: &str) -> (String, String, Option<i32>) {
+    let run = kinocue(&[&["register"], args, &["--config", hall]].concat());
+    (run.stdout, run.stderr, run.code)
+}
+
+#[test]
+fn registers_of_units_are_read_by_their_numbers_kept_and_compared_and_nothing_is_written() {
+    let Bench { hall, sim, folder } = Bench::of("silvermax");
+    assert_eq!(home(&hall).2, Some(0));
+    let (text, said, exit) = register(&["read", "R38..40", "R1"], &hall);
+    assert_eq!(exit, Some(0), "{said}");
+    for words in ["16.R38", "lower soft limit", "-1.00 mm", "18.R39", "151.00 mm", "17.R1"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let file = folder.path().join("kept.toml");
+    let file = file.to_str().expect("text");
+    assert_eq!(register(&["save", file], &hall).2, Some(0));
+    let (_, said, exit) = register(&["diff", file], &hall);
+    assert_eq!((exit, said.contains("nothing differs")), (Some(0), true), "{said}");
+    let kept = fs::read_to_string(file).expect("it was written");
+    fs::write(file, kept.replace("\"17.R38\" = -800", "\"17.R38\" = -801")).expect("a file");
+    let (text, said, exit) = register(&["diff", file], &hall);
+    assert_eq!(exit, Some(1), "{said}");
+    assert!(text.contains("17.R38") && text.contains("-801") && !text.contains("18.R38"), "{text}");
+    sim.signal(Signal::TERM);
+    let counts = sim.finish().report_of(0);
+    assert!(counts["units"].as_array().is_some_and(|units| units.iter().all(|unit| unit["kills"] == 0)));
+}
+
+#[test]
+fn a_sixpack_is_read_by_its_queries_and_its_settings_are_refused_by_name() {
+    let Bench { hall, sim, folder } = Bench::of("sixpack2");
+    let (_, said, exit) = register(&["read"], &hall);
+    assert_eq!(exit, Some(69), "as it woke: {said}");
+    assert!(said.contains("answers as it woke, at 19,200 baud; home it"), "{said}");
+    assert_eq!(home(&hall).2, Some(0));
+    let (text, said, exit) = register(&["read", "$20", "$43", "$30"], &hall);
+    assert_eq!(exit, Some(0), "{said}");
+    for words in ["1.$20.motor2.position", "1.$43.celsius", "1.$30.input7", " V"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let (_, said, exit) = register(&["read", "$15"], &hall);
+    assert_eq!(exit, Some(64));
+    assert!(said.contains("no command that reads its settings back"), "{said}");
+    let (_, said, exit) = register(&["read", "R1"], &hall);
+    assert_eq!(exit, Some(64));
+    assert!(said.contains("none of these controllers has such registers"), "{said}");
+    let file = folder.path().join("kept.toml");
+    let (_, said, exit) = register(&["save", file.to_str().expect("text")], &hall);
+    assert_eq!((exit, file.exists()), (Some(64), false), "{said}");
+    assert!(said.contains("A1: left out, as no setting of a SIXpack 2 can be read"), "{said}");
+    sim.signal(Signal::TERM);
+    sim.finish();
+}
+
+#[test]
+fn a_port_that_another_program_has_is_named_with_what_to_do_before_registers_are_read() {
+    let Bench { hall, sim, folder: _folder } = Bench::of("silvermax");
+    let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
+    let mut said = homing.stderr().lines().map(|line| line.expect("text"));
+    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    let (_, told, exit) = register(&["read", "R1"], &hall);
+    assert_eq!(exit, Some(75), "{told}");
+    assert!(told.contains("another program has it") && told.contains("systemctl stop kinocue"), "{told}");
+    homing.signal(Signal::INT);
+    assert!(said.any(|line| line.ends_with("the seat is not home")));
+    homing.finish();
+    sim.signal(Signal::TERM);
+    sim.finish();
+}

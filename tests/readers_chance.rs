@@ -6,7 +6,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use kinocue::cue::{self, Cue, CueFaults, Source, Step};
+use kinocue::cue::{self, Cue, CueFaults, Source, TrackStep};
 use kinocue::harness::channel::Sample;
 use kinocue::harness::config;
 use kinocue::harness::device::settings;
@@ -125,7 +125,7 @@ fn assert_sound(cue: &Cue) {
     let floor = if is_in_fractions(cue) { 0.0 } else { -f64::from(i32::MAX) };
     assert!(cue.positions().iter().all(|position| position.is_finite() && *position >= floor));
     for (track, steps) in cue.tracks().used() {
-        let values = || steps.as_slice().iter().map(|Step { value: Sample(values), .. }| *values);
+        let values = || steps.as_slice().iter().map(|TrackStep { value: Sample(values), .. }| *values);
         assert!(values().flatten().all(|value| value >= 0.0), "{track}");
         let mut extends = values().map(|levels| Analogue::from_levels(levels).extend());
         let is_analogue = track.to_string().contains("analogue");
@@ -168,7 +168,7 @@ fn assert_read(read: Result<Cue, CueFaults>) {
 /// What a cue says of its effects. In a table each has a cell in the first row, 0 where nothing was said; of messages the first may be
 /// later, and until then it is 0 as well.
 fn said(cue: &Cue) -> Vec<(String, Vec<String>)> {
-    const UNSAID: &str = "Step { at: ShowTime(0), value: Sample([0.0, 0.0]) }";
+    const UNSAID: &str = "TrackStep { at: ShowTime(0), value: Sample([0.0, 0.0]) }";
     let told = cue.tracks().used().map(|(track, steps)| {
         let steps = steps.as_slice().iter().map(|step| format!("{step:?}"));
         (track.to_string(), steps.skip_while(|step| step == UNSAID).collect())

@@ -3,8 +3,8 @@
 use kinocue::harness::motion::Pulses;
 use kinocue::wire::{
     Access, Code, FrameNo, FromController, ImaxMotion, ImaxRegisters, MAX_LEN, Message, MotionReply,
-    MotionRequest, PerAxis, ReadRequest, RegisterReply, ReplyCode, Report, ServoRead, ServoReply, ServoWrite,
-    Status, Timing, Vibration, VibrationPort, Words, WriteRequest,
+    MotionRequest, PerAxis, ReadRequest, RegisterReply, RegisterReport, ReplyCode, ServoRead, ServoReply,
+    ServoWrite, Status, Timing, Vibration, VibrationPort, Words, WriteRequest,
 };
 use proptest::prelude::*;
 
@@ -146,10 +146,10 @@ proptest! {
             Message::Read(ReadRequest { channel, accept, reply, start, num: asked }),
             Message::Write(WriteRequest { channel, accept, reply, start, data: words }),
             Message::RegisterReply(RegisterReply { access, code, channel: slot, error, start, num, data: words }),
-            Message::ServoRead(ServoRead { servo: channel, accept, reply, start, num: asked }),
-            Message::ServoWrite(ServoWrite { servo: channel, accept, reply, start, data: words }),
+            Message::ServoRead(ServoRead { channel, accept, reply, start, num: asked }),
+            Message::ServoWrite(ServoWrite { channel, accept, reply, start, data: words }),
             Message::ServoReply(ServoReply { access, code, servo: slot, error, start, num, data: words }),
-            Message::Report(Report { channel, accept, reply, start, data: words }),
+            Message::Report(RegisterReport { channel, accept, reply, start, data: words }),
         ] {
             let bytes = emitted(&message);
             prop_assert_eq!(Message::parse(&bytes), Ok(message));
@@ -173,7 +173,7 @@ fn read_all_ways(bytes: &[u8]) {
 fn assert_told_apart(bytes: &[u8]) {
     let told = FromController::parse(VibrationPort::Two, bytes);
     let (reply, registers) = (MotionReply::parse(bytes).ok(), RegisterReply::parse(bytes).ok());
-    let (status, report) = (Status::parse(bytes).ok(), Report::parse(bytes).ok());
+    let (status, report) = (Status::parse(bytes).ok(), RegisterReport::parse(bytes).ok());
     let is_wide = ImaxRegisters::parse(bytes).is_ok_and(|reply| reply.is_wide());
     let alone = match (reply, registers, status, report) {
         (Some(reply), None, None, None) => FromController::Reply(reply),

@@ -3,8 +3,8 @@
 use kinocue::harness::motion::Pulses;
 use kinocue::wire::{
     Access, Analogue, Code, FrameNo, ImaxMotion, ImaxRegisters, MAX_LEN, Message, MotionReply, MotionRequest,
-    PerAxis, ReadRequest, RegisterReply, ReplyCode, Report, ServoRead, ServoReply, ServoWrite, Status,
-    Timing, Vibration, VibrationPort, WireError, Words, WriteRequest,
+    PerAxis, ReadRequest, RegisterReply, RegisterReport, ReplyCode, ServoRead, ServoReply, ServoWrite,
+    Status, Timing, Vibration, VibrationPort, WireError, Words, WriteRequest,
 };
 use serde::Deserialize;
 
@@ -149,13 +149,13 @@ impl Fields {
             "reg_write" => Message::Write(WriteRequest { channel, accept, reply, start, data: self.words() }),
             "reg_read_reply" => self.register_reply(Access::Read),
             "reg_write_reply" => self.register_reply(Access::Write),
-            "servo_read" => Message::ServoRead(ServoRead { servo, accept, reply, start, num }),
+            "servo_read" => Message::ServoRead(ServoRead { channel: servo, accept, reply, start, num }),
             "servo_write" => {
-                Message::ServoWrite(ServoWrite { servo, accept, reply, start, data: self.words() })
+                Message::ServoWrite(ServoWrite { channel: servo, accept, reply, start, data: self.words() })
             }
             "servo_read_reply" => self.servo_reply(Access::Read),
             "servo_write_reply" => self.servo_reply(Access::Write),
-            "report" => Message::Report(Report { channel, accept, reply, start, data: self.words() }),
+            "report" => Message::Report(RegisterReport { channel, accept, reply, start, data: self.words() }),
             "status" => Message::Status(Status {
                 station: Code(self.id),
                 positions: self.positions(),

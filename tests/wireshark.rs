@@ -172,12 +172,12 @@ fn put_registers(fields: &mut Fields, bytes: &[u8], message: &Message<'_>) -> us
         }
         Message::ServoRead(read) => {
             codes(fields, read.accept, read.reply);
-            fields.insert("kinocue.servo", read.servo.to_string());
+            fields.insert("kinocue.servo", read.channel.to_string());
             (read.start, usize::from(read.num), data)
         }
         Message::ServoWrite(write) => {
             codes(fields, write.accept, write.reply);
-            fields.insert("kinocue.servo", write.servo.to_string());
+            fields.insert("kinocue.servo", write.channel.to_string());
             (write.start, write.data.len(), write.data)
         }
         Message::ServoReply(reply) => {

@@ -119,25 +119,25 @@ pub(super) async fn upload(
 }
 
 /// A piece of an upload.
-enum Piece {
+enum UploadPiece {
     Bytes(Bytes),
     /// That was all of it.
     End,
 }
 
 /// Hands a body on as it comes; ends early where nobody takes it any more, which whoever took it explains.
-async fn feed(mut body: Body, to: mpsc::Sender<Piece>) -> Result<(), Problem> {
+async fn feed(mut body: Body, to: mpsc::Sender<UploadPiece>) -> Result<(), Problem> {
     loop {
         let piece = match timeout(STALL, body.frame()).await {
             Ok(Some(Ok(frame))) => match frame.into_data() {
-                Ok(bytes) => Piece::Bytes(bytes),
+                Ok(bytes) => UploadPiece::Bytes(bytes),
                 Err(_) => continue, // trailers
             },
             Ok(Some(Err(_))) => return Err(cut_short()),
-            Ok(None) => Piece::End,
+            Ok(None) => UploadPiece::End,
             Err(_) => return Err(slow(STALL)),
         };
-        let last = matches!(piece, Piece::End);
+        let last = matches!(piece, UploadPiece::End);
         if to.send(piece).await.is_err() || last {
             return Ok(());
         }
@@ -145,12 +145,16 @@ async fn feed(mut body: Body, to: mpsc::Sender<Piece>) -> Result<(), Problem> {
 }
 
 /// Takes the pieces into the library; what ends before its end leaves nothing.
-fn take_in(library: &Library, id: &CueId, mut pieces: mpsc::Receiver<Piece>) -> Result<CueInfo, Problem> {
+fn take_in(
+    library: &Library,
+    id: &CueId,
+    mut pieces: mpsc::Receiver<UploadPiece>,
+) -> Result<CueInfo, Problem> {
     let mut upload = library.begin(id)?;
     loop {
         match pieces.blocking_recv() {
-            Some(Piece::Bytes(bytes)) => upload.write(&bytes)?,
-            Some(Piece::End) => return upload.finish(),
+            Some(UploadPiece::Bytes(bytes)) => upload.write(&bytes)?,
+            Some(UploadPiece::End) => return upload.finish(),
             None => return Err(cut_short()),
         }
     }

@@ -16,10 +16,10 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 
 use super::access::one;
-use super::once::Reply;
+use super::once::KeptReply;
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
-use super::rest::Rest;
+use super::rest::BodyRest;
 use super::shared::Shared;
 use super::show::STOP;
 use crate::control::{Code, Place, Problem, Surface, Who};
@@ -37,7 +37,7 @@ const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none
 /// Passes a request on, or refuses it. What was begun is ended also where the connection goes away meanwhile.
 pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
     let of_gate = Arc::clone(&shared);
-    let (request, rest) = Rest::of(request);
+    let (request, rest) = BodyRest::of(request);
     let response = match tokio::spawn(async move { pass(&of_gate, request, next).await }).await {
         Ok(response) => response,
         Err(_) => render(panicked().into_response(), None),
@@ -131,7 +131,7 @@ async fn once(shared: &Shared, asker: &str, key: &str, request: Request, next: N
         Err(problem) => return problem.into_response(),
     };
     let reply = first.get_or_init(|| async {
-        Reply::of(render(caught(next.run(request)).await, Some(&shared.handle.status()))).await
+        KeptReply::of(render(caught(next.run(request)).await, Some(&shared.handle.status()))).await
     });
     let reply = reply.await;
     if reply.is_busy() {

@@ -12,7 +12,7 @@ use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
-use std::thread::{Builder, JoinHandle};
+use std::thread::Builder;
 use std::time::Duration;
 
 use tokio::runtime::{self, Runtime};
@@ -41,6 +41,7 @@ mod rest;
 mod routes;
 mod serve;
 mod service;
+mod serving;
 mod settings;
 mod shared;
 mod show;
@@ -50,6 +51,7 @@ mod stop;
 mod streams;
 mod tries;
 
+pub(crate) use serving::ServingThread;
 pub use stop::{StopSocket, stop_socket};
 
 use access::Access;
@@ -132,12 +134,12 @@ pub enum ApiError {
     System(#[source] io::Error),
 }
 
-/// The API, served until this is dropped.
+/// The API, served until this is dropped: no more connections are taken then, and those that are there end what they are at, within a
+/// few seconds.
 #[derive(Debug)]
 pub struct Running {
     addresses: Vec<SocketAddr>,
-    closing: watch::Sender<bool>,
-    thread: Option<JoinHandle<()>>,
+    _thread: ServingThread,
 }
 
 impl Running {
@@ -145,16 +147,6 @@ impl Running {
     #[must_use]
     pub fn addresses(&self) -> &[SocketAddr] {
         &self.addresses
-    }
-}
-
-impl Drop for Running {
-    /// Ends it: no more connections are taken, and those that are there end what they are at, within a few seconds.
-    fn drop(&mut self) {
-        self.closing.send_replace(true);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // a panic in it has been told
-        }
     }
 }
 
@@ -195,13 +187,13 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         .max_blocking_threads(BLOCKING)
         .build()
         .map_err(ApiError::System)?;
-    let sockets = Sockets { local, _file: file, tcp, log };
+    let sockets = ApiSockets { local, _file: file, tcp, log };
     let thread = Builder::new().name(THREAD.to_owned()).spawn(move || run(runtime, sockets, shared, router));
-    Ok(Running { addresses, closing, thread: Some(thread.map_err(ApiError::System)?) })
+    Ok(Running { addresses, _thread: ServingThread::new(closing, thread.map_err(ApiError::System)?) })
 }
 
 /// What is listened on.
-struct Sockets {
+struct ApiSockets {
     local: std::os::unix::net::UnixListener,
     /// Goes when the server ends.
     _file: SocketFile,
@@ -210,11 +202,11 @@ struct Sockets {
 }
 
 /// Serves until the server ends.
-fn run(runtime: Runtime, sockets: Sockets, shared: Arc<Shared>, router: axum::Router) {
-    let Sockets { local, _file, tcp, log } = sockets;
+fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, router: axum::Router) {
+    let ApiSockets { local, _file, tcp, log } = sockets;
     let mut closing = shared.closing.clone();
     let (alive, mut all_gone) = mpsc::channel(1);
-    let hall = serve::Hall { router, closing: closing.clone(), alive, log };
+    let hall = serve::ServedHall { router, closing: closing.clone(), alive, log };
     runtime.block_on(async move {
         tokio::spawn(Pulse::follow(shared));
         let places = serve::tcp_places();

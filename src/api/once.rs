@@ -29,7 +29,7 @@ const AGE: Duration = Duration::from_secs(600);
 pub(super) struct Once(Mutex<VecDeque<Kept>>);
 
 /// The reply to the first request with a key; empty until it is there.
-pub(super) type First = Arc<OnceCell<Reply>>;
+pub(super) type First = Arc<OnceCell<KeptReply>>;
 
 #[derive(Debug)]
 struct Kept {
@@ -44,7 +44,7 @@ struct Kept {
 
 /// A reply that can be given again.
 #[derive(Debug, Clone)]
-pub(super) struct Reply {
+pub(super) struct KeptReply {
     status: StatusCode,
     content_type: Option<HeaderValue>,
     body: Bytes,
@@ -101,7 +101,7 @@ fn forget(kept: &mut VecDeque<Kept>, now: MonoTime) {
     }
 }
 
-impl Reply {
+impl KeptReply {
     /// A response, whole.
     pub(super) async fn of(response: Response) -> Self {
         let (parts, body) = response.into_parts();
@@ -136,8 +136,8 @@ mod tests {
         MonoTime::from_nanos(0) + Duration::from_secs(seconds)
     }
 
-    fn reply(bytes: usize) -> Reply {
-        Reply { status: StatusCode::OK, content_type: None, body: vec![b'x'; bytes].into() }
+    fn reply(bytes: usize) -> KeptReply {
+        KeptReply { status: StatusCode::OK, content_type: None, body: vec![b'x'; bytes].into() }
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub(super) const PROBLEM_JSON: &str = "application/problem+json";
 /// Why something was not done, and how the hall is (RFC 9457).
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Problem)]
-pub(super) struct Body<'p> {
+pub(super) struct ProblemBody<'p> {
     /// Names the kind: `urn:kinocue:problem:` and the code.
     #[serde(rename = "type")]
     kind: String,
@@ -49,7 +49,7 @@ impl IntoResponse for Problem {
 pub(super) fn render(mut response: Response, hall: Option<&Status>) -> Response {
     let Some(problem) = response.extensions_mut().remove::<Problem>() else { return response };
     let Problem { status, code, detail, remedy, faults } = &problem;
-    let body = Body {
+    let body = ProblemBody {
         kind: format!("urn:kinocue:problem:{}", code.word()),
         title: title(*code),
         status: *status,

@@ -20,10 +20,10 @@ use super::pieces::Pieces;
 use super::problem::bad_value;
 use super::shared::{Shared, turn};
 use crate::control::{Code, Problem};
-use crate::journal::{self, Most, Report};
+use crate::journal::{self, JournalReport, ReportBounds};
 
 /// The newest of a day, and no more.
-const MOST: Most = Most { shows: 500, actions: 5_000 };
+const MOST: ReportBounds = ReportBounds { shows: 500, actions: 5_000 };
 /// Bytes of a piece, and how many wait for whoever reads them.
 const PIECE: usize = 64 << 10;
 const WAITING: usize = 2;
@@ -34,7 +34,7 @@ const READING: Duration = Duration::from_secs(30);
 /// things that were asked, the newest; `kinocue report` has all. One at a time.
 #[utoipa::path(
     get, path = "/api/v1/reports/{day}", tag = "library",
-    params(("day" = String, Path, description = "YYYY-MM-DD")), responses((status = 200, body = Report))
+    params(("day" = String, Path, description = "YYYY-MM-DD")), responses((status = 200, body = JournalReport))
 )]
 pub(super) async fn one(State(shared): State<Arc<Shared>>, Name(day): Name) -> Result<Response, Problem> {
     let day = date(&day)?;
@@ -49,7 +49,7 @@ pub(super) async fn one(State(shared): State<Arc<Shared>>, Name(day): Name) -> R
     let (to, mut written) = mpsc::channel(WAITING);
     let (pieces, body) = mpsc::channel(WAITING);
     tokio::task::spawn_blocking(move || {
-        let mut out = BufWriter::with_capacity(PIECE, Out(to));
+        let mut out = BufWriter::with_capacity(PIECE, ReportPieces(to));
         // Where it cannot be written, nobody reads it any more.
         let _ = serde_json::to_writer(&mut out, &report).map_err(io::Error::from).and_then(|()| out.flush());
     });
@@ -69,9 +69,9 @@ pub(super) async fn one(State(shared): State<Arc<Shared>>, Name(day): Name) -> R
 }
 
 /// Pieces on their way out; each write waits until there is room.
-struct Out(mpsc::Sender<Bytes>);
+struct ReportPieces(mpsc::Sender<Bytes>);
 
-impl Write for Out {
+impl Write for ReportPieces {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let sent = self.0.blocking_send(Bytes::copy_from_slice(bytes));
         sent.map(|()| bytes.len()).map_err(|_| io::ErrorKind::BrokenPipe.into())

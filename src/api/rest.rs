@@ -19,9 +19,9 @@ const PATIENCE: Duration = Duration::from_millis(500);
 
 /// A body that the handler reads as far as it likes, and the gate afterwards.
 #[derive(Debug, Clone)]
-pub(super) struct Rest(Arc<Mutex<Body>>);
+pub(super) struct BodyRest(Arc<Mutex<Body>>);
 
-impl Rest {
+impl BodyRest {
     /// The request with a body that is shared with what is given beside it.
     pub(super) fn of(request: Request) -> (Request, Option<Self>) {
         // Who asks first whether to send it is answered by the reply itself.
@@ -52,7 +52,7 @@ impl Rest {
     }
 }
 
-impl hyper::body::Body for Rest {
+impl hyper::body::Body for BodyRest {
     type Data = Bytes;
     type Error = axum::Error;
 

@@ -12,7 +12,7 @@ use utoipa::{OpenApi as _, ToSchema as _};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::problem::{Body, PROBLEM_JSON};
+use super::problem::{PROBLEM_JSON, ProblemBody};
 use super::shared::Shared;
 use super::{controllers, cues, gate, playlist, reports, service, settings, show, status};
 use crate::control::Code;
@@ -27,7 +27,7 @@ use crate::control::Code;
             control socket is engineer; over TCP send Authorization: Bearer TOKEN. Replies carry X-Kinocue-Time, unix \
             milliseconds, to reckon X-Kinocue-Sent by."
     ),
-    components(schemas(Body<'static>, Code))
+    components(schemas(ProblemBody<'static>, Code))
 )]
 struct Document;
 
@@ -107,7 +107,7 @@ fn describe(path: &mut PathItem) {
 }
 
 fn may_fail(operation: &mut Operation) {
-    let schema = Ref::from_schema_name(Body::name());
+    let schema = Ref::from_schema_name(ProblemBody::name());
     let problem = ResponseBuilder::new()
         .description("Why it was not done")
         .content(PROBLEM_JSON, Content::new(Some(schema)))

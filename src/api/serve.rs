@@ -37,7 +37,7 @@ const PAUSE: Duration = Duration::from_millis(100);
 
 /// What every connection needs.
 #[derive(Clone)]
-pub(super) struct Hall {
+pub(super) struct ServedHall {
     /// The routes.
     pub(super) router: axum::Router,
     /// True if the server ends.
@@ -48,7 +48,7 @@ pub(super) struct Hall {
     pub(super) log: Log,
 }
 
-impl Hall {
+impl ServedHall {
     /// A place for a connection, for which another may have to leave.
     fn place(&self, places: &Places, address: Option<IpAddr>, from: &str) -> Place {
         let (place, crowded) = places.take(address);
@@ -65,7 +65,7 @@ impl Hall {
 }
 
 /// Serves the control socket until the server ends.
-pub(super) async fn local(listener: UnixListener, hall: Hall) {
+pub(super) async fn local(listener: UnixListener, hall: ServedHall) {
     let places = Places::new(LOCAL);
     let on = |(stream, _): (UnixStream, _)| {
         let Ok(user) = stream.peer_cred() else { return };
@@ -76,7 +76,7 @@ pub(super) async fn local(listener: UnixListener, hall: Hall) {
 }
 
 /// Serves one TCP port until the server ends.
-pub(super) async fn tcp(listener: TcpListener, places: Places, hall: Hall) {
+pub(super) async fn tcp(listener: TcpListener, places: Places, hall: ServedHall) {
     let on = |(stream, from): (TcpStream, SocketAddr)| {
         let address = from.ip().to_canonical();
         let place = hall.place(&places, Some(address), &address.to_string());
@@ -109,11 +109,11 @@ pub(super) fn tcp_places() -> Places {
     Places::new(TCP)
 }
 
-async fn connection<S>(stream: S, peer: Peer, place: Place, hall: Hall)
+async fn connection<S>(stream: S, peer: Peer, place: Place, hall: ServedHall)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let Hall { router, mut closing, alive: _alive, .. } = hall;
+    let ServedHall { router, mut closing, alive: _alive, .. } = hall;
     let router = Arc::new(TowerToHyperService::new(router));
     let place = Arc::new(place);
     let of_requests = Arc::clone(&place);

@@ -16,7 +16,7 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 use super::asker::StatusReply;
 use super::pieces::Pieces;
 use super::shared::Shared;
-use super::streams::Stream;
+use super::streams::StreamPlace;
 use crate::control::{Code, FilmStatus, Problem, Status, Who};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
@@ -62,7 +62,7 @@ pub(super) async fn events(
 }
 
 /// Pushes statuses until the other end has gone, or the server ends.
-async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, place: Stream) {
+async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, place: StreamPlace) {
     let mut statuses = shared.handle.watch();
     let mut closing = shared.closing.clone();
     let mut pace = interval(PACE);

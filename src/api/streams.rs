@@ -18,7 +18,7 @@ pub(super) struct Streams(Arc<Mutex<Vec<Watching>>>);
 
 /// A place among them, free again when it is dropped.
 #[derive(Debug)]
-pub(super) struct Stream {
+pub(super) struct StreamPlace {
     watching: Arc<Mutex<Vec<Watching>>>,
     leave: Arc<Notify>,
 }
@@ -35,7 +35,7 @@ impl Streams {
     ///
     /// # Errors
     /// If there is none, and nobody whose role is less.
-    pub(super) fn take(&self, who: &Who) -> Result<Stream, Problem> {
+    pub(super) fn take(&self, who: &Who) -> Result<StreamPlace, Problem> {
         let mut watching = lock(&self.0);
         let count = |is: &dyn Fn(&Who) -> bool| watching.iter().filter(|one| is(&one.who)).count();
         if count(&|other| other.surface == who.surface && other.name == who.name) >= MOST_OF_ONE {
@@ -51,18 +51,18 @@ impl Streams {
         }
         let leave = Arc::<Notify>::default();
         watching.push(Watching { who: who.clone(), leave: Arc::clone(&leave) });
-        Ok(Stream { watching: Arc::clone(&self.0), leave })
+        Ok(StreamPlace { watching: Arc::clone(&self.0), leave })
     }
 }
 
-impl Stream {
+impl StreamPlace {
     /// Waits until the place has to be left; for good, where it never has to.
     pub(super) async fn leave(&self) {
         self.leave.notified().await;
     }
 }
 
-impl Drop for Stream {
+impl Drop for StreamPlace {
     fn drop(&mut self) {
         lock(&self.watching).retain(|one| !Arc::ptr_eq(&one.leave, &self.leave));
     }
@@ -89,7 +89,7 @@ mod tests {
         Who { role, surface: Surface::Http, name: name.to_owned() }
     }
 
-    fn has_to_leave(stream: &Stream) -> bool {
+    fn has_to_leave(stream: &StreamPlace) -> bool {
         pin!(stream.leave()).poll(&mut Context::from_waker(Waker::noop())).is_ready()
     }
 

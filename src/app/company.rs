@@ -32,7 +32,7 @@ pub(super) struct Company<'a> {
 
 /// A count, and what was sent from here before it and since.
 #[derive(Debug, Clone, Copy, Default)]
-struct Count {
+struct SentCount {
     told: Option<u16>,
     /// Reads that went out while it was asked for.
     sent: u16,
@@ -57,10 +57,10 @@ impl Company<'_> {
         (0..self.lanes.len()).filter_map(surplus).collect()
     }
 
-    fn counts(&mut self) -> Vec<Count> {
+    fn counts(&mut self) -> Vec<SentCount> {
         let ends = self.controllers.iter().zip(self.lanes);
         let mut peers: Vec<_> =
-            ends.map(|(controller, lane)| (Peer::new(controller, lane), Count::default())).collect();
+            ends.map(|(controller, lane)| (Peer::new(controller, lane), SentCount::default())).collect();
         for _ in 0..TRIES {
             let now = Monotonic.now();
             for (lane, (peer, count)) in peers.iter_mut().enumerate() {
@@ -71,7 +71,7 @@ impl Company<'_> {
                 }
             }
             // Of one that has no counter nothing is asked.
-            let is_open = |(_, count): &(Peer, Count)| count.told.is_none() && count.sent > 0;
+            let is_open = |(_, count): &(Peer, SentCount)| count.told.is_none() && count.sent > 0;
             while peers.iter().any(is_open) && self.has_slept_before(now + WAIT) {
                 self.acks.drain(&mut |lane: usize, arrival| {
                     let (peer, count) = &mut peers[lane];

@@ -15,7 +15,7 @@ use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock as _, MonoTime};
 
 /// The tick loop on real time and real sockets.
-pub(super) type Ticks<'a> = TickLoop<'a, Spinning<'a, Monotonic>, Outlets>;
+pub(super) type RealTicks<'a> = TickLoop<'a, Spinning<'a, Monotonic>, Outlets>;
 
 /// The ack thread and the planner's.
 #[derive(Debug)]
@@ -80,7 +80,7 @@ impl<'scope> Helpers<'scope> {
     ///
     /// # Panics
     /// If one of them panicked.
-    pub(super) fn end(self, ticks: &Ticks<'_>, ended: Ended, granted: RealTime, origin: MonoTime) -> Run {
+    pub(super) fn end(self, ticks: &RealTicks<'_>, ended: Ended, granted: RealTime, origin: MonoTime) -> Run {
         self.over.store(true, Ordering::Release);
         self.planner.thread().unpark();
         let refusals = self.planner.join().expect("the planner does not panic");

@@ -19,7 +19,7 @@ pub(crate) mod surfaces;
 
 pub use play::Play;
 pub(crate) use refused::PlayError;
-pub(crate) use report::Report;
+pub(crate) use report::PlayReport;
 pub use runtime::Control;
 pub use script::PlayHandle;
 pub use staged::StagedShow;

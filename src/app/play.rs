@@ -11,7 +11,7 @@ use super::refused::PlayError;
 use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeError};
 use super::script::{PlayHandle, PlayScript, off_park};
 use super::staged::{StagedShow, at_any_pace};
-use super::sum_up::{About, Played, sum_up};
+use super::sum_up::{Played, SumUp, sum_up};
 use crate::config::{Config, Misfit};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
@@ -177,7 +177,7 @@ impl Play {
             ending => ending,
         };
         run.origin = led.began.unwrap_or(run.origin);
-        let about = About { cue, rate, ending: ending.into(), silent };
+        let about = SumUp { cue, rate, ending: ending.into(), silent };
         let mut played = sum_up(about, &config.controllers, &led.prepared, &run);
         if ending == Ending::Completed {
             let off_park = off_park(&lanes, &live, run.closed_at).into_iter();

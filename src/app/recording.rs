@@ -8,7 +8,7 @@ use std::thread::{Builder, JoinHandle};
 
 use mcap::{McapError, McapResult};
 
-use super::Report;
+use super::PlayReport;
 use crate::config::{Config, Connection};
 use crate::drive::Lane;
 use crate::record::{About, FrameKind, Intake, RecordedSeat, Recorder, Recording, SAMPLE_HZ, Taps};
@@ -57,7 +57,7 @@ impl PlayRecording {
     ///
     /// # Errors
     /// Why there is no whole file, in a sentence; what was written until then stays.
-    pub(super) fn finish(self, report: Option<&Report>) -> Result<(), String> {
+    pub(super) fn finish(self, report: Option<&PlayReport>) -> Result<(), String> {
         let Self { path, part, thread } = self;
         let finish = || {
             let recorder = thread.join().map_err(|_| io::Error::other("its thread panicked"))?;

@@ -14,7 +14,7 @@ use crate::time::MonoTime;
 
 /// What became of a play. Within one `format` fields are added, never changed.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Report {
+pub struct PlayReport {
     /// The layout of this document ([`crate::control::FORMAT`]).
     pub(crate) format: u32,
     /// The cue file, as it was named.
@@ -183,7 +183,7 @@ pub(crate) struct ControllerReport {
     pub(crate) state: StateReport,
 }
 
-impl Report {
+impl PlayReport {
     /// The figures as people read them, with a table of the controllers.
     #[must_use]
     pub(crate) fn text(&self) -> String {
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn every_field_of_a_report_is_read_as_it_was_written_and_written_as_it_ever_was() {
         let json = include_str!("../../tests/data/play-report.json");
-        let report: Report = serde_json::from_str(json).unwrap();
+        let report: PlayReport = serde_json::from_str(json).unwrap();
         assert_eq!(serde_json::to_string_pretty(&report).unwrap() + "\n", json);
     }
 }

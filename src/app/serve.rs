@@ -19,8 +19,8 @@ use signal_hook::flag;
 use super::film::HallFilm;
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
-use super::sum_up::{About, Played, sum_up};
-use super::supervisor::{Carryover, ServiceLog, Signals, Supervisor, SupervisorEnd, SupervisorPorts};
+use super::sum_up::{Played, SumUp, sum_up};
+use super::supervisor::{Carryover, ServiceLog, Supervisor, SupervisorEnd, SupervisorPorts, SystemSignals};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::api::Pages;
 use crate::config::Config;
@@ -128,7 +128,7 @@ pub(crate) struct Parts {
     /// The console.
     pub(crate) pages: Pages,
     /// What tells it to end, and to read its configuration anew.
-    pub(crate) signals: Signals,
+    pub(crate) signals: SystemSignals,
     /// Where it says what happens.
     pub(crate) log: Log,
 }
@@ -149,7 +149,7 @@ impl Served {
         // That a group is there when the hall opens is no change worth telling.
         let mut seen = BTreeSet::new();
         closed.run.accounts.changes.retain(|one| !seen.insert(one.group) || one.why != Why::SeenAgain);
-        let about = About { cue, rate: Rate::from_hz(config.show.rate_hz), ending: ended, silent: false };
+        let about = SumUp { cue, rate: Rate::from_hz(config.show.rate_hz), ending: ended, silent: false };
         // A hall brings its seats to park by frames like any other.
         let prepared = Prepared::nothing(config.controllers.len());
         sum_up(about, &config.controllers, &prepared, &closed.run)
@@ -313,8 +313,8 @@ fn feed_watchdog(handle: &RuntimeHandle) -> Option<WatchdogThread> {
 ///
 /// # Errors
 /// [`ServeError::System`] where they cannot be handled.
-pub(crate) fn signals() -> Result<Signals, ServeError> {
-    let signals = Signals::default();
+pub(crate) fn signals() -> Result<SystemSignals, ServeError> {
+    let signals = SystemSignals::default();
     let on = |signal, flag: &Arc<_>| flag::register(signal, Arc::clone(flag)).map_err(ServeError::System);
     on(SIGTERM, &signals.leave)?;
     on(SIGINT, &signals.leave)?;

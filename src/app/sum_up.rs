@@ -1,6 +1,6 @@
 //! Sums up a play: the report, and notes for the person.
 
-use super::report::{ControllerReport, EventReport, RealTimeReport, Report, StateReport};
+use super::report::{ControllerReport, EventReport, PlayReport, RealTimeReport, StateReport};
 use super::run::Run;
 use super::script::Prepared;
 use crate::config::Controller;
@@ -47,7 +47,7 @@ impl From<engine::Ending> for Ending {
 #[derive(Debug)]
 pub struct Played {
     /// Its report.
-    pub report: Report,
+    pub report: PlayReport,
     /// What the system refused, in words.
     pub(crate) refusals: Vec<String>,
     /// What else a person should know, in words.
@@ -61,7 +61,7 @@ pub struct Played {
 }
 
 /// What is summed up.
-pub(super) struct About {
+pub(super) struct SumUp {
     /// What was played, as people know it.
     pub(super) cue: String,
     pub(super) rate: Rate,
@@ -72,9 +72,9 @@ pub(super) struct About {
 }
 
 /// Sums up what was played to these controllers, whose accounts are closed.
-pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepared, run: &Run) -> Played {
-    let About { cue, rate, ending, silent } = about;
-    let report = Report {
+pub(super) fn sum_up(about: SumUp, controllers: &[Controller], prepared: &Prepared, run: &Run) -> Played {
+    let SumUp { cue, rate, ending, silent } = about;
+    let report = PlayReport {
         format: FORMAT,
         cue,
         result: ending,

@@ -4,12 +4,12 @@
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::thread::{Builder, JoinHandle};
+use std::thread::Builder;
 
 use tokio::runtime;
 use tokio::sync::watch;
 
-use crate::api::{self, ApiError, Pages, StopSocket, stop_socket};
+use crate::api::{self, ApiError, Pages, ServingThread, StopSocket, stop_socket};
 use crate::config::Config;
 use crate::control::Handle;
 use crate::library::Library;
@@ -49,17 +49,10 @@ pub(crate) enum SurfaceError {
 #[derive(Debug)]
 pub(crate) struct Surfaces {
     // The stop goes last.
-    ports: Option<Ports>,
+    ports: Option<ServingThread>,
     osc: Option<Arc<Counts>>,
     api: api::Running,
     stop: StopSocket,
-}
-
-/// The ports for show control, on a thread of their own.
-#[derive(Debug)]
-struct Ports {
-    closing: watch::Sender<bool>,
-    thread: Option<JoinHandle<()>>,
 }
 
 impl Surfaces {
@@ -90,7 +83,7 @@ impl Surfaces {
         let text = config.text.as_ref().map(|text| text_port::open(text, handle.clone())).transpose()?;
         let counts = osc.as_ref().map(Osc::counts);
         let ports =
-            if osc.is_some() || text.is_some() { Some(Ports::start(osc, text, log.clone())?) } else { None };
+            if osc.is_some() || text.is_some() { Some(show_control(osc, text, log.clone())?) } else { None };
         Ok(Self { ports, osc: counts, api, stop })
     }
 
@@ -114,49 +107,39 @@ impl Surfaces {
     }
 }
 
-impl Ports {
-    fn start(osc: Option<Osc>, text: Option<Text>, log: Log) -> Result<Self, SurfaceError> {
-        let (closing, mut closed) = watch::channel(false);
-        let runtime =
-            runtime::Builder::new_current_thread().enable_all().build().map_err(SurfaceError::System)?;
-        let run = move || {
-            runtime.block_on(async move {
-                let fail = |what: &str, error: io::Error| {
-                    let text = format!("the port for {what} has failed: {error}; start the service anew");
-                    log.say(Line::new(Priority::Error, "port", text));
-                };
-                let osc = async {
-                    if let Some(Err(error)) = match osc {
-                        Some(osc) => Some(osc.serve().await),
-                        None => None,
-                    } {
-                        fail("OSC", error);
-                    }
-                };
-                let text = async {
-                    if let Some(Err(error)) = match text {
-                        Some(text) => Some(text.serve().await),
-                        None => None,
-                    } {
-                        fail("text", error);
-                    }
-                };
-                tokio::select! {
-                    _ = closed.wait_for(|closing| *closing) => {}
-                    () = async { tokio::join!(osc, text); std::future::pending::<()>().await } => {}
+/// The ports for show control, on a thread of their own.
+fn show_control(osc: Option<Osc>, text: Option<Text>, log: Log) -> Result<ServingThread, SurfaceError> {
+    let (closing, mut closed) = watch::channel(false);
+    let runtime =
+        runtime::Builder::new_current_thread().enable_all().build().map_err(SurfaceError::System)?;
+    let run = move || {
+        runtime.block_on(async move {
+            let fail = |what: &str, error: io::Error| {
+                let text = format!("the port for {what} has failed: {error}; start the service anew");
+                log.say(Line::new(Priority::Error, "port", text));
+            };
+            let osc = async {
+                if let Some(Err(error)) = match osc {
+                    Some(osc) => Some(osc.serve().await),
+                    None => None,
+                } {
+                    fail("OSC", error);
                 }
-            });
-        };
-        let thread = Builder::new().name("ports".to_owned()).spawn(run).map_err(SurfaceError::System)?;
-        Ok(Self { closing, thread: Some(thread) })
-    }
-}
-
-impl Drop for Ports {
-    fn drop(&mut self) {
-        self.closing.send_replace(true);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // a panic in it has been told
-        }
-    }
+            };
+            let text = async {
+                if let Some(Err(error)) = match text {
+                    Some(text) => Some(text.serve().await),
+                    None => None,
+                } {
+                    fail("text", error);
+                }
+            };
+            tokio::select! {
+                _ = closed.wait_for(|closing| *closing) => {}
+                () = async { tokio::join!(osc, text); std::future::pending::<()>().await } => {}
+            }
+        });
+    };
+    let thread = Builder::new().name("ports".to_owned()).spawn(run).map_err(SurfaceError::System)?;
+    Ok(ServingThread::new(closing, thread))
 }

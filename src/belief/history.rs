@@ -14,7 +14,7 @@ const BUCKETS: usize = 26;
 
 /// The places that some frames lead through.
 #[derive(Debug, Clone, Copy)]
-struct Bucket {
+struct PlaceBucket {
     from: MonoTime,
     /// When the last of them is over.
     until: MonoTime,
@@ -26,7 +26,7 @@ struct Bucket {
 /// The places of the last half second, bucket by bucket, the newest at `newest`.
 #[derive(Debug, Clone)]
 pub(super) struct History {
-    buckets: [Bucket; BUCKETS],
+    buckets: [PlaceBucket; BUCKETS],
     newest: usize,
 }
 
@@ -34,7 +34,7 @@ impl History {
     /// The seat is there, and no frame led it elsewhere.
     pub(super) const fn at(pose: Pose) -> Self {
         let zero = MonoTime::from_nanos(0);
-        let empty = Bucket { from: zero, until: zero, reach: Reach::at(pose), shakes: 0.0 };
+        let empty = PlaceBucket { from: zero, until: zero, reach: Reach::at(pose), shakes: 0.0 };
         Self { buckets: [empty; BUCKETS], newest: 0 }
     }
 
@@ -42,7 +42,7 @@ impl History {
     pub(super) fn push(&mut self, last: &Pose, pose: &Pose, shakes: f64, (at, until): (MonoTime, MonoTime)) {
         if at.since(self.buckets[self.newest].from) >= BUCKET {
             self.newest = (self.newest + 1) % BUCKETS;
-            self.buckets[self.newest] = Bucket { from: at, until, reach: Reach::at(*last), shakes };
+            self.buckets[self.newest] = PlaceBucket { from: at, until, reach: Reach::at(*last), shakes };
         }
         let bucket = &mut self.buckets[self.newest];
         (bucket.until, bucket.shakes) = (bucket.until.max(until), bucket.shakes.max(shakes));

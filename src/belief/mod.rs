@@ -6,6 +6,7 @@
 //! frame since then would have it (`span`). Each frame is held against all of these before it is sent
 //! ([`Belief::allows`]). Tick thread; told the time; allocates nothing.
 
+mod check;
 mod evidence;
 mod history;
 mod kinds;
@@ -373,84 +374,10 @@ impl Belief {
         now > self.executed_until() + QUIET.max(2 * self.period)
     }
 
-    /// Whether a frame to `pose`, to be reached in so many milliseconds, keeps the greatest speed of every axis from wherever
-    /// it may be. Losses shorter than [`GAP`] are left out: while acks come, an axis is where its last frame leads.
-    #[must_use]
-    pub(crate) fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
-        let time = f64::from(lasts_ms);
-        if self.is_quiet(now) && !self.is_fresh(now) && self.within != 0 {
-            return false;
-        }
-        let from_all = self.may_be_anywhere_between(now);
-        if !from_all && self.within == self.own && self.sways == 0.0 {
-            // Nearly every frame: without a branch, on slots that the seat does not have as well, whose speed has no bound.
-            let axes = pose.iter().zip(self.spans.last()).zip(&self.speed);
-            return axes.fold(true, |all, ((to, from), speed)| all & ((to - from).abs() <= speed * time));
-        }
-        slots_in(self.own).all(|slot| self.distance(slot, pose, from_all) <= self.speed[slot] * time)
-    }
-
-    /// How far from `pose` each axis may be at the most; 0 where the seat has no such axis.
-    #[must_use]
-    pub(crate) fn farthest(&self, pose: &Pose, now: MonoTime) -> Pose {
-        let from_all = self.may_be_anywhere_between(now);
-        let mut farthest = [0.0; MAX_AXES];
-        slots_in(self.own).for_each(|slot| farthest[slot] = self.distance(slot, pose, from_all));
-        farthest
-    }
-
-    /// True if a seat may be at any place that its open frames lead through, not at the last alone.
-    fn may_be_anywhere_between(&self, now: MonoTime) -> bool {
-        self.gap || self.is_quiet(now)
-    }
-
-    /// How far a slot may be from where `pose` has it, at the most.
-    #[inline]
-    fn distance(&self, slot: usize, pose: &Pose, from_all: bool) -> f64 {
-        let (low, high) = if self.within >> slot & 1 == 0 {
-            (0.0, 1.0)
-        } else if from_all {
-            self.spans.reach(slot)
-        } else {
-            (self.spans.last()[slot], self.spans.last()[slot])
-        };
-        (pose[slot] - low).abs().max((pose[slot] - high).abs()) + self.sways
-    }
-
-    /// Notes a frame that the kernel took.
-    pub(crate) fn taken(&mut self, taken: &Taken<'_>) {
-        let Taken { frame, asked, pose, lasts_ms, at_most_ms, shakes, at } = *taken;
-        let [lasts, at_most] = [lasts_ms, at_most_ms].map(|ms| Duration::from_millis(u64::from(ms)));
-        let behind = self.busy_until.since(at);
-        self.tally.late += u64::from(behind > lasts.max(self.period));
-        self.tally.hurried += u64::from(behind > 3 * lasts.max(self.period));
-        self.busy_until = self.busy_until.max(at) + lasts;
-        self.busy_at_most = self.busy_at_most.max(at) + at_most;
-        self.shaking.on_frame(frame, shakes);
-        // One that vibrates on does so until this frame arrives.
-        self.history.push(self.spans.last(), pose, shakes.max(self.sways), (at, self.busy_until));
-        // What was refused before it is missing as well, until it is acked.
-        let since = self.refused_since.take().unwrap_or(at);
-        self.spans.push(frame, asked, pose, since);
-        if !matches!(self.known, Known::Commanded(_)) {
-            self.known = Known::Commanded(at);
-        }
-    }
-
-    /// Notes that the kernel did not take a frame.
-    pub(crate) fn refused(&mut self, at: MonoTime) {
-        self.refused_since.get_or_insert(at);
-    }
-
     /// The seat may have been moved unseen: what was known of it is known no more.
     pub(crate) fn forget(&mut self) {
         (self.known, self.within, self.sways) = (Known::Nothing, 0, 0.0);
         self.spans.restart_at(*self.spans.last());
-    }
-
-    /// Notes that a frame was not sent.
-    pub(crate) const fn withheld(&mut self) {
-        self.tally.withheld += 1;
     }
 }
 

@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::time::Duration;
 
-use super::source::{Order, Source, array_at};
+use super::source::{ByteOrder, Source, array_at};
 use super::{CaptureError, MAX_PACKET, Record};
 
 mod field {
@@ -22,7 +22,7 @@ const NANOSECONDS: u32 = 0xa1b2_3c4d;
 /// What the magic number says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
-    order: Order,
+    order: ByteOrder,
     /// Nanoseconds of one step of a time's fraction.
     step_ns: u32,
 }
@@ -30,7 +30,7 @@ pub(super) struct Layout {
 impl Layout {
     /// The layout of a file that opens with `magic`.
     pub(super) fn of(magic: [u8; 4]) -> Option<Self> {
-        [Order::Big, Order::Little].into_iter().find_map(|order| match order.u32(magic) {
+        [ByteOrder::Big, ByteOrder::Little].into_iter().find_map(|order| match order.u32(magic) {
             MICROSECONDS => Some(Self { order, step_ns: 1_000 }),
             NANOSECONDS => Some(Self { order, step_ns: 1 }),
             _ => None,
@@ -70,6 +70,6 @@ impl Pcap {
 }
 
 /// A number of a header that was read whole.
-fn number(order: Order, header: &[u8], at: usize) -> u32 {
+fn number(order: ByteOrder, header: &[u8], at: usize) -> u32 {
     order.u32(array_at(header, at).expect("the place is inside the header"))
 }

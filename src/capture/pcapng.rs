@@ -4,7 +4,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::time::Duration;
 
-use super::source::{Order, Source, array_at};
+use super::source::{ByteOrder, Source, array_at};
 use super::{CaptureError, MAX_PACKET, Record};
 
 /// Opens a section, and so the file.
@@ -49,7 +49,7 @@ const MAX_INTERFACES: usize = 65_536;
 /// Reads packets.
 #[derive(Debug)]
 pub(super) struct PcapNg {
-    order: Order,
+    order: ByteOrder,
     interfaces: Vec<Interface>,
 }
 
@@ -65,7 +65,7 @@ struct Interface {
 impl PcapNg {
     /// Reads the section header that the file opens with, its kind having been read.
     pub(super) fn open<R: Read>(source: &mut Source<R>) -> Result<Self, CaptureError> {
-        let mut read = Self { order: Order::Big, interfaces: Vec::new() };
+        let mut read = Self { order: ByteOrder::Big, interfaces: Vec::new() };
         read.section(source)?;
         Ok(read)
     }
@@ -107,8 +107,8 @@ impl PcapNg {
         let len = source.array()?;
         let mark = source.array()?;
         self.order = match u32::from_be_bytes(mark) {
-            0x1a2b_3c4d => Order::Big,
-            0x4d3c_2b1a => Order::Little,
+            0x1a2b_3c4d => ByteOrder::Big,
+            0x4d3c_2b1a => ByteOrder::Little,
             _ => return Err(CaptureError::ByteOrder { at: at + 8, found: mark }),
         };
         self.interfaces.clear();
@@ -188,7 +188,7 @@ impl PcapNg {
 
 impl Interface {
     /// Takes the resolution and the offset of its times from its options; damaged ones count for nothing.
-    fn options(&mut self, order: Order, mut options: &[u8]) {
+    fn options(&mut self, order: ByteOrder, mut options: &[u8]) {
         while let (Some(code), Some(len)) = (array_at(options, 0), array_at(options, 2)) {
             let (code, len) = (order.u16(code), usize::from(order.u16(len)));
             let Some(value) = options.get(4..4 + len) else { return };
@@ -234,7 +234,7 @@ fn check_len(at: u64, found: u32, least: u32) -> Result<(), CaptureError> {
 }
 
 /// A number of a packet's block.
-fn number(order: Order, at: u64, block: &[u8], place: usize) -> Result<u32, CaptureError> {
+fn number(order: ByteOrder, at: u64, block: &[u8], place: usize) -> Result<u32, CaptureError> {
     array_at(block, place).map(|bytes| order.u32(bytes)).ok_or_else(|| short_packet(at, block))
 }
 

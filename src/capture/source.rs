@@ -74,12 +74,12 @@ impl<R: Read> Source<R> {
 
 /// The order of the bytes in a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Order {
+pub(super) enum ByteOrder {
     Big,
     Little,
 }
 
-impl Order {
+impl ByteOrder {
     pub(super) const fn u16(self, bytes: [u8; 2]) -> u16 {
         match self {
             Self::Big => u16::from_be_bytes(bytes),

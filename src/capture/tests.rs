@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use super::source::Order;
+use super::source::ByteOrder;
 use super::*;
 
 /// A UDP datagram in an IPv4 packet, 10.0.0.1:8410 to 10.0.0.2:7408, with the flags and offset of a fragment.
@@ -28,14 +28,14 @@ fn content(link: u16, bytes: &[u8]) -> Content<'_> {
 }
 
 /// Numbers in the order of a capture.
-fn put(order: Order, numbers: &[u32]) -> Vec<u8> {
+fn put(order: ByteOrder, numbers: &[u32]) -> Vec<u8> {
     numbers.iter().flat_map(|n| if order == BIG { n.to_be_bytes() } else { n.to_le_bytes() }).collect()
 }
 
-const BIG: Order = Order::Big;
-const LITTLE: Order = Order::Little;
+const BIG: ByteOrder = ByteOrder::Big;
+const LITTLE: ByteOrder = ByteOrder::Little;
 
-fn pcap(order: Order, magic: u32, packets: &[(u32, u32, &[u8])]) -> Vec<u8> {
+fn pcap(order: ByteOrder, magic: u32, packets: &[(u32, u32, &[u8])]) -> Vec<u8> {
     let version = if order == BIG { 0x0002_0004 } else { 0x0004_0002 };
     let mut file = put(order, &[magic, version, 0, 0, 65_535, 101]);
     for &(seconds, fraction, bytes) in packets {
@@ -46,23 +46,23 @@ fn pcap(order: Order, magic: u32, packets: &[(u32, u32, &[u8])]) -> Vec<u8> {
     file
 }
 
-fn block(order: Order, kind: u32, body: &[u8]) -> Vec<u8> {
+fn block(order: ByteOrder, kind: u32, body: &[u8]) -> Vec<u8> {
     let padded = [body, &[0; 4][..body.len().next_multiple_of(4) - body.len()]].concat();
     let len = u32::try_from(padded.len() + 12).unwrap();
     [put(order, &[kind, len]), padded, put(order, &[len])].concat()
 }
 
-fn section(order: Order) -> Vec<u8> {
+fn section(order: ByteOrder) -> Vec<u8> {
     block(order, 0x0a0d_0d0a, &put(order, &[0x1a2b_3c4d, 1, u32::MAX, u32::MAX]))
 }
 
 /// An interface of raw IP, keeping at most `snap_len` bytes.
-fn interface(order: Order, snap_len: u32, options: &[u8]) -> Vec<u8> {
+fn interface(order: ByteOrder, snap_len: u32, options: &[u8]) -> Vec<u8> {
     let link = if order == BIG { 101 << 16 } else { 101 };
     block(order, 1, &[&put(order, &[link, snap_len])[..], options].concat())
 }
 
-fn enhanced(order: Order, interface: u32, time: [u32; 2], bytes: &[u8]) -> Vec<u8> {
+fn enhanced(order: ByteOrder, interface: u32, time: [u32; 2], bytes: &[u8]) -> Vec<u8> {
     let len = u32::try_from(bytes.len()).unwrap();
     block(order, 6, &[&put(order, &[interface, time[0], time[1], len, len])[..], bytes].concat())
 }

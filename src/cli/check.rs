@@ -63,7 +63,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let mut report = Report { level: args.level, trim_ms: args.trim, ..Report::default() };
+    let mut report = CheckReport { level: args.level, trim_ms: args.trim, ..CheckReport::default() };
     let hall = args.seat.config.as_deref().map(|path| (path, report.configuration(path)));
     if let Some((path, Some(hall))) = &hall {
         report.links(path, hall);
@@ -98,7 +98,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 
 /// What all files together have shown.
 #[derive(Debug, Default, Serialize)]
-struct Report {
+struct CheckReport {
     passed: bool,
     faults: Vec<FaultReport>,
     /// Faults beyond those listed.
@@ -168,7 +168,7 @@ impl FaultReport {
     }
 }
 
-impl Report {
+impl CheckReport {
     fn fault(&mut self, exit: Exit, fault: FaultReport) {
         self.exits.push(exit);
         if !self.faults.contains(&fault) {

@@ -29,7 +29,7 @@ pub(super) struct Args {
     /// Format of the field to read: rows are line,time_ms,x,y,z,u,v,w, where time_ms is how long a row takes; u8 are
     /// raw bytes, one an axis, 0 to 255 over the stroke.
     #[arg(long, value_enum, value_name = "FORMAT")]
-    from: Option<Format>,
+    from: Option<ConvertFormat>,
     /// Unit of the positions in rows: mm, percent, fraction or pulse.
     #[arg(long, value_name = "UNIT", requires = "from", required_if_eq("from", "rows"))]
     units: Option<DeclaredUnit>,
@@ -51,14 +51,14 @@ pub(super) struct Args {
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Format {
+enum ConvertFormat {
     Rows,
     U8,
 }
 
 /// What is written, by the name of the output.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Target {
+pub(super) enum ConvertTarget {
     Csv,
     Mcap,
 }
@@ -96,12 +96,12 @@ pub(super) fn refuse_to_replace(output: &Path, force: bool) -> Result<(), Failur
 }
 
 /// What the name of an output says that it is to be.
-pub(super) fn target(output: &Path) -> anyhow::Result<Target> {
+pub(super) fn target(output: &Path) -> anyhow::Result<ConvertTarget> {
     let named = |extension| output.extension().is_some_and(|it| it.eq_ignore_ascii_case(extension));
     if named("csv") {
-        Ok(Target::Csv)
+        Ok(ConvertTarget::Csv)
     } else if named("mcap") {
-        Ok(Target::Mcap)
+        Ok(ConvertTarget::Mcap)
     } else {
         Err(anyhow!("{}: the name of what is written ends in .csv or .mcap", output.display()))
     }
@@ -111,8 +111,8 @@ pub(super) fn target(output: &Path) -> anyhow::Result<Target> {
 fn read(args: &Args) -> Result<(Cue, Option<Problem>), CueFaults> {
     let source = match args.from {
         None => Source::Native,
-        Some(Format::Rows) => Source::Rows { unit: args.units.unwrap_or_default() },
-        Some(Format::U8) => {
+        Some(ConvertFormat::Rows) => Source::Rows { unit: args.units.unwrap_or_default() },
+        Some(ConvertFormat::U8) => {
             Source::U8 { axes: args.axes.unwrap_or_default(), rate_hz: args.rate.unwrap_or_default() }
         }
     };
@@ -144,12 +144,12 @@ fn tell_lost(cue: &Cue, lost: Option<&Problem>) {
 }
 
 /// Writes beside the output and renames, so that there is the old file or the whole new one at any time.
-pub(super) fn write(cue: &Cue, output: &Path, target: Target) -> Result<(), Failure> {
-    let part = Part::create(output).or_exit(Exit::Io)?;
+pub(super) fn write(cue: &Cue, output: &Path, target: ConvertTarget) -> Result<(), Failure> {
+    let part = ConvertPart::create(output).or_exit(Exit::Io)?;
     let bar = ProgressBar::no_length().with_style(style("writing {bytes}"));
     let mut out = BufWriter::new(bar.wrap_write(&part.file));
     match target {
-        Target::Csv => {
+        ConvertTarget::Csv => {
             if !cue.markers().is_empty() {
                 print::tell(&format!("csv has no place for markers; {} are left out", cue.markers().len()));
             }
@@ -158,7 +158,9 @@ pub(super) fn write(cue: &Cue, output: &Path, target: Target) -> Result<(), Fail
                 refused => failure(refused, Exit::BadCue, cue.path()),
             })?;
         }
-        Target::Mcap => cue::write_mcap(cue, &mut out).map_err(|error| failure(error, Exit::Io, output))?,
+        ConvertTarget::Mcap => {
+            cue::write_mcap(cue, &mut out).map_err(|error| failure(error, Exit::Io, output))?
+        }
     }
     out.flush().map_err(|error| failure(error, Exit::Io, output))?;
     drop(out);
@@ -172,7 +174,7 @@ fn failure(error: impl Into<anyhow::Error>, exit: Exit, path: &Path) -> Failure 
 
 /// Writes a whole file in the same way.
 pub(super) fn write_whole(output: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let part = Part::create(output).or_exit(Exit::Io)?;
+    let part = ConvertPart::create(output).or_exit(Exit::Io)?;
     (&part.file).write_all(bytes).map_err(|error| failure(error, Exit::Io, output))?;
     part.rename().map_err(|error| failure(error, Exit::Io, output))
 }
@@ -182,13 +184,13 @@ fn style(template: &str) -> ProgressStyle {
 }
 
 /// A file on its way to its name; gone again unless it gets there.
-struct Part {
+struct ConvertPart {
     file: File,
     path: PathBuf,
     output: PathBuf,
 }
 
-impl Part {
+impl ConvertPart {
     fn create(output: &Path) -> anyhow::Result<Self> {
         let mut name = std::ffi::OsString::from(".");
         name.push(output.file_name().unwrap_or_default());
@@ -205,7 +207,7 @@ impl Part {
     }
 }
 
-impl Drop for Part {
+impl Drop for ConvertPart {
     fn drop(&mut self) {
         // After the rename there is nothing left under this name, which is no error here.
         let _ = fs::remove_file(&self.path);

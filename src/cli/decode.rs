@@ -19,9 +19,9 @@ mod silvermax;
 mod sixpack2;
 mod tally;
 
-use input::{Input, Stream};
-use message::Reading;
-use printer::{Halt, Manner, Printer};
+use input::{Input, MessageStream};
+use message::MessageReading;
+use printer::{PrintManner, Printer, StreamEnd};
 use silvermax::SilverDecoder;
 use sixpack2::SixpackDecoder;
 
@@ -57,8 +57,8 @@ pub(super) struct Args {
     /// Which family's manual messages are read by: imax is the layout as its manual prints it, which no known program
     /// sends. Of serial drives a file, or the standard input, is their octets, lines of hex, or a log of lines
     /// "seconds > hex" to the drive and "seconds < hex" from it.
-    #[arg(long, value_enum, default_value_t = Reading::Smc)]
-    dialect: Reading,
+    #[arg(long, value_enum, default_value_t = MessageReading::Smc)]
+    dialect: MessageReading,
 
     /// Bytes of Port Out in frames with vibration, and of the inputs in the answers: 2 or 4.
     #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
@@ -82,7 +82,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let is_serial = matches!(args.dialect, Reading::Silvermax | Reading::Sixpack2);
+    let is_serial = matches!(args.dialect, MessageReading::Silvermax | MessageReading::Sixpack2);
     if is_serial && (args.all || args.verbose || !args.port.is_empty()) {
         return Err(anyhow!(
             "--port, --all and --verbose are for datagrams; leave them out with a serial line"
@@ -90,50 +90,50 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         .or_exit(Exit::Usage);
     }
     match args.dialect {
-        Reading::Silvermax => serial::run(args, SilverDecoder::default()),
-        Reading::Sixpack2 => serial::run(args, SixpackDecoder::default()),
+        MessageReading::Silvermax => serial::run(args, SilverDecoder::default()),
+        MessageReading::Sixpack2 => serial::run(args, SixpackDecoder::default()),
         _ => datagrams(args),
     }
 }
 
 fn datagrams(args: &Args) -> Result<Exit, Failure> {
     let port = args.vibration_port_octets;
-    let manner = Manner { reading: args.dialect, port, json: args.json, full: args.verbose };
+    let manner = PrintManner { reading: args.dialect, port, json: args.json, full: args.verbose };
     match Input::of(&args.input)? {
         Input::Messages(messages) => {
-            let mut printer = Printer::new(io::stdout().lock(), Manner { full: true, ..manner });
+            let mut printer = Printer::new(io::stdout().lock(), PrintManner { full: true, ..manner });
             let written = printer.messages(&messages);
             end(written.and_then(|()| printer.finish()))
         }
         Input::File(path) => {
             let printer = Printer::new(BufWriter::new(io::stdout().lock()), manner);
-            stream(printer, Stream::open(&path)?, args, &path.display().to_string())
+            stream(printer, MessageStream::open(&path)?, args, &path.display().to_string())
         }
         // Unlike a file it may come slowly, so that each line is written at once.
         Input::Stdin => {
-            stream(Printer::new(io::stdout().lock(), manner), Stream::stdin()?, args, "standard input")
+            stream(Printer::new(io::stdout().lock(), manner), MessageStream::stdin()?, args, "standard input")
         }
     }
 }
 
 fn stream(
     mut printer: Printer<impl Write>,
-    stream: Stream,
+    stream: MessageStream,
     args: &Args,
     name: &str,
 ) -> Result<Exit, Failure> {
     let filter = Filter { ports: if args.port.is_empty() { &PORTS } else { &args.port }, all: args.all };
     let halted = match stream {
-        Stream::Capture(input) => printer.capture(input, filter),
-        Stream::Lines(input) => printer.lines(input),
+        MessageStream::Capture(input) => printer.capture(input, filter),
+        MessageStream::Lines(input) => printer.lines(input),
     };
     let halted = match halted {
-        Err(Halt::Output(error)) => return end(Err(error)),
-        Err(Halt::Input(error)) | Err(Halt::Capture(CaptureError::Io(error))) => {
+        Err(StreamEnd::Output(error)) => return end(Err(error)),
+        Err(StreamEnd::Input(error)) | Err(StreamEnd::Capture(CaptureError::Io(error))) => {
             Err(error).with_context(|| format!("cannot read {name}")).or_exit(Exit::Io)
         }
-        Err(Halt::Empty) => Err(anyhow!("{name}: neither hex nor a capture")).or_exit(Exit::BadCue),
-        Err(Halt::Capture(error)) => Err(anyhow!("{name}: {error}")).or_exit(Exit::BadCue),
+        Err(StreamEnd::Empty) => Err(anyhow!("{name}: neither hex nor a capture")).or_exit(Exit::BadCue),
+        Err(StreamEnd::Capture(error)) => Err(anyhow!("{name}: {error}")).or_exit(Exit::BadCue),
         Ok(()) => Ok(()),
     };
     let exit = end(printer.summary().and_then(|()| printer.finish()))?;

@@ -15,9 +15,9 @@ use super::{Exit, Failure, load, print};
 use crate::config::Config;
 use crate::control::model::{InMicros, Percentiles};
 use crate::doctor::chart::{buckets, draw};
-use crate::doctor::lateness::{Load, RATE_HZ, Run};
+use crate::doctor::lateness::{LatenessRun, MachineLoad, RATE_HZ};
 use crate::doctor::measure::measure;
-use crate::doctor::{Hall, Line, Verdict, facts, judge, ready};
+use crate::doctor::{FindingLine, Hall, Verdict, facts, judge, ready};
 use crate::sys::realtime::normal_priority;
 
 /// Checks if this machine is fit for real-time use, and says what to change if it is not.
@@ -74,16 +74,17 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         None => Hall { controllers: args.controllers, neighbours: args.controllers },
     };
     let mut lines = judge(&facts(), hall);
-    let loads: &[Load] = match (args.seconds, args.load) {
+    let loads: &[MachineLoad] = match (args.seconds, args.load) {
         (0, _) => &[],
-        (_, false) => &[Load::Idle],
-        (_, true) => &[Load::Idle, Load::Loaded],
+        (_, false) => &[MachineLoad::Idle],
+        (_, true) => &[MachineLoad::Idle, MachineLoad::Loaded],
     };
-    let runs: Vec<Run> = loads.iter().map(|&load| watched(load, Duration::from_secs(args.seconds))).collect();
-    lines.extend(runs.iter().map(Run::judge));
+    let runs: Vec<LatenessRun> =
+        loads.iter().map(|&load| watched(load, Duration::from_secs(args.seconds))).collect();
+    lines.extend(runs.iter().map(LatenessRun::judge));
     let ready = ready(&lines);
     if args.json {
-        print::json(&Report {
+        print::json(&DoctorReport {
             ready,
             controllers: hall.controllers,
             runs: runs.iter().map(RunReport::of).collect(),
@@ -103,7 +104,7 @@ fn hall(config: &Config) -> Hall {
 }
 
 /// Measures on this thread, while another draws how far it is.
-fn watched(load: Load, span: Duration) -> Run {
+fn watched(load: MachineLoad, span: Duration) -> LatenessRun {
     let (done, over) = (AtomicU64::new(0), AtomicBool::new(false));
     if !std::io::stderr().is_terminal() {
         return measure(load, span, &done);
@@ -117,7 +118,7 @@ fn watched(load: Load, span: Duration) -> Run {
     })
 }
 
-fn progress(load: Load, span: Duration, done: &AtomicU64, over: &AtomicBool) {
+fn progress(load: MachineLoad, span: Duration, done: &AtomicU64, over: &AtomicBool) {
     let _ = normal_priority(); // a line drawn at another priority is no reason to fail
     let ticks_per_s = Duration::from_secs(1).as_nanos() / u128::from(crate::doctor::lateness::PERIOD_NS);
     let total = u128::from(span.as_secs()) * ticks_per_s;
@@ -134,10 +135,10 @@ fn progress(load: Load, span: Duration, done: &AtomicU64, over: &AtomicBool) {
 
 /// What programs read. Fields may be added, never changed.
 #[derive(Debug, Serialize)]
-struct Report {
+struct DoctorReport {
     ready: bool,
     controllers: u32,
-    lines: Vec<Line>,
+    lines: Vec<FindingLine>,
     runs: Vec<RunReport>,
 }
 
@@ -165,7 +166,7 @@ struct BucketReport {
 }
 
 impl RunReport {
-    fn of(run: &Run) -> Self {
+    fn of(run: &LatenessRun) -> Self {
         let histogram = buckets(&run.lateness).into_iter().map(|bucket| BucketReport {
             from_us: bucket.from_ns / 1_000,
             to_us: (bucket.to_ns < u64::MAX).then_some(bucket.to_ns / 1_000),
@@ -183,7 +184,7 @@ impl RunReport {
     }
 }
 
-fn text(lines: &[Line], runs: &[Run], hall: Hall) -> String {
+fn text(lines: &[FindingLine], runs: &[LatenessRun], hall: Hall) -> String {
     let mut text = String::new();
     for line in lines {
         append(&mut text, format_args!("{:<8} {:<22} {}\n", line.verdict.word(), line.id, line.found));

@@ -15,12 +15,12 @@ pub(super) struct AxisReport {
     seat: String,
     unit: &'static str,
     position: Position,
-    velocity: Most,
+    velocity: GreatestSize,
     /// Change of velocity from frame to frame, mm/s; `check` alone has it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    step: Option<Most>,
-    acceleration: Most,
-    jerk: Most,
+    step: Option<GreatestSize>,
+    acceleration: GreatestSize,
+    jerk: GreatestSize,
 }
 
 /// The ends of what an axis does; `at_s` and `line` are those of `max`.
@@ -41,7 +41,7 @@ struct Position {
 
 /// The greatest size of something, and what the seat allows.
 #[derive(Debug, Serialize)]
-struct Most {
+struct GreatestSize {
     max: f64,
     limit: f64,
     at_s: f64,
@@ -50,7 +50,7 @@ struct Most {
     margin: f64,
 }
 
-impl Most {
+impl GreatestSize {
     fn new(figure: Figure, limit: f64) -> Self {
         let Figure { value, at, line } = figure;
         Self::proved(Worst { value, limit, at, line })
@@ -89,10 +89,10 @@ pub(super) fn report(file: &str, figures: &[AxisFigures]) -> Vec<AxisReport> {
             seat: on.seat.name.clone(),
             unit: geometry.unit.name(),
             position: Position::new(*lowest, *highest, geometry, room(lowest, highest, geometry)),
-            velocity: Most::new(*velocity, geometry.max_velocity),
+            velocity: GreatestSize::new(*velocity, geometry.max_velocity),
             step: None,
-            acceleration: Most::new(*acceleration, geometry.max_acceleration),
-            jerk: Most::new(*jerk, geometry.max_jerk),
+            acceleration: GreatestSize::new(*acceleration, geometry.max_acceleration),
+            jerk: GreatestSize::new(*jerk, geometry.max_jerk),
         }
     };
     figures.iter().enumerate().map(axis).collect()
@@ -110,10 +110,10 @@ pub(super) fn proved(file: &str, axes: &[AxisProof]) -> Vec<AxisReport> {
         seat: proof.on.seat.name.clone(),
         unit: proof.on.geometry().unit.name(),
         position: Position::new(proof.lowest, proof.highest, proof.on.geometry(), proof.position_margin()),
-        velocity: Most::proved(proof.velocity),
-        step: Some(Most::proved(proof.step)),
-        acceleration: Most::proved(proof.acceleration),
-        jerk: Most::proved(proof.jerk),
+        velocity: GreatestSize::proved(proof.velocity),
+        step: Some(GreatestSize::proved(proof.step)),
+        acceleration: GreatestSize::proved(proof.acceleration),
+        jerk: GreatestSize::proved(proof.jerk),
     };
     axes.iter().map(axis).collect()
 }

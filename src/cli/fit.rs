@@ -12,7 +12,7 @@ use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, OrExit as _, print};
 use crate::config::parse_level;
 use crate::motion::AxisUnit;
-use crate::proof::{self, Fitted, Manner};
+use crate::proof::{self, FitManner, Fitted};
 use crate::timeline::Timeline;
 
 /// Fits a cue into the limits of its seats.
@@ -73,7 +73,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let judge = args.seat.judge(hall)?;
     let timeline = Timeline::new(load::cue(&args.cue, &args.source.source())?);
     let terms = judge.terms(&timeline, args.level);
-    let manner = Manner { per_axis: args.per_axis, smooth: args.smooth };
+    let manner = FitManner { per_axis: args.per_axis, smooth: args.smooth };
     let fitted = proof::fit(timeline, &terms, manner)
         .map_err(|error| anyhow!("{}: {error}", args.cue.display()))
         .or_exit(Exit::CheckFailed)?;
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     refuse_what_links_miss(args, &judge, &fitted)?;
     convert::write(fitted.timeline.cue(), &args.output, target)?;
-    let report = Report::new(args, &fitted);
+    let report = FitReport::new(args, &fitted);
     if args.json {
         print::json(&report)?;
     } else {
@@ -118,7 +118,7 @@ fn refuse_the_input(cue: &Path, output: &Path) -> Result<(), Failure> {
 
 /// What was done.
 #[derive(Debug, Serialize)]
-struct Report {
+struct FitReport {
     cue: String,
     output: String,
     seat: String,
@@ -142,7 +142,7 @@ struct Report {
     after: Vec<AxisReport>,
 }
 
-impl Report {
+impl FitReport {
     fn new(args: &Args, fitted: &Fitted) -> Self {
         let seats: Vec<_> = fitted.after.axes.iter().map(|axis| axis.on.clone()).collect();
         let (cue, output) = (args.cue.display().to_string(), args.output.display().to_string());

@@ -8,15 +8,15 @@ use serde::Serialize;
 
 use super::ask::{agreed, somebody};
 use super::client;
-use super::targets::{Driven, TargetArgs, Targets, Troubles, state};
+use super::targets::{DrivenTargets, TargetArgs, Targets, Troubles, state};
 use super::{Exit, Failure, print};
 use crate::config::Controller;
 use crate::device::home::{HomeError, PA0E, Progress, hindrance, home};
-use crate::device::{Outcome, Patience, Request, Talk, table};
+use crate::device::{Patience, Request, RequestOutcome, Talk, table};
 
 mod drives;
 
-use drives::Homed;
+use drives::HomingResult;
 
 /// Homes empty seats.
 ///
@@ -55,12 +55,12 @@ pub(super) struct Args {
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
-    controllers: Vec<ControllerReport<'a>>,
+struct HomingReport<'a> {
+    controllers: Vec<ControllerHoming<'a>>,
 }
 
 #[derive(Serialize)]
-struct ControllerReport<'a> {
+struct ControllerHoming<'a> {
     name: &'a str,
     address: String,
     home: bool,
@@ -103,13 +103,16 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         is_ended = drives::home_all(&driven, &mut on_links, &mut troubles)?;
     }
     if args.server.json {
-        print::json(&Report::new((&targets, &results), (&driven, &on_links)))?;
+        print::json(&HomingReport::new((&targets, &results), (&driven, &on_links)))?;
     }
     Ok(if is_ended { Exit::Interrupted } else { troubles.exit() })
 }
 
 /// The names of those that can be homed.
-fn ready_names<'c, C>(controllers: &'c [Controller<C>], results: &[Homed]) -> impl Iterator<Item = &'c str> {
+fn ready_names<'c, C>(
+    controllers: &'c [Controller<C>],
+    results: &[HomingResult],
+) -> impl Iterator<Item = &'c str> {
     controllers.iter().zip(results).filter(|(_, result)| result.is_ok()).map(|(one, _)| one.name.as_str())
 }
 
@@ -121,8 +124,8 @@ fn question(names: &[&str]) -> String {
 }
 
 /// Asks each controller what its reset does, and says so; an error for each that cannot home, of which it has told.
-fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<Homed> {
-    let one = |outcome: Outcome| {
+fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<HomingResult> {
+    let one = |outcome: RequestOutcome| {
         let (lane, name) = (outcome.lane, targets.name(outcome.lane));
         let (_, answer) = troubles.sort(targets, outcome)?;
         let controller = &targets.controllers[lane];
@@ -160,9 +163,12 @@ fn move_home(
     home(talk, &lanes, timeout, &mut |lane, progress| display.show(lane, progress))
 }
 
-impl<'a> Report<'a> {
-    fn new((targets, results): (&'a Targets, &[Homed]), (driven, on_links): (&'a Driven, &[Homed])) -> Self {
-        let one = |(name, address, result): (&'a str, String, &Homed)| ControllerReport {
+impl<'a> HomingReport<'a> {
+    fn new(
+        (targets, results): (&'a Targets, &[HomingResult]),
+        (driven, on_links): (&'a DrivenTargets, &[HomingResult]),
+    ) -> Self {
+        let one = |(name, address, result): (&'a str, String, &HomingResult)| ControllerHoming {
             name,
             address,
             home: result.is_ok(),
@@ -190,10 +196,10 @@ fn tell(error: &HomeError, name: &str, troubles: &mut Troubles) {
 /// Progress: on a terminal a line for each controller on its way, kept up to date; elsewhere a line for each step.
 struct Display {
     bars: Option<MultiProgress>,
-    lines: Vec<Line>,
+    lines: Vec<ProgressLine>,
 }
 
-struct Line {
+struct ProgressLine {
     lane: usize,
     name: String,
     bar: Option<ProgressBar>,
@@ -211,7 +217,7 @@ impl Display {
                 bar.set_style(style.expect("the template is fixed"));
                 bar.set_prefix(name.clone());
             }
-            Line { lane, name, bar, homing: false }
+            ProgressLine { lane, name, bar, homing: false }
         };
         Self { lines: lanes.iter().map(line).collect(), bars }
     }

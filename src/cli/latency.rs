@@ -25,8 +25,8 @@ mod compare;
 mod report;
 mod watch;
 
-use report::{Refused, Report};
-use watch::{Out, Watch};
+use report::{LatencyReport, RefusedFrames};
+use watch::{LatencyWatch, UnfinishedFile};
 
 /// Virtual controllers where no others are named, as many as `demo` has.
 const VIRTUAL: u16 = 4;
@@ -122,7 +122,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 /// The controllers that the arguments name.
 fn configuration(args: &Args) -> Result<Config, Failure> {
     if let Some(path) = &args.config {
-        return load::playable(path);
+        return load::without_drives(path);
     }
     let says_axes = |to: &str| to.split(',').any(|part| part.trim_start().starts_with("axes="));
     let with_axes = |to: &String| if says_axes(to) { to.clone() } else { format!("{to},{AXES}") };
@@ -138,21 +138,21 @@ fn measure(args: &Args, mut config: Config, of_our_own: bool) -> Result<Exit, Fa
     let (config, refused) = standing(config)?;
     if config.controllers.is_empty() {
         let why = anyhow!("no seat left to measure; only reads were sent");
-        return Err(why).or_exit(Refused::exit(&refused));
+        return Err(why).or_exit(RefusedFrames::exit(&refused));
     }
     let about = about(args.rate, config.controllers.len(), of_our_own);
     let (times, played) = send(args, config, &about)?;
     for line in played.refusals.iter().chain(&played.notes) {
         print::tell(&format!("kinocue: {line}"));
     }
-    let report = Report::new(&about, args.seconds, of_our_own, &times, &refused, &played);
+    let report = LatencyReport::new(&about, args.seconds, of_our_own, &times, &refused, &played);
     if args.json {
         print::json(&report)?;
     } else {
         print::out(&report.text(&times))?;
     }
     match judge(&played)? {
-        Exit::Done => Ok(Refused::exit(&refused)),
+        Exit::Done => Ok(RefusedFrames::exit(&refused)),
         other => Ok(other),
     }
 }
@@ -174,8 +174,8 @@ fn send(args: &Args, config: Config, about: &str) -> Result<(Times, Played), Fai
     leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let live = control.live;
     // Created before anything is measured, so that nobody measures for an hour and then cannot keep it.
-    let out = args.out.as_deref().map(Out::create).transpose()?;
-    let watch = Watch::start(Arc::clone(&live), args.seconds, about, out)?;
+    let out = args.out.as_deref().map(UnfinishedFile::create).transpose()?;
+    let watch = LatencyWatch::start(Arc::clone(&live), args.seconds, about, out)?;
     let played = play.run(|_| false).map_err(failed);
     watch.finish(played.is_ok())?;
     Ok((live.times(), played?))
@@ -183,7 +183,7 @@ fn send(args: &Args, config: Config, about: &str) -> Result<(Times, Played), Fai
 
 /// The configuration with only those controllers whose seats can be held, parked where they stand; and the others, which
 /// are told of.
-fn standing(config: Config) -> Result<(Config, Vec<Refused>), Failure> {
+fn standing(config: Config) -> Result<(Config, Vec<RefusedFrames>), Failure> {
     let targets = Targets { controllers: config.stations(), show: config.show.clone() };
     let mut talk = targets.open()?;
     let stood = stand(&mut talk, &targets.controllers);
@@ -197,7 +197,7 @@ fn standing(config: Config) -> Result<(Config, Vec<Refused>), Failure> {
             }
             Err(error) => {
                 print::tell(&format!("kinocue: {}: left out: {error}", controller.name));
-                refused.push(Refused::new(controller.name, &error));
+                refused.push(RefusedFrames::new(controller.name, &error));
             }
         }
     }

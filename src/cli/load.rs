@@ -180,9 +180,9 @@ pub(super) fn config(path: &Path) -> Result<Config, Failure> {
 }
 
 /// Reads a configuration whose seats are about to be moved; one that nothing can play ends the program.
-pub(super) fn playable(path: &Path) -> Result<Config, Failure> {
+pub(super) fn without_drives(path: &Path) -> Result<Config, Failure> {
     let config = config(path)?;
-    config.playable().or_exit(Exit::Config)?;
+    config.without_drives().or_exit(Exit::Config)?;
     Ok(config)
 }
 

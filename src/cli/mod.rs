@@ -67,11 +67,11 @@ Exit codes:
 #[command(name = "kinocue", version, max_term_width = 100, after_help = AFTER)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: ProgramCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum ProgramCommand {
     Demo(demo::Args),
     Play(play::Args),
     Sim(sim::Args),
@@ -91,7 +91,7 @@ enum Command {
     Report(report::Args),
     Token(token::Args),
     #[command(flatten)]
-    Client(client::Command),
+    Client(client::ClientCommand),
     Completions(completions::Args),
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
@@ -148,31 +148,31 @@ fn end_on_panic() {
     }));
 }
 
-fn run(command: Command) -> Result<Exit, Failure> {
+fn run(command: ProgramCommand) -> Result<Exit, Failure> {
     match command {
-        Command::Demo(args) => demo::run(&args),
-        Command::Play(args) => play::run(&args),
-        Command::Sim(args) => sim::run(&args),
-        Command::Check(args) => check::run(&args),
-        Command::Info(args) => info::run(&args),
-        Command::Plot(args) => plot::run(&args),
-        Command::Convert(args) => convert::run(&args),
-        Command::Fit(args) => fit::run(&args),
-        Command::Decode(args) => decode::run(&args),
-        Command::Preflight(args) => preflight::run(&args),
-        Command::Register(args) => register::run(&args),
-        Command::Sync(args) => sync::run(&args),
-        Command::Home(args) => home::run(&args),
-        Command::Doctor(args) => doctor::run(&args),
-        Command::Serve(args) => serve::run(&args),
-        Command::Latency(args) => latency::run(&args),
-        Command::Report(args) => report::run(&args),
-        Command::Token(args) => token::run(&args),
-        Command::Client(command) => client::run(&command),
-        Command::Completions(args) => completions::run(&args),
-        Command::Prove(args) => prove::run(&args),
-        Command::FilmPlayer(args) => film_player::run(&args),
-        Command::Man(args) => man::run(&args),
+        ProgramCommand::Demo(args) => demo::run(&args),
+        ProgramCommand::Play(args) => play::run(&args),
+        ProgramCommand::Sim(args) => sim::run(&args),
+        ProgramCommand::Check(args) => check::run(&args),
+        ProgramCommand::Info(args) => info::run(&args),
+        ProgramCommand::Plot(args) => plot::run(&args),
+        ProgramCommand::Convert(args) => convert::run(&args),
+        ProgramCommand::Fit(args) => fit::run(&args),
+        ProgramCommand::Decode(args) => decode::run(&args),
+        ProgramCommand::Preflight(args) => preflight::run(&args),
+        ProgramCommand::Register(args) => register::run(&args),
+        ProgramCommand::Sync(args) => sync::run(&args),
+        ProgramCommand::Home(args) => home::run(&args),
+        ProgramCommand::Doctor(args) => doctor::run(&args),
+        ProgramCommand::Serve(args) => serve::run(&args),
+        ProgramCommand::Latency(args) => latency::run(&args),
+        ProgramCommand::Report(args) => report::run(&args),
+        ProgramCommand::Token(args) => token::run(&args),
+        ProgramCommand::Client(command) => client::run(&command),
+        ProgramCommand::Completions(args) => completions::run(&args),
+        ProgramCommand::Prove(args) => prove::run(&args),
+        ProgramCommand::FilmPlayer(args) => film_player::run(&args),
+        ProgramCommand::Man(args) => man::run(&args),
     }
 }
 

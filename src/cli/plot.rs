@@ -72,7 +72,7 @@ pub(super) struct Args {
 
 /// What a picture is written as.
 #[derive(Debug, Clone, Copy)]
-enum Format {
+enum PlotFormat {
     Page,
     Svg,
 }
@@ -120,10 +120,10 @@ impl Args {
     }
 }
 
-fn format(path: &Path) -> Result<Format, Failure> {
+fn format(path: &Path) -> Result<PlotFormat, Failure> {
     match path.extension().and_then(|end| end.to_str()) {
-        Some("html") => Ok(Format::Page),
-        Some("svg") => Ok(Format::Svg),
+        Some("html") => Ok(PlotFormat::Page),
+        Some("svg") => Ok(PlotFormat::Svg),
         _ => Err(anyhow!("{}: its name has to end in .html or .svg", path.display())).or_exit(Exit::Usage),
     }
 }
@@ -138,12 +138,12 @@ fn facts(timeline: &Timeline, seats: &[SeatAxis], rate_hz: f64) -> Vec<String> {
     ]
 }
 
-fn tell(picture: &Picture, file: Option<(&Path, Format)>, args: &Args) -> Result<(), Failure> {
+fn tell(picture: &Picture, file: Option<(&Path, PlotFormat)>, args: &Args) -> Result<(), Failure> {
     match file {
         Some((path, format)) => {
             let text = match format {
-                Format::Page => plot::page(picture, args.theme),
-                Format::Svg => plot::svg(picture, args.theme),
+                PlotFormat::Page => plot::page(picture, args.theme),
+                PlotFormat::Svg => plot::svg(picture, args.theme),
             };
             convert::write_whole(path, text.as_bytes())?;
             print::out(&format!("{}\n", picture.sentence))

@@ -15,7 +15,7 @@ use super::{Exit, Failure, OrExit as _, print};
 use crate::device::survey::{Survey, survey};
 use crate::motion::MAX_AXES;
 use crate::net::{Route, route};
-use crate::preflight::{Check, Subject, Terms, judge, judge_driven, wanted};
+use crate::preflight::{Check, ShowTerms, Subject, judge, judge_driven, wanted};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 use crate::timeline::Timeline;
@@ -24,7 +24,7 @@ mod drives;
 mod explain;
 mod report;
 
-use report::{ControllerReport, Report};
+use report::{ControllerChecks, PreflightReport};
 
 /// Checks every controller before anyone sits down.
 ///
@@ -91,7 +91,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         args.cue.as_ref().map(|path| load::cue(path, &args.source.source())).transpose()?.map(Timeline::new);
     let cue_axes = cue.as_ref().map_or(MAX_AXES, Timeline::axes);
     let (targets, driven) = args.targets.resolve_all_for(&args.names, cue_axes)?;
-    let terms = Terms {
+    let terms = ShowTerms {
         frame_port: targets.show.bind.port(),
         rate_hz: args.rate.unwrap_or(targets.show.rate_hz),
         cue: cue.map(|cue| (cue.axes(), cue.has_vibration())),
@@ -115,9 +115,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let findings = judge(&subjects, &terms, &targets.show.accept_findings);
     let on_links = drives::subjects(&driven, &looked);
     let found = judge_driven(&on_links, &targets.show.accept_findings);
-    let all = ControllerReport::of_all(&subjects, findings);
-    let all = all.chain(ControllerReport::of_driven(&on_links, found));
-    let report = Report::new(all.collect(), Monotonic.now().since(begun));
+    let all = ControllerChecks::of_all(&subjects, findings);
+    let all = all.chain(ControllerChecks::of_driven(&on_links, found));
+    let report = PreflightReport::new(all.collect(), Monotonic.now().since(begun));
     tell(&report, args.server.json)
 }
 
@@ -181,7 +181,7 @@ fn survey_all(targets: &Targets) -> Result<Vec<Survey>, Failure> {
     Ok(surveys)
 }
 
-fn tell(report: &Report, json: bool) -> Result<Exit, Failure> {
+fn tell(report: &PreflightReport, json: bool) -> Result<Exit, Failure> {
     if json {
         print::json(report)?;
     } else {

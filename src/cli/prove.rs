@@ -14,7 +14,7 @@ use crate::drive::Manner;
 use crate::engine::Show;
 use crate::library::{Drawing, Hashed, MAX_POINTS, Verdict, draw, needs_hall};
 use crate::proof::{Digest, Terms, prove_in};
-use crate::sys::humble::{self, Bounds};
+use crate::sys::humble::{self, ProcessBounds};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
@@ -40,7 +40,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let bounds = Bounds { memory: args.memory_mib.saturating_mul(1 << 20), cpu_s: args.seconds.max(1) };
+    let bounds =
+        ProcessBounds { memory: args.memory_mib.saturating_mul(1 << 20), cpu_s: args.seconds.max(1) };
     humble::lower(bounds).context("cannot bound the check").or_exit(Exit::System)?;
     if let Some(points) = args.curve {
         print::json(&draw_curves(&args.cue, &args.config, points)?)?;

@@ -7,6 +7,7 @@ use super::{Exit, Failure, print};
 use crate::device::{Address, Patience, Request, Talk, reads, settings::Values};
 
 mod diff;
+mod drives;
 mod list;
 mod read;
 mod save;
@@ -23,18 +24,21 @@ Examples:
 Registers are named as the manuals name them (PA95, pa 0x95, dp 06..0b, dpf0, servo 1 508),
 as the panel of an integrated controller shows them (CP149, cd 006..011), or by their names in
 `kinocue register list`. Numbers of PA and DP are hexadecimal, those of CP and CD decimal;
-values are decimal, or hexadecimal behind 0x.";
+values are decimal, or hexadecimal behind 0x.
+
+Seats on serial drives are read over their port, which the service must not have open meanwhile: registers of
+SilverMax units as R38 or R0..40, in decimal; queries of a SIXpack 2 as \"\\$20\" or '$43'. Nothing is written to them here.";
 
 /// Reads, writes, saves and compares the registers of controllers.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     #[command(subcommand)]
-    command: Command,
+    command: RegisterCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+enum RegisterCommand {
     List(list::Args),
     Read(read::Args),
     Write(write::Args),
@@ -44,11 +48,11 @@ enum Command {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     match &args.command {
-        Command::List(args) => list::run(args),
-        Command::Read(args) => read::run(args),
-        Command::Write(args) => write::run(args),
-        Command::Save(args) => save::run(args),
-        Command::Diff(args) => diff::run(args),
+        RegisterCommand::List(args) => list::run(args),
+        RegisterCommand::Read(args) => read::run(args),
+        RegisterCommand::Write(args) => write::run(args),
+        RegisterCommand::Save(args) => save::run(args),
+        RegisterCommand::Diff(args) => diff::run(args),
     }
 }
 

@@ -7,7 +7,7 @@ use jiff::civil::Date;
 
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::config::Log;
-use crate::journal::{self, JournalError, Most, Report};
+use crate::journal::{self, JournalError, JournalReport, ReportBounds};
 use crate::sys::clock::local_now;
 
 mod csv;
@@ -87,7 +87,7 @@ impl Day {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (from, to) = days(args, local_now().date())?;
     let dir = folder(args)?;
-    let report = journal::report(&dir, from, to, Most::ALL)
+    let report = journal::report(&dir, from, to, ReportBounds::ALL)
         .map_err(|error| Failure { exit: exit(&error), error: error.into() })?;
     if args.json {
         print::json(&report)?;
@@ -130,7 +130,7 @@ fn exit(error: &JournalError) -> Exit {
     }
 }
 
-fn tell_notes(report: &Report) {
+fn tell_notes(report: &JournalReport) {
     report.notes.iter().for_each(|note| print::tell(note));
 }
 

@@ -12,6 +12,7 @@ use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use control::{CarryOut, Control};
+pub(super) use tty::Drives;
 
 use super::print::{self, tell};
 use super::{Exit, Failure, OrExit as _};
@@ -95,8 +96,8 @@ pub(super) struct Args {
     parameters: Vec<(u8, u16)>,
 
     /// Which family they belong to: smc, mbox for MBOX and IMAX, or serial drives, which need --tty.
-    #[arg(long, value_enum, default_value_t = Family::Smc)]
-    dialect: Family,
+    #[arg(long, value_enum, default_value_t = SimFamily::Smc)]
+    dialect: SimFamily,
 
     /// Probability that a datagram goes unanswered, 0..1: half of those never arrive, of the others the answer is lost.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance, conflicts_with = "tty")]
@@ -164,7 +165,7 @@ pub(super) struct Args {
 
 /// A family of controllers, or of serial drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Family {
+pub(super) enum SimFamily {
     Smc,
     Mbox,
     Silvermax,
@@ -172,24 +173,25 @@ enum Family {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let signals = Signals::catch().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
+    let signals =
+        SignalSocket::catch().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
     match (args.dialect, &args.tty.tty) {
-        (Family::Silvermax, Some(path)) => silvermax::run(args, path, signals),
-        (Family::Sixpack2, Some(path)) => sixpack2::run(args, path, signals),
-        (Family::Smc, None) => run_farm(args, Dialect::Smc, signals),
-        (Family::Mbox, None) => run_farm(args, Dialect::Mbox, signals),
-        (Family::Silvermax | Family::Sixpack2, None) => {
+        (SimFamily::Silvermax, Some(path)) => silvermax::run(args, path, signals),
+        (SimFamily::Sixpack2, Some(path)) => sixpack2::run(args, path, signals),
+        (SimFamily::Smc, None) => run_farm(args, Dialect::Smc, signals),
+        (SimFamily::Mbox, None) => run_farm(args, Dialect::Mbox, signals),
+        (SimFamily::Silvermax | SimFamily::Sixpack2, None) => {
             Err(anyhow!("serial drives need a line; give --tty and the link to it, as in --tty ./stalls"))
                 .or_exit(Exit::Usage)
         }
-        (Family::Smc | Family::Mbox, Some(_)) => {
+        (SimFamily::Smc | SimFamily::Mbox, Some(_)) => {
             Err(anyhow!("--tty is for serial drives; give --dialect silvermax or sixpack2 with it"))
                 .or_exit(Exit::Usage)
         }
     }
 }
 
-fn run_farm(args: &Args, dialect: Dialect, signals: Signals) -> Result<Exit, Failure> {
+fn run_farm(args: &Args, dialect: Dialect, signals: SignalSocket) -> Result<Exit, Failure> {
     if !args.listen.ip().is_loopback() && !args.allow_lan {
         let address = args.listen;
         let refusal =
@@ -281,9 +283,9 @@ fn report(outcomes: &[Outcome], json: bool) -> Result<(), Failure> {
 }
 
 /// Ctrl-C and SIGTERM as a byte on a socket, which a thread can wait for.
-struct Signals(UnixStream);
+struct SignalSocket(UnixStream);
 
-impl Signals {
+impl SignalSocket {
     fn catch() -> std::io::Result<Self> {
         let (wait, write) = UnixStream::pair()?;
         signal_hook::low_level::pipe::register(SIGINT, write.try_clone()?)?;

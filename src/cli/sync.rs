@@ -38,11 +38,11 @@ pub(super) struct Args {
     #[command(flatten)]
     server: ServerArgs,
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Option<SyncCommand>,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Command {
+enum SyncCommand {
     Use(UseArgs),
     Send(send::Args),
     Check(check::Args),
@@ -73,12 +73,12 @@ impl LabelArgs {
 pub(super) fn run(Args { server, command }: &Args) -> Result<Exit, Failure> {
     match command {
         None => show_film(server),
-        Some(Command::Use(args)) => choose_film_source(args),
-        Some(Command::Send(args)) => send::run(args),
-        Some(Command::Check(args)) => check::run(args),
-        Some(Command::Index(args)) => index::run(args),
-        Some(Command::Watch(args)) => watch::run(args),
-        Some(Command::Relay(args)) => relay::run(args),
-        Some(Command::Calibrate(args)) => calibrate::run(args),
+        Some(SyncCommand::Use(args)) => choose_film_source(args),
+        Some(SyncCommand::Send(args)) => send::run(args),
+        Some(SyncCommand::Check(args)) => check::run(args),
+        Some(SyncCommand::Index(args)) => index::run(args),
+        Some(SyncCommand::Watch(args)) => watch::run(args),
+        Some(SyncCommand::Relay(args)) => relay::run(args),
+        Some(SyncCommand::Calibrate(args)) => calibrate::run(args),
     }
 }

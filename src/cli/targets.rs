@@ -9,7 +9,7 @@ use anyhow::{Context as _, anyhow};
 
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::config::{Config, Controller, Link, Show, Station, from_to_args};
-use crate::device::{Answer, Fault, Outcome, Request, Talk, refusal};
+use crate::device::{Fault, RegisterAnswer, Request, RequestOutcome, Talk, refusal};
 use crate::drive::rates::LinkLoad;
 use crate::motion::MAX_AXES;
 use crate::net::NetError;
@@ -43,7 +43,7 @@ pub(super) struct Targets {
 
 /// The controllers on links that are meant.
 #[derive(Debug)]
-pub(super) struct Driven {
+pub(super) struct DrivenTargets {
     pub(super) controllers: Vec<Controller>,
     /// All links of the hall.
     pub(super) links: Vec<Link>,
@@ -67,12 +67,12 @@ impl TargetArgs {
     pub(super) fn resolve(&self, names: &[String]) -> Result<Targets, Failure> {
         // Without a cue nothing limits the axes but the protocol.
         let meant = self.meant(names, MAX_AXES)?;
-        Config { controllers: meant.on_links, ..meant.config }.playable().or_exit(Exit::Config)?;
+        Config { controllers: meant.on_links, ..meant.config }.without_drives().or_exit(Exit::Config)?;
         Ok(meant.on_network)
     }
 
     /// The same, those on links apart.
-    pub(super) fn resolve_all(&self, names: &[String]) -> Result<(Targets, Driven), Failure> {
+    pub(super) fn resolve_all(&self, names: &[String]) -> Result<(Targets, DrivenTargets), Failure> {
         self.resolve_all_for(names, MAX_AXES)
     }
 
@@ -81,9 +81,9 @@ impl TargetArgs {
         &self,
         names: &[String],
         cue_axes: usize,
-    ) -> Result<(Targets, Driven), Failure> {
+    ) -> Result<(Targets, DrivenTargets), Failure> {
         let Meant { on_network, on_links, loads, config, periods } = self.meant(names, cue_axes)?;
-        Ok((on_network, Driven { controllers: on_links, links: config.links, loads, periods }))
+        Ok((on_network, DrivenTargets { controllers: on_links, links: config.links, loads, periods }))
     }
 
     fn meant(&self, names: &[String], cue_axes: usize) -> Result<Meant, Failure> {
@@ -195,8 +195,12 @@ pub(super) struct Troubles {
 
 impl Troubles {
     /// Takes an answer apart; tells of the fault where there is none, and gives the line of it.
-    pub(super) fn sort(&mut self, targets: &Targets, outcome: Outcome) -> Result<(Request, Answer), String> {
-        let Outcome { lane, request, result } = outcome;
+    pub(super) fn sort(
+        &mut self,
+        targets: &Targets,
+        outcome: RequestOutcome,
+    ) -> Result<(Request, RegisterAnswer), String> {
+        let RequestOutcome { lane, request, result } = outcome;
         match result {
             Ok(answer) => Ok((request, answer)),
             Err(fault) => {
@@ -244,7 +248,7 @@ pub(super) fn tell_absent(controller: &Controller) {
 }
 
 /// What a controller's state is, where it is not the normal one.
-pub(super) fn state(controller: &Controller<Station>, answer: &Answer) -> Option<String> {
+pub(super) fn state(controller: &Controller<Station>, answer: &RegisterAnswer) -> Option<String> {
     (answer.code != ReplyCode::Running)
         .then(|| refusal(answer.code, answer.error, controller.connection.dialect))
 }

@@ -1,12 +1,12 @@
 //! `[api]`: where HTTP is served besides the control socket, to whom, and who they are.
 
-use std::fmt;
 use std::net::SocketAddr;
 
 use serde::{Deserialize, Serialize};
 
 use super::fault::Faults;
 use super::section::{Entry, Section};
+use crate::plain;
 
 /// HTTP over TCP. By default there is none: the control socket alone is served.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -46,15 +46,11 @@ pub enum Role {
     Engineer,
 }
 
-impl fmt::Display for Role {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::View => "view",
-            Self::Operate => "operate",
-            Self::Engineer => "engineer",
-        })
-    }
-}
+plain::displayed!(Role {
+    Self::View => "view",
+    Self::Operate => "operate",
+    Self::Engineer => "engineer",
+});
 
 /// Reads the table.
 pub(super) fn api(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Api> {

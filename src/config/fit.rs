@@ -64,7 +64,7 @@ pub enum Misfit {
         /// What the cue asks for.
         amplitude: Amplitude,
         /// What a frame can say.
-        limit: Swing,
+        limit: VibrationSwing,
     },
     /// A swing that leaves the stroke wherever the axis stands.
     #[error("v{axis}_amp: {amplitude} is over {limit}, half the stroke; lower the amplitude")]
@@ -74,7 +74,7 @@ pub enum Misfit {
         /// What the cue asks for.
         amplitude: Amplitude,
         /// Half the seat's stroke.
-        limit: Swing,
+        limit: VibrationSwing,
     },
     /// An analogue output that no controller has.
     #[error(
@@ -119,7 +119,7 @@ pub enum Misfit {
 
 /// How far a vibration swings to either side.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Swing {
+pub struct VibrationSwing {
     /// How far, in the unit of the axis.
     pub(crate) far: f64,
     /// That unit.
@@ -128,7 +128,7 @@ pub struct Swing {
     pub(crate) pulses: f64,
 }
 
-impl fmt::Display for Swing {
+impl fmt::Display for VibrationSwing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:.3} {}, {:.0} pulses", self.far, self.unit.name(), self.pulses)
     }
@@ -138,7 +138,7 @@ impl fmt::Display for Swing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Amplitude {
     /// How far.
-    pub(crate) swing: Swing,
+    pub(crate) swing: VibrationSwing,
     /// The seat type that it means so much on.
     pub(crate) seat: String,
     /// The first show time at which it is asked for.
@@ -282,7 +282,7 @@ fn overshake(axis: usize, on: &SeatAxis, timeline: &Timeline) -> Option<Misfit> 
     let (seat, geometry) = (&on.seat, on.geometry());
     let stroke_pulses = geometry.stroke_pulses();
     let far = |pulses: f64| pulses / stroke_pulses * geometry.stroke();
-    let swing = |pulses: f64| Swing { far: far(pulses), unit: geometry.unit, pulses };
+    let swing = |pulses: f64| VibrationSwing { far: far(pulses), unit: geometry.unit, pulses };
     // Whole pulses, as the wire has them.
     let pulses = (strongest.amplitude * timeline.unit(axis).to_stroke(geometry) * stroke_pulses).round();
     let half = (stroke_pulses / 2.0).round();

@@ -247,13 +247,13 @@ impl Config {
         self.controllers.iter().filter(|one| one.drives().is_some())
     }
 
-    /// Checks that all of the hall can be played.
+    /// Checks that no seat of the hall has drives, for what asks controllers on the network alone.
     ///
     /// # Errors
-    /// [`DrivesUnplayed`] where some of its seats have drives: no room plays these yet, and a part of a hall is not it.
-    pub(crate) fn playable(&self) -> Result<(), DrivesUnplayed> {
+    /// [`OnLinks`] with the names of those that have.
+    pub(crate) fn without_drives(&self) -> Result<(), OnLinks> {
         let names: Vec<_> = self.on_links().map(|one| one.name.as_str()).collect();
-        if names.is_empty() { Ok(()) } else { Err(DrivesUnplayed(names.join(", "))) }
+        if names.is_empty() { Ok(()) } else { Err(OnLinks(names.join(", "))) }
     }
 
     /// Whether this program can play the hall: it opens no CAN bus.
@@ -292,10 +292,18 @@ impl Config {
 /// A hall that has seats with serial drives.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "drives are not played yet: {0} on links; `kinocue check` and `info` read such a hall, to play the rest of it take \
-     those controllers out of the file"
+    "no CAN bus is opened yet: {0} on one; put their units on a serial line (wiring = \"rs232\" or \"rs485\"), or take those \
+     controllers out of the file; `kinocue check` and `info` read such a hall"
 )]
 pub(crate) struct DrivesUnplayed(String);
+
+/// Seats on serial links, for a command that reaches controllers on the network alone.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{0} on serial links, which this does not reach: how soon drives answer is told by `kinocue preflight`, what they hold by \
+     `kinocue register read`, and `kinocue home` alone writes to them; name other controllers, or take these out of the file"
+)]
+pub(crate) struct OnLinks(String);
 
 /// Reads and checks a configuration file.
 ///

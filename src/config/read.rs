@@ -91,15 +91,9 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let presets = preset_at.map_or_else(Vec::new, |entry| presets(entry, &effects, faults));
     let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, faults));
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
+    let stated = Stated { show: show_at, seat: seat_at, controller: controller_at, link: link_at };
     let site = Site { seats: &seats, named: &named, effects: &effects };
-    let links = link_at.map_or_else(Vec::new, |entry| links(entry, faults));
-    let seat_drives = seat_at.map_or_else(Vec::new, |entry| seat_drives(entry, &seats, faults));
-    let peers = controller_at
-        .map_or_else(Peers::default, |entry| controllers(entry, &site, (&links, &seat_drives), faults));
-    refuse_sparse_acks(show_at, &peers, faults);
-    refuse_parted_groups(&peers.placed, &peers.by_udp(), faults);
-    let links = settle(links, &peers.placed, faults);
-    let (controllers, absent) = peers.into_lists();
+    let (controllers, absent, links) = stated.controllers(&site, faults);
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
@@ -124,6 +118,34 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         sync,
         film,
     })
+}
+
+/// The sections that say together which controllers there are.
+#[derive(Clone, Copy)]
+struct Stated<'t> {
+    show: Option<Entry<'t>>,
+    seat: Option<Entry<'t>>,
+    controller: Option<Entry<'t>>,
+    link: Option<Entry<'t>>,
+}
+
+impl Stated<'_> {
+    /// All controllers, those that are absent, and the links, each as it is used.
+    fn controllers(
+        self,
+        site: &Site<'_>,
+        faults: &mut Faults<'_>,
+    ) -> (Vec<Controller>, Vec<Absent>, Vec<super::Link>) {
+        let links = self.link.map_or_else(Vec::new, |entry| links(entry, faults));
+        let drives = self.seat.map_or_else(Vec::new, |entry| seat_drives(entry, site.seats, faults));
+        let controllers = |entry| controllers(entry, site, (&links, &drives), faults);
+        let peers = self.controller.map_or_else(Peers::default, controllers);
+        refuse_sparse_acks(self.show, &peers, faults);
+        refuse_parted_groups(&peers.placed, &peers.by_udp(), faults);
+        let links = settle(links, &peers.placed, faults);
+        let (controllers, absent) = peers.into_lists();
+        (controllers, absent, links)
+    }
 }
 
 fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {

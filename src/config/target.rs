@@ -169,7 +169,7 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
     let refuse = |reason: String| TargetError::Target { target: target.to_owned(), reason };
     let mut parts = target.split(',');
     let host = parts.next().unwrap_or_default();
-    let mut options = Options { name: format!("c{}", index + 1), ..Options::default() };
+    let mut options = TargetOptions { name: format!("c{}", index + 1), ..TargetOptions::default() };
     for part in parts {
         options.set(part).map_err(refuse)?;
     }
@@ -220,7 +220,7 @@ fn resolve(target: &str, host: &str) -> Result<SocketAddrV4, TargetError> {
 }
 
 /// The part of `--to` after the address.
-struct Options {
+struct TargetOptions {
     name: String,
     axes: Option<usize>,
     offset: usize,
@@ -229,7 +229,7 @@ struct Options {
     vibration_port: VibrationPort,
 }
 
-impl Default for Options {
+impl Default for TargetOptions {
     fn default() -> Self {
         Self {
             name: String::new(),
@@ -242,7 +242,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl TargetOptions {
     fn set(&mut self, part: &str) -> Result<(), String> {
         let (key, value) = part.split_once('=').ok_or_else(|| format!("{part:?} is not key=value"))?;
         let refuse = |wanted: &str| format!("{key}={value} is not one of {wanted}");

@@ -45,6 +45,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/headline.js" JS,
     "js/histogram.js" JS,
     "js/levels.js" JS,
+    "js/links.js" JS,
     "js/main.js" JS,
     "js/map.js" JS,
     "js/marks.js" JS,

@@ -11,6 +11,14 @@ pub struct LinkStatus {
     pub name: String,
     /// Its port.
     pub port: String,
+    /// What its drives are: `silvermax`, or `sixpack2`, which confirms nothing.
+    pub dialect: String,
+    /// Segments, or targets, a second for each axis.
+    pub rate_hz: f64,
+    /// How long before its seats are there their poses are made, ms.
+    pub lead_ms: f64,
+    /// How far its drives are beside the loaded cue at the most, as it was proved at full level, mm; null where none is loaded.
+    pub deviation_mm: Option<f64>,
     /// Why its port cannot be had, with what to do; null while it is open.
     pub fault: Option<String>,
     /// Requests that wait for an answer.
@@ -41,12 +49,16 @@ pub struct LinkAxisStatus {
     pub made: u64,
     /// Segments that the drive has taken.
     pub acked: u64,
+    /// Targets that were sent to a drive which confirms none.
+    pub unconfirmed: u64,
     /// Segments that it did not take.
     pub refused: u64,
     /// Segments that were not answered, taken or not.
     pub in_doubt: u64,
     /// Segments that were never sent, as the axis braked.
     pub skipped: u64,
+    /// Segments that wait in its drive, the running one among them; 0 where a drive has no queue.
+    pub queued: usize,
     /// How often its queue ran dry in motion.
     pub dry: u64,
     /// How far its motor was beside its target when both were read last, mm.

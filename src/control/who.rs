@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::Role;
+use crate::plain;
 
 /// Which way somebody came.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -45,19 +46,15 @@ impl Surface {
     }
 }
 
-impl fmt::Display for Surface {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Socket => "socket",
-            Self::Http => "http",
-            Self::Osc => "osc",
-            Self::Text => "text",
-            Self::Schedule => "schedule",
-            Self::Signal => "signal",
-            Self::Program => "program",
-        })
-    }
-}
+plain::displayed!(Surface {
+    Self::Socket => "socket",
+    Self::Http => "http",
+    Self::Osc => "osc",
+    Self::Text => "text",
+    Self::Schedule => "schedule",
+    Self::Signal => "signal",
+    Self::Program => "program",
+});
 
 impl fmt::Display for Who {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -27,7 +27,7 @@ fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cu
     let Some((declared, header)) = read_head(&mut lines, &mut faults) else {
         return Err(faults.or(path, Problem::Empty));
     };
-    let mut rows = Rows::new(path, &declared, header);
+    let mut rows = CsvRows::new(path, &declared, header);
     lines.each(&mut faults, |number, line, faults| {
         if rows.cue.rows() == rows_at_most {
             faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
@@ -112,16 +112,16 @@ fn parsed<T: FromStr<Err: ToString>>(text: &str) -> Result<T, String> {
 }
 
 /// The rows while they are read, and the cue so far.
-struct Rows {
+struct CsvRows {
     header: Header,
     /// The tracks of the table that the file has, and the first column of each.
     tracks: Vec<(TrackId, usize)>,
     splitter: Splitter,
-    row: Row,
+    row: CsvRow,
     cue: Cue,
 }
 
-impl Rows {
+impl CsvRows {
     fn new(path: &Path, declared: &Declared, header: Header) -> Self {
         let mut axis_cells = [0; MAX_AXES];
         let mut tracks: Vec<(TrackId, usize)> = Vec::new();
@@ -148,7 +148,7 @@ impl Rows {
             effects,
             ..Cue::blank(path)
         };
-        let row = Row::before_all(declared.units, header.time_unit_ns);
+        let row = CsvRow::before_all(declared.units, header.time_unit_ns);
         Self { header, tracks, splitter: Splitter::new(), row, cue }
     }
 
@@ -208,7 +208,7 @@ impl Rows {
 
 /// The row being read; before that the one before it, which an empty cell holds.
 #[derive(Debug, Clone, Copy)]
-struct Row {
+struct CsvRow {
     units: DeclaredUnits,
     time_unit_ns: f64,
     /// True if a row was read, so that an empty cell has something to hold.
@@ -221,7 +221,7 @@ struct Row {
     word: u16,
 }
 
-impl Row {
+impl CsvRow {
     const fn before_all(units: DeclaredUnits, time_unit_ns: f64) -> Self {
         Self {
             units,

@@ -32,8 +32,8 @@ pub use mcap::recover;
 pub use mcap::write as write_mcap;
 use place::Origin;
 pub(crate) use problem::Problem;
-pub use steps::Step;
 pub(crate) use steps::Steps;
+pub use steps::TrackStep;
 pub(crate) use tracks::{Tracks, Vibration};
 pub(crate) use unit::{DeclaredUnit, Interpolation, Unit, Units, UnknownInterpolation};
 

@@ -20,7 +20,7 @@ const FIRST_AXIS: usize = 2;
 pub(super) fn read(path: &Path, input: impl Read, unit: DeclaredUnit) -> Result<Cue, CueFaults> {
     let mut lines = Lines::new(input);
     let mut faults = Collector::default();
-    let mut reading: Option<Reading> = None;
+    let mut reading: Option<RowReading> = None;
     lines.each(&mut faults, |number, line, faults| {
         match &mut reading {
             Some(reading) if reading.cue.rows() > MAX_ROWS => {
@@ -28,7 +28,7 @@ pub(super) fn read(path: &Path, input: impl Read, unit: DeclaredUnit) -> Result<
                 return ControlFlow::Break(());
             }
             Some(reading) => reading.take(number, line, faults),
-            None => match Reading::new(path, unit, number, line, faults) {
+            None => match RowReading::new(path, unit, number, line, faults) {
                 Some(begun) => reading = Some(begun),
                 None => return ControlFlow::Break(()),
             },
@@ -41,7 +41,7 @@ pub(super) fn read(path: &Path, input: impl Read, unit: DeclaredUnit) -> Result<
     }
 }
 
-struct Reading {
+struct RowReading {
     splitter: Splitter,
     unit: DeclaredUnit,
     cue: Cue,
@@ -49,7 +49,7 @@ struct Reading {
     begun: bool,
 }
 
-impl Reading {
+impl RowReading {
     /// Understands the header row.
     fn new(path: &Path, unit: DeclaredUnit, number: u64, line: &str, faults: &mut Collector) -> Option<Self> {
         let mut splitter = Splitter::new();

@@ -4,7 +4,7 @@ use crate::time::ShowTime;
 
 /// A value and the show time from which it holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step<T> {
+pub struct TrackStep<T> {
     /// From when on.
     pub(crate) at: ShowTime,
     /// What holds from then on.
@@ -13,7 +13,7 @@ pub struct Step<T> {
 
 /// A track of values, each holding until the next; only changes are kept.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Steps<T>(Vec<Step<T>>);
+pub struct Steps<T>(Vec<TrackStep<T>>);
 
 impl<T> Default for Steps<T> {
     fn default() -> Self {
@@ -28,7 +28,7 @@ impl<T: Copy + PartialEq + Default> Steps<T> {
             self.0.pop();
         }
         if self.0.last().is_none_or(|last| last.value != value) {
-            self.0.push(Step { at, value });
+            self.0.push(TrackStep { at, value });
         }
     }
 
@@ -46,7 +46,7 @@ impl<T: Copy + PartialEq + Default> Steps<T> {
 
     /// The changes in order of time.
     #[must_use]
-    pub fn as_slice(&self) -> &[Step<T>] {
+    pub fn as_slice(&self) -> &[TrackStep<T>] {
         &self.0
     }
 

@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::request::Id;
+use super::request::RequestId;
 use super::{Fault, Odd, Request};
 use crate::net::SendFault;
 use crate::time::MonoTime;
@@ -49,7 +49,7 @@ impl Default for Patience {
 
 /// What a controller answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Answer {
+pub struct RegisterAnswer {
     /// The registers that were asked for, in order; what was written, echoed.
     pub(crate) words: Vec<u16>,
     /// How the controller is. An SMC controller answers in every state, and a reply with x = 3 or 4 tells of that state,
@@ -65,13 +65,13 @@ pub struct Answer {
 
 /// What became of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Outcome {
+pub struct RequestOutcome {
     /// Whose it was.
     pub lane: usize,
     /// What was asked.
     pub(crate) request: Request,
     /// What came of it.
-    pub result: Result<Answer, Fault>,
+    pub result: Result<RegisterAnswer, Fault>,
 }
 
 /// What came from a controller's address and was no answer.
@@ -92,7 +92,7 @@ pub(crate) struct Odds {
 pub(crate) struct Exchange {
     lanes: Vec<Lane>,
     patience: Patience,
-    outcomes: Vec<Option<Outcome>>,
+    outcomes: Vec<Option<RequestOutcome>>,
     buf: Box<[u8; MAX_LEN]>,
 }
 
@@ -103,7 +103,7 @@ struct Lane {
     flight: Option<Flight>,
     /// What may still be answered, though nobody waits for it.
     owed: Vec<Owed>,
-    answered: Option<Id>,
+    answered: Option<RequestId>,
     odds: Odds,
 }
 
@@ -112,7 +112,7 @@ struct Lane {
 struct Flight {
     index: usize,
     request: Request,
-    id: Id,
+    id: RequestId,
     tries: u32,
     sent: MonoTime,
     odd: Option<Odd>,
@@ -120,7 +120,7 @@ struct Flight {
 
 #[derive(Debug)]
 struct Owed {
-    id: Id,
+    id: RequestId,
     answers: u32,
     until: MonoTime,
 }
@@ -204,7 +204,7 @@ impl Exchange {
                 return Some((index, request));
             }
             let result = Err(Fault::NoWay { request: request.clone() });
-            self.outcomes[index] = Some(Outcome { lane, request, result });
+            self.outcomes[index] = Some(RequestOutcome { lane, request, result });
         }
         None
     }
@@ -217,10 +217,10 @@ impl Exchange {
         let Some(Flight { index, request, id, tries, sent, odd }) = one.flight.take() else { return };
         one.owed.push(Owed { id, answers: tries, until: sent + LATEST });
         let result = Err(Fault::Silent { request: request.clone(), tries, timeout, odd });
-        self.outcomes[index] = Some(Outcome { lane, request, result });
+        self.outcomes[index] = Some(RequestOutcome { lane, request, result });
         for (index, request) in one.queue.drain(..) {
             let result = Err(Fault::Unasked { request: request.clone() });
-            self.outcomes[index] = Some(Outcome { lane, request, result });
+            self.outcomes[index] = Some(RequestOutcome { lane, request, result });
         }
     }
 
@@ -264,7 +264,7 @@ impl Exchange {
             }
             one.answered = Some(id);
             let result = reply.result(&request, dialect, at.since(sent), tries);
-            self.outcomes[index] = Some(Outcome { lane, request, result });
+            self.outcomes[index] = Some(RequestOutcome { lane, request, result });
         } else if let Some(owed) = one.owed.iter_mut().find(|owed| reply.answers(owed.id, dialect)) {
             owed.answers -= 1;
             one.owed.retain(|owed| owed.answers > 0);
@@ -291,7 +291,7 @@ impl Exchange {
     }
 
     /// The outcomes of a finished exchange, in the order of the requests.
-    pub(crate) fn take(&mut self) -> Vec<Outcome> {
+    pub(crate) fn take(&mut self) -> Vec<RequestOutcome> {
         self.outcomes.drain(..).flatten().collect()
     }
 
@@ -346,7 +346,7 @@ impl<'a> Reply<'a> {
         if len > need { Err(WireError::Surplus { len, need }) } else { Ok(Some(reply)) }
     }
 
-    fn answers(&self, id: Id, dialect: Dialect) -> bool {
+    fn answers(&self, id: RequestId, dialect: Dialect) -> bool {
         let slot_tells = !self.code.refused() || (dialect == Dialect::Mbox && !self.servo);
         let counts = self.num == id.num || (self.code.refused() && self.num == 0);
         self.servo == id.servo
@@ -362,7 +362,7 @@ impl<'a> Reply<'a> {
         dialect: Dialect,
         took: Duration,
         tries: u32,
-    ) -> Result<Answer, Fault> {
+    ) -> Result<RegisterAnswer, Fault> {
         let words: Vec<u16> = self.words.iter().collect();
         let error = match dialect {
             _ if !self.code.refused() => DeviceError(0),
@@ -375,7 +375,7 @@ impl<'a> Reply<'a> {
         let whole = self.access == Access::Write || words.len() == usize::from(self.num);
         let done = !self.code.refused() || (dialect == Dialect::Smc && tells_state && whole && self.num > 0);
         if done {
-            Ok(Answer { words, code: self.code, error, took, tries })
+            Ok(RegisterAnswer { words, code: self.code, error, took, tries })
         } else {
             Err(Fault::Refused { request: request.clone(), code: self.code, error, dialect })
         }

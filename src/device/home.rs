@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use super::talk::Link;
-use super::{Address, Answer, Fault, Patience, Request, Talk, refusal};
+use super::{Address, Fault, Patience, RegisterAnswer, Request, Talk, refusal};
 use crate::time::{Clock, MonoTime};
 use crate::wire::{DeviceError, Dialect, ReplyCode};
 
@@ -90,7 +90,7 @@ pub(crate) enum Progress {
 }
 
 /// One seat on its way.
-struct Seat {
+struct SeatHoming {
     lane: usize,
     dialect: Dialect,
     started: MonoTime,
@@ -134,7 +134,7 @@ pub(crate) fn unsearched<L: Link, C: Clock>(
     lanes: &[(usize, Dialect)],
 ) -> Vec<(usize, HomeError)> {
     let requests = lanes.iter().map(|(lane, _)| (*lane, Request::read(PA0E))).collect();
-    let value = |answer: &Answer| answer.words.first().copied().filter(|value| *value != 0);
+    let value = |answer: &RegisterAnswer| answer.words.first().copied().filter(|value| *value != 0);
     let told = talk.ask(requests, Patience::default()).into_iter();
     told.filter_map(|outcome| {
         Some((outcome.lane, HomeError::Unsearched(value(outcome.result.as_ref().ok()?)?)))
@@ -146,12 +146,12 @@ fn start<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
     lanes: &[(usize, Dialect)],
     on: &mut dyn FnMut(usize, &Progress),
-) -> Vec<Seat> {
+) -> Vec<SeatHoming> {
     let orders = lanes.iter().map(|(lane, _)| (*lane, Request::write(DPF0, START))).collect();
     let outcomes = talk.ask(orders, Patience::default());
     let started = talk.now();
     let seats = outcomes.into_iter().zip(lanes).map(|(outcome, &(lane, dialect))| {
-        let mut seat = Seat { lane, dialect, started, complete: 0, dpf0: None, result: None };
+        let mut seat = SeatHoming { lane, dialect, started, complete: 0, dpf0: None, result: None };
         match outcome.result {
             Ok(answer) => seat.check(&answer),
             Err(fault) => seat.result = Some(Err(fault.into())),
@@ -167,8 +167,8 @@ fn start<L: Link, C: Clock>(
 
 /// What keeps a controller that answered so from homing, where anything does.
 #[must_use]
-pub(crate) fn hindrance(answer: &Answer, dialect: Dialect) -> Option<HomeError> {
-    let &Answer { code, error, .. } = answer;
+pub(crate) fn hindrance(answer: &RegisterAnswer, dialect: Dialect) -> Option<HomeError> {
+    let &RegisterAnswer { code, error, .. } = answer;
     let hopeless = match code {
         ReplyCode::Running => false,
         ReplyCode::EmergencyStop | ReplyCode::Command => true,
@@ -178,15 +178,15 @@ pub(crate) fn hindrance(answer: &Answer, dialect: Dialect) -> Option<HomeError> 
     hopeless.then_some(HomeError::State { code, error, dialect })
 }
 
-impl Seat {
+impl SeatHoming {
     /// Ends homing where the controller is in a state that it cannot leave by itself.
-    fn check(&mut self, answer: &Answer) {
+    fn check(&mut self, answer: &RegisterAnswer) {
         if let Some(error) = hindrance(answer, self.dialect) {
             self.result = Some(Err(error));
         }
     }
 
-    fn on_look(&mut self, look: Result<Answer, Fault>, at: MonoTime, timeout: Duration) {
+    fn on_look(&mut self, look: Result<RegisterAnswer, Fault>, at: MonoTime, timeout: Duration) {
         let since = at.since(self.started);
         match look {
             Ok(answer) => {

@@ -30,7 +30,7 @@ mod testing;
 
 pub use address::Address;
 pub use exchange::Patience;
-pub(crate) use exchange::{Answer, Endpoint, Exchange, Odds, Outcome};
+pub(crate) use exchange::{Endpoint, Exchange, Odds, RegisterAnswer, RequestOutcome};
 pub(crate) use fault::{Fault, Odd, refusal};
 pub(crate) use request::Request;
 pub use request::reads;

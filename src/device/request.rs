@@ -74,7 +74,7 @@ impl Request {
     }
 
     /// By what the answer is known; `None` if a controller of this dialect has no way to be asked for it.
-    pub(super) fn id(&self, dialect: Dialect) -> Option<Id> {
+    pub(super) fn id(&self, dialect: Dialect) -> Option<RequestId> {
         let (access, num) = match *self {
             Self::Read { count, .. } => (Access::Read, count),
             Self::Write { .. } => (Access::Write, 1),
@@ -95,21 +95,21 @@ impl Request {
                 Dialect::Mbox => return None, // channel 0 would write PA of that number
             },
         };
-        Some(Id { servo, access, channel, start, num })
+        Some(RequestId { servo, access, channel, start, num })
     }
 
     /// Writes the request to the front of `buf` and returns it.
-    pub(super) fn emit<'b>(&self, id: Id, peer: &Endpoint, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let Id { servo, channel, start, num, .. } = id;
+    pub(super) fn emit<'b>(&self, id: RequestId, peer: &Endpoint, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let RequestId { servo, channel, start, num, .. } = id;
         let (accept, reply) = (peer.code, peer.code);
         match *self {
-            Self::Read { .. } if servo => ServoRead { servo: channel, accept, reply, start, num }.emit(buf),
+            Self::Read { .. } if servo => ServoRead { channel, accept, reply, start, num }.emit(buf),
             Self::Read { .. } => ReadRequest { channel, accept, reply, start, num }.emit(buf),
             Self::Write { value, .. } => {
                 let words = [value];
                 let data = Words::from(&words[..]);
                 if servo {
-                    ServoWrite { servo: channel, accept, reply, start, data }.emit(buf)
+                    ServoWrite { channel, accept, reply, start, data }.emit(buf)
                 } else {
                     WriteRequest { channel, accept, reply, start, data }.emit(buf)
                 }
@@ -139,7 +139,7 @@ impl fmt::Display for Request {
 
 /// By what a reply is known: the protocol gives register messages no number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Id {
+pub(super) struct RequestId {
     /// True if it is about a drive.
     pub(super) servo: bool,
     /// Read or write.
@@ -152,7 +152,7 @@ pub(super) struct Id {
     pub(super) num: u16,
 }
 
-impl Id {
+impl RequestId {
     /// True if a reply to the one could pass for a reply to the other: with x over 2 an SMC controller puts its error
     /// number where channel or drive stood, and may leave out the words.
     pub(super) fn confusable(self, other: Self) -> bool {

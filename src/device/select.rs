@@ -99,7 +99,7 @@ pub(crate) struct Assignment {
 /// # Errors
 /// A [`SelectError`] for the first words that name none.
 pub(crate) fn selections(words: &[String]) -> Result<Vec<Selection>, SelectError> {
-    let mut words = Words::new(words);
+    let mut words = SelectionWords::new(words);
     if words.peek().is_none() {
         return Ok(vec![whole(Address::Pa), whole(Address::Dp)]);
     }
@@ -115,7 +115,7 @@ pub(crate) fn selections(words: &[String]) -> Result<Vec<Selection>, SelectError
 /// # Errors
 /// A [`SelectError`] for the first words that are none; for a register named twice, and where there are no words.
 pub(crate) fn assignments(words: &[String]) -> Result<Vec<Assignment>, SelectError> {
-    let mut words = Words::new(words);
+    let mut words = SelectionWords::new(words);
     let mut found: Vec<Assignment> = Vec::new();
     while words.peek().is_some() {
         let selection = selection(&mut words)?;
@@ -136,9 +136,9 @@ pub(crate) fn assignments(words: &[String]) -> Result<Vec<Assignment>, SelectErr
 }
 
 /// Words one after the other, in small letters, `=` by itself.
-struct Words(Vec<String>, usize);
+struct SelectionWords(Vec<String>, usize);
 
-impl Words {
+impl SelectionWords {
     fn new(words: &[String]) -> Self {
         let joined = words.join(" ").to_lowercase().replace('=', " = ");
         Self(joined.split_whitespace().map(str::to_owned).collect(), 0)
@@ -154,7 +154,7 @@ impl Words {
     }
 }
 
-fn selection(words: &mut Words) -> Result<Selection, SelectError> {
+fn selection(words: &mut SelectionWords) -> Result<Selection, SelectError> {
     let word = words.next().ok_or(SelectError::Nobody)?.to_owned();
     match word.as_str() {
         "pa" => of_table("PA", Address::Pa, words),
@@ -168,7 +168,11 @@ fn selection(words: &mut Words) -> Result<Selection, SelectError> {
 }
 
 /// Registers named by a table and, in the next word, by their numbers; without numbers, the whole table.
-fn of_table(space: &'static str, of: fn(u8) -> Address, words: &mut Words) -> Result<Selection, SelectError> {
+fn of_table(
+    space: &'static str,
+    of: fn(u8) -> Address,
+    words: &mut SelectionWords,
+) -> Result<Selection, SelectError> {
     match words.peek() {
         Some(next) if begins_with_digits(next) => {
             let next = next.to_owned();
@@ -180,17 +184,17 @@ fn of_table(space: &'static str, of: fn(u8) -> Address, words: &mut Words) -> Re
 }
 
 /// Names on the panel of an integrated controller count as PA and DP do, in decimal (SMC manual 2.3): CP149 is PA95.
-struct Panel {
+struct PanelName {
     name: &'static str,
     space: &'static str,
     of: fn(u8) -> Address,
 }
 
-const PARAMETERS: Panel = Panel { name: "CP", space: "PA", of: Address::Pa };
-const MONITORS: Panel = Panel { name: "CD", space: "DP", of: Address::Dp };
+const PARAMETERS: PanelName = PanelName { name: "CP", space: "PA", of: Address::Pa };
+const MONITORS: PanelName = PanelName { name: "CD", space: "DP", of: Address::Dp };
 
 /// `cp 149`, `cd 006..011`; without numbers, the whole table.
-fn of_panel(panel: Panel, words: &mut Words) -> Result<Selection, SelectError> {
+fn of_panel(panel: PanelName, words: &mut SelectionWords) -> Result<Selection, SelectError> {
     match words.peek() {
         Some(next) if next.starts_with(|c: char| c.is_ascii_digit()) => {
             let next = next.to_owned();
@@ -202,7 +206,7 @@ fn of_panel(panel: Panel, words: &mut Words) -> Result<Selection, SelectError> {
 }
 
 /// The documented registers among `numbers` of a panel.
-fn on_panel(numbers: &str, panel: &Panel) -> Result<Selection, SelectError> {
+fn on_panel(numbers: &str, panel: &PanelName) -> Result<Selection, SelectError> {
     let bad = || SelectError::Number {
         word: numbers.to_owned(),
         space: panel.name,
@@ -222,7 +226,7 @@ fn on_panel(numbers: &str, panel: &Panel) -> Result<Selection, SelectError> {
 }
 
 /// `dpf 0`: the control registers by their last digit.
-fn control(words: &mut Words) -> Result<Selection, SelectError> {
+fn control(words: &mut SelectionWords) -> Result<Selection, SelectError> {
     let word = words.next().unwrap_or_default().to_owned();
     let bad = || SelectError::Number { word: word.clone(), space: "DPF", wanted: "0 to f" };
     let (first, last) = ends(&word).ok_or_else(bad)?;
@@ -232,7 +236,7 @@ fn control(words: &mut Words) -> Result<Selection, SelectError> {
 }
 
 /// `servo 1 508`, `servo 1 PA508..510`.
-fn servo(words: &mut Words) -> Result<Selection, SelectError> {
+fn servo(words: &mut SelectionWords) -> Result<Selection, SelectError> {
     let servo = words.next().and_then(number).filter(|servo| *servo > 0).ok_or(SelectError::Servo)?;
     let word = words.next().ok_or(SelectError::Servo)?.to_owned();
     let (first, last) = ends(word.strip_prefix("pa").unwrap_or(&word)).ok_or(SelectError::Servo)?;

@@ -52,12 +52,41 @@ pub struct Saved {
     pub(crate) values: Values,
 }
 
+/// The settings of a seat on serial drives.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SavedDrives {
+    /// Its name.
+    pub(crate) name: String,
+    /// Its link.
+    pub(crate) address: String,
+    /// Unit and register, as `16.R38`, with what that holds.
+    pub(crate) registers: BTreeMap<String, i64>,
+}
+
+/// All that a file has.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct SavedHall {
+    /// Controllers on the network.
+    pub(crate) controllers: Vec<Saved>,
+    /// Seats on links.
+    pub(crate) drives: Vec<SavedDrives>,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
     kinocue_settings: u32,
     #[serde(default)]
     controller: BTreeMap<String, Section>,
+    #[serde(default)]
+    drives: BTreeMap<String, DriveSection>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DriveSection {
+    address: String,
+    registers: BTreeMap<String, i64>,
 }
 
 #[derive(Deserialize)]
@@ -83,7 +112,7 @@ pub(crate) fn parameters(dialect: Dialect) -> impl Iterator<Item = &'static Regi
 
 /// The settings as the text of a file.
 #[must_use]
-pub(crate) fn text(all: &[Saved]) -> String {
+pub(crate) fn text(all: &[Saved], drives: &[SavedDrives]) -> String {
     let mut text = String::from("# Parameters of motion controllers, read by `kinocue register save`.\n");
     let done = "a String takes what is written to it";
     writeln!(text, "kinocue_settings = {VERSION}").expect(done);
@@ -96,6 +125,14 @@ pub(crate) fn text(all: &[Saved]) -> String {
         for (address, value) in &one.values {
             let what = table().get(*address).map_or("", |register| register.name.as_str());
             writeln!(text, "{address} = {value:<6} # {what}").expect(done);
+        }
+    }
+    for one in drives {
+        let name = quoted(&one.name);
+        writeln!(text, "\n[drives.{name}]\naddress = {}", quoted(&one.address)).expect(done);
+        writeln!(text, "\n[drives.{name}.registers]").expect(done);
+        for (register, value) in &one.registers {
+            writeln!(text, "\"{register}\" = {value}").expect(done);
         }
     }
     text
@@ -118,15 +155,21 @@ fn quoted(name: &str) -> String {
 ///
 /// # Errors
 /// A [`SettingsError`] for the first thing in it that does not belong there.
-pub fn parse(text: &str) -> Result<Vec<Saved>, SettingsError> {
+pub fn parse(text: &str) -> Result<SavedHall, SettingsError> {
     let document: Document = toml::from_str(text).map_err(|error| SettingsError::Shape(Box::new(error)))?;
     if document.kinocue_settings != VERSION {
         return Err(SettingsError::Version(document.kinocue_settings));
     }
-    if document.controller.is_empty() {
+    if document.controller.is_empty() && document.drives.is_empty() {
         return Err(SettingsError::Empty);
     }
-    document.controller.into_iter().map(|(name, section)| saved(name, section)).collect()
+    let controllers = document.controller.into_iter().map(|(name, section)| saved(name, section));
+    let drives = document.drives.into_iter().map(|(name, section)| SavedDrives {
+        name,
+        address: section.address,
+        registers: section.registers,
+    });
+    Ok(SavedHall { controllers: controllers.collect::<Result<_, _>>()?, drives: drives.collect() })
 }
 
 fn saved(name: String, section: Section) -> Result<Saved, SettingsError> {
@@ -191,9 +234,11 @@ mod tests {
     #[test]
     fn a_file_reads_back_as_it_was_written() {
         let all = [saved("A1"), saved("row \"B\" \\ 2\u{7f}")];
-        let text = text(&all);
+        let registers = BTreeMap::from([("16.R38".to_owned(), -800), ("16.R39".to_owned(), 120_800)]);
+        let drives = SavedDrives { name: "L1".to_owned(), address: "link:stalls".to_owned(), registers };
+        let text = text(&all, std::slice::from_ref(&drives));
         assert!(text.contains("PA95 = 0      # axis offset"), "{text}");
-        assert_eq!(parse(&text).unwrap(), all);
+        assert_eq!(parse(&text).unwrap(), SavedHall { controllers: all.into(), drives: vec![drives] });
     }
 
     #[test]

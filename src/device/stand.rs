@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::settings::Values;
 use super::survey::told;
 use super::talk::Link;
-use super::{Address, Fault, Outcome, Patience, Request, Talk, reads, refusal};
+use super::{Address, Fault, Patience, Request, RequestOutcome, Talk, reads, refusal};
 use crate::config::{Controller, FanOut, Station};
 use crate::motion::{PulseRange, Pulses};
 use crate::time::Clock;
@@ -174,7 +174,7 @@ fn ask<L: Link, C: Clock>(
         requests.extend(reads(&wanted(controller)).into_iter().map(|read| (lane, read)));
     }
     let mut found: Vec<Result<Values, StandError>> = vec![Ok(Values::new()); controllers.len()];
-    for Outcome { lane, request, result } in talk.ask(requests, PATIENCE) {
+    for RequestOutcome { lane, request, result } in talk.ask(requests, PATIENCE) {
         let dialect = controllers[lane].connection.dialect;
         let Ok(values) = &mut found[lane] else { continue };
         match result {

@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use super::settings::Values;
 use super::talk::Link;
-use super::{Address, Answer, Fault, Odds, Outcome, Patience, Request, Talk, places, reads, table};
+use super::{
+    Address, Fault, Odds, Patience, RegisterAnswer, Request, RequestOutcome, Talk, places, reads, table,
+};
 use crate::config::{Controller, Station};
 use crate::net::Origin;
 use crate::observe::{ControllerState, Observer, Watched};
@@ -113,7 +115,7 @@ struct Packets {
 }
 
 impl Packets {
-    fn count(&mut self, request: &Request, result: &Result<Answer, Fault>) {
+    fn count(&mut self, request: &Request, result: &Result<RegisterAnswer, Fault>) {
         match result {
             Ok(answer) if self.first.is_none() && *request == Request::read(PACKETS) => {
                 // What answers an earlier try has not counted the later ones.
@@ -140,7 +142,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
 
     fn first(&mut self) {
         let requests = (0..self.controllers.len()).map(|lane| (lane, IDENTITY)).collect();
-        for Outcome { lane, result, .. } in self.ask(requests, FIRST) {
+        for RequestOutcome { lane, result, .. } in self.ask(requests, FIRST) {
             match result {
                 Ok(answer) => self.found[lane].values.extend(told(&IDENTITY, &answer)),
                 Err(fault) if fault.refused() => self.found[lane].unread.push(fault),
@@ -156,7 +158,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
             let missing: Vec<_> = missing.filter(|it| !self.found[lane].values.contains_key(it)).collect();
             requests.extend(reads(&missing).into_iter().map(|read| (lane, read)));
         }
-        for Outcome { lane, request, result } in self.ask(requests, REGISTERS) {
+        for RequestOutcome { lane, request, result } in self.ask(requests, REGISTERS) {
             match result {
                 Ok(answer) => self.found[lane].values.extend(told(&request, &answer)),
                 Err(fault) => self.found[lane].unread.push(fault),
@@ -176,7 +178,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
                 Dialect::Mbox => mbox,
             };
             let requests = self.live().into_iter().map(|lane| (lane, Request::read(of(lane)))).collect();
-            for Outcome { lane, result, .. } in self.ask(requests, ROUND) {
+            for RequestOutcome { lane, result, .. } in self.ask(requests, ROUND) {
                 let found = &mut self.found[lane];
                 match result {
                     // A refusal is an answer too, but one whose time nobody took.
@@ -197,7 +199,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
             requests.extend(reads(&known).into_iter().map(|read| (lane, read)));
         }
         requests.extend(self.each_smc(Request::read(PACKETS)));
-        for Outcome { lane, request, result } in self.ask(requests, LAST) {
+        for RequestOutcome { lane, request, result } in self.ask(requests, LAST) {
             let Ok(answer) = result else { continue };
             if request == IDENTITY {
                 let before = &self.found[lane].values;
@@ -234,10 +236,10 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
     }
 
     /// Asks, notes states, and counts what is sent; hears what comes meanwhile.
-    fn ask(&mut self, requests: Vec<(usize, Request)>, patience: Patience) -> Vec<Outcome> {
+    fn ask(&mut self, requests: Vec<(usize, Request)>, patience: Patience) -> Vec<RequestOutcome> {
         let Self { talk, observer, .. } = self;
         let outcomes = talk.ask_watching(requests, patience, &mut hearing(observer));
-        for Outcome { lane, request, result } in &outcomes {
+        for RequestOutcome { lane, request, result } in &outcomes {
             self.packets[*lane].count(request, result);
             let state = result.as_ref().ok().map(|answer| (answer.code, answer.error));
             if let Some(state) = state.filter(|(code, _)| *code != ReplyCode::Running) {
@@ -268,7 +270,7 @@ fn hearing(observer: &mut Observer) -> impl FnMut(Origin, &[u8], MonoTime) {
 }
 
 /// The registers of a read, and what they hold.
-pub(super) fn told(request: &Request, answer: &Answer) -> impl Iterator<Item = (Address, u16)> {
+pub(super) fn told(request: &Request, answer: &RegisterAnswer) -> impl Iterator<Item = (Address, u16)> {
     let first = request.first();
     let addresses = (0..).map_while(move |step| first.after(step));
     addresses.zip(answer.words.clone())

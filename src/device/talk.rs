@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::net::SocketAddrV4;
 use std::time::Duration;
 
-use super::{Endpoint, Exchange, Odds, Outcome, Patience, Request};
+use super::{Endpoint, Exchange, Odds, Patience, Request, RequestOutcome};
 use crate::config::{Controller, Station};
 use crate::net::{Delivery, NetError, Origin, Ports, Receiver, SendFault, Sender};
 use crate::sys::clock::Monotonic;
@@ -95,7 +95,7 @@ impl<L: Link, C: Clock> Talk<L, C> {
     ///
     /// # Panics
     /// If a request is for a lane that there is not.
-    pub fn ask(&mut self, requests: Vec<(usize, Request)>, patience: Patience) -> Vec<Outcome> {
+    pub fn ask(&mut self, requests: Vec<(usize, Request)>, patience: Patience) -> Vec<RequestOutcome> {
         self.ask_watching(requests, patience, &mut |_, _, _| {})
     }
 
@@ -108,7 +108,7 @@ impl<L: Link, C: Clock> Talk<L, C> {
         requests: Vec<(usize, Request)>,
         patience: Patience,
         watch: &mut Watch<'_>,
-    ) -> Vec<Outcome> {
+    ) -> Vec<RequestOutcome> {
         self.exchange.begin(requests, patience);
         loop {
             self.send_due();

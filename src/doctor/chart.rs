@@ -17,7 +17,7 @@ fn ends() -> impl Iterator<Item = u64> {
 
 /// Some of the times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Bucket {
+pub(crate) struct ChartBucket {
     /// From here, ns.
     pub(crate) from_ns: u64,
     /// To here, ns; not in it. That of the last bucket has no end: `u64::MAX`.
@@ -26,7 +26,7 @@ pub(crate) struct Bucket {
     pub(crate) count: u64,
 }
 
-impl Bucket {
+impl ChartBucket {
     fn range(&self) -> String {
         let range = match self.to_ns {
             u64::MAX => format!("over {}", us(self.from_ns)),
@@ -38,16 +38,16 @@ impl Bucket {
 
 /// Sorts a histogram of nanoseconds into buckets, from the first that holds a time to the last.
 #[must_use]
-pub(crate) fn buckets(times: &Histogram) -> Vec<Bucket> {
+pub(crate) fn buckets(times: &Histogram) -> Vec<ChartBucket> {
     let mut from_ns = 0;
-    let mut all: Vec<Bucket> = ends()
+    let mut all: Vec<ChartBucket> = ends()
         .map(|to_ns| {
-            let bucket = Bucket { from_ns, to_ns, count: 0 };
+            let bucket = ChartBucket { from_ns, to_ns, count: 0 };
             from_ns = to_ns;
             bucket
         })
         .collect();
-    all.push(Bucket { from_ns, to_ns: u64::MAX, count: 0 });
+    all.push(ChartBucket { from_ns, to_ns: u64::MAX, count: 0 });
     for recorded in times.iter_recorded() {
         // The middle of what the histogram holds together: its ends may lie in two buckets.
         let ns = times.median_equivalent(recorded.value_iterated_to());
@@ -116,7 +116,7 @@ mod tests {
         times.saturating_record(1_500_000);
         let buckets = buckets(&times);
         assert_eq!(buckets.iter().map(|bucket| bucket.count).sum::<u64>(), 1_000);
-        let ends = |bucket: &Bucket| (bucket.from_ns, bucket.to_ns, bucket.count);
+        let ends = |bucket: &ChartBucket| (bucket.from_ns, bucket.to_ns, bucket.count);
         assert_eq!(ends(&buckets[0]), (2_000, 5_000, 990));
         assert_eq!(ends(&buckets[3]), (20_000, 50_000, 9));
         assert_eq!(ends(buckets.last().unwrap()), (1_000_000, 2_000_000, 1));

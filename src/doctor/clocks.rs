@@ -1,13 +1,13 @@
 //! The machine's clocks: what time is read from, how finely it is slept, and whether the wall clock is true.
 
-use super::{Line, Seen};
+use super::{FindingLine, Seen};
 use crate::sys::machine::ClockSync;
 
 /// What is known of the clocks.
 #[derive(Debug, Clone)]
 pub(crate) struct Clocks {
     /// What the kernel reads the time from.
-    pub(crate) source: Seen<Source>,
+    pub(crate) source: Seen<ClockSource>,
     /// The finest step of a sleep, ns.
     pub(crate) resolution_ns: u64,
     /// How well the wall clock is held.
@@ -16,7 +16,7 @@ pub(crate) struct Clocks {
 
 /// The kernel's clock source.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Source {
+pub(crate) struct ClockSource {
     /// The one in use.
     pub(crate) current: String,
     /// Those that could be.
@@ -37,23 +37,27 @@ const FAR_US: u64 = 100_000;
 impl Clocks {
     /// One line for each.
     #[must_use]
-    pub(crate) fn judge(&self) -> Vec<Line> {
+    pub(crate) fn judge(&self) -> Vec<FindingLine> {
         vec![self.clock_source(), self.resolution(), self.wall_clock()]
     }
 
-    fn clock_source(&self) -> Line {
+    fn clock_source(&self) -> FindingLine {
         const ID: &str = "clock_source";
         const FILE: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
         let source = match &self.source {
             Ok(source) => source,
-            Err(why) => return Line::unknown(ID, why, format!("cat {FILE}")),
+            Err(why) => return FindingLine::unknown(ID, why, format!("cat {FILE}")),
         };
         let current = source.current.as_str();
         if FAST.contains(&current) {
-            return Line::ok(ID, current);
+            return FindingLine::ok(ID, current);
         }
         if !SLOW.contains(&current) && current != "jiffies" {
-            return Line::unknown(ID, format!("{current}, whose cost is not known"), "see the measured run");
+            return FindingLine::unknown(
+                ID,
+                format!("{current}, whose cost is not known"),
+                "see the measured run",
+            );
         }
         let fix = match source.available.iter().find(|name| FAST.contains(&name.as_str())) {
             Some(fast) => format!("echo {fast} > {FILE}"),
@@ -62,35 +66,39 @@ impl Clocks {
                 .to_owned(),
         };
         if current == "jiffies" {
-            return Line::bad(ID, "jiffies: time goes in steps of milliseconds", fix);
+            return FindingLine::bad(ID, "jiffies: time goes in steps of milliseconds", fix);
         }
-        Line::warn(ID, format!("{current}: each reading takes a microsecond or more"), fix)
+        FindingLine::warn(ID, format!("{current}: each reading takes a microsecond or more"), fix)
     }
 
-    fn resolution(&self) -> Line {
+    fn resolution(&self) -> FindingLine {
         const ID: &str = "timer_resolution";
         let found = format!("{} ns", self.resolution_ns);
         if self.resolution_ns <= COARSE_NS {
-            return Line::ok(ID, found);
+            return FindingLine::ok(ID, found);
         }
-        Line::bad(ID, found, "boot without highres=off, with a kernel that has CONFIG_HIGH_RES_TIMERS=y")
+        FindingLine::bad(
+            ID,
+            found,
+            "boot without highres=off, with a kernel that has CONFIG_HIGH_RES_TIMERS=y",
+        )
     }
 
-    fn wall_clock(&self) -> Line {
+    fn wall_clock(&self) -> FindingLine {
         const ID: &str = "clock_synchronisation";
         const FIX: &str =
             "apt install chrony, or timedatectl set-ntp true; of a container or virtual machine: on the host";
         match &self.sync {
-            Err(why) => Line::unknown(ID, why, "chronyc tracking, or timedatectl show-timesync"),
-            Ok(sync) if !sync.synchronised => Line::warn(
+            Err(why) => FindingLine::unknown(ID, why, "chronyc tracking, or timedatectl show-timesync"),
+            Ok(sync) if !sync.synchronised => FindingLine::warn(
                 ID,
                 "nobody disciplines the wall clock; ticks do not follow it, but logs and other machines will disagree",
                 FIX,
             ),
             Ok(sync) if sync.max_error_us > FAR_US => {
-                Line::warn(ID, format!("may be wrong by {} ms", sync.max_error_us / 1_000), FIX)
+                FindingLine::warn(ID, format!("may be wrong by {} ms", sync.max_error_us / 1_000), FIX)
             }
-            Ok(sync) => Line::ok(ID, format!("within {} µs", sync.max_error_us)),
+            Ok(sync) => FindingLine::ok(ID, format!("within {} µs", sync.max_error_us)),
         }
     }
 }

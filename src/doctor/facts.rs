@@ -5,12 +5,12 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
-use super::clocks::{Clocks, Source};
+use super::clocks::{ClockSource, Clocks};
 use super::kernel::{Kernel, PreemptionSigns, RealTimeThreads, Slack};
-use super::memory::Memory;
-use super::network::{NeighbourTable, Network};
+use super::memory::MemoryFacts;
+use super::network::{NeighbourTable, NetworkFacts};
 use super::processor::{Around, DmaLatency, IdleState, Processor, machine};
-use super::scheduling::{Group, Refusal, Scheduling, Throttle, Trial};
+use super::scheduling::{FifoTrial, Group, RealTimeRefusal, Scheduling, Throttle};
 use super::{Facts, Seen, text};
 use crate::sys::machine as sys;
 use crate::sys::realtime::PRIORITY;
@@ -38,7 +38,7 @@ pub(crate) fn facts() -> Facts {
             group: group(&config),
             throttle: throttle(),
         },
-        memory: Memory {
+        memory: MemoryFacts {
             locked: sys::try_memory_lock().map_err(|error| error.to_string()),
             limit: limits.locked,
             swaps: read("/proc/swaps").map(|text| text::swaps(&text)),
@@ -90,13 +90,13 @@ fn kernel_config() -> String {
     places.iter().map(text_of).find(|text| !text.is_empty()).unwrap_or_default()
 }
 
-fn tried(trial: sys::Trial) -> Trial {
+fn tried(trial: sys::Trial) -> FifoTrial {
     let (policy, priority) = trial.in_force;
-    let refusal = trial.refusal.map(|error| Refusal {
+    let refusal = trial.refusal.map(|error| RealTimeRefusal {
         words: error.to_string(),
         not_permitted: error.raw_os_error() == Some(rustix::io::Errno::PERM.raw_os_error()),
     });
-    Trial { given: trial.given, policy, priority, refusal }
+    FifoTrial { given: trial.given, policy, priority, refusal }
 }
 
 fn slack(trial: &sys::Trial) -> Seen<Slack> {
@@ -252,7 +252,7 @@ fn around() -> Around {
 
 fn clocks() -> Clocks {
     let folder = Path::new("/sys/devices/system/clocksource/clocksource0");
-    let source = read(folder.join("current_clocksource")).map(|current| Source {
+    let source = read(folder.join("current_clocksource")).map(|current| ClockSource {
         current: current.trim().to_owned(),
         available: text_of(folder.join("available_clocksource"))
             .split_ascii_whitespace()
@@ -266,13 +266,13 @@ fn clocks() -> Clocks {
     }
 }
 
-fn network(files: sys::Limit) -> Network {
+fn network(files: sys::ProcessLimit) -> NetworkFacts {
     let threshold = |n| number(&format!("/proc/sys/net/ipv4/neigh/default/gc_thresh{n}"));
     let neighbours =
         || Ok(NeighbourTable { kept: threshold(1)?, tidied: threshold(2)?, most: threshold(3)? });
     let udp = "/proc/sys/net/ipv4/udp_mem";
     let last = |text: String| text.split_ascii_whitespace().last().and_then(|word| word.parse().ok());
-    Network {
+    NetworkFacts {
         neighbours: neighbours(),
         receive_max: number("/proc/sys/net/core/rmem_max"),
         receive_default: number("/proc/sys/net/core/rmem_default"),

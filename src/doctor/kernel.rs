@@ -1,7 +1,7 @@
 //! The kernel: how readily it lets go of a processor, how punctually it wakes, and whom else it serves first.
 
 use super::text::{boot_option, bracketed, option_set};
-use super::{Line, Seen, count, some_of};
+use super::{FindingLine, Seen, count, some_of};
 use crate::sys::realtime::PRIORITY;
 
 /// What is known of the kernel.
@@ -125,22 +125,22 @@ pub(crate) struct RealTimeThreads {
 impl Kernel {
     /// One line for each; `granted` where a play would be real-time.
     #[must_use]
-    pub(crate) fn judge(&self, granted: bool) -> Vec<Line> {
+    pub(crate) fn judge(&self, granted: bool) -> Vec<FindingLine> {
         vec![self.model(), self.timer_slack(granted), self.other_threads()]
     }
 
-    fn model(&self) -> Line {
+    fn model(&self) -> FindingLine {
         const ID: &str = "preemption";
         match &self.preemption {
-            Err(why) => Line::unknown(
+            Err(why) => FindingLine::unknown(
                 ID,
                 why,
                 "as root: cat /sys/kernel/debug/sched/preempt; or: zgrep PREEMPT /proc/config.gz",
             ),
             Ok(model @ (Preemption::RealTime | Preemption::Full | Preemption::Lazy)) => {
-                Line::ok(ID, model.name())
+                FindingLine::ok(ID, model.name())
             }
-            Ok(model) => Line::warn(
+            Ok(model) => FindingLine::warn(
                 ID,
                 format!("{}: a long system call of another program delays a tick", model.name()),
                 "boot with preempt=full, or with a PREEMPT_RT kernel (Debian: apt install linux-image-rt-amd64)",
@@ -148,15 +148,17 @@ impl Kernel {
         }
     }
 
-    fn timer_slack(&self, granted: bool) -> Line {
+    fn timer_slack(&self, granted: bool) -> FindingLine {
         const ID: &str = "timer_slack";
         match &self.slack {
-            Err(why) => Line::unknown(ID, why, "cat /proc/self/timerslack_ns"),
+            Err(why) => FindingLine::unknown(ID, why, "cat /proc/self/timerslack_ns"),
             Ok(slack) if granted => {
-                Line::ok(ID, format!("{} ns, of no effect on real-time threads", slack.default_ns))
+                FindingLine::ok(ID, format!("{} ns, of no effect on real-time threads", slack.default_ns))
             }
-            Ok(slack) if slack.settable => Line::ok(ID, format!("{} ns; play sets 1 ns", slack.default_ns)),
-            Ok(slack) => Line::warn(
+            Ok(slack) if slack.settable => {
+                FindingLine::ok(ID, format!("{} ns; play sets 1 ns", slack.default_ns))
+            }
+            Ok(slack) => FindingLine::warn(
                 ID,
                 format!("{} ns, and setting 1 ns was refused: every wake-up is that late", slack.default_ns),
                 "allow prctl(PR_SET_TIMERSLACK) in the container's seccomp profile, or see realtime_policy",
@@ -164,17 +166,17 @@ impl Kernel {
         }
     }
 
-    fn other_threads(&self) -> Line {
+    fn other_threads(&self) -> FindingLine {
         const ID: &str = "other_realtime_threads";
         const LOOK: &str = "on the host: ps -eLo pid,tid,cls,rtprio,comm | awk '$4 >= 50'";
         let others = match &self.others {
             Ok(others) => others,
-            Err(why) => return Line::unknown(ID, why, LOOK),
+            Err(why) => return FindingLine::unknown(ID, why, LOOK),
         };
         let kernels = format!("{} of the kernel's own", count(others.of_kernel, "thread"));
         let programs = &others.of_programs;
         if !programs.is_empty() {
-            return Line::warn(
+            return FindingLine::warn(
                 ID,
                 format!("at priority {PRIORITY} or more: {}; and {kernels}", some_of(programs, 5)),
                 format!(
@@ -184,9 +186,9 @@ impl Kernel {
             );
         }
         if others.whole {
-            Line::ok(ID, format!("no program's at priority {PRIORITY} or more; {kernels}"))
+            FindingLine::ok(ID, format!("no program's at priority {PRIORITY} or more; {kernels}"))
         } else {
-            Line::unknown(ID, "none that can be seen here, but other programs are hidden", LOOK)
+            FindingLine::unknown(ID, "none that can be seen here, but other programs are hidden", LOOK)
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The measured run: how late a bare tick loop woke up, and whether that will do.
 
-use super::{Line, Verdict};
+use super::{FindingLine, Verdict};
 use crate::sys::realtime::Policy;
 use crate::tracker::Histogram;
 
@@ -11,14 +11,14 @@ pub(crate) const PERIOD_NS: u64 = 1_000_000;
 
 /// What else the machine did during a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Load {
+pub(crate) enum MachineLoad {
     /// Nothing of ours.
     Idle,
     /// One thread of ordinary priority on each processor that never sleeps.
     Loaded,
 }
 
-impl Load {
+impl MachineLoad {
     /// As it is written in reports.
     #[must_use]
     pub(crate) const fn word(self) -> &'static str {
@@ -38,9 +38,9 @@ impl Load {
 
 /// What came of a run.
 #[derive(Debug, Clone)]
-pub(crate) struct Run {
+pub(crate) struct LatenessRun {
     /// What else went on.
-    pub(crate) load: Load,
+    pub(crate) load: MachineLoad,
     /// How the loop was scheduled.
     pub(crate) policy: Policy,
     /// Wake-ups.
@@ -58,13 +58,13 @@ pub(crate) const BAD_PERCENT: u64 = 50;
 /// Ticks slept through of 1,000 above which a machine is not ready.
 pub(crate) const BAD_MISSED_PER_MILLE: u64 = 1;
 
-impl Run {
+impl LatenessRun {
     /// The line of this run.
     #[must_use]
-    pub(crate) fn judge(&self) -> Line {
+    pub(crate) fn judge(&self) -> FindingLine {
         let id = self.load.id();
         if self.lateness.is_empty() {
-            return Line::unknown(id, "no tick was measured", "kinocue doctor --seconds 10");
+            return FindingLine::unknown(id, "no tick was measured", "kinocue doctor --seconds 10");
         }
         let p99 = self.lateness.value_at_quantile(0.99);
         let found = format!(
@@ -76,9 +76,9 @@ impl Run {
             self.policy
         );
         match self.verdict(p99) {
-            Verdict::Bad => Line::bad(id, found, self.fix()),
-            Verdict::Warn => Line::warn(id, found, self.fix()),
-            _ => Line::ok(id, found),
+            Verdict::Bad => FindingLine::bad(id, found, self.fix()),
+            Verdict::Warn => FindingLine::warn(id, found, self.fix()),
+            _ => FindingLine::ok(id, found),
         }
     }
 
@@ -96,11 +96,11 @@ impl Run {
     fn fix(&self) -> &'static str {
         match (self.policy, self.load) {
             (Policy::Other, _) => "see realtime_policy: under load nothing else helps",
-            (_, Load::Idle) => {
+            (_, MachineLoad::Idle) => {
                 "see idle_states, governor and virtual_machine: an idle processor is slow to wake; then \
                  other_realtime_threads"
             }
-            (_, Load::Loaded) => "see other_realtime_threads, preemption and virtual_machine",
+            (_, MachineLoad::Loaded) => "see other_realtime_threads, preemption and virtual_machine",
         }
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use super::lateness::{Load, RATE_HZ, Run};
+use super::lateness::{LatenessRun, MachineLoad, RATE_HZ};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock, MonoTime, Rate, TickGrid, nanos};
@@ -20,7 +20,7 @@ const OVERRUN: Duration = Duration::from_millis(100);
 /// Measures for `span`, and counts the ticks in `done` meanwhile. The calling thread stays real-time afterwards, where that
 /// was granted, and the memory locked, as in a play.
 #[must_use]
-pub(crate) fn measure(load: Load, span: Duration, done: &AtomicU64) -> Run {
+pub(crate) fn measure(load: MachineLoad, span: Duration, done: &AtomicU64) -> LatenessRun {
     let mut lateness = histogram();
     let policy = realtime::request().policy;
     let origin = Monotonic.now() + RUN_UP;
@@ -33,13 +33,13 @@ pub(crate) fn measure(load: Load, span: Duration, done: &AtomicU64) -> Run {
         over.store(true, Ordering::Relaxed);
         counts
     });
-    Run { load, policy, ticks, missed, lateness }
+    LatenessRun { load, policy, ticks, missed, lateness }
 }
 
-fn busy_threads(load: Load) -> usize {
+fn busy_threads(load: MachineLoad) -> usize {
     match load {
-        Load::Idle => 0,
-        Load::Loaded => thread::available_parallelism().map_or(1, NonZeroUsize::get),
+        MachineLoad::Idle => 0,
+        MachineLoad::Loaded => thread::available_parallelism().map_or(1, NonZeroUsize::get),
     }
 }
 

@@ -1,15 +1,15 @@
 //! Memory that stays where it is: a page that has to come from a disk stops a tick for milliseconds.
 
-use super::{Line, Seen, some_of};
-use crate::sys::machine::Limit;
+use super::{FindingLine, Seen, some_of};
+use crate::sys::machine::ProcessLimit;
 
 /// What is known of memory.
 #[derive(Debug, Clone)]
-pub(crate) struct Memory {
+pub(crate) struct MemoryFacts {
     /// True if locking it was granted; else why not.
     pub(crate) locked: Result<(), String>,
     /// Bytes that may be locked without a right (`RLIMIT_MEMLOCK`).
-    pub(crate) limit: Limit,
+    pub(crate) limit: ProcessLimit,
     /// What the machine swaps to.
     pub(crate) swaps: Seen<Vec<String>>,
 }
@@ -17,30 +17,30 @@ pub(crate) struct Memory {
 const UNLIMITED: &str = "LimitMEMLOCK=infinity in the unit, or `@kinocue - memlock unlimited` in \
                          /etc/security/limits.d/kinocue.conf and log in anew; in a container: --ulimit memlock=-1";
 
-impl Memory {
+impl MemoryFacts {
     /// One line for each.
     #[must_use]
-    pub(crate) fn judge(&self) -> Vec<Line> {
+    pub(crate) fn judge(&self) -> Vec<FindingLine> {
         vec![self.lock(), self.lock_limit(), self.swap()]
     }
 
-    fn lock(&self) -> Line {
+    fn lock(&self) -> FindingLine {
         const ID: &str = "memory_lock";
         match &self.locked {
-            Ok(()) => Line::ok(ID, "granted"),
+            Ok(()) => FindingLine::ok(ID, "granted"),
             // Without swap only pages of the program's own file can leave.
             Err(why) if self.swaps.as_ref().is_ok_and(Vec::is_empty) => {
-                Line::warn(ID, format!("refused: {why}"), UNLIMITED)
+                FindingLine::warn(ID, format!("refused: {why}"), UNLIMITED)
             }
-            Err(why) => Line::bad(ID, format!("refused: {why}, and the machine may swap"), UNLIMITED),
+            Err(why) => FindingLine::bad(ID, format!("refused: {why}, and the machine may swap"), UNLIMITED),
         }
     }
 
-    fn lock_limit(&self) -> Line {
+    fn lock_limit(&self) -> FindingLine {
         const ID: &str = "memory_lock_limit";
         match self.limit.soft {
-            None => Line::ok(ID, "RLIMIT_MEMLOCK unlimited"),
-            Some(bytes) => Line::warn(
+            None => FindingLine::ok(ID, "RLIMIT_MEMLOCK unlimited"),
+            Some(bytes) => FindingLine::warn(
                 ID,
                 format!(
                     "RLIMIT_MEMLOCK {bytes} bytes: only what is there at the start is locked, and only if it fits"
@@ -50,15 +50,15 @@ impl Memory {
         }
     }
 
-    fn swap(&self) -> Line {
+    fn swap(&self) -> FindingLine {
         const ID: &str = "swap";
         match &self.swaps {
-            Err(why) => Line::unknown(ID, why, "swapon --show"),
-            Ok(swaps) if swaps.is_empty() => Line::ok(ID, "none"),
+            Err(why) => FindingLine::unknown(ID, why, "swapon --show"),
+            Ok(swaps) if swaps.is_empty() => FindingLine::ok(ID, "none"),
             Ok(swaps) if self.locked.is_ok() && self.limit.soft.is_none() => {
-                Line::ok(ID, format!("{}; locked memory does not go there", some_of(swaps, 3)))
+                FindingLine::ok(ID, format!("{}; locked memory does not go there", some_of(swaps, 3)))
             }
-            Ok(swaps) => Line::warn(
+            Ok(swaps) => FindingLine::warn(
                 ID,
                 format!("{}, and not all memory is locked", some_of(swaps, 3)),
                 "swapoff -a, and take it out of /etc/fstab; or see memory_lock_limit",

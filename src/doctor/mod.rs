@@ -53,7 +53,7 @@ impl Verdict {
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct Line {
+pub(crate) struct FindingLine {
     /// Its name, the same in every version.
     pub(crate) id: &'static str,
     /// What was found.
@@ -64,7 +64,7 @@ pub(crate) struct Line {
     pub(crate) fix: Option<String>,
 }
 
-impl Line {
+impl FindingLine {
     /// All is well.
     fn ok(id: &'static str, found: impl Into<String>) -> Self {
         Self { id, found: found.into(), verdict: Verdict::Ok, fix: None }
@@ -104,18 +104,18 @@ pub(crate) struct Facts {
     /// The kernel, and the other real-time programs that it runs.
     pub(crate) kernel: kernel::Kernel,
     /// Locked memory and swap.
-    pub(crate) memory: memory::Memory,
+    pub(crate) memory: memory::MemoryFacts,
     /// The processors and how they save power.
     pub(crate) processor: processor::Processor,
     /// Its clocks.
     pub(crate) clocks: clocks::Clocks,
     /// Its tables and buffers.
-    pub(crate) network: network::Network,
+    pub(crate) network: network::NetworkFacts,
 }
 
 /// Judges every fact for a hall, in the order in which a person would mend things.
 #[must_use]
-pub(crate) fn judge(facts: &Facts, hall: Hall) -> Vec<Line> {
+pub(crate) fn judge(facts: &Facts, hall: Hall) -> Vec<FindingLine> {
     let granted = facts.scheduling.granted();
     let mut lines = facts.scheduling.judge();
     lines.extend(facts.memory.judge());
@@ -128,7 +128,7 @@ pub(crate) fn judge(facts: &Facts, hall: Hall) -> Vec<Line> {
 
 /// True if a machine with these findings is ready: nothing is bad. What could not be seen does not count against it.
 #[must_use]
-pub(crate) fn ready(lines: &[Line]) -> bool {
+pub(crate) fn ready(lines: &[FindingLine]) -> bool {
     lines.iter().all(|line| line.verdict != Verdict::Bad)
 }
 

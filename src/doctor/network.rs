@@ -1,11 +1,11 @@
 //! Tables and buffers that a hall of many controllers can outgrow.
 
-use super::{Hall, Line, Seen, count};
-use crate::sys::machine::Limit;
+use super::{FindingLine, Hall, Seen, count};
+use crate::sys::machine::ProcessLimit;
 
 /// What is known of the network's limits.
 #[derive(Debug, Clone)]
-pub(crate) struct Network {
+pub(crate) struct NetworkFacts {
     /// Sizes of the table of neighbours.
     pub(crate) neighbours: Seen<NeighbourTable>,
     /// Bytes that a socket's receive buffer may be asked to have (`rmem_max`).
@@ -15,7 +15,7 @@ pub(crate) struct Network {
     /// Pages that all UDP sockets of the machine may fill together (the last of `udp_mem`).
     pub(crate) udp_pages: Seen<u64>,
     /// Files that the process may have open.
-    pub(crate) files: Limit,
+    pub(crate) files: ProcessLimit,
 }
 
 /// The kernel's table of link addresses, `net.ipv4.neigh.default.gc_thresh1` to `3`.
@@ -43,21 +43,27 @@ const ASKED: u64 = 1 << 20;
 /// The smallest page there is.
 const PAGE: u64 = 4_096;
 
-impl Network {
+impl NetworkFacts {
     /// One line for each.
     #[must_use]
-    pub(crate) fn judge(&self, hall: Hall) -> Vec<Line> {
+    pub(crate) fn judge(&self, hall: Hall) -> Vec<FindingLine> {
         vec![self.neighbour_table(hall), self.receive_buffer(hall), self.open_files(hall)]
     }
 
-    fn neighbour_table(&self, hall: Hall) -> Line {
+    fn neighbour_table(&self, hall: Hall) -> FindingLine {
         const ID: &str = "neighbour_table";
         let need = u64::from(hall.neighbours) + OTHER_NEIGHBOURS;
         let table = match &self.neighbours {
             Ok(table) => *table,
-            Err(_) if hall.neighbours == 0 => return Line::ok(ID, "not needed: no controller is elsewhere"),
+            Err(_) if hall.neighbours == 0 => {
+                return FindingLine::ok(ID, "not needed: no controller is elsewhere");
+            }
             Err(why) => {
-                return Line::unknown(ID, why, "on the host: sysctl -a | grep neigh.default.gc_thresh");
+                return FindingLine::unknown(
+                    ID,
+                    why,
+                    "on the host: sysctl -a | grep neigh.default.gc_thresh",
+                );
             }
         };
         let found = format!(
@@ -68,7 +74,7 @@ impl Network {
             count(hall.neighbours as usize, "controller")
         );
         if hall.neighbours == 0 || need <= table.tidied {
-            return Line::ok(ID, found);
+            return FindingLine::ok(ID, found);
         }
         let kept = need.next_power_of_two();
         let fix = format!(
@@ -78,18 +84,18 @@ impl Network {
             4 * kept
         );
         if need > table.most {
-            Line::bad(ID, found + ": frames to some will find no link address", fix)
+            FindingLine::bad(ID, found + ": frames to some will find no link address", fix)
         } else {
-            Line::warn(ID, found + ": idle entries are dropped, and their next frames wait", fix)
+            FindingLine::warn(ID, found + ": idle entries are dropped, and their next frames wait", fix)
         }
     }
 
-    fn receive_buffer(&self, hall: Hall) -> Line {
+    fn receive_buffer(&self, hall: Hall) -> FindingLine {
         const ID: &str = "socket_buffers";
         const LOOK: &str = "on the host: sysctl net.core.rmem_max net.ipv4.udp_mem";
         let (most, unasked) = match (&self.receive_max, &self.receive_default) {
             (Ok(most), Ok(unasked)) => (*most, *unasked),
-            (Err(why), _) | (_, Err(why)) => return Line::unknown(ID, why, LOOK),
+            (Err(why), _) | (_, Err(why)) => return FindingLine::unknown(ID, why, LOOK),
         };
         let one = REPLIES * REPLY_BYTES;
         let all = one * u64::from(hall.controllers);
@@ -99,10 +105,10 @@ impl Network {
             "{has} bytes for each controller's replies (rmem_max {most}, rmem_default {unasked}); 5 ms of them take {one}"
         );
         if has < one {
-            return Line::warn(ID, found, format!("sysctl -w net.core.rmem_max={ASKED}"));
+            return FindingLine::warn(ID, found, format!("sysctl -w net.core.rmem_max={ASKED}"));
         }
         match &self.udp_pages {
-            Ok(pages) if pages.saturating_mul(PAGE) < all => Line::warn(
+            Ok(pages) if pages.saturating_mul(PAGE) < all => FindingLine::warn(
                 ID,
                 format!("{found}; those of all {all}, but UDP has {pages} pages of memory"),
                 format!(
@@ -112,23 +118,25 @@ impl Network {
                     4 * all / PAGE
                 ),
             ),
-            Ok(_) => Line::ok(ID, format!("{found}, those of all {all}")),
-            Err(why) => {
-                Line::unknown(ID, format!("{found}, those of all {all}; UDP's own memory: {why}"), LOOK)
-            }
+            Ok(_) => FindingLine::ok(ID, format!("{found}, those of all {all}")),
+            Err(why) => FindingLine::unknown(
+                ID,
+                format!("{found}, those of all {all}; UDP's own memory: {why}"),
+                LOOK,
+            ),
         }
     }
 
-    fn open_files(&self, hall: Hall) -> Line {
+    fn open_files(&self, hall: Hall) -> FindingLine {
         const ID: &str = "open_files";
         let need = u64::from(hall.controllers) + OTHER_FILES;
         let hard = self.files.hard.map_or_else(|| "unlimited".to_owned(), |most| most.to_string());
         let found = format!("RLIMIT_NOFILE {hard}, needed {need}");
         if self.files.hard.is_none_or(|most| most >= need) {
-            return Line::ok(ID, found);
+            return FindingLine::ok(ID, found);
         }
         let enough = need.next_power_of_two();
-        Line::bad(
+        FindingLine::bad(
             ID,
             found,
             format!(

@@ -1,6 +1,6 @@
 //! The processors: how many, whose, and how deep they sleep.
 
-use super::{Line, Seen, some_of};
+use super::{FindingLine, Seen, some_of};
 
 /// What is known of the processors.
 #[derive(Debug, Clone)]
@@ -76,7 +76,7 @@ const DEEP_US: u64 = 50;
 impl Processor {
     /// One line for each; `granted` where a play would be real-time.
     #[must_use]
-    pub(crate) fn judge(&self, granted: bool) -> Vec<Line> {
+    pub(crate) fn judge(&self, granted: bool) -> Vec<FindingLine> {
         vec![
             self.number(),
             self.time_quota(granted),
@@ -87,33 +87,33 @@ impl Processor {
         ]
     }
 
-    fn number(&self) -> Line {
+    fn number(&self) -> FindingLine {
         const ID: &str = "processors";
         match &self.allowed {
-            Err(why) => Line::unknown(ID, why, "nproc"),
-            Ok(1) => Line::warn(
+            Err(why) => FindingLine::unknown(ID, why, "nproc"),
+            Ok(1) => FindingLine::warn(
                 ID,
                 "1: replies are read, and moves planned, only while no tick is sent",
                 "give kinocue a second processor (AllowedCPUs= and CPUAffinity= in the unit, --cpuset-cpus of a container)",
             ),
-            Ok(n) => Line::ok(ID, n.to_string()),
+            Ok(n) => FindingLine::ok(ID, n.to_string()),
         }
     }
 
-    fn time_quota(&self, granted: bool) -> Line {
+    fn time_quota(&self, granted: bool) -> FindingLine {
         const ID: &str = "processor_quota";
         const FIX: &str = "no CPUQuota= in the unit and its slice; no --cpus or CPU limit on the container";
         match &self.quota {
-            Err(why) => Line::unknown(ID, why, "cat /sys/fs/cgroup/cpu.max"),
-            Ok(None) => Line::ok(ID, "none"),
-            Ok(Some(cpus)) if granted || *cpus >= 1.0 => Line::warn(
+            Err(why) => FindingLine::unknown(ID, why, "cat /sys/fs/cgroup/cpu.max"),
+            Ok(None) => FindingLine::ok(ID, "none"),
+            Ok(Some(cpus)) if granted || *cpus >= 1.0 => FindingLine::warn(
                 ID,
                 format!(
                     "{cpus:.2} processors: past it ordinary threads stand still for the rest of a period"
                 ),
                 FIX,
             ),
-            Ok(Some(cpus)) => Line::bad(
+            Ok(Some(cpus)) => FindingLine::bad(
                 ID,
                 format!("{cpus:.2} processors: past it every thread stands still for the rest of a period"),
                 FIX,
@@ -121,19 +121,19 @@ impl Processor {
         }
     }
 
-    fn governor(&self) -> Line {
+    fn governor(&self) -> FindingLine {
         const ID: &str = "governor";
         let mut names = match &self.governors {
             Ok(names) => names.clone(),
-            Err(why) => return Line::unknown(ID, why, "on the host: cpupower frequency-info"),
+            Err(why) => return FindingLine::unknown(ID, why, "on the host: cpupower frequency-info"),
         };
         names.sort_unstable();
         names.dedup();
         let found = some_of(&names, 4);
         if names.iter().all(|name| name == "performance") {
-            return Line::ok(ID, found);
+            return FindingLine::ok(ID, found);
         }
-        Line::warn(
+        FindingLine::warn(
             ID,
             format!("{found}: a tick may begin on a slow clock"),
             "cpupower frequency-set -g performance (or: echo performance | tee \
@@ -149,30 +149,30 @@ impl Processor {
         states.iter().filter(|state| state.latency_us <= held).max_by_key(|state| state.latency_us)
     }
 
-    fn idle_states(&self) -> Line {
+    fn idle_states(&self) -> FindingLine {
         const ID: &str = "idle_states";
         match (&self.idle, self.deep()) {
-            (Err(why), _) => Line::unknown(ID, why, "on the host: cpupower idle-info"),
-            (Ok(_), None) => Line::ok(ID, "none in use"),
+            (Err(why), _) => FindingLine::unknown(ID, why, "on the host: cpupower idle-info"),
+            (Ok(_), None) => FindingLine::ok(ID, "none in use"),
             (Ok(_), Some(state)) => {
                 let found = format!("the deepest in use, {}, wakes in {} µs", state.name, state.latency_us);
                 if state.latency_us <= DEEP_US {
-                    return Line::ok(ID, found);
+                    return FindingLine::ok(ID, found);
                 }
                 let fix = format!(
                     "cpupower idle-set -D {DEEP_US}, or hold 0 in /dev/cpu_dma_latency during a show (tuned-adm profile \
                      latency-performance does)"
                 );
-                Line::warn(ID, found, fix)
+                FindingLine::warn(ID, found, fix)
             }
         }
     }
 
-    fn latency_device(&self) -> Line {
+    fn latency_device(&self) -> FindingLine {
         const ID: &str = "cpu_dma_latency";
         let device = match &self.dma_latency {
             Ok(device) => device,
-            Err(why) => return Line::unknown(ID, why, "on the host: ls -l /dev/cpu_dma_latency"),
+            Err(why) => return FindingLine::unknown(ID, why, "on the host: ls -l /dev/cpu_dma_latency"),
         };
         let held = match device.held_us {
             None => "; what it holds could not be read".to_owned(),
@@ -181,11 +181,12 @@ impl Processor {
         };
         let shallow = self.idle.is_ok() && self.deep().is_none_or(|state| state.latency_us <= DEEP_US);
         match &device.opened {
-            Ok(()) => Line::ok(ID, "can be opened".to_owned() + &held),
-            Err(why) if shallow => {
-                Line::ok(ID, format!("cannot be opened ({why}); not needed, no idle state in use is deep"))
-            }
-            Err(why) => Line::warn(
+            Ok(()) => FindingLine::ok(ID, "can be opened".to_owned() + &held),
+            Err(why) if shallow => FindingLine::ok(
+                ID,
+                format!("cannot be opened ({why}); not needed, no idle state in use is deep"),
+            ),
+            Err(why) => FindingLine::warn(
                 ID,
                 format!("cannot be opened ({why}){held}"),
                 "in /etc/udev/rules.d/90-kinocue.rules: KERNEL==\"cpu_dma_latency\", GROUP=\"kinocue\", MODE=\"0660\"",
@@ -193,13 +194,13 @@ impl Processor {
         }
     }
 
-    fn virtual_machine(&self) -> Line {
+    fn virtual_machine(&self) -> FindingLine {
         const ID: &str = "virtual_machine";
         let container = if self.around.container { "; in a container" } else { "" };
         match &self.around.machine {
-            Err(why) => Line::unknown(ID, format!("{why}{container}"), "systemd-detect-virt"),
-            Ok(None) => Line::ok(ID, format!("no sign of one{container}")),
-            Ok(Some(which)) => Line::warn(
+            Err(why) => FindingLine::unknown(ID, format!("{why}{container}"), "systemd-detect-virt"),
+            Ok(None) => FindingLine::ok(ID, format!("no sign of one{container}")),
+            Ok(Some(which)) => FindingLine::warn(
                 ID,
                 format!("{which}{container}: its host can take a processor away unseen"),
                 "run on the bare machine; else pin each virtual processor to one of the host's own, shared with nothing",

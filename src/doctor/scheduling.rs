@@ -1,16 +1,16 @@
 //! Real-time scheduling: whether it is granted, and each thing that can stand in its way.
 
-use super::{Line, Seen};
-use crate::sys::machine::Limit;
+use super::{FindingLine, Seen};
+use crate::sys::machine::ProcessLimit;
 use crate::sys::realtime::{PRIORITY, Policy};
 
 /// What is known of real-time scheduling.
 #[derive(Debug, Clone)]
 pub(crate) struct Scheduling {
     /// What came of trying it.
-    pub(crate) trial: Seen<Trial>,
+    pub(crate) trial: Seen<FifoTrial>,
     /// The highest priority that needs no right (`RLIMIT_RTPRIO`).
-    pub(crate) limit: Limit,
+    pub(crate) limit: ProcessLimit,
     /// True if this process has the right to any priority (`CAP_SYS_NICE` in the first user namespace).
     pub(crate) right: Seen<bool>,
     /// The control group that rules processor time.
@@ -21,7 +21,7 @@ pub(crate) struct Scheduling {
 
 /// What came of asking the kernel for `SCHED_FIFO`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Trial {
+pub(crate) struct FifoTrial {
     /// True if whoever started the program gave it.
     pub(crate) given: bool,
     /// The policy in force afterwards.
@@ -29,12 +29,12 @@ pub(crate) struct Trial {
     /// Its priority.
     pub(crate) priority: u8,
     /// Why it was refused.
-    pub(crate) refusal: Option<Refusal>,
+    pub(crate) refusal: Option<RealTimeRefusal>,
 }
 
 /// Why the kernel refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Refusal {
+pub(crate) struct RealTimeRefusal {
     /// In the kernel's words.
     pub(crate) words: String,
     /// True if it was `EPERM`: for lack of a right, or by a control group.
@@ -79,24 +79,24 @@ impl Scheduling {
 
     /// One line for each.
     #[must_use]
-    pub(crate) fn judge(&self) -> Vec<Line> {
+    pub(crate) fn judge(&self) -> Vec<FindingLine> {
         vec![self.policy(), self.priority_limit(), self.control_group(), self.guard()]
     }
 
-    fn policy(&self) -> Line {
+    fn policy(&self) -> FindingLine {
         const ID: &str = "realtime_policy";
         let trial = match &self.trial {
             Ok(trial) => trial,
-            Err(why) => return Line::unknown(ID, why, format!("chrt -f {PRIORITY} true")),
+            Err(why) => return FindingLine::unknown(ID, why, format!("chrt -f {PRIORITY} true")),
         };
         let in_force = format!("{} at priority {}", trial.policy, trial.priority);
         match &trial.refusal {
             _ if trial.policy != Policy::Other && trial.given => {
-                Line::ok(ID, format!("{in_force}, given by whoever started the program"))
+                FindingLine::ok(ID, format!("{in_force}, given by whoever started the program"))
             }
-            _ if trial.policy != Policy::Other => Line::ok(ID, format!("{in_force} was granted")),
-            Some(refusal) => Line::bad(ID, format!("refused: {}", refusal.words), self.remedy()),
-            None => Line::bad(ID, "granted, but not in force", self.remedy()),
+            _ if trial.policy != Policy::Other => FindingLine::ok(ID, format!("{in_force} was granted")),
+            Some(refusal) => FindingLine::bad(ID, format!("refused: {}", refusal.words), self.remedy()),
+            None => FindingLine::bad(ID, "granted, but not in force", self.remedy()),
         }
     }
 
@@ -110,7 +110,7 @@ impl Scheduling {
         )
     }
 
-    fn priority_limit(&self) -> Line {
+    fn priority_limit(&self) -> FindingLine {
         const ID: &str = "priority_limit";
         let limit = self.limit.soft.map_or_else(|| "none".to_owned(), |most| most.to_string());
         let found = format!("RLIMIT_RTPRIO {limit}");
@@ -121,51 +121,53 @@ impl Scheduling {
             )
         };
         if self.limit.soft.is_none_or(|most| most >= u64::from(PRIORITY)) {
-            return Line::ok(ID, found);
+            return FindingLine::ok(ID, found);
         }
         match &self.right {
-            Ok(true) => Line::ok(ID, found + "; not needed with CAP_SYS_NICE"),
-            _ if self.granted() => Line::ok(ID, found + "; not needed, the policy was given"),
+            Ok(true) => FindingLine::ok(ID, found + "; not needed with CAP_SYS_NICE"),
+            _ if self.granted() => FindingLine::ok(ID, found + "; not needed, the policy was given"),
             _ if self.limit.hard.is_none_or(|most| most >= u64::from(PRIORITY)) => {
-                Line::bad(ID, found + ", which may be raised", format!("ulimit -r {PRIORITY}"))
+                FindingLine::bad(ID, found + ", which may be raised", format!("ulimit -r {PRIORITY}"))
             }
-            Ok(false) => Line::bad(ID, found + ", and no CAP_SYS_NICE that reaches the scheduler", fix()),
-            Err(why) => Line::bad(ID, format!("{found}; whether there is CAP_SYS_NICE: {why}"), fix()),
+            Ok(false) => {
+                FindingLine::bad(ID, found + ", and no CAP_SYS_NICE that reaches the scheduler", fix())
+            }
+            Err(why) => FindingLine::bad(ID, format!("{found}; whether there is CAP_SYS_NICE: {why}"), fix()),
         }
     }
 
-    fn control_group(&self) -> Line {
+    fn control_group(&self) -> FindingLine {
         const ID: &str = "realtime_group";
         const LOOK: &str =
             "cat /proc/self/cgroup; zgrep RT_GROUP_SCHED /proc/config.gz /boot/config-$(uname -r)";
         let group = match &self.group {
             Ok(group) => group,
             Err(why) if self.granted() => {
-                return Line::ok(ID, format!("the group does not refuse it ({why})"));
+                return FindingLine::ok(ID, format!("the group does not refuse it ({why})"));
             }
-            Err(why) => return Line::unknown(ID, why, LOOK),
+            Err(why) => return FindingLine::unknown(ID, why, LOOK),
         };
         let found = group.words();
         let refused = self.trial.as_ref().ok().and_then(|trial| trial.refusal.as_ref());
         match &group.share {
-            _ if self.granted() => Line::ok(ID, found + ", which does not refuse it"),
-            Some((file, 0)) => Line::bad(
+            _ if self.granted() => FindingLine::ok(ID, found + ", which does not refuse it"),
+            Some((file, 0)) => FindingLine::bad(
                 ID,
                 found,
                 format!(
                     "echo 200000 > {file} (first in each group above it), or start kinocue outside the group"
                 ),
             ),
-            _ if group.configured == Some(false) => Line::ok(ID, found),
-            _ if refused.is_some_and(|refusal| refusal.not_permitted) && self.entitled() => Line::bad(
+            _ if group.configured == Some(false) => FindingLine::ok(ID, found),
+            _ if refused.is_some_and(|refusal| refusal.not_permitted) && self.entitled() => FindingLine::bad(
                 ID,
                 found
                     + "; refused although the limit allows it: blocked by the control group or a seccomp filter",
                 "no CPUWeight=, CPUQuota= or Delegate= in the unit and its slice; or boot with rt_group_sched=0; in a \
                  container: --cap-add SYS_NICE and a seccomp profile that allows sched_setscheduler",
             ),
-            Some(_) => Line::ok(ID, found),
-            None => Line::unknown(
+            Some(_) => FindingLine::ok(ID, found),
+            None => FindingLine::unknown(
                 ID,
                 found + "; whether it has a real-time share shows only once right or limit allow the policy",
                 LOOK,
@@ -173,24 +175,30 @@ impl Scheduling {
         }
     }
 
-    fn guard(&self) -> Line {
+    fn guard(&self) -> FindingLine {
         const ID: &str = "realtime_throttle";
         const LINE: &str = "sysctl -w kernel.sched_rt_runtime_us=950000 kernel.sched_rt_period_us=1000000";
         let throttle = match &self.throttle {
             Ok(throttle) => *throttle,
-            Err(why) => return Line::unknown(ID, why, "sysctl kernel.sched_rt_runtime_us"),
+            Err(why) => return FindingLine::unknown(ID, why, "sysctl kernel.sched_rt_runtime_us"),
         };
         let found =
             format!("{} µs of each {} µs for real-time threads", throttle.runtime_us, throttle.period_us);
         match throttle.runtime_us {
-            ..0 => {
-                Line::warn(ID, "off: a real-time thread that never sleeps takes its processor for good", LINE)
-            }
-            0 => Line::bad(ID, found, LINE),
+            ..0 => FindingLine::warn(
+                ID,
+                "off: a real-time thread that never sleeps takes its processor for good",
+                LINE,
+            ),
+            0 => FindingLine::bad(ID, found, LINE),
             runtime if runtime.saturating_mul(100) < throttle.period_us.saturating_mul(MOST_PERCENT) => {
-                Line::warn(ID, format!("{found}; a play with a spin uses up to {MOST_PERCENT} %"), LINE)
+                FindingLine::warn(
+                    ID,
+                    format!("{found}; a play with a spin uses up to {MOST_PERCENT} %"),
+                    LINE,
+                )
             }
-            _ => Line::ok(ID, found),
+            _ => FindingLine::ok(ID, found),
         }
     }
 }

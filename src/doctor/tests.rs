@@ -1,29 +1,29 @@
 //! Machines made up, and what is said of them.
 
-use super::clocks::{Clocks, Source};
+use super::clocks::{ClockSource, Clocks};
 use super::kernel::{Kernel, Preemption, RealTimeThreads, Slack};
-use super::lateness::{Load, Run};
-use super::memory::Memory;
-use super::network::{NeighbourTable, Network};
+use super::lateness::{LatenessRun, MachineLoad};
+use super::memory::MemoryFacts;
+use super::network::{NeighbourTable, NetworkFacts};
 use super::processor::{Around, DmaLatency, IdleState, Processor};
-use super::scheduling::{Group, Refusal, Scheduling, Throttle, Trial};
+use super::scheduling::{FifoTrial, Group, RealTimeRefusal, Scheduling, Throttle};
 use super::*;
-use crate::sys::machine::{ClockSync, Limit};
+use crate::sys::machine::{ClockSync, ProcessLimit};
 use crate::sys::realtime::Policy;
 use crate::tracker::histogram;
 
 const ONE: Hall = Hall { controllers: 1, neighbours: 1 };
-const NO_LIMIT: Limit = Limit { soft: None, hard: None };
+const NO_LIMIT: ProcessLimit = ProcessLimit { soft: None, hard: None };
 
-fn at_most(limit: u64) -> Limit {
-    Limit { soft: Some(limit), hard: Some(limit) }
+fn at_most(limit: u64) -> ProcessLimit {
+    ProcessLimit { soft: Some(limit), hard: Some(limit) }
 }
 
 /// A bare machine, set up for shows.
 fn good() -> Facts {
     Facts {
         scheduling: Scheduling {
-            trial: Ok(Trial { given: false, policy: Policy::Fifo, priority: 50, refusal: None }),
+            trial: Ok(FifoTrial { given: false, policy: Policy::Fifo, priority: 50, refusal: None }),
             limit: at_most(50),
             right: Ok(false),
             group: Ok(Group { path: "/system.slice".to_owned(), share: None, configured: Some(false) }),
@@ -34,7 +34,7 @@ fn good() -> Facts {
             slack: Ok(Slack { default_ns: 50_000, settable: true }),
             others: Ok(RealTimeThreads { of_programs: Vec::new(), of_kernel: 9, whole: true }),
         },
-        memory: Memory { locked: Ok(()), limit: NO_LIMIT, swaps: Ok(Vec::new()) },
+        memory: MemoryFacts { locked: Ok(()), limit: NO_LIMIT, swaps: Ok(Vec::new()) },
         processor: Processor {
             allowed: Ok(8),
             quota: Ok(None),
@@ -44,11 +44,11 @@ fn good() -> Facts {
             around: Around { container: false, machine: Ok(None) },
         },
         clocks: Clocks {
-            source: Ok(Source { current: "tsc".to_owned(), available: vec!["tsc".to_owned()] }),
+            source: Ok(ClockSource { current: "tsc".to_owned(), available: vec!["tsc".to_owned()] }),
             resolution_ns: 1,
             sync: Ok(ClockSync { synchronised: true, max_error_us: 500 }),
         },
-        network: Network {
+        network: NetworkFacts {
             neighbours: Ok(NeighbourTable { kept: 128, tidied: 512, most: 1_024 }),
             receive_max: Ok(212_992),
             receive_default: Ok(212_992),
@@ -63,9 +63,9 @@ fn state(name: &str, latency_us: u64) -> IdleState {
 }
 
 fn refuse(facts: &mut Facts, not_permitted: bool) {
-    let refusal = Refusal { words: "Operation not permitted".to_owned(), not_permitted };
+    let refusal = RealTimeRefusal { words: "Operation not permitted".to_owned(), not_permitted };
     facts.scheduling.trial =
-        Ok(Trial { given: false, policy: Policy::Other, priority: 0, refusal: Some(refusal) });
+        Ok(FifoTrial { given: false, policy: Policy::Other, priority: 0, refusal: Some(refusal) });
 }
 
 fn not_seen<T>() -> Seen<T> {
@@ -73,11 +73,11 @@ fn not_seen<T>() -> Seen<T> {
 }
 
 /// The line of that name for one controller.
-fn line(facts: &Facts, id: &str) -> Line {
+fn line(facts: &Facts, id: &str) -> FindingLine {
     line_for(facts, ONE, id)
 }
 
-fn line_for(facts: &Facts, hall: Hall, id: &str) -> Line {
+fn line_for(facts: &Facts, hall: Hall, id: &str) -> FindingLine {
     judge(facts, hall).into_iter().find(|line| line.id == id).unwrap()
 }
 
@@ -104,7 +104,7 @@ fn whatever_is_not_ok_says_what_to_do() {
     let mut facts = good();
     refuse(&mut facts, true);
     facts.scheduling.limit = at_most(0);
-    facts.memory = Memory { locked: not_seen(), limit: at_most(65_536), swaps: not_seen() };
+    facts.memory = MemoryFacts { locked: not_seen(), limit: at_most(65_536), swaps: not_seen() };
     facts.kernel = Kernel { preemption: not_seen(), slack: not_seen(), others: not_seen() };
     facts.clocks = Clocks { source: not_seen(), resolution_ns: 4_000_000, sync: not_seen() };
     facts.network.neighbours = not_seen();
@@ -125,7 +125,7 @@ fn a_refused_policy_is_never_ready_and_names_the_limit_to_raise() {
     let limit = line(&facts, "priority_limit");
     assert_eq!(limit.verdict, Verdict::Bad);
     assert!(limit.fix.unwrap().contains("LimitRTPRIO=50"));
-    facts.scheduling.limit = Limit { soft: Some(0), hard: Some(99) };
+    facts.scheduling.limit = ProcessLimit { soft: Some(0), hard: Some(99) };
     assert_eq!(line(&facts, "priority_limit").fix.unwrap(), "ulimit -r 50");
     facts.scheduling.right = Ok(true);
     assert_eq!(verdict(&facts, "priority_limit"), Verdict::Ok);
@@ -134,7 +134,8 @@ fn a_refused_policy_is_never_ready_and_names_the_limit_to_raise() {
 #[test]
 fn a_policy_that_is_granted_but_not_in_force_is_bad() {
     let mut facts = good();
-    facts.scheduling.trial = Ok(Trial { given: false, policy: Policy::Other, priority: 0, refusal: None });
+    facts.scheduling.trial =
+        Ok(FifoTrial { given: false, policy: Policy::Other, priority: 0, refusal: None });
     assert_eq!(verdict(&facts, "realtime_policy"), Verdict::Bad);
 }
 
@@ -142,7 +143,7 @@ fn a_policy_that_is_granted_but_not_in_force_is_bad() {
 fn a_policy_that_systemd_gave_needs_no_limit() {
     let mut facts = good();
     facts.scheduling.trial =
-        Ok(Trial { given: true, policy: Policy::RoundRobin, priority: 20, refusal: None });
+        Ok(FifoTrial { given: true, policy: Policy::RoundRobin, priority: 20, refusal: None });
     facts.scheduling.limit = at_most(0);
     assert!(ready(&judge(&facts, ONE)));
     assert!(line(&facts, "realtime_policy").found.contains("rr at priority 20, given"));
@@ -253,7 +254,7 @@ fn a_slow_clock_source_is_changed_for_a_fast_one_where_there_is_one() {
     let mut facts = good();
     let mut judged = |current: &str, available: &[&str]| {
         let available = available.iter().map(|name| (*name).to_owned()).collect();
-        facts.clocks.source = Ok(Source { current: current.to_owned(), available });
+        facts.clocks.source = Ok(ClockSource { current: current.to_owned(), available });
         line(&facts, "clock_source")
     };
     let hpet = judged("hpet", &["hpet", "tsc"]);
@@ -304,12 +305,12 @@ fn buffers_and_files_are_held_against_the_hall() {
     assert!(line(&facts, "socket_buffers").fix.unwrap().contains("net.core.rmem_max="));
 }
 
-fn measured(policy: Policy, lateness_us: &[(u64, u64)], missed: u64) -> Run {
+fn measured(policy: Policy, lateness_us: &[(u64, u64)], missed: u64) -> LatenessRun {
     let mut lateness = histogram();
     for &(us, ticks) in lateness_us {
         lateness.record_n(us * 1_000, ticks).unwrap();
     }
-    Run { load: Load::Loaded, policy, ticks: lateness.len(), missed, lateness }
+    LatenessRun { load: MachineLoad::Loaded, policy, ticks: lateness.len(), missed, lateness }
 }
 
 #[test]

@@ -36,7 +36,7 @@ const TRIES: usize = 60;
 
 /// One axis on its way; strokes and seconds.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Axis {
+pub(super) struct BlindAxis {
     place: f64,
     /// How fast it went there; signed.
     speed: f64,
@@ -62,7 +62,7 @@ pub(super) struct Grid {
 
 /// The next line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Leg {
+pub(super) struct BlindLeg {
     /// Where each axis goes.
     pub(super) to: Pose,
     /// Its Time, and the ticks that it takes, the one in which it is sent included.
@@ -79,7 +79,7 @@ fn sight_ticks(rate: Rate) -> u32 {
     u32::try_from(Spacing::at_rate(rate.hz()).n).unwrap_or(u32::MAX)
 }
 
-impl Axis {
+impl BlindAxis {
     /// A slot of which the seat has no axis: it moves nothing.
     pub(super) const PADDING: Self =
         Self { place: 0.0, speed: 0.0, farthest: 0.0, velocity: f64::INFINITY, step: 0.0 };
@@ -131,7 +131,7 @@ impl Grid {
 
 /// The next line of that way to rest, or at rest for [`STILL_FOR_MS`] in all; none once that is over, or where no frame can bring the
 /// axes there.
-pub(super) fn next_leg(axes: &[Axis; MAX_AXES], grid: Grid) -> Option<Leg> {
+pub(super) fn next_leg(axes: &[BlindAxis; MAX_AXES], grid: Grid) -> Option<BlindLeg> {
     let mut axes = *axes;
     // Each axis as gently as it can alone: one that is short of room is not to brake the others.
     for axis in &mut axes {
@@ -149,14 +149,14 @@ pub(super) fn next_leg(axes: &[Axis; MAX_AXES], grid: Grid) -> Option<Leg> {
 }
 
 /// How many times as large as they are the steps have to be.
-fn gentlest(axes: &[Axis], grid: Grid) -> Option<f64> {
+fn gentlest(axes: &[BlindAxis], grid: Grid) -> Option<f64> {
     let sizes = std::iter::successors(Some(1.0), |size| Some(size * HARDER));
     sizes.take(TRIES).find(|size| fits(axes, grid, *size))
 }
 
 /// Whether the whole way fits with steps so many times as large.
-fn fits(axes: &[Axis], mut grid: Grid, harder: f64) -> bool {
-    let mut kept = [Axis::PADDING; MAX_AXES];
+fn fits(axes: &[BlindAxis], mut grid: Grid, harder: f64) -> bool {
+    let mut kept = [BlindAxis::PADDING; MAX_AXES];
     kept[..axes.len()].copy_from_slice(axes);
     let axes = &mut kept[..axes.len()];
     loop {
@@ -170,22 +170,22 @@ fn fits(axes: &[Axis], mut grid: Grid, harder: f64) -> bool {
     }
 }
 
-fn slow(axes: &mut [Axis], harder: f64) {
+fn slow(axes: &mut [BlindAxis], harder: f64) {
     axes.iter_mut().for_each(|axis| axis.slow(harder));
 }
 
-fn rest(axes: &[Axis]) -> bool {
+fn rest(axes: &[BlindAxis]) -> bool {
     axes.iter().all(|axis| axis.speed == 0.0)
 }
 
 /// Goes one line on at the present speeds; none where that leads out of a stroke, or takes too long.
-fn go(axes: &mut [Axis], grid: Grid) -> Option<Leg> {
+fn go(axes: &mut [BlindAxis], grid: Grid) -> Option<BlindLeg> {
     line(axes, grid, 0.0)
 }
 
 /// The same with a line that takes `least_s` at the least.
-fn line(axes: &mut [Axis], grid: Grid, least_s: f64) -> Option<Leg> {
-    let needs_s = axes.iter().map(Axis::needs_s).fold(least_s, f64::max);
+fn line(axes: &mut [BlindAxis], grid: Grid, least_s: f64) -> Option<BlindLeg> {
+    let needs_s = axes.iter().map(BlindAxis::needs_s).fold(least_s, f64::max);
     let (ticks, lasts_ms) = grid.line(needs_s)?;
     let mut to = [0.0; MAX_AXES];
     for (axis, to) in axes.iter_mut().zip(&mut to) {
@@ -193,7 +193,7 @@ fn line(axes: &mut [Axis], grid: Grid, least_s: f64) -> Option<Leg> {
         *to = axis.place;
     }
     let inside = axes.iter().all(|axis| axis.speed == 0.0 || (0.0..=1.0).contains(&axis.place));
-    inside.then_some(Leg { to, lasts_ms, ticks })
+    inside.then_some(BlindLeg { to, lasts_ms, ticks })
 }
 
 #[cfg(test)]
@@ -215,18 +215,18 @@ mod tests {
     }
 
     /// An axis of a bench seat: where it is, mm, how fast, mm/s, and how far away it may be, mm.
-    fn axis(place: f64, speed: f64, farthest: f64, rate: Rate) -> Axis {
-        Axis::new(place / 150.0, speed / 150.0, farthest / 150.0, &LIMITS, rate)
+    fn axis(place: f64, speed: f64, farthest: f64, rate: Rate) -> BlindAxis {
+        BlindAxis::new(place / 150.0, speed / 150.0, farthest / 150.0, &LIMITS, rate)
     }
 
-    fn one(axis: Axis) -> [Axis; MAX_AXES] {
-        let mut axes = [Axis::PADDING; MAX_AXES];
+    fn one(axis: BlindAxis) -> [BlindAxis; MAX_AXES] {
+        let mut axes = [BlindAxis::PADDING; MAX_AXES];
         axes[0] = axis;
         axes
     }
 
     /// All lines to rest, each planned from the end of the one before, as it is in a show.
-    fn way(mut axes: [Axis; MAX_AXES], mut grid: Grid) -> Vec<Leg> {
+    fn way(mut axes: [BlindAxis; MAX_AXES], mut grid: Grid) -> Vec<BlindLeg> {
         let mut legs = Vec::new();
         while let Some(leg) = next_leg(&axes, grid) {
             for (axis, to) in axes.iter_mut().zip(leg.to) {
@@ -242,7 +242,7 @@ mod tests {
     }
 
     /// The sharpest acceleration that the measure sees where a seat has come to `place` with `speed` and hears all of these, mm/s².
-    fn sharpest(place: f64, speed: f64, legs: &[Leg]) -> f64 {
+    fn sharpest(place: f64, speed: f64, legs: &[BlindLeg]) -> f64 {
         let mut lines = vec![(200, place)];
         lines.extend(legs.iter().map(|leg| (leg.lasts_ms, leg.to[0] * 150.0)));
         lines.push((200, lines[lines.len() - 1].1));
@@ -333,7 +333,7 @@ mod tests {
             let (mut grid, mut at, mut speed) = (grid(100.0, 3_000), 90, speed / 150.0);
             for frame in 9.. {
                 let farthest = belief.farthest(&pose, ms(at));
-                let axis = Axis::new(pose[0], speed, farthest[0], &LIMITS, grid.rate);
+                let axis = BlindAxis::new(pose[0], speed, farthest[0], &LIMITS, grid.rate);
                 let Some(leg) = next_leg(&one(axis), grid) else { break };
                 prop_assert!(belief.allows(&leg.to, leg.lasts_ms, ms(at)), "{:?}", leg);
                 belief.taken(&taken(frame, &leg.to, leg.lasts_ms, at));
@@ -352,7 +352,7 @@ mod tests {
             longest_ms in 50_u32..3_000,
         ) {
             let mut grid = grid(hz, longest_ms);
-            let mut kept = [Axis::PADDING; MAX_AXES];
+            let mut kept = [BlindAxis::PADDING; MAX_AXES];
             for (kept, (place, speed, farthest)) in kept.iter_mut().zip(axes) {
                 *kept = axis(place, speed, farthest, grid.rate);
             }

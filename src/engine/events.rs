@@ -1,9 +1,8 @@
 //! What became of the lanes and of what was asked, until whoever leads the hall takes it. What lasts is no event: that is
 //! [`super::Engine::progress`].
 
-use std::fmt;
-
 use crate::belief::Fall;
+use crate::plain;
 
 /// What the planner found no move for, while the show goes on without it. In words by its `Display`, without the name of the seat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,19 +13,13 @@ pub enum Unplanned {
     Lane(usize),
 }
 
-impl fmt::Display for Unplanned {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Seek => {
-                "the seek was not done: no move within the limits leads there; seek a little earlier or later"
-            }
-            Self::Lane(_) => {
-                "it stays where it is: no move within the limits leads it to where it should be; seek elsewhere in the cue, \
-                 or park"
-            }
-        })
-    }
-}
+plain::displayed!(Unplanned {
+    Self::Seek =>
+        "the seek was not done: no move within the limits leads there; seek a little earlier or later",
+    Self::Lane(_) =>
+        "it stays where it is: no move within the limits leads it to where it should be; seek elsewhere in the cue, \
+         or park",
+});
 
 /// Something that happened once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::blind::{self, Axis, Grid, LONGEST_WAY_MS};
+use super::blind::{self, BlindAxis, Grid, LONGEST_WAY_MS};
 use super::fader::Fader;
 use super::mix::Mix;
 use super::phase::hold_frames;
@@ -344,9 +344,9 @@ impl LaneMotion {
     ) -> Option<u32> {
         let LaneMode::Blind(since_ms) = self.mode else { return None };
         let (pose, speed) = (*self.pose(), self.trail.speed(blind::sight_s(rate)));
-        let mut axes = [Axis::PADDING; MAX_AXES];
+        let mut axes = [BlindAxis::PADDING; MAX_AXES];
         for (slot, own) in self.window.slots().iter().enumerate().filter(|(_, own)| own.is_own) {
-            axes[slot] = Axis::new(pose[slot], speed[slot], farthest[slot], &own.limits, rate);
+            axes[slot] = BlindAxis::new(pose[slot], speed[slot], farthest[slot], &own.limits, rate);
         }
         let grid = Grid { rate, index, longest_ms, left_ms: LONGEST_WAY_MS.saturating_sub(since_ms) };
         let Some(leg) = blind::next_leg(&axes, grid) else {

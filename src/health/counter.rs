@@ -22,18 +22,18 @@ const DOUBLED: u64 = 64;
 
 /// The counter of one controller.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Counter {
+pub(super) struct PacketCounter {
     /// When it is to be read next.
     next: Option<MonoTime>,
     /// What was told, and not judged yet.
     told: Option<u16>,
-    first: Option<Count>,
+    first: Option<PacketCount>,
     /// The next count says no more than what may still arrive.
     anew: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Count {
+struct PacketCount {
     packets: u16,
     traffic: Traffic,
     at: MonoTime,
@@ -43,14 +43,14 @@ struct Count {
 
 /// What a count says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Said {
+pub(super) enum CountVerdict {
     /// It got more than was sent.
     Crowded,
     /// It began anew.
     Rebooted,
 }
 
-impl Counter {
+impl PacketCounter {
     /// The same that compares nothing with what was counted so far.
     pub(super) const fn anew(&self) -> Self {
         Self { next: None, told: None, first: self.first, anew: true }
@@ -61,7 +61,7 @@ impl Counter {
     }
 
     /// True if it is time to read it; if so, the next time is due a while later.
-    pub(super) fn take_turn(&mut self, controller: usize, now: MonoTime) -> bool {
+    pub(super) fn is_turn(&mut self, controller: usize, now: MonoTime) -> bool {
         let turn = u32::try_from(controller % TURNS).unwrap_or_default();
         let next = *self.next.get_or_insert(now + APART * turn);
         let due = now >= next;
@@ -72,10 +72,10 @@ impl Counter {
     }
 
     /// Judges what was told by all that was sent until now, which is a little more than it can have counted.
-    pub(super) fn judge(&mut self, traffic: Traffic, now: MonoTime) -> Option<Said> {
+    pub(super) fn judge(&mut self, traffic: Traffic, now: MonoTime) -> Option<CountVerdict> {
         let packets = self.told.take()?;
         let anew = std::mem::take(&mut self.anew);
-        let count = Count { packets, traffic, at: now, late: Overdue::default() };
+        let count = PacketCount { packets, traffic, at: now, late: Overdue::default() };
         let Some(first) = self.first.filter(|first| now.since(first.at) < STALE) else {
             self.first = Some(count);
             return None;
@@ -87,7 +87,7 @@ impl Counter {
         let fits = grown <= sent + first.late.most(now) + tolerated && grown + tolerated >= acked;
         if now.since(first.at) >= SPAN || !fits || anew {
             let late = if fits { first.late.after(sent, grown, now) } else { Overdue::default() };
-            self.first = Some(Count { late, ..count });
+            self.first = Some(PacketCount { late, ..count });
         }
         if anew {
             return None;
@@ -95,7 +95,7 @@ impl Counter {
         if fits {
             return None;
         }
-        Some(if u64::from(packets) <= sent { Said::Rebooted } else { Said::Crowded })
+        Some(if u64::from(packets) <= sent { CountVerdict::Rebooted } else { CountVerdict::Crowded })
     }
 }
 
@@ -108,8 +108,8 @@ mod tests {
     }
 
     /// Counts once a second of a controller that is sent, and acks, 100 frames a second.
-    fn judge(counts: &[u16]) -> Vec<Option<Said>> {
-        let mut counter = Counter::default();
+    fn judge(counts: &[u16]) -> Vec<Option<CountVerdict>> {
+        let mut counter = PacketCounter::default();
         let mut second = 0;
         let mut one = |packets: &u16| {
             counter.hear(*packets);
@@ -127,14 +127,14 @@ mod tests {
 
     #[test]
     fn another_master_is_known_by_the_second_count_after_it_began() {
-        assert_eq!(judge(&[500, 600, 750])[2], Some(Said::Crowded));
-        assert_eq!(judge(&[500, 620, 740])[2], Some(Said::Crowded), "twenty a second");
+        assert_eq!(judge(&[500, 600, 750])[2], Some(CountVerdict::Crowded));
+        assert_eq!(judge(&[500, 620, 740])[2], Some(CountVerdict::Crowded), "twenty a second");
     }
 
     #[test]
     fn what_was_held_back_is_not_taken_for_another_masters_when_it_comes_and_more_than_that_is() {
-        for (more, said) in [(0, None), (60, Some(Said::Crowded))] {
-            let mut counter = Counter::default();
+        for (more, said) in [(0, None), (60, Some(CountVerdict::Crowded))] {
+            let mut counter = PacketCounter::default();
             let mut after = |packets: u16, sent, at| {
                 counter.hear(packets);
                 counter.judge(Traffic { sent, acked: 0 }, s(at))
@@ -152,15 +152,15 @@ mod tests {
 
     #[test]
     fn a_counter_that_began_anew_is_a_reboot_and_the_next_is_measured_from_there() {
-        assert_eq!(judge(&[40_000, 40_100, 60, 160]), [None, None, Some(Said::Rebooted), None]);
+        assert_eq!(judge(&[40_000, 40_100, 60, 160]), [None, None, Some(CountVerdict::Rebooted), None]);
     }
 
     #[test]
     fn controllers_take_turns_and_each_is_read_once_a_second() {
         let ms = |ms: u64| MonoTime::from_nanos(ms * 1_000_000);
-        let mut counter = Counter::default();
+        let mut counter = PacketCounter::default();
         let times: Vec<u64> =
-            (0..250).map(|tick| 10 * tick).filter(|at| counter.take_turn(3, ms(*at))).collect();
+            (0..250).map(|tick| 10 * tick).filter(|at| counter.is_turn(3, ms(*at))).collect();
         assert_eq!(times, [60, 1_060, 2_060]);
     }
 }

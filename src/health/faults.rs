@@ -2,6 +2,7 @@
 
 use super::Why;
 use crate::motion::MAX_AXES;
+use crate::state::Event;
 
 /// FaultLatch and alarms of one controller, and what of them is latched until a person clears it.
 #[derive(Debug, Clone)]
@@ -11,8 +12,8 @@ pub(super) struct FaultLatch {
     pub(super) pressed: bool,
     /// One was, since it was cleared.
     pub(super) tripped: bool,
-    /// It began, and nobody was told yet.
-    press_untold: bool,
+    /// That one began, until the hall is told.
+    press: Option<Event>,
     error: u16,
     /// The alarm that it tells of itself (MBOX): a register, and what stands there; over with 0.
     alarm: (u16, u16),
@@ -30,7 +31,7 @@ impl FaultLatch {
             controller,
             pressed: false,
             tripped: false,
-            press_untold: false,
+            press: None,
             error: 0,
             alarm: (0, 0),
             drives: [0; MAX_AXES],
@@ -94,7 +95,9 @@ impl FaultLatch {
     }
 
     pub(super) const fn on_emergency_stop(&mut self, pressed: bool) {
-        self.press_untold |= pressed && !self.pressed;
+        if pressed && !self.pressed {
+            self.press = Some(Event::EmergencyStop(self.controller));
+        }
         self.tripped |= pressed;
         self.pressed = pressed;
     }
@@ -104,9 +107,9 @@ impl FaultLatch {
         self.pressed = false;
     }
 
-    /// True if an emergency stop began since this was last asked.
-    pub(super) const fn take_press(&mut self) -> bool {
-        std::mem::replace(&mut self.press_untold, false)
+    /// What the hall is to hear of it: an emergency stop that began since the last time.
+    pub(super) const fn take_press(&mut self) -> Option<Event> {
+        self.press.take()
     }
 
     /// True if something is still wrong with it.

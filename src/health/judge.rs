@@ -1,7 +1,8 @@
 //! From what is known of the members to the standing of their group, and to what the hall has to hear of it.
 
 use super::{
-    Change, Demand, HealthState, HealthTable, Latch, LossPolicy, Notice, Place, WELL_AFTER, Why, state, well,
+    Change, Demand, GroupStanding, HealthState, HealthTable, Latch, LossPolicy, Notice, WELL_AFTER, Why,
+    state, well,
 };
 use crate::time::MonoTime;
 use crate::wire::DPFE;
@@ -59,7 +60,8 @@ impl HealthTable {
             found.must_rehome = found.must_rehome.or(member.must_rehome);
             found.silent = found.silent.or(when(member.is_silent(now), Why::Silent(controller)));
             found.poor = found.poor.or(when(member.is_poor(), Why::AcksMissing(controller)));
-            found.moved = found.moved.or(when(member.moved, Why::Moved(controller)));
+            let is_moved = |why: &Why| matches!(why, Why::Moved(_));
+            found.moved = found.moved.or(member.unsure.filter(is_moved));
             found.unsure = found.unsure.or(member.unsure);
             let outside = |(axis, pulses)| Why::Outside { controller, axis, pulses };
             found.outside = found.outside.or(member.outside.map(outside));
@@ -98,13 +100,14 @@ impl HealthTable {
         let mut pressed = false;
         for (controller, member) in self.members.iter_mut().enumerate() {
             pressed |= member.holds();
-            if member.take_crowd() {
-                on(Notice::Hall(state::Event::Trouble(state::Trouble::OtherMaster(controller))));
+            if let Some(trouble) = member.take_trouble() {
+                on(Notice::Hall(state::Event::Trouble(trouble)));
             }
             // Wherever it is pressed the hall stops; it waits for a release only where somebody is to sit.
-            if (member.faults.take_press() || member.holds()) && !self.stop_told {
+            let held = member.holds().then_some(state::Event::EmergencyStop(controller));
+            if let Some(stop) = member.faults.take_press().or(held).filter(|_| !self.stop_told) {
                 self.stop_told = true;
-                on(Notice::Hall(state::Event::EmergencyStop(controller)));
+                on(Notice::Hall(stop));
             }
         }
         if self.stop_told && !pressed {
@@ -132,7 +135,7 @@ impl HealthTable {
 
     pub(super) fn tell_of_counts(&mut self, now: MonoTime, on: &mut dyn FnMut(Notice)) {
         for (controller, member) in self.members.iter_mut().enumerate().filter(|_| self.watched) {
-            if member.take_count(now) {
+            if member.counts_now(now) {
                 on(Notice::Count(controller));
             }
         }
@@ -142,7 +145,7 @@ impl HealthTable {
         for (controller, member) in self.members.iter_mut().enumerate() {
             let standing = self.places[self.groups.group_of(controller)].standing;
             let wanted = standing.is_looked_at() || (self.watched && member.wants_baseline(now));
-            if wanted && member.take_read(now) {
+            if wanted && member.reads.begins_now(now) {
                 on(Notice::Read(controller));
             }
         }
@@ -164,7 +167,7 @@ impl Why {
     }
 }
 
-impl Place {
+impl GroupStanding {
     fn after(self, found: Findings, watched: bool, now: MonoTime) -> (HealthState, Why) {
         let same = (self.standing, self.why);
         if let Some(why) = found.tripped {

@@ -3,53 +3,53 @@
 use std::time::Duration;
 
 use super::Why;
-use super::counter::{Counter, Said};
+use super::counter::{CountVerdict, PacketCounter};
 use super::faults::FaultLatch;
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
+use super::reads::Reads;
 use super::replies::Replies;
 use crate::belief::Fall;
 use crate::motion::Pulses;
+use crate::state::Trouble;
 use crate::time::MonoTime;
 use crate::wire::{DPFE, FrameNo};
 
 /// How long a sighting speaks for a controller whose group waits for the others.
 const SEEN_FOR: Duration = Duration::from_secs(1);
-/// While nothing moves, what a controller is and whether it knows its zero is read this often: nobody sees it being reset.
-const LOOK_AGAIN: Duration = Duration::from_secs(1);
 /// A seat that falls out three times within so long is not led back and forth any more.
 const UNSTEADY: Duration = Duration::from_mins(1);
 /// Frames go to a controller to which one went so long ago.
 const FLOWS: Duration = Duration::from_millis(500);
-/// From one read to the next: 5 Hz.
-const READ_EVERY: Duration = Duration::from_millis(200);
+
+/// By what a controller is known again.
+#[derive(Debug, Clone, Copy)]
+enum KnownBy {
+    /// Its position is known from homing or preflight, so that the next sighting needs no proof.
+    Trusted,
+    /// Nothing can prove that it has not restarted.
+    Unproved,
+    /// By what it counted when it was seen last.
+    Seen(Baseline),
+}
 
 #[derive(Debug, Clone)]
 pub(super) struct Member {
     controller: usize,
     replies: Replies,
     traffic: Traffic,
-    baseline: Option<Baseline>,
-    /// Its position is known from homing or preflight, so that the next sighting needs no proof.
-    trusted: bool,
+    identity: KnownBy,
     /// It has to say that it knows its zero, however it came.
     must_be_home: bool,
     /// When it was last seen as it was.
     seen: Option<MonoTime>,
-    /// A read was sent that nothing came of yet.
-    reading: bool,
-    /// When it was last read, and whether it is to be again.
-    read: MonoTime,
-    look_again: bool,
-    next_read: Option<MonoTime>,
+    pub(super) reads: Reads,
     /// Nobody wants it to take part.
     pub(super) out: bool,
     /// It has to be homed, and why.
     pub(super) must_rehome: Option<Why>,
     /// What it says is wrong with it.
     pub(super) faults: FaultLatch,
-    /// Its seat was found elsewhere than frames left it.
-    pub(super) moved: bool,
-    /// Nobody knows where its seat is, and why.
+    /// Nobody knows where its seat is, and why; or it was found elsewhere than frames left it.
     pub(super) unsure: Option<Why>,
     /// When it was sent to last before each of the last two times that nobody knew that any more.
     falls: [Option<MonoTime>; 2],
@@ -59,9 +59,9 @@ pub(super) struct Member {
     pub(super) ambiguous: bool,
     /// When a frame was last sent, and what the controller counts meanwhile.
     framed: Option<MonoTime>,
-    counter: Counter,
-    /// Another master was found, and nobody was told yet.
-    crowd_untold: bool,
+    counter: PacketCounter,
+    /// Another master that was found, until the hall is told.
+    trouble: Option<Trouble>,
 }
 
 impl Member {
@@ -70,25 +70,20 @@ impl Member {
             controller,
             replies: Replies::new(interval),
             traffic: Traffic::default(),
-            baseline: None,
-            trusted: true,
+            identity: KnownBy::Trusted,
             must_be_home: false,
             seen: None,
-            reading: false,
-            read: MonoTime::default(),
-            look_again: false,
-            next_read: None,
+            reads: Reads::default(),
             out: false,
             must_rehome: None,
             faults: FaultLatch::of(controller),
-            moved: false,
             unsure: None,
             falls: [None; 2],
             outside: None,
             ambiguous: false,
             framed: None,
-            counter: Counter::default(),
-            crowd_untold: false,
+            counter: PacketCounter::default(),
+            trouble: None,
         }
     }
 
@@ -126,8 +121,7 @@ impl Member {
 
     pub(super) fn on_read_sent(&mut self, datagrams: u32) {
         self.traffic.sent += u64::from(datagrams);
-        self.reading = true;
-        self.replies.on_read_sent(self.read);
+        self.replies.on_read_sent(self.reads.on_sent());
     }
 
     /// So many datagrams went out that ask for nothing of this.
@@ -142,12 +136,12 @@ impl Member {
             return;
         }
         self.replies.on_beat_sent(at);
-        self.look_again = self.must_be_home && at.since(self.read) >= LOOK_AGAIN;
+        self.reads.on_beat_sent(self.must_be_home, at);
     }
 
     /// Takes a sighting. Ignores an identity reply not requested since the loss.
     pub(super) fn on_sighting(&mut self, sighting: &Sighting, at: MonoTime) {
-        if !std::mem::take(&mut self.reading) {
+        if !self.reads.on_sighting() {
             return;
         }
         self.on_answer(at);
@@ -160,12 +154,11 @@ impl Member {
         let is_well = sighting.error == 0 && sighting.alarm == 0;
         self.faults.refusing &= !is_well;
         if let Some(why) = self.against(sighting, at) {
-            self.crowd_untold |= self.must_rehome.is_none() && matches!(why, Why::OtherMaster(_));
-            self.must_rehome.get_or_insert(why);
+            self.must_home_again(why);
         } else {
             let renewed = |before: Baseline| before.renewed(sighting, self.traffic, at);
-            self.baseline = Some(self.baseline.map_or_else(|| Baseline::of(sighting, self.traffic), renewed));
-            self.trusted = false;
+            let baseline = self.baseline().map_or_else(|| Baseline::of(sighting, self.traffic), renewed);
+            self.identity = KnownBy::Seen(baseline);
             self.replies.forget_gap();
             self.seen = is_well.then_some(at);
         }
@@ -183,10 +176,10 @@ impl Member {
 
     fn against(&self, sighting: &Sighting, now: MonoTime) -> Option<Why> {
         let controller = self.controller;
-        let verdict = match &self.baseline {
-            Some(baseline) => baseline.judge(sighting, self.traffic, self.replies.has_gap(), now),
-            None if self.trusted => Verdict::Same,
-            None => Verdict::Unproved,
+        let verdict = match &self.identity {
+            KnownBy::Seen(baseline) => baseline.judge(sighting, self.traffic, self.replies.has_gap(), now),
+            KnownBy::Trusted => Verdict::Same,
+            KnownBy::Unproved => Verdict::Unproved,
         };
         match verdict {
             Verdict::Same if self.must_be_home && !sighting.homed => Some(Why::NotHome(controller)),
@@ -217,9 +210,24 @@ impl Member {
         self.faults.pressed && !self.out
     }
 
-    /// True if another master was found since this was last asked.
-    pub(super) const fn take_crowd(&mut self) -> bool {
-        std::mem::replace(&mut self.crowd_untold, false)
+    /// What the hall is to hear of it: another master that was found since the last time.
+    pub(super) const fn take_trouble(&mut self) -> Option<Trouble> {
+        self.trouble.take()
+    }
+
+    /// It is out until it was homed, for the first reason that there was.
+    fn must_home_again(&mut self, why: Why) {
+        if self.must_rehome.is_none() && matches!(why, Why::OtherMaster(_)) {
+            self.trouble = Some(Trouble::OtherMaster(self.controller));
+        }
+        self.must_rehome.get_or_insert(why);
+    }
+
+    const fn baseline(&self) -> Option<Baseline> {
+        match self.identity {
+            KnownBy::Seen(baseline) => Some(baseline),
+            KnownBy::Trusted | KnownBy::Unproved => None,
+        }
     }
 
     /// Nobody knows where its frames have led it: what was seen of it is from before the last of them.
@@ -230,7 +238,12 @@ impl Member {
             Fall::PutBack | Fall::Stale => Why::NotSeenYet,
             Fall::Stopped => Why::CutShort(self.controller),
         };
-        (self.unsure, self.seen, self.reading) = (Some(why), None, false);
+        // That somebody moved its seat goes on to be worth a word.
+        if !matches!(self.unsure, Some(Why::Moved(_))) {
+            self.unsure = Some(why);
+        }
+        self.seen = None;
+        self.reads.forget_open();
         if matches!(why, Why::NotSeenYet | Why::CutShort(_)) {
             return;
         }
@@ -244,7 +257,7 @@ impl Member {
 
     /// DPF0 was read by itself. Some seats are played without ever having been homed by it: only the loss of it tells something.
     pub(super) fn on_zero(&mut self, homed: bool) {
-        let was_home = self.must_be_home || self.baseline.is_some_and(|baseline| baseline.homed());
+        let was_home = self.must_be_home || self.baseline().is_some_and(|baseline| baseline.homed());
         if was_home && !homed {
             self.must_rehome.get_or_insert(Why::NotHome(self.controller));
         }
@@ -258,11 +271,10 @@ impl Member {
     /// It was homed: its position is known, and what it counts from here on is the new measure.
     pub(super) fn on_homed(&mut self) {
         self.must_rehome = None;
-        self.baseline = None;
-        self.trusted = true;
+        self.identity = KnownBy::Trusted;
         self.seen = None;
         self.replies.on_homed();
-        self.counter = Counter::default();
+        self.counter = PacketCounter::default();
     }
 
     /// What was latched is over, unless it goes on.
@@ -279,18 +291,15 @@ impl Member {
     pub(super) fn tick(&mut self, now: MonoTime) {
         self.replies.tick(now);
         match self.counter.judge(self.traffic, now) {
-            Some(Said::Crowded) => {
-                self.crowd_untold |= self.must_rehome.is_none();
-                self.must_rehome.get_or_insert(Why::OtherMaster(self.controller));
-            }
-            Some(Said::Rebooted) => drop(self.must_rehome.get_or_insert(Why::Rebooted(self.controller))),
+            Some(CountVerdict::Crowded) => self.must_home_again(Why::OtherMaster(self.controller)),
+            Some(CountVerdict::Rebooted) => self.must_home_again(Why::Rebooted(self.controller)),
             None => {}
         }
     }
 
     /// True if frames go there, and it is time to read its packet counter; if so, it counts as sent.
-    pub(super) fn take_count(&mut self, now: MonoTime) -> bool {
-        let due = self.flows(now) && self.counter.take_turn(self.controller, now);
+    pub(super) fn counts_now(&mut self, now: MonoTime) -> bool {
+        let due = self.flows(now) && self.counter.is_turn(self.controller, now);
         self.traffic.sent += u64::from(due);
         due
     }
@@ -314,15 +323,16 @@ impl Member {
 
     /// Where it was never read, nothing can prove any more that it has not rebooted.
     pub(super) const fn distrust(&mut self) {
-        self.trusted &= self.baseline.is_some();
+        if matches!(self.identity, KnownBy::Trusted) {
+            self.identity = KnownBy::Unproved;
+        }
     }
 
     /// Whatever was on its way, or was seen, does not count from here on.
     pub(super) fn forget(&mut self) {
         self.seen = None;
-        (self.moved, self.unsure) = (false, None);
-        self.reading = false;
-        self.next_read = None;
+        self.unsure = None;
+        self.reads.forget();
         // Who it is when it is back, and whether it rebooted, is for a sighting to prove.
         self.counter = self.counter.anew();
         self.replies.rest();
@@ -331,21 +341,13 @@ impl Member {
     /// True if its packet counter has to be read, though all is well. One that has none is looked at all the time, also in a
     /// show: that it is not home any more is the only sign of a reset.
     pub(super) fn wants_baseline(&self, now: MonoTime) -> bool {
-        self.look_again
-            || self.baseline.map_or(self.trusted, |baseline| {
-                let since = now.since(self.read);
-                baseline.is_stale(self.traffic) || (!baseline.is_counted() && since >= LOOK_AGAIN)
-            })
-    }
-
-    /// True if it is time for a read; if so, the next one is due a while later.
-    pub(super) fn take_read(&mut self, now: MonoTime) -> bool {
-        let due = self.next_read.is_none_or(|next| now >= next);
-        if due {
-            self.next_read = Some(now + READ_EVERY);
-            // Not again before the next beat: none goes out while somebody counts datagrams.
-            (self.read, self.look_again) = (now, false);
-        }
-        due
+        let of_identity = match &self.identity {
+            KnownBy::Trusted => true,
+            KnownBy::Unproved => false,
+            KnownBy::Seen(baseline) => {
+                baseline.is_stale(self.traffic) || (!baseline.is_counted() && self.reads.is_old(now))
+            }
+        };
+        self.reads.again() || of_identity
     }
 }

@@ -14,6 +14,7 @@ mod judge;
 mod late;
 mod member;
 mod proof;
+mod reads;
 mod replies;
 #[cfg(test)]
 mod tests;
@@ -45,7 +46,7 @@ const WELL_AFTER: Duration = Duration::from_secs(1);
 pub struct HealthTable {
     groups: Groups,
     members: Vec<Member>,
-    places: Vec<Place>,
+    places: Vec<GroupStanding>,
     policy: LossPolicy,
     watched: bool,
     /// The hall was told of an emergency stop, and not yet that it is over.
@@ -56,7 +57,7 @@ pub struct HealthTable {
 
 /// Where one group stands.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct GroupStanding {
     standing: HealthState,
     why: Why,
     /// When acks were last missing.
@@ -72,7 +73,7 @@ impl HealthTable {
         let interval = period * ack_every.max(1);
         let members = (0..groups.controllers()).map(|controller| Member::new(controller, interval)).collect();
         let (standing, why) = well(watched);
-        let place = Place { standing, why, poor: MonoTime::default() };
+        let place = GroupStanding { standing, why, poor: MonoTime::default() };
         let places = vec![place; groups.len()];
         Self { groups, members, places, policy, watched, stop_told: false, latch_told: Latch::Free }
     }
@@ -209,7 +210,7 @@ impl HealthTable {
 
     /// A seat at rest was found elsewhere than frames left it: its group is out until it was looked at, and joins from there.
     pub(crate) fn on_moved(&mut self, controller: usize) {
-        self.members[controller].moved = true;
+        self.members[controller].unsure = Some(Why::Moved(controller));
     }
 
     /// It is not known where the frames to a controller have led its seat, and none goes there any more: its group is out until it was

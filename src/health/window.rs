@@ -16,7 +16,7 @@ const RUN: u32 = 5;
 const SHARE: usize = 10;
 
 #[derive(Debug, Clone, Copy)]
-struct Asked {
+struct AskedFrame {
     frame: FrameNo,
     at: MonoTime,
     answered: bool,
@@ -27,7 +27,7 @@ struct Asked {
 /// Frames that asked, oldest first.
 #[derive(Debug, Clone)]
 pub(super) struct Window {
-    asked: VecDeque<Asked>,
+    asked: VecDeque<AskedFrame>,
     /// Of these, the ones whose acks are due.
     due: usize,
     missing: usize,
@@ -57,7 +57,7 @@ impl Window {
         if self.asked.len() == self.asked.capacity() {
             self.forget_oldest();
         }
-        self.asked.push_back(Asked { frame, at, answered: false, missing: false });
+        self.asked.push_back(AskedFrame { frame, at, answered: false, missing: false });
     }
 
     /// An ack that came at `at`: the first to a frame that asked and is remembered, else none. Says whether it is a sign

@@ -3,26 +3,23 @@
 use std::fmt;
 
 use super::{Change, HealthState, Why};
+use crate::plain;
 use crate::wire::DPFE;
 
 /// What has to be said, loudly, where acks are off.
 pub(crate) const ACKS_OFF: &str = "acks are off: a controller that is lost, refuses frames or has an emergency stop is noticed by \
                             its own reports at best";
 
-impl fmt::Display for HealthState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Ok => "ok",
-            Self::Degraded => "degraded",
-            Self::Lost => "lost",
-            Self::Rejoining => "rejoining",
-            Self::Stopped => "stopped",
-            Self::Error => "error",
-            Self::Excluded => "excluded",
-            Self::Unwatched => "unwatched",
-        })
-    }
-}
+plain::displayed!(HealthState {
+    Self::Ok => "ok",
+    Self::Degraded => "degraded",
+    Self::Lost => "lost",
+    Self::Rejoining => "rejoining",
+    Self::Stopped => "stopped",
+    Self::Error => "error",
+    Self::Excluded => "excluded",
+    Self::Unwatched => "unwatched",
+});
 
 impl HealthState {
     /// What a person does about it.

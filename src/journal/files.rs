@@ -10,14 +10,14 @@ use crate::sys::folder::Folder;
 
 /// What a file holds. Each kind has half of the room, so that no flood of asks washes shows out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
+pub(super) enum FileKind {
     /// Shows, and starts of the program.
     Shows,
     /// What was asked.
     Asked,
 }
 
-impl Kind {
+impl FileKind {
     /// All of them.
     pub(super) const ALL: [Self; 2] = [Self::Shows, Self::Asked];
 
@@ -35,7 +35,7 @@ impl Kind {
 pub(super) struct FileId {
     pub(super) day: Date,
     pub(super) number: u32,
-    pub(super) kind: Kind,
+    pub(super) kind: FileKind,
 }
 
 impl FileId {
@@ -44,12 +44,12 @@ impl FileId {
     }
 
     fn parse(name: &str) -> Option<Self> {
-        let of = |kind: Kind| {
+        let of = |kind: FileKind| {
             let (day, number) = name.strip_prefix(kind.prefix())?.strip_suffix(".jsonl")?.rsplit_once('-')?;
             let id = Self { day: day.parse().ok()?, number: number.parse().ok()?, kind };
             (id.name() == name).then_some(id)
         };
-        Kind::ALL.into_iter().find_map(of)
+        FileKind::ALL.into_iter().find_map(of)
     }
 }
 

@@ -20,7 +20,7 @@ pub(crate) struct Folds(Vec<Fold>);
 /// Asks of one kind.
 #[derive(Debug)]
 struct Fold {
-    kind: Kind,
+    kind: FoldKind,
     since: MonoTime,
     /// The repeats so far, as one.
     repeats: Option<Action>,
@@ -29,14 +29,14 @@ struct Fold {
 /// What is a repeat of what: asked by the same person with the same word, done or refused alike, and where it was done, of the
 /// same things.
 #[derive(Debug, PartialEq, Eq)]
-struct Kind {
+struct FoldKind {
     who: String,
     word: &'static str,
     done: bool,
     of: String,
 }
 
-impl Kind {
+impl FoldKind {
     fn new(action: &Action, word: &'static str) -> Self {
         let of = match (action.is_done(), word) {
             (false, _) => String::new(),
@@ -53,7 +53,7 @@ impl Folds {
     #[must_use]
     pub(crate) fn take(&mut self, action: Action, word: &'static str, now: MonoTime) -> Vec<Action> {
         let mut written = self.due(now);
-        let mut kind = Kind::new(&action, word);
+        let mut kind = FoldKind::new(&action, word);
         let of_one = self.0.iter().filter(|fold| fold.kind.who == kind.who).count();
         if of_one >= KINDS_OF_ONE && self.0.iter().all(|fold| fold.kind != kind) {
             kind.of = String::new();

@@ -26,7 +26,7 @@ mod writer;
 pub(crate) use fold::Folds;
 pub use record::{Action, FilmProof, Outcome, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
-pub(crate) use report::{JournalError, Most, Report, Shown, Totals, report};
+pub(crate) use report::{JournalError, JournalReport, ReportBounds, ReportShown, Totals, report};
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -39,7 +39,7 @@ use jiff::civil::Date;
 
 use crate::config::Log;
 use record::{Line, day_of};
-use writer::{Entry, Writer};
+use writer::{QueuedLine, Writer};
 
 /// Lines that wait for the disk at the most; more are lost.
 const WAITING: usize = 1024;
@@ -69,7 +69,7 @@ impl From<&Log> for Limits {
 /// A journal that is being written. Dropped, it writes what still waits.
 #[derive(Debug)]
 pub struct Journal {
-    to: Option<SyncSender<Entry>>,
+    to: Option<SyncSender<QueuedLine>>,
     thread: Option<JoinHandle<()>>,
     standing: Arc<Standing>,
     /// The day of lines whose time cannot be read.
@@ -90,7 +90,7 @@ impl Journal {
     #[must_use]
     pub fn open(dir: &Path, limits: Limits, now: &Zoned) -> Self {
         let standing = Arc::new(Standing::default());
-        let (to, entries) = mpsc::sync_channel::<Entry>(WAITING);
+        let (to, entries) = mpsc::sync_channel::<QueuedLine>(WAITING);
         let mut writer = Writer::new(dir, limits);
         let of_thread = Arc::clone(&standing);
         let write = move || entries.iter().for_each(|entry| of_thread.write(&mut writer, &entry));
@@ -141,7 +141,7 @@ impl Journal {
         let Ok(mut text) = serde_json::to_vec(line) else { return lose("it has no words") };
         text.push(b'\n');
         let day = day_of(line.at()).unwrap_or(self.day);
-        let entry = Entry { day, at: line.at().to_owned(), text, kind: line.kind(), sync };
+        let entry = QueuedLine { day, at: line.at().to_owned(), text, kind: line.kind(), sync };
         match self.to.as_ref().map(|to| to.try_send(entry)) {
             Some(Ok(())) => {}
             Some(Err(TrySendError::Full(_))) => lose("the disk is too slow"),
@@ -161,14 +161,14 @@ impl Drop for Journal {
 
 impl Standing {
     /// Writes a line, and before it how many were lost, if any were.
-    fn write(&self, writer: &mut Writer, entry: &Entry) {
+    fn write(&self, writer: &mut Writer, entry: &QueuedLine) {
         let troubled = lock(&self.trouble).is_some();
         let lines = self.lost.load(Ordering::Relaxed);
         let written = if troubled && lines > 0 {
             let gap = Line::Lost { at: entry.at.clone(), lines };
             let mut text = serde_json::to_vec(&gap).unwrap_or_default();
             text.push(b'\n');
-            writer.append(&Entry { text, ..entry.clone() }).and_then(|()| writer.append(entry))
+            writer.append(&QueuedLine { text, ..entry.clone() }).and_then(|()| writer.append(entry))
         } else {
             writer.append(entry)
         };

@@ -5,7 +5,7 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::files::Kind;
+use super::files::FileKind;
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 
 /// Events of a show that are kept, and characters of each.
@@ -168,10 +168,10 @@ pub(super) enum Line {
 
 impl Line {
     /// In which files it belongs.
-    pub(super) const fn kind(&self) -> Kind {
+    pub(super) const fn kind(&self) -> FileKind {
         match self {
-            Self::Action(_) => Kind::Asked,
-            _ => Kind::Shows,
+            Self::Action(_) => FileKind::Asked,
+            _ => FileKind::Shows,
         }
     }
 

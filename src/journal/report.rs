@@ -21,14 +21,14 @@ const MOST_NOTES: usize = 20;
 
 /// How much of some days is taken into a report; of more the newest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Most {
+pub(crate) struct ReportBounds {
     /// Shows.
     pub(crate) shows: usize,
     /// What was asked.
     pub(crate) actions: usize,
 }
 
-impl Most {
+impl ReportBounds {
     /// All that there is.
     pub(crate) const ALL: Self = Self { shows: usize::MAX, actions: usize::MAX };
 }
@@ -45,13 +45,13 @@ pub(crate) struct JournalError {
 
 /// What was played, and what was asked, on some days.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub(crate) struct Report {
+pub(crate) struct JournalReport {
     /// The first day, YYYY-MM-DD.
     pub(crate) from: String,
     /// The last day, YYYY-MM-DD.
     pub(crate) to: String,
     /// The shows that began on these days, in their order.
-    pub(crate) shows: Vec<Shown>,
+    pub(crate) shows: Vec<ReportShown>,
     /// All of them together.
     pub(crate) totals: Totals,
     /// What was asked on these days, in its order.
@@ -62,7 +62,7 @@ pub(crate) struct Report {
 
 /// One show.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub(crate) struct Shown {
+pub(crate) struct ReportShown {
     /// What came of it.
     pub(crate) result: ShowResult,
     /// How long it took from begin to end, s; null if it has no end.
@@ -115,7 +115,12 @@ pub(crate) struct Totals {
 ///
 /// # Errors
 /// [`JournalError`] where the folder or a file of it cannot be read. No records are no error.
-pub(crate) fn report(dir: &Path, from: Date, to: Date, most: Most) -> Result<Report, JournalError> {
+pub(crate) fn report(
+    dir: &Path,
+    from: Date,
+    to: Date,
+    most: ReportBounds,
+) -> Result<JournalReport, JournalError> {
     let mut days = Days::new(from, to, most);
     let mut gather = || -> io::Result<bool> {
         let folder = Folder::open(dir)?;
@@ -137,7 +142,7 @@ pub(crate) fn report(dir: &Path, from: Date, to: Date, most: Most) -> Result<Rep
 struct Days {
     from: Date,
     to: Date,
-    most: Most,
+    most: ReportBounds,
     shows: VecDeque<Open>,
     actions: VecDeque<Action>,
     /// What was left out: shows, and what was asked.
@@ -152,7 +157,7 @@ struct Open {
 }
 
 impl Days {
-    fn new(from: Date, to: Date, most: Most) -> Self {
+    fn new(from: Date, to: Date, most: ReportBounds) -> Self {
         let (shows, actions) = (VecDeque::new(), VecDeque::new());
         Self { from, to, most, shows, actions, more: (0, 0), notes: Vec::new() }
     }
@@ -188,7 +193,7 @@ impl Days {
         }
     }
 
-    fn report(self, runs: bool) -> Report {
+    fn report(self, runs: bool) -> JournalReport {
         let Self { from, to, shows, actions, more: left_out, mut notes, .. } = self;
         let last = shows.len();
         let shows: Vec<_> = shows
@@ -204,7 +209,7 @@ impl Days {
             notes.extend((more > 0).then_some(words));
         }
         let (totals, actions) = (Totals::of(&shows), actions.into());
-        Report { from: from.to_string(), to: to.to_string(), shows, totals, actions, notes }
+        JournalReport { from: from.to_string(), to: to.to_string(), shows, totals, actions, notes }
     }
 }
 
@@ -214,7 +219,7 @@ fn keep<T>(all: &mut VecDeque<T>, most: usize) -> usize {
 }
 
 impl Open {
-    fn shown(self, may_run: bool) -> Shown {
+    fn shown(self, may_run: bool) -> ReportShown {
         let Self { record, outlived } = self;
         let result = match &record.outcome {
             Some(outcome) => match outcome.result {
@@ -230,12 +235,12 @@ impl Open {
                 (record.start.parse().ok()?, outcome.end.parse().ok()?);
             Some(end.duration_since(start).as_secs_f64())
         });
-        Shown { result, took_s, record }
+        ReportShown { result, took_s, record }
     }
 }
 
 impl Totals {
-    fn of(shows: &[Shown]) -> Self {
+    fn of(shows: &[ReportShown]) -> Self {
         let outcomes = shows.iter().filter_map(|show| show.record.outcome.as_ref());
         let frames = outcomes.map(|outcome| outcome.frames).sum();
         let mut totals = Self { shows: shows.len(), frames, ..Self::default() };

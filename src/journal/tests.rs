@@ -91,8 +91,8 @@ fn starts(file: &Path) -> usize {
     lines.filter(|line| matches!(line, Line::Start { .. })).count()
 }
 
-fn of_day(dir: &Path, text: &str) -> Report {
-    report(dir, day(text), day(text), Most::ALL).unwrap()
+fn of_day(dir: &Path, text: &str) -> JournalReport {
+    report(dir, day(text), day(text), ReportBounds::ALL).unwrap()
 }
 
 const START: &str = "2026-11-21T19:00:03.250+01:00";
@@ -207,7 +207,7 @@ fn files_end_at_their_size_and_the_oldest_go() {
     let sizes: Vec<_> = files(dir.path()).iter().map(|file| fs::metadata(file).unwrap().len()).collect();
     assert!(sizes.iter().all(|size| *size <= 1_000) && sizes.iter().sum::<u64>() <= 4_100, "{sizes:?}");
     assert!(dir.path().join("notes.txt").exists());
-    let report = report(dir.path(), day("2026-11-18"), day("2026-11-21"), Most::ALL).unwrap();
+    let report = report(dir.path(), day("2026-11-18"), day("2026-11-21"), ReportBounds::ALL).unwrap();
     assert_eq!(report.actions.last().unwrap().what, "trim 39");
     assert!(report.actions.iter().all(|action| action.at.starts_with("2026-11-21")), "the oldest are gone");
 }
@@ -295,7 +295,7 @@ fn of_a_great_day_the_newest_is_taken_and_the_rest_is_named() {
     }
     drop(journal);
     let day = day("2026-11-21");
-    let report = report(dir.path(), day, day, Most { shows: 2, actions: 3 }).unwrap();
+    let report = report(dir.path(), day, day, ReportBounds { shows: 2, actions: 3 }).unwrap();
     assert_eq!((report.shows.len(), report.actions.len()), (2, 3));
     assert_eq!((report.actions[0].what.as_str(), &report.shows[1].record.start[14..16]), ("trim 2", "04"));
     assert!(report.notes[0].starts_with("3 shows before these") && report.notes[1].starts_with("2 things"));
@@ -323,8 +323,8 @@ fn a_long_tale_is_shortened() {
 fn no_journal_is_told_from_an_empty_one() {
     let dir = tempfile::tempdir().unwrap();
     assert!(of_day(dir.path(), "2026-11-21").shows.is_empty());
-    let missing =
-        report(&dir.path().join("none"), day("2026-11-21"), day("2026-11-21"), Most::ALL).unwrap_err();
+    let missing = report(&dir.path().join("none"), day("2026-11-21"), day("2026-11-21"), ReportBounds::ALL)
+        .unwrap_err();
     assert_eq!(missing.source.kind(), std::io::ErrorKind::NotFound);
 }
 

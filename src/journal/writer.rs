@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 use jiff::civil::Date;
 
 use super::Limits;
-use super::files::{self, FileId, Kind};
+use super::files::{self, FileId, FileKind};
 use crate::sys::folder::{Folder, Stamp};
 
 /// A line on its way to the disk.
 #[derive(Debug, Clone)]
-pub(super) struct Entry {
+pub(super) struct QueuedLine {
     /// The day that it belongs to.
     pub(super) day: Date,
     /// When it happened.
@@ -21,7 +21,7 @@ pub(super) struct Entry {
     /// The line with its end.
     pub(super) text: Vec<u8>,
     /// In which files it belongs.
-    pub(super) kind: Kind,
+    pub(super) kind: FileKind,
     /// True if it is to be on the disk before the next one is written.
     pub(super) sync: bool,
 }
@@ -53,11 +53,11 @@ impl Writer {
     }
 
     /// Writes a line. After an error everything is opened anew the next time.
-    pub(super) fn append(&mut self, entry: &Entry) -> io::Result<()> {
+    pub(super) fn append(&mut self, entry: &QueuedLine) -> io::Result<()> {
         self.try_append(entry).inspect_err(|_| self.current[entry.kind as usize] = None)
     }
 
-    fn try_append(&mut self, entry: &Entry) -> io::Result<()> {
+    fn try_append(&mut self, entry: &QueuedLine) -> io::Result<()> {
         let folder = match self.folder.take() {
             Some(folder) => folder,
             None => {
@@ -87,7 +87,7 @@ impl Writer {
 
 impl Current {
     /// The last file of the day, or the next one where that is full.
-    fn open(folder: &Folder, entry: &Entry, limits: &Limits) -> io::Result<Self> {
+    fn open(folder: &Folder, entry: &QueuedLine, limits: &Limits) -> io::Result<Self> {
         let fits = |id: &FileId| id.day == entry.day && id.kind == entry.kind;
         let of_day = files::all(folder)?.into_iter().rfind(fits);
         let mut id = of_day.unwrap_or(FileId { day: entry.day, number: 0, kind: entry.kind });
@@ -106,7 +106,7 @@ impl Current {
         }
     }
 
-    fn append(&mut self, entry: &Entry) -> io::Result<()> {
+    fn append(&mut self, entry: &QueuedLine) -> io::Result<()> {
         let line = match self.torn {
             true => [b"\n", entry.text.as_slice()].concat(),
             false => entry.text.clone(),

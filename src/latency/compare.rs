@@ -13,7 +13,7 @@ const ALIKE: f64 = 1.25;
 
 /// One figure of both measurements.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Figure {
+pub(crate) struct TimesFigure {
     /// `p50`, `p90`, `p99`, `p99.9` or `max`.
     pub(crate) figure: &'static str,
     /// Of the first, µs.
@@ -26,13 +26,13 @@ pub(crate) struct Figure {
 
 /// One kind of times in both measurements.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Row {
+pub(crate) struct TimesRow {
     /// Times of the first.
     pub(crate) a_count: u64,
     /// Times of the second.
     pub(crate) b_count: u64,
     /// The figures, in rising order.
-    pub(crate) figures: Vec<Figure>,
+    pub(crate) figures: Vec<TimesFigure>,
     /// What they come to, in a line.
     pub(crate) verdict: String,
 }
@@ -41,9 +41,9 @@ pub(crate) struct Row {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Comparison {
     /// Lateness of ticks.
-    pub(crate) lateness: Row,
+    pub(crate) lateness: TimesRow,
     /// Latency of acks.
-    pub(crate) ack_latency: Row,
+    pub(crate) ack_latency: TimesRow,
 }
 
 impl Comparison {
@@ -57,16 +57,16 @@ impl Comparison {
     }
 }
 
-fn row(name: &str, a: &Histogram, b: &Histogram) -> Row {
+fn row(name: &str, a: &Histogram, b: &Histogram) -> TimesRow {
     let [a, b] = [a, b].map(Percentiles::of);
-    let figure = |((figure, a_us), (_, b_us)): ((&'static str, _), (_, _))| Figure {
+    let figure = |((figure, a_us), (_, b_us)): ((&'static str, _), (_, _))| TimesFigure {
         figure,
         a_us,
         b_us,
         ratio: ratio(a_us, b_us),
     };
     let figures = a.named().into_iter().zip(b.named()).map(figure).collect();
-    Row { a_count: a.count, b_count: b.count, figures, verdict: format!("{name}: {}", verdict(&a, &b)) }
+    TimesRow { a_count: a.count, b_count: b.count, figures, verdict: format!("{name}: {}", verdict(&a, &b)) }
 }
 
 fn ratio(a: Option<f64>, b: Option<f64>) -> Option<f64> {

@@ -6,7 +6,7 @@ mod hold;
 mod log;
 mod percentiles;
 
-pub(crate) use compare::{Comparison, Row};
+pub(crate) use compare::{Comparison, TimesRow};
 pub(crate) use hold::{cue, held};
 pub(crate) use log::Log;
 pub use log::read;

@@ -19,7 +19,7 @@ const MOST: usize = 2;
 /// A cue that is being uploaded. Dropped, it leaves nothing.
 #[derive(Debug)]
 pub struct Upload {
-    place: Place,
+    place: UploadPlace,
     id: CueId,
     file: File,
     size: u64,
@@ -28,13 +28,13 @@ pub struct Upload {
 
 /// Where it is written to, and its turn among the uploads; both are given back when it is dropped.
 #[derive(Debug)]
-struct Place {
+struct UploadPlace {
     library: Library,
     folder: Folder,
     name: String,
 }
 
-impl Drop for Place {
+impl Drop for UploadPlace {
     fn drop(&mut self) {
         // Where it cannot be removed now, it is at the next start.
         let _ = self.folder.remove(&self.name);
@@ -55,7 +55,7 @@ impl Upload {
         }
         let serial = inner.serial.fetch_add(1, Ordering::Relaxed);
         let name = format!("{UNFINISHED}{}-{serial}", std::process::id());
-        let place = Place { library: library.clone(), folder, name };
+        let place = UploadPlace { library: library.clone(), folder, name };
         let file = place.folder.create(&place.name).map_err(|error| unwritten(&error))?;
         Ok(Self { place, id: id.clone(), file, size: 0, hash: Sha256::new() })
     }

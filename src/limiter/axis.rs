@@ -13,7 +13,7 @@ const LONGEST: f64 = 8.0;
 
 /// What an axis is about.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Mode {
+pub(super) enum AxisMode {
     /// Sends what is asked.
     Following,
     /// Comes to rest, and stays there.
@@ -28,19 +28,19 @@ pub(super) enum Mode {
 
 /// The state of one axis.
 #[derive(Debug, Clone)]
-pub(super) struct Axis {
+pub(super) struct AxisLimiter {
     pub(super) limits: AxisLimits,
-    pub(super) mode: Mode,
+    pub(super) mode: AxisMode,
     /// The last way to rest that was looked for in good time, and the frame from whose pose it begins.
     pub(super) way_out: Option<(u64, Halt)>,
     /// Which of the ways to rest did last.
     pub(super) habit: usize,
     fade: f64,
     stretch: f64,
-    asked: Asked,
+    asked: AskedPose,
 }
 
-impl Axis {
+impl AxisLimiter {
     pub(super) fn new(limits: AxisLimits, spacing: Spacing) -> Self {
         // The greatest derivatives of u^3 (10 - 15 u + 6 u^2) are 15/8, 10/sqrt 3 and 60 (docs/limiter.md, section 7).
         let share = |limit: f64| FADE_SHARE * limit;
@@ -50,18 +50,18 @@ impl Axis {
             .max(SHORTEST_RETURN);
         Self {
             limits,
-            mode: Mode::Following,
+            mode: AxisMode::Following,
             way_out: None,
             habit: 0,
             fade,
             stretch: 1.0,
-            asked: Asked::new(spacing),
+            asked: AskedPose::new(spacing),
         }
     }
 
     /// Forgets all but the limits: the axis stands, and has for long.
     pub(super) fn rest(&mut self) {
-        self.mode = Mode::Following;
+        self.mode = AxisMode::Following;
         self.way_out = None;
         self.stretch = 1.0;
         self.asked.forget();
@@ -71,11 +71,11 @@ impl Axis {
     pub(super) fn brake(&mut self, brake: Halt, seconds: f64) -> f64 {
         match self.mode {
             // What the fade adds to what it fades onto shrinks with its length, so a longer one may be let pass.
-            Mode::Returning { .. } => self.stretch = (2.0 * self.stretch).min(LONGEST),
-            Mode::Following => self.asked.forget(),
-            Mode::Braking { .. } => {}
+            AxisMode::Returning { .. } => self.stretch = (2.0 * self.stretch).min(LONGEST),
+            AxisMode::Following => self.asked.forget(),
+            AxisMode::Braking { .. } => {}
         }
-        self.mode = Mode::Braking { brake, after: seconds };
+        self.mode = AxisMode::Braking { brake, after: seconds };
         self.way_out = None;
         brake.position(seconds)
     }
@@ -87,28 +87,28 @@ impl Axis {
 
     /// Where the present mode leads in a frame of so many seconds, `asked` being what is asked. On a way to rest that is
     /// over, the way back, once what is asked can be followed.
-    pub(super) fn wish(&self, asked: f64, seconds: f64) -> (Mode, f64) {
+    pub(super) fn wish(&self, asked: f64, seconds: f64) -> (AxisMode, f64) {
         match self.mode {
-            Mode::Following => (Mode::Following, asked),
-            Mode::Braking { brake, after } if after > brake.seconds() && self.asked.is_sound() => {
-                let back = Mode::Returning {
+            AxisMode::Following => (AxisMode::Following, asked),
+            AxisMode::Braking { brake, after } if after > brake.seconds() && self.asked.is_sound() => {
+                let back = AxisMode::Returning {
                     from: brake.position(after),
                     after: 0.0,
                     seconds: self.fade * self.stretch,
                 };
                 fade_on(back, asked, seconds)
             }
-            Mode::Braking { brake, after } => {
+            AxisMode::Braking { brake, after } => {
                 let after = after + seconds;
-                (Mode::Braking { brake, after }, brake.position(after))
+                (AxisMode::Braking { brake, after }, brake.position(after))
             }
-            Mode::Returning { .. } => fade_on(self.mode, asked, seconds),
+            AxisMode::Returning { .. } => fade_on(self.mode, asked, seconds),
         }
     }
 
     /// Takes up the mode that a wish came with.
-    pub(super) fn take_up(&mut self, mode: Mode) {
-        if mode == Mode::Following {
+    pub(super) fn take_up(&mut self, mode: AxisMode) {
+        if mode == AxisMode::Following {
             self.stretch = 1.0;
         }
         self.mode = mode;
@@ -116,20 +116,20 @@ impl Axis {
 }
 
 /// The next frame of a way back: what is asked counts for more and more.
-fn fade_on(mode: Mode, asked: f64, passed: f64) -> (Mode, f64) {
-    let Mode::Returning { from, after, seconds } = mode else { return (mode, asked) };
+fn fade_on(mode: AxisMode, asked: f64, passed: f64) -> (AxisMode, f64) {
+    let AxisMode::Returning { from, after, seconds } = mode else { return (mode, asked) };
     let after = after + passed;
     if after >= seconds {
-        return (Mode::Following, asked);
+        return (AxisMode::Following, asked);
     }
     let u = after / seconds;
     let weight = u * u * u * (10.0 + u * (6.0 * u - 15.0));
-    (Mode::Returning { from, after, seconds }, from + weight * (asked - from))
+    (AxisMode::Returning { from, after, seconds }, from + weight * (asked - from))
 }
 
 /// What is asked, taken by itself: whether it can be followed.
 #[derive(Debug, Clone)]
-struct Asked {
+struct AskedPose {
     spacing: Spacing,
     measure: Measure,
     at: ShowTime,
@@ -137,7 +137,7 @@ struct Asked {
     sound: usize,
 }
 
-impl Asked {
+impl AskedPose {
     const fn new(spacing: Spacing) -> Self {
         Self { spacing, measure: Measure::new(spacing), at: ShowTime::ZERO, sound: 0 }
     }

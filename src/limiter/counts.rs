@@ -1,6 +1,6 @@
 //! What a limiter had to do: plain data.
 
-use std::fmt;
+use crate::plain;
 
 /// Clamps within a second that make a fault.
 const FAULT: usize = 3;
@@ -24,19 +24,14 @@ pub enum Limit {
     WayOut,
 }
 
-impl fmt::Display for Limit {
-    /// What it limits.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Position => "position",
-            Self::Velocity => "velocity",
-            Self::Step => "change of velocity from frame to frame",
-            Self::Acceleration => "acceleration",
-            Self::Jerk => "jerk",
-            Self::WayOut => "a way to rest",
-        })
-    }
-}
+plain::displayed!(Limit {
+    Self::Position => "position",
+    Self::Velocity => "velocity",
+    Self::Step => "change of velocity from frame to frame",
+    Self::Acceleration => "acceleration",
+    Self::Jerk => "jerk",
+    Self::WayOut => "a way to rest",
+});
 
 /// A pose that was not let pass.
 #[derive(Debug, Clone, Copy, PartialEq)]

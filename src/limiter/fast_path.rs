@@ -19,32 +19,32 @@ const WIDTH: usize = 2;
 const GROUPS: usize = MAX_AXES / WIDTH;
 
 /// A number for each axis of a group.
-type Row = [f64; WIDTH];
+type GroupRow = [f64; WIDTH];
 
 /// Limits of a group of axes, each in a row of its own; none for axes that a lane does not have.
 #[derive(Debug, Clone, Copy)]
-struct Rows {
-    velocity: Row,
-    step: Row,
-    acceleration: Row,
-    jerk: Row,
+struct GroupRows {
+    velocity: GroupRow,
+    step: GroupRow,
+    acceleration: GroupRow,
+    jerk: GroupRow,
     /// What sums of acceleration and of jerk beyond the level may come to.
-    rest: [Row; 2],
+    rest: [GroupRow; 2],
     /// For the way to rest: half of 1 / jerk, half of 1 / acceleration, half of acceleration / jerk, at the level.
-    half_per_jerk: Row,
-    half_per_acceleration: Row,
-    half_rise: Row,
+    half_per_jerk: GroupRow,
+    half_per_acceleration: GroupRow,
+    half_rise: GroupRow,
 }
 
 /// A group of axes: what it may do, and what is known of it from frame to frame. What one frame needs of it lies together.
 #[derive(Debug, Clone, Copy)]
-struct Group {
-    rows: Rows,
-    position: Row,
-    velocity: Row,
-    acceleration: Row,
+struct AxisGroup {
+    rows: GroupRows,
+    position: GroupRow,
+    velocity: GroupRow,
+    acceleration: GroupRow,
     /// Sums beyond the level in the present stretch of frames and in the one before: acceleration, jerk.
-    sums: [[Row; 2]; 2],
+    sums: [[GroupRow; 2]; 2],
 }
 
 /// What one more frame makes of an axis, frame to frame.
@@ -59,7 +59,7 @@ struct Glance {
 
 /// Seconds and their reciprocals: of the newest frame, and together with one and two before it.
 #[derive(Debug, Clone, Copy, Default)]
-struct Spans {
+struct FrameSpans {
     /// The Times they are of, newest first.
     times: [f64; 3],
     frame: f64,
@@ -72,7 +72,7 @@ struct Spans {
 /// What is known from frame to frame of all axes of a lane.
 #[derive(Debug, Clone)]
 pub(super) struct FastPath {
-    groups: [Group; GROUPS],
+    groups: [AxisGroup; GROUPS],
     /// How many of them the lane has.
     used: usize,
     /// Frames of a stretch, no less than the measure looks back on; and those left of the present one.
@@ -80,7 +80,7 @@ pub(super) struct FastPath {
     left: usize,
     /// Times of the newest frames, s, newest first.
     times: [f64; 2],
-    spans: Spans,
+    spans: FrameSpans,
 }
 
 impl FastPath {
@@ -91,7 +91,7 @@ impl FastPath {
         pose: Pose,
         usual: f64,
     ) -> Self {
-        let mut groups = [Group::WITHOUT_AXES; GROUPS];
+        let mut groups = [AxisGroup::WITHOUT_AXES; GROUPS];
         let mut axes = 0;
         for (axis, limits) in limits.enumerate() {
             groups[axis / WIDTH].rows.limit(axis % WIDTH, limits, spacing.n as f64);
@@ -105,7 +105,7 @@ impl FastPath {
             stretch,
             left: stretch,
             times: [usual; 2],
-            spans: Spans::default(),
+            spans: FrameSpans::default(),
         };
         calm.rest(pose, usual);
         calm
@@ -114,7 +114,7 @@ impl FastPath {
     /// All stand in `pose`, and have for long.
     pub(super) fn rest(&mut self, pose: Pose, usual: f64) {
         for (group, position) in self.groups.iter_mut().zip(in_groups(&pose)) {
-            *group = Group { rows: group.rows, position: *position, ..Group::WITHOUT_AXES };
+            *group = AxisGroup { rows: group.rows, position: *position, ..AxisGroup::WITHOUT_AXES };
         }
         self.left = self.stretch;
         self.times = [usual; 2];
@@ -123,7 +123,7 @@ impl FastPath {
 
     fn look_at_times(&mut self, frame: f64) {
         let two = frame + self.times[0];
-        self.spans = Spans {
+        self.spans = FrameSpans {
             times: [frame, self.times[0], self.times[1]],
             frame,
             two,
@@ -142,9 +142,9 @@ impl FastPath {
         }
     }
 
-    /// Takes `pose` if it is calm on all axes; says whether it was taken.
+    /// Takes `pose` if it is calm on all axes; true if it was.
     #[inline]
-    pub(super) fn take_calm(&mut self, pose: &Pose) -> bool {
+    pub(super) fn admit_calm(&mut self, pose: &Pose) -> bool {
         let (seen, calm) = self.see(pose);
         if calm {
             self.keep(pose, &seen);
@@ -165,8 +165,8 @@ impl FastPath {
 
     /// What that pose makes of all axes, and whether they are calm.
     #[inline(always)]
-    fn see(&self, pose: &Pose) -> ([Seen; GROUPS], bool) {
-        let mut seen = [Seen::NOTHING; GROUPS];
+    fn see(&self, pose: &Pose) -> ([GroupSeen; GROUPS], bool) {
+        let mut seen = [GroupSeen::NOTHING; GROUPS];
         let mut calm = true;
         for ((seen, group), position) in seen.iter_mut().zip(&self.groups[..self.used]).zip(in_groups(pose)) {
             calm &= group.see(position, &self.spans, seen);
@@ -175,7 +175,7 @@ impl FastPath {
     }
 
     #[inline]
-    fn keep(&mut self, pose: &Pose, seen: &[Seen; GROUPS]) {
+    fn keep(&mut self, pose: &Pose, seen: &[GroupSeen; GROUPS]) {
         self.left -= 1;
         let ends = self.left == 0;
         if ends {
@@ -189,11 +189,11 @@ impl FastPath {
     }
 }
 
-fn in_groups(pose: &Pose) -> &[Row] {
+fn in_groups(pose: &Pose) -> &[GroupRow] {
     pose.as_chunks().0
 }
 
-impl Rows {
+impl GroupRows {
     /// Nothing is asked of an axis that there is not.
     const ANY: Self = {
         let (none, any) = ([0.0; WIDTH], [f64::INFINITY; WIDTH]);
@@ -234,15 +234,21 @@ impl Rows {
     }
 }
 
-impl Group {
+impl AxisGroup {
     const WITHOUT_AXES: Self = {
         let none = [0.0; WIDTH];
-        Self { rows: Rows::ANY, position: none, velocity: none, acceleration: none, sums: [[none; 2]; 2] }
+        Self {
+            rows: GroupRows::ANY,
+            position: none,
+            velocity: none,
+            acceleration: none,
+            sums: [[none; 2]; 2],
+        }
     };
 
     /// What one more frame makes of its axes; says whether they are calm.
     #[inline(always)]
-    fn see(&self, position: &Row, spans: &Spans, seen: &mut Seen) -> bool {
+    fn see(&self, position: &GroupRow, spans: &FrameSpans, seen: &mut GroupSeen) -> bool {
         let mut calm = true;
         for (axis, &position) in position.iter().enumerate() {
             let glance = self.glance(axis, position, spans);
@@ -257,7 +263,7 @@ impl Group {
 
     /// Takes what was seen; a stretch ends with it, or not.
     #[inline(always)]
-    fn keep(&mut self, seen: &Seen, ends: bool) {
+    fn keep(&mut self, seen: &GroupSeen, ends: bool) {
         self.velocity = seen.velocity;
         self.acceleration = seen.acceleration;
         for (sum, beyond) in self.sums[0].iter_mut().flatten().zip(seen.beyond.iter().flatten()) {
@@ -270,7 +276,7 @@ impl Group {
 
     #[inline(always)]
     #[expect(clippy::manual_range_contains, reason = "without a branch the loops around it become vectors")]
-    fn glance(&self, axis: usize, position: f64, spans: &Spans) -> Glance {
+    fn glance(&self, axis: usize, position: f64, spans: &FrameSpans) -> Glance {
         let rows = &self.rows;
         let velocity = (position - self.position[axis]) * spans.per_frame;
         let change = velocity - self.velocity[axis];
@@ -304,13 +310,13 @@ impl Group {
 
 /// What was seen of a group of axes.
 #[derive(Clone, Copy)]
-struct Seen {
-    velocity: Row,
-    acceleration: Row,
-    beyond: [Row; 2],
+struct GroupSeen {
+    velocity: GroupRow,
+    acceleration: GroupRow,
+    beyond: [GroupRow; 2],
 }
 
-impl Seen {
+impl GroupSeen {
     const NOTHING: Self =
         Self { velocity: [0.0; WIDTH], acceleration: [0.0; WIDTH], beyond: [[0.0; WIDTH]; 2] };
 }
@@ -319,8 +325,8 @@ impl Seen {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::history::Difference;
-    use super::super::times::Times;
+    use super::super::history::Reciprocals;
+    use super::super::times::FrameTimes;
     use super::*;
     use crate::time::Rate;
 
@@ -333,7 +339,7 @@ mod tests {
         if order == 2 {
             seconds[3] = seconds[2] - 1.0;
         }
-        let shown = Difference::new(apart, seconds).show(places.map(x));
+        let shown = Reciprocals::new(apart, seconds).show(places.map(x));
         if order == 2 { shown.acceleration } else { shown.jerk }
     }
 
@@ -346,7 +352,7 @@ mod tests {
             let spacing = Spacing::at_rate(rate.hz());
             let most = 2.0 / f64::from(u32::try_from(spacing.n).expect("1 to 20"));
             for (apart, order) in [(spacing.n, 2), (spacing.m, 2), (spacing.n, 3), (spacing.m, 3)] {
-                let mut times = Times::new(rate);
+                let mut times = FrameTimes::new(rate);
                 let mut at = vec![0.0];
                 for frame in 0..order * apart {
                     at.push(at[frame] + f64::from(times.of(start + frame as u64)) * 1e-3);

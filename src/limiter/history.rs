@@ -7,7 +7,7 @@ const ROWS: usize = 128;
 
 /// Poses and when they are reached, newest last. Never allocates.
 #[derive(Debug, Clone)]
-pub(super) struct History {
+pub(super) struct PoseHistory {
     spacing: Spacing,
     poses: [Pose; ROWS],
     at_ms: [i64; ROWS],
@@ -15,12 +15,12 @@ pub(super) struct History {
     /// Frames in a row with the same Time.
     even: usize,
     /// Those of frames of that Time, once all that they span have it.
-    differences: Option<[Difference; 2]>,
+    differences: Option<[Reciprocals; 2]>,
 }
 
 /// The reciprocals that the differences of four poses need: of the times between them.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Difference {
+pub(super) struct Reciprocals {
     /// Periods from one pose to the next.
     pub(super) apart: usize,
     /// Seconds from the newest pose back to the second and to the third.
@@ -40,7 +40,7 @@ pub(super) struct Shown {
     pub(super) jerk: f64,
 }
 
-impl Difference {
+impl Reciprocals {
     /// For poses at these seconds, newest first.
     pub(super) fn new(apart: usize, at: [f64; 4]) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl Difference {
     }
 }
 
-impl History {
+impl PoseHistory {
     /// At rest in a pose all along.
     pub(super) fn new(spacing: Spacing, pose: Pose, period_ms: u32) -> Self {
         let mut history =
@@ -113,14 +113,14 @@ impl History {
     }
 
     /// The two differences that a pose reached `time_ms` after the newest makes.
-    pub(super) fn differences(&mut self, time_ms: u32) -> [Difference; 2] {
+    pub(super) fn differences(&mut self, time_ms: u32) -> [Reciprocals; 2] {
         let even = self.even > 3 * self.spacing.m && self.last_time() == i64::from(time_ms);
         if let (true, Some(differences)) = (even, self.differences) {
             return differences;
         }
         let Spacing { n, m } = self.spacing;
         let differences = [n, m].map(|apart| {
-            Difference::new(apart, [0, 1, 2, 3].map(|count| -self.seconds_since(count * apart, time_ms)))
+            Reciprocals::new(apart, [0, 1, 2, 3].map(|count| -self.seconds_since(count * apart, time_ms)))
         });
         self.differences = even.then_some(differences);
         differences

@@ -27,7 +27,7 @@ impl AxisLimits {
 
     /// True if the next pose keeps the limits: inside the stroke, frame velocity, its step, both distances. Not-a-number does not.
     #[inline]
-    pub(super) fn hold(&self, next: &Next) -> bool {
+    pub(super) fn hold(&self, next: &NextPose) -> bool {
         let [n, m] = next.shown;
         (next.position >= 0.0)
             & (next.position <= 1.0)
@@ -42,7 +42,7 @@ impl AxisLimits {
 
 /// The next pose of an axis, as the measure sees it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Next {
+pub(super) struct NextPose {
     pub(super) position: f64,
     /// Of the frame: distance over Time.
     pub(super) velocity: f64,

@@ -17,13 +17,13 @@ mod times;
 pub use counts::Limit;
 pub(crate) use counts::{Clamp, Counts};
 
-use axis::{Axis, Mode};
+use axis::{AxisLimiter, AxisMode};
 use counts::Counter;
 use fast_path::FastPath;
-use history::{Difference, History};
-use limits::{AxisLimits, Next, SLACK};
+use history::{PoseHistory, Reciprocals};
+use limits::{AxisLimits, NextPose, SLACK};
 use stop_path::StopPath;
-use times::Times;
+use times::FrameTimes;
 
 use crate::belief::KnownPose;
 use crate::motion::{AxisState, Halt, Limits, MAX_AXES, Pose, Spacing, Window};
@@ -57,10 +57,10 @@ pub enum Provenance {
 /// The limiter of one lane.
 #[derive(Debug, Clone)]
 pub struct Limiter {
-    axes: Vec<Axis>,
+    axes: Vec<AxisLimiter>,
     fast_path: FastPath,
-    history: History,
-    times: Times,
+    history: PoseHistory,
+    times: FrameTimes,
     /// True if every axis is sent what is asked.
     following: bool,
     /// True if it was told where the lane stands.
@@ -76,16 +76,16 @@ struct Frame {
     seconds: f64,
     per_second: f64,
     per_second_before: f64,
-    differences: [Difference; 2],
+    differences: [Reciprocals; 2],
 }
 
 impl Limiter {
     /// The limiter of a lane. It lets nothing pass before it is told where the lane stands ([`Self::restart`]).
     #[must_use]
     pub(crate) fn new(window: &Window, rate: Rate) -> Self {
-        let (spacing, times) = (Spacing::at_rate(rate.hz()), Times::new(rate));
+        let (spacing, times) = (Spacing::at_rate(rate.hz()), FrameTimes::new(rate));
         let limits = window.slots().iter().map(|slot| AxisLimits::new(slot.limits, times.period()));
-        let axes: Vec<Axis> = limits.map(|limits| Axis::new(limits, spacing)).collect();
+        let axes: Vec<AxisLimiter> = limits.map(|limits| AxisLimiter::new(limits, spacing)).collect();
         let pose = [0.0; MAX_AXES];
         Self {
             fast_path: FastPath::new(
@@ -95,7 +95,7 @@ impl Limiter {
                 f64::from(times.usual_ms()) * 1e-3,
             ),
             axes,
-            history: History::new(spacing, pose, times.usual_ms()),
+            history: PoseHistory::new(spacing, pose, times.usual_ms()),
             times,
             following: false,
             is_seeded: false,
@@ -124,7 +124,7 @@ impl Limiter {
         let pose = held_inside(pose);
         self.history.rest(pose, self.times.usual_ms());
         self.fast_path.rest(pose, f64::from(self.times.usual_ms()) * 1e-3);
-        self.axes.iter_mut().for_each(Axis::rest);
+        self.axes.iter_mut().for_each(AxisLimiter::rest);
         self.following = true;
     }
 
@@ -153,7 +153,7 @@ impl Limiter {
     pub fn admit(&mut self, pose: &mut Pose, index: u64, asked: Provenance) -> Admitted {
         let time_ms = self.times.of(index);
         self.fast_path.begin(f64::from(time_ms) * 1e-3);
-        if self.following && self.fast_path.take_calm(pose) {
+        if self.following && self.fast_path.admit_calm(pose) {
             self.history.push(*pose, time_ms);
             self.counter.tick(time_ms, false, false);
             return Admitted::Passed;
@@ -175,14 +175,19 @@ impl Limiter {
     }
 
     #[inline]
-    fn next(&self, axis: usize, position: f64, frame: &Frame) -> Next {
+    fn next(&self, axis: usize, position: f64, frame: &Frame) -> NextPose {
         let before = |back: usize| self.history.before(back)[axis];
         let velocity = (position - before(1)) * frame.per_second;
         let shown = frame.differences.map(|difference| {
             let apart = difference.apart;
             difference.show([position, before(apart), before(2 * apart), before(3 * apart)])
         });
-        Next { position, velocity, step: velocity - (before(1) - before(2)) * frame.per_second_before, shown }
+        NextPose {
+            position,
+            velocity,
+            step: velocity - (before(1) - before(2)) * frame.per_second_before,
+            shown,
+        }
     }
 
     /// The same axis by axis, where not all is plain.
@@ -199,7 +204,7 @@ impl Limiter {
             let (sent, was_refused) = self.judge_axis(axis, *position, frame, asked);
             *position = sent;
             refused |= was_refused;
-            held |= self.axes[axis].mode != Mode::Following;
+            held |= self.axes[axis].mode != AxisMode::Following;
         }
         self.following = !held;
         self.fast_path.take(pose);
@@ -215,11 +220,11 @@ impl Limiter {
     /// What one axis is sent, and whether what was asked broke a limit.
     fn judge_axis(&mut self, axis: usize, asked: f64, frame: &Frame, by: Provenance) -> (f64, bool) {
         let state = &mut self.axes[axis];
-        let broken = state.mode != Mode::Following && state.look(asked, frame.time_ms);
+        let broken = state.mode != AxisMode::Following && state.look(asked, frame.time_ms);
         let (mode, wish) = state.wish(asked, frame.seconds);
         let next = self.next(axis, wish, frame);
         let held = self.axes[axis].limits.hold(&next);
-        if let Mode::Braking { .. } = mode {
+        if let AxisMode::Braking { .. } = mode {
             if held {
                 self.axes[axis].take_up(mode);
                 return (wish, broken);
@@ -242,13 +247,13 @@ impl Limiter {
     /// within them is part of the proof (`proof::end`); a planned move ends at rest or on the cue. The stroke has room for a
     /// stop at once as well, since what turns inside it leaves room to turn sooner. That much is asked here all the same, in
     /// closed form: what was said to be proved and runs out of its stroke is refused while there is room left.
-    fn leads_on(&mut self, axis: usize, next: &Next, frame: &Frame, by: Provenance) -> bool {
+    fn leads_on(&mut self, axis: usize, next: &NextPose, frame: &Frame, by: Provenance) -> bool {
         (by == Provenance::Proved && self.has_room(axis, next, frame))
             || self.leaves_a_way_out(axis, next, frame)
     }
 
     /// True if the axis can turn inside the stroke, by what its last poses show of its motion.
-    fn has_room(&self, axis: usize, next: &Next, frame: &Frame) -> bool {
+    fn has_room(&self, axis: usize, next: &NextPose, frame: &Frame) -> bool {
         let AxisLimits { velocity, acceleration, jerk, .. } = self.axes[axis].limits;
         let limits = Limits { velocity, acceleration, jerk };
         frame.differences.iter().zip(next.shown).any(|(difference, shown)| {
@@ -261,7 +266,7 @@ impl Limiter {
     }
 
     /// True if the axis can come to rest after this pose; the way is kept for the next tick.
-    fn leaves_a_way_out(&mut self, axis: usize, next: &Next, frame: &Frame) -> bool {
+    fn leaves_a_way_out(&mut self, axis: usize, next: &NextPose, frame: &Frame) -> bool {
         let state = &mut self.axes[axis];
         if self.fast_path.is_calm(axis, next.position) {
             return true;
@@ -300,7 +305,7 @@ impl Limiter {
 }
 
 /// The limit that a pose exceeds most, and how many times.
-fn exceeded(limits: &AxisLimits, next: &Next) -> (Limit, f64) {
+fn exceeded(limits: &AxisLimits, next: &NextPose) -> (Limit, f64) {
     if !(0.0..=1.0).contains(&next.position) {
         return (Limit::Position, f64::INFINITY);
     }

@@ -1,9 +1,9 @@
 //! Decides if an axis can still come to rest: ways to brake, tried against the measure over the frames to come.
 
 use super::fast_path::LEVEL;
-use super::history::{Difference, History};
+use super::history::{PoseHistory, Reciprocals};
 use super::limits::AxisLimits;
-use super::times::Times;
+use super::times::FrameTimes;
 use crate::motion::{AxisState, Begun, Halt, Means, Spacing};
 
 // 3 x 27 periods at 1,000 Hz, and the end of that.
@@ -35,16 +35,16 @@ pub(super) struct StopPath<'a> {
     at: [f64; PAST + AHEAD],
     positions: [f64; PAST + AHEAD],
     /// The differences, where all frames have the same Time.
-    even: Option<[Difference; 2]>,
+    even: Option<[Reciprocals; 2]>,
 }
 
 impl<'a> StopPath<'a> {
     /// Before a frame of `time_ms` is sent; or after, if it carries `sent`. `times` is past that frame.
     pub(super) fn new(
-        history: &History,
+        history: &PoseHistory,
         axis: usize,
         limits: &'a AxisLimits,
-        times: Times,
+        times: FrameTimes,
         time_ms: u32,
         sent: Option<f64>,
     ) -> Self {
@@ -66,7 +66,7 @@ impl<'a> StopPath<'a> {
     }
 
     /// When the frames ahead are reached, `first` being the Time of the first if it is known already.
-    fn look_ahead(&mut self, mut times: Times, first: Option<u32>) {
+    fn look_ahead(&mut self, mut times: FrameTimes, first: Option<u32>) {
         let mut first = first;
         let mut sum = 0.0;
         for at in &mut self.at[PAST..] {
@@ -80,8 +80,8 @@ impl<'a> StopPath<'a> {
         }
     }
 
-    fn difference(&self, place: usize, apart: usize) -> Difference {
-        Difference::new(apart, [0, 1, 2, 3].map(|count| self.at[place.saturating_sub(count * apart)]))
+    fn difference(&self, place: usize, apart: usize) -> Reciprocals {
+        Reciprocals::new(apart, [0, 1, 2, 3].map(|count| self.at[place.saturating_sub(count * apart)]))
     }
 
     fn nodes(&self, place: usize, apart: usize) -> [f64; 4] {
@@ -225,7 +225,7 @@ mod tests {
             let place = |at: f64| middle + scale * wave(at);
 
             let mut limiter = Limiter::new(&window, rate);
-            let (mut pose, mut times, mut at) = ([0.0; MAX_AXES], Times::new(rate), 0.0);
+            let (mut pose, mut times, mut at) = ([0.0; MAX_AXES], FrameTimes::new(rate), 0.0);
             pose[0] = place(0.0);
             limiter.is_seeded = true;
             limiter.rest_in(pose);
@@ -234,7 +234,7 @@ mod tests {
                 at += f64::from(times.of(frame)) * 1e-3;
                 pose[0] = place(at);
                 limiter.fast_path.begin(f64::from(rate.time_ms(frame)) * 1e-3);
-                let is_calm = limiter.following && limiter.fast_path.clone().take_calm(&pose);
+                let is_calm = limiter.following && limiter.fast_path.clone().admit_calm(&pose);
                 limiter.admit(&mut pose, frame, Provenance::Anyhow);
                 if is_calm {
                     calm += 1;

@@ -4,7 +4,7 @@ use crate::time::Rate;
 
 /// Where a frame is on the grid of its rate.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Times {
+pub(super) struct FrameTimes {
     rate: Rate,
     millihertz: u64,
     /// A period, whole milliseconds, and what it leaves over.
@@ -15,7 +15,7 @@ pub(super) struct Times {
     over: u64,
 }
 
-impl Times {
+impl FrameTimes {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1,000 to 1,000,000")]
     pub(super) fn new(rate: Rate) -> Self {
         let millihertz = (rate.hz() * 1000.0).round() as u64;
@@ -78,7 +78,7 @@ mod tests {
     fn they_are_those_of_the_rate_whichever_frame_is_asked_for() {
         for hz in [1.0, 23.976, 50.0, 60.0, 119.88, 333.0, 999.0, 1000.0] {
             let rate = Rate::from_hz(hz);
-            let mut times = Times::new(rate);
+            let mut times = FrameTimes::new(rate);
             for frame in (0..500).chain([70_000_000_000, 70_000_000_001, 3]) {
                 assert_eq!(times.of(frame), rate.time_ms(frame), "{hz} Hz, frame {frame}");
             }

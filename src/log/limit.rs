@@ -16,11 +16,11 @@ const OTHERS: &str = "others";
 /// Holds lines back, but never the newest of a cause for longer than a second.
 #[derive(Debug, Default)]
 pub(super) struct RateLimiter {
-    causes: HashMap<String, Seen>,
+    causes: HashMap<String, CauseSeen>,
 }
 
 #[derive(Debug)]
-struct Seen {
+struct CauseSeen {
     /// When a line of it passed.
     passed: MonoTime,
     /// The newest since.
@@ -46,7 +46,7 @@ impl RateLimiter {
 
     /// The newest lines of causes that were held back and fell silent.
     pub(super) fn due(&mut self, now: MonoTime) -> Vec<Line> {
-        let due = |seen: &mut Seen| {
+        let due = |seen: &mut CauseSeen| {
             let mut line = seen.held.take_if(|_| now.since(seen.passed) >= EVERY)?;
             add(&mut line, seen.more);
             (seen.passed, seen.more) = (now, 0);
@@ -62,7 +62,7 @@ impl RateLimiter {
 
     /// Everything held back, whatever the time: the program ends.
     pub(super) fn rest(&mut self) -> Vec<Line> {
-        let rest = |(_, mut seen): (String, Seen)| {
+        let rest = |(_, mut seen): (String, CauseSeen)| {
             let mut line = seen.held.take()?;
             add(&mut line, seen.more);
             Some(line)
@@ -79,7 +79,7 @@ impl RateLimiter {
         let cause = if full { OTHERS } else { cause };
         if !self.causes.contains_key(cause) {
             let passed = now.before(EVERY);
-            self.causes.insert(cause.to_owned(), Seen { passed, held: None, more: 0 });
+            self.causes.insert(cause.to_owned(), CauseSeen { passed, held: None, more: 0 });
         }
         cause.to_owned()
     }

@@ -94,18 +94,18 @@ impl Line {
 
 /// Where to say something; one each for whoever speaks.
 #[derive(Debug, Clone)]
-pub struct Log(Arc<Shared>);
+pub struct Log(Arc<LogShared>);
 
 #[derive(Debug, Default)]
-struct Shared {
-    state: Mutex<State>,
+struct LogShared {
+    state: Mutex<LogState>,
     /// Wakes the writer, and whoever waits for its end.
     wake: Condvar,
     dropped: AtomicU64,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct LogState {
     limiter: RateLimiter,
     queue: VecDeque<Line>,
     closing: bool,
@@ -129,7 +129,7 @@ impl Log {
     }
 
     fn writing(write: impl FnMut(&Line) -> bool + Send + 'static) -> io::Result<Self> {
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(LogShared::default());
         let writer = Arc::clone(&shared);
         thread::Builder::new().name("log".to_owned()).spawn(move || writer.write(write))?;
         Ok(Self(shared))
@@ -164,12 +164,12 @@ impl Log {
     }
 }
 
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
+impl LogShared {
+    fn lock(&self) -> MutexGuard<'_, LogState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn put(&self, state: &mut State, line: Line) {
+    fn put(&self, state: &mut LogState, line: Line) {
         if state.queue.len() < QUEUE {
             state.queue.push_back(line);
         } else {

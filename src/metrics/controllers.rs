@@ -1,22 +1,22 @@
 //! Figures of each controller.
 
-use super::{Family, Labels, Values, flag};
+use super::{Labels, MetricFamily, MetricValues, flag};
 use crate::control::{ControllerStatus, Health};
 
-pub(super) fn families(controllers: &[ControllerStatus]) -> Vec<Family> {
+pub(super) fn families(controllers: &[ControllerStatus]) -> Vec<MetricFamily> {
     let mut all = health(controllers);
     all.extend(frames(controllers));
     all
 }
 
-fn health(all: &[ControllerStatus]) -> Vec<Family> {
+fn health(all: &[ControllerStatus]) -> Vec<MetricFamily> {
     vec![
         gauges(all, "controller_up", "1 where the controller answers", |one| answers(one.health)),
         gauges(all, "controller_enabled", "1 where it is to take part", |one| Some(flag(one.enabled))),
-        Family {
+        MetricFamily {
             name: "controller_health",
             help: "1, with how it stands",
-            values: Values::Gauges(
+            values: MetricValues::Gauges(
                 all.iter().map(|one| (and(one, "health", one.health.word()), 1.0)).collect(),
             ),
         },
@@ -32,7 +32,7 @@ fn health(all: &[ControllerStatus]) -> Vec<Family> {
     ]
 }
 
-fn frames(all: &[ControllerStatus]) -> Vec<Family> {
+fn frames(all: &[ControllerStatus]) -> Vec<MetricFamily> {
     let acks = all.iter().flat_map(|one| {
         [("acked", one.frames.acked), ("refused", one.frames.refused), ("lost", one.frames.lost)]
             .map(|(result, count)| (and(one, "result", result), count))
@@ -41,10 +41,10 @@ fn frames(all: &[ControllerStatus]) -> Vec<Family> {
         counters(all, "frames_sent", "Frames handed to the kernel", |one| one.frames.sent),
         counters(all, "frames_failed", "Frames that the kernel did not take", |one| one.send_failed),
         counters(all, "frames_asked", "Frames that asked for a reply", |one| one.frames.asked),
-        Family {
+        MetricFamily {
             name: "acks",
             help: "What became of the frames that asked; lost: no reply within a second",
-            values: Values::Counters(acks.collect()),
+            values: MetricValues::Counters(acks.collect()),
         },
         counters(all, "limit_interventions", "How often the limiter held motion back", |one| one.clamps),
     ]
@@ -60,16 +60,16 @@ const fn answers(health: Health) -> Option<f64> {
 }
 
 /// Percentiles, not a histogram for each: those of all controllers together are in `ack_latency_seconds`.
-fn latencies(all: &[ControllerStatus]) -> Family {
+fn latencies(all: &[ControllerStatus]) -> MetricFamily {
     let values = all.iter().flat_map(|one| {
         [("0.5", one.ack_p50_us), ("0.99", one.ack_p99_us)]
             .into_iter()
             .filter_map(|(quantile, us)| Some((and(one, "quantile", quantile), us? / 1e6)))
     });
-    Family {
+    MetricFamily {
         name: "controller_ack_latency_seconds",
         help: "Latency of its acks since the program started",
-        values: Values::Gauges(values.collect()),
+        values: MetricValues::Gauges(values.collect()),
     }
 }
 
@@ -78,9 +78,9 @@ fn gauges(
     name: &'static str,
     help: &'static str,
     value: impl Fn(&ControllerStatus) -> Option<f64>,
-) -> Family {
+) -> MetricFamily {
     let values = all.iter().filter_map(|one| Some((of(one), value(one)?))).collect();
-    Family { name, help, values: Values::Gauges(values) }
+    MetricFamily { name, help, values: MetricValues::Gauges(values) }
 }
 
 fn counters(
@@ -88,9 +88,9 @@ fn counters(
     name: &'static str,
     help: &'static str,
     count: impl Fn(&ControllerStatus) -> u64,
-) -> Family {
+) -> MetricFamily {
     let values = all.iter().map(|one| (of(one), count(one))).collect();
-    Family { name, help, values: Values::Counters(values) }
+    MetricFamily { name, help, values: MetricValues::Counters(values) }
 }
 
 fn of(one: &ControllerStatus) -> Labels {

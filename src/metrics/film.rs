@@ -1,41 +1,41 @@
 //! Figures of the film that a hall follows; of a hall that follows none there are none.
 
-use super::{Family, Labels, Values, flag};
+use super::{Labels, MetricFamily, MetricValues, flag};
 use crate::control::{FilmSourceStatus, FilmStatus};
 
-pub(super) fn families(film: &FilmStatus) -> Vec<Family> {
+pub(super) fn families(film: &FilmStatus) -> Vec<MetricFamily> {
     let mut all = whole(film);
     all.extend(sources(film));
     all.extend(counts(&film.sources));
     all
 }
 
-fn whole(film: &FilmStatus) -> Vec<Family> {
+fn whole(film: &FilmStatus) -> Vec<MetricFamily> {
     let apart = film.disagrees.as_ref().map(|two| two.ahead_s);
     vec![
-        Family {
+        MetricFamily {
             name: "sync_state",
             help: "1, with the state of the film",
-            values: Values::Gauges(vec![(vec![("state", film.state.clone())], 1.0)]),
+            values: MetricValues::Gauges(vec![(vec![("state", film.state.clone())], 1.0)]),
         },
-        Family::gauge("sync_follows", "1 where the loaded show follows the film", flag(film.leads)),
-        Family::gauge("sync_position_seconds", "Where the film is in the loaded cue", film.position_s),
-        Family::gauge(
+        MetricFamily::gauge("sync_follows", "1 where the loaded show follows the film", flag(film.leads)),
+        MetricFamily::gauge("sync_position_seconds", "Where the film is in the loaded cue", film.position_s),
+        MetricFamily::gauge(
             "sync_error_seconds",
             "How far ahead of the film, less the trim, the seats are while they follow it",
             film.error_ms.map(|ms| ms / 1e3),
         ),
-        Family::gauge(
+        MetricFamily::gauge(
             "sync_disagreement_seconds",
             "How far a source that ranks higher, or was passed over by hand, is ahead of the one that leads",
             apart,
         ),
-        Family::counter("sync_switches", "How often another source took over", film.switches),
-        Family::counter("sync_joins", "How often seats have joined the film", film.joins),
+        MetricFamily::counter("sync_switches", "How often another source took over", film.switches),
+        MetricFamily::counter("sync_joins", "How often seats have joined the film", film.joins),
     ]
 }
 
-fn sources(film: &FilmStatus) -> Vec<Family> {
+fn sources(film: &FilmStatus) -> Vec<MetricFamily> {
     let all = &film.sources;
     let is = |name: &Option<String>, one: &FilmSourceStatus| Some(flag(name.as_ref() == Some(&one.source)));
     let states = all.iter().map(|one| {
@@ -43,10 +43,10 @@ fn sources(film: &FilmStatus) -> Vec<Family> {
         (labels, 1.0)
     });
     vec![
-        Family {
+        MetricFamily {
             name: "sync_source_state",
             help: "1, with the state of the source",
-            values: Values::Gauges(states.collect()),
+            values: MetricValues::Gauges(states.collect()),
         },
         gauges(all, "sync_leads", "1 for the source that leads", |one| is(&film.source, one)),
         gauges(all, "sync_chosen", "1 for the source that a person chose", |one| is(&film.chosen, one)),
@@ -60,17 +60,17 @@ fn sources(film: &FilmStatus) -> Vec<Family> {
     ]
 }
 
-fn counts(all: &[FilmSourceStatus]) -> Vec<Family> {
+fn counts(all: &[FilmSourceStatus]) -> Vec<MetricFamily> {
     vec![
         counters(all, "sync_dropouts", "How often nothing was heard of the source", |one| one.dropouts),
         counters(all, "sync_rejected", "Samples too far off to be used", |one| one.rejected),
         counters(all, "sync_jumps", "How often the film jumped by the source", |one| one.jumps),
         counters(all, "sync_foreign", "What others sent in place of the source", |one| one.foreign),
         counters(all, "sync_garbage", "What the source sent that says nothing of a film", |one| one.garbage),
-        Family {
+        MetricFamily {
             name: "sync_freewheel_seconds",
             help: "For how long the film was taken to run on while nothing was heard of the source",
-            values: Values::Seconds(all.iter().map(|one| (of(one), one.freewheel_s)).collect()),
+            values: MetricValues::Seconds(all.iter().map(|one| (of(one), one.freewheel_s)).collect()),
         },
     ]
 }
@@ -80,9 +80,9 @@ fn gauges(
     name: &'static str,
     help: &'static str,
     figure: impl Fn(&FilmSourceStatus) -> Option<f64>,
-) -> Family {
+) -> MetricFamily {
     let values = all.iter().filter_map(|one| Some((of(one), figure(one)?)));
-    Family { name, help, values: Values::Gauges(values.collect()) }
+    MetricFamily { name, help, values: MetricValues::Gauges(values.collect()) }
 }
 
 fn counters(
@@ -90,9 +90,9 @@ fn counters(
     name: &'static str,
     help: &'static str,
     figure: impl Fn(&FilmSourceStatus) -> u64,
-) -> Family {
+) -> MetricFamily {
     let values = all.iter().map(|one| (of(one), figure(one)));
-    Family { name, help, values: Values::Counters(values.collect()) }
+    MetricFamily { name, help, values: MetricValues::Counters(values.collect()) }
 }
 
 fn of(one: &FilmSourceStatus) -> Labels {

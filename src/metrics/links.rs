@@ -1,40 +1,46 @@
 //! Figures of each serial link, and of each axis on it.
 
-use super::{Family, Labels, Values, flag};
+use super::{Labels, MetricFamily, MetricValues, flag};
 use crate::control::{LinkAxisStatus, LinkStatus};
 
-pub(super) fn families(links: &[LinkStatus]) -> Vec<Family> {
+pub(super) fn families(links: &[LinkStatus]) -> Vec<MetricFamily> {
     if links.is_empty() {
         return Vec::new();
     }
     let up = links.iter().map(|link| (of(link), flag(link.fault.is_none())));
     let delay = links.iter().map(|link| (of(link), link.delay_p99_us / 1e6));
     vec![
-        Family { name: "link_up", help: "1 where its port is open", values: Values::Gauges(up.collect()) },
-        Family {
+        MetricFamily {
+            name: "link_up",
+            help: "1 where its port is open",
+            values: MetricValues::Gauges(up.collect()),
+        },
+        MetricFamily {
             name: "link_answer_delay_seconds",
             help: "99 of 100 answers begin no later after the request",
-            values: Values::Gauges(delay.collect()),
+            values: MetricValues::Gauges(delay.collect()),
         },
-        Family {
+        MetricFamily {
             name: "link_exchanges",
             help: "Requests to drives, and what came of them; stray: what came that answers nothing",
-            values: Values::Counters(links.iter().flat_map(exchanges).collect()),
+            values: MetricValues::Counters(links.iter().flat_map(exchanges).collect()),
         },
-        Family {
+        MetricFamily {
             name: "axis_segments",
             help: "Segments of motion made for an axis, and what became of them",
-            values: Values::Counters(axes(links).flat_map(segments).collect()),
+            values: MetricValues::Counters(axes(links).flat_map(segments).collect()),
         },
-        Family {
+        MetricFamily {
             name: "axis_queue_dry",
             help: "How often the queue of an axis ran dry in motion",
-            values: Values::Counters(axes(links).map(|(link, axis)| (at(link, axis), axis.dry)).collect()),
+            values: MetricValues::Counters(
+                axes(links).map(|(link, axis)| (at(link, axis), axis.dry)).collect(),
+            ),
         },
-        Family {
+        MetricFamily {
             name: "axis_error_meters",
             help: "How far the motor was beside its target when both were read last",
-            values: Values::Gauges(
+            values: MetricValues::Gauges(
                 axes(links).map(|(link, axis)| (at(link, axis), axis.error_mm / 1e3)).collect(),
             ),
         },

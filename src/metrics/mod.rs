@@ -34,7 +34,7 @@ pub(crate) fn render(status: &Status) -> String {
     page
 }
 
-fn families(status: &Status) -> Vec<Family> {
+fn families(status: &Status) -> Vec<MetricFamily> {
     let mut families = shows::families(status);
     families.extend(controllers::families(&status.controllers));
     families.extend(links::families(&status.links));
@@ -50,16 +50,16 @@ type Labels = Vec<(&'static str, String)>;
 
 /// One figure, for each set of labels.
 #[derive(Debug)]
-struct Family {
+struct MetricFamily {
     /// Its name, without `kinocue_` in front, and without `_total` or `_info` behind.
     name: &'static str,
     /// What it is, for a person; no full stop.
     help: &'static str,
-    values: Values,
+    values: MetricValues,
 }
 
 #[derive(Debug)]
-enum Values {
+enum MetricValues {
     /// What goes up and down.
     Gauges(Vec<(Labels, f64)>),
     /// What only grows while the program runs.
@@ -72,14 +72,14 @@ enum Values {
     Histogram { sum: f64, buckets: Vec<(f64, u64)> },
 }
 
-impl Family {
+impl MetricFamily {
     fn gauge(name: &'static str, help: &'static str, value: impl Into<Option<f64>>) -> Self {
         let values = value.into().map(|value| (Labels::new(), value)).into_iter().collect();
-        Self { name, help, values: Values::Gauges(values) }
+        Self { name, help, values: MetricValues::Gauges(values) }
     }
 
     fn counter(name: &'static str, help: &'static str, value: u64) -> Self {
-        Self { name, help, values: Values::Counters(vec![(Labels::new(), value)]) }
+        Self { name, help, values: MetricValues::Counters(vec![(Labels::new(), value)]) }
     }
 
     fn histogram(name: &'static str, help: &'static str, histogram: &control::Histogram) -> Self {
@@ -88,32 +88,34 @@ impl Family {
         if buckets.is_empty() {
             buckets.push((f64::INFINITY, 0)); // the format asks for this one
         }
-        Self { name, help, values: Values::Histogram { sum: histogram.sum_s, buckets } }
+        Self { name, help, values: MetricValues::Histogram { sum: histogram.sum_s, buckets } }
     }
 
     fn encode(&self, encoder: &mut DescriptorEncoder) -> fmt::Result {
         let Self { name, help, values } = self;
         let kind = match values {
-            Values::Gauges(_) => MetricType::Gauge,
-            Values::Counters(_) | Values::Seconds(_) => MetricType::Counter,
-            Values::Info(_) => MetricType::Info,
-            Values::Histogram { .. } => MetricType::Histogram,
+            MetricValues::Gauges(_) => MetricType::Gauge,
+            MetricValues::Counters(_) | MetricValues::Seconds(_) => MetricType::Counter,
+            MetricValues::Info(_) => MetricType::Info,
+            MetricValues::Histogram { .. } => MetricType::Histogram,
         };
         let mut metric = encoder.encode_descriptor(name, help, None, kind)?;
         match values {
-            Values::Gauges(all) => all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
+            MetricValues::Gauges(all) => all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
                 [] => metric.encode_gauge(value),
                 _ => metric.encode_family(labels)?.encode_gauge(value),
             }),
-            Values::Counters(all) => all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
-                [] => metric.encode_counter(value, NO_EXEMPLAR),
-                _ => metric.encode_family(labels)?.encode_counter(value, NO_EXEMPLAR),
-            }),
-            Values::Seconds(all) => all.iter().try_for_each(|(labels, seconds)| {
+            MetricValues::Counters(all) => {
+                all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
+                    [] => metric.encode_counter(value, NO_EXEMPLAR),
+                    _ => metric.encode_family(labels)?.encode_counter(value, NO_EXEMPLAR),
+                })
+            }
+            MetricValues::Seconds(all) => all.iter().try_for_each(|(labels, seconds)| {
                 metric.encode_family(labels)?.encode_counter(seconds, NO_EXEMPLAR)
             }),
-            Values::Info(labels) => metric.encode_info(labels),
-            Values::Histogram { sum, buckets } => {
+            MetricValues::Info(labels) => metric.encode_info(labels),
+            MetricValues::Histogram { sum, buckets } => {
                 let count = buckets.iter().map(|(_, count)| count).sum();
                 metric.encode_histogram::<NoLabelSet>(*sum, count, buckets, None)
             }
@@ -123,7 +125,7 @@ impl Family {
 
 /// What a registry asks for its figures.
 #[derive(Debug)]
-struct Families(Vec<Family>);
+struct Families(Vec<MetricFamily>);
 
 impl Collector for Families {
     fn encode(&self, mut encoder: DescriptorEncoder) -> fmt::Result {

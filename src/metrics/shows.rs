@@ -2,57 +2,65 @@
 
 use std::collections::BTreeMap;
 
-use super::{Family, Labels, Values, flag};
+use super::{Labels, MetricFamily, MetricValues, flag};
 use crate::control::Status;
 use crate::state::State;
 
-pub(super) fn families(status: &Status) -> Vec<Family> {
+pub(super) fn families(status: &Status) -> Vec<MetricFamily> {
     let mut all = state(status);
     all.extend(ticks(status));
     all.extend(levels(status));
     all.extend(machine(status));
     all.push(warnings(status));
-    all.extend(status.osc.as_ref().map(|counts| Family {
+    all.extend(status.osc.as_ref().map(|counts| MetricFamily {
         name: "osc_messages",
         help: "What came to the port for OSC, by what became of it",
-        values: Values::Counters(
+        values: MetricValues::Counters(
             counts.iter().map(|(word, count)| (label("result", word.as_str()), *count)).collect(),
         ),
     }));
     all
 }
 
-fn state(status: &Status) -> Vec<Family> {
+fn state(status: &Status) -> Vec<MetricFamily> {
     let show = status.show.as_ref();
     let preflight = status.preflight.as_ref();
     let states = State::ALL.map(|state| (label("state", state.word()), flag(status.state == state)));
     vec![
-        Family {
+        MetricFamily {
             name: "build",
             help: "What program this is",
-            values: Values::Info(label("version", &*status.version)),
+            values: MetricValues::Info(label("version", &*status.version)),
         },
-        Family::gauge("uptime_seconds", "Since the program started", status.uptime_s),
-        Family { name: "state", help: "1 for the state of the hall", values: Values::Gauges(states.into()) },
-        Family::gauge("state_age_seconds", "Since the hall is in its state", status.since_s),
-        Family::gauge("moving", "1 while motion frames leave", flag(status.moving)),
-        Family::gauge(
+        MetricFamily::gauge("uptime_seconds", "Since the program started", status.uptime_s),
+        MetricFamily {
+            name: "state",
+            help: "1 for the state of the hall",
+            values: MetricValues::Gauges(states.into()),
+        },
+        MetricFamily::gauge("state_age_seconds", "Since the hall is in its state", status.since_s),
+        MetricFamily::gauge("moving", "1 while motion frames leave", flag(status.moving)),
+        MetricFamily::gauge(
             "show_position_seconds",
             "Where the film is in the loaded cue",
             show.map(|show| show.position_s),
         ),
-        Family::gauge("show_length_seconds", "The length of the loaded cue", show.map(|show| show.length_s)),
-        Family::gauge(
+        MetricFamily::gauge(
+            "show_length_seconds",
+            "The length of the loaded cue",
+            show.map(|show| show.length_s),
+        ),
+        MetricFamily::gauge(
             "trim_seconds",
             "How much later than the film the motion is",
             f64::from(status.trim_ms) / 1e3,
         ),
-        Family::gauge(
+        MetricFamily::gauge(
             "preflight_passed",
             "1 where the last preflight found nothing that fails",
             preflight.map(|preflight| flag(preflight.passed)),
         ),
-        Family::gauge(
+        MetricFamily::gauge(
             "preflight_age_seconds",
             "Since the last preflight",
             preflight.map(|preflight| preflight.age_s),
@@ -60,17 +68,17 @@ fn state(status: &Status) -> Vec<Family> {
     ]
 }
 
-fn ticks(status: &Status) -> Vec<Family> {
+fn ticks(status: &Status) -> Vec<MetricFamily> {
     vec![
-        Family::gauge("tick_rate_hertz", "Ticks per second, as configured", status.rate_hz),
-        Family::counter("ticks", "Ticks, in every state", status.ticks),
-        Family::counter("ticks_missed", "Ticks slept through", status.missed_ticks),
-        Family::histogram(
+        MetricFamily::gauge("tick_rate_hertz", "Ticks per second, as configured", status.rate_hz),
+        MetricFamily::counter("ticks", "Ticks, in every state", status.ticks),
+        MetricFamily::counter("ticks_missed", "Ticks slept through", status.missed_ticks),
+        MetricFamily::histogram(
             "tick_lateness_seconds",
             "First send of a tick after its deadline, of the ticks that sent",
             &status.lateness.histogram,
         ),
-        Family::histogram(
+        MetricFamily::histogram(
             "ack_latency_seconds",
             "From sending a frame to its ack, all controllers",
             &status.ack_latency.histogram,
@@ -78,32 +86,32 @@ fn ticks(status: &Status) -> Vec<Family> {
     ]
 }
 
-fn levels(status: &Status) -> Vec<Family> {
+fn levels(status: &Status) -> Vec<MetricFamily> {
     let levels = &status.levels;
     let groups = [("motion", levels.motion), ("vibration", levels.vibration)];
     let groups = groups.map(|(group, level)| (label("group", group), level));
     let rows = levels.rows.iter().map(|(row, level)| (label("row", row), *level));
     let effects = levels.effects.iter().map(|(effect, on)| (label("effect", effect), flag(*on)));
     vec![
-        Family {
+        MetricFamily {
             name: "level_ratio",
             help: "How much of the cue the seats make, 0 to 1",
-            values: Values::Gauges(groups.into()),
+            values: MetricValues::Gauges(groups.into()),
         },
-        Family {
+        MetricFamily {
             name: "row_level_ratio",
             help: "The same of a row, on top of the hall's",
-            values: Values::Gauges(rows.collect()),
+            values: MetricValues::Gauges(rows.collect()),
         },
-        Family {
+        MetricFamily {
             name: "effect_allowed",
             help: "1 where the effect may be on",
-            values: Values::Gauges(effects.collect()),
+            values: MetricValues::Gauges(effects.collect()),
         },
     ]
 }
 
-fn machine(status: &Status) -> Vec<Family> {
+fn machine(status: &Status) -> Vec<MetricFamily> {
     let granted = &status.realtime;
     let memory_locked = if granted.memory_locked { "yes" } else { "no" };
     let info = vec![
@@ -113,12 +121,12 @@ fn machine(status: &Status) -> Vec<Family> {
     ];
     let realtime = matches!(granted.policy.as_str(), "fifo" | "rr") && granted.memory_locked;
     vec![
-        Family {
+        MetricFamily {
             name: "rt_scheduling",
             help: "What the system granted the tick thread",
-            values: Values::Info(info),
+            values: MetricValues::Info(info),
         },
-        Family::gauge(
+        MetricFamily::gauge(
             "realtime",
             "1 where the tick thread is real-time and memory is locked",
             flag(realtime),
@@ -127,17 +135,17 @@ fn machine(status: &Status) -> Vec<Family> {
 }
 
 /// How many warnings there are of each kind: one and the same may be about many controllers.
-fn warnings(status: &Status) -> Family {
+fn warnings(status: &Status) -> MetricFamily {
     let mut counts: BTreeMap<(&str, &str), u32> = BTreeMap::new();
     for warning in &status.warnings {
         *counts.entry((&warning.id, warning.severity.word())).or_default() += 1;
     }
     let labels = |id: &str, severity: &str| vec![("id", id.to_owned()), ("severity", severity.to_owned())];
     let counts = counts.iter().map(|((id, severity), count)| (labels(id, severity), f64::from(*count)));
-    Family {
+    MetricFamily {
         name: "warnings",
         help: "What a person should know, how many of each kind",
-        values: Values::Gauges(counts.collect()),
+        values: MetricValues::Gauges(counts.collect()),
     }
 }
 

@@ -43,7 +43,7 @@ pub(crate) enum Begun {
 
 /// A stretch of constant jerk.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Stretch {
+struct JerkStretch {
     from: AxisState,
     jerk: f64,
     seconds: f64,
@@ -53,7 +53,7 @@ struct Stretch {
 /// deceleration, hold it, let go of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Halt {
-    stretches: [Stretch; 5],
+    stretches: [JerkStretch; 5],
     rest: f64,
 }
 
@@ -85,7 +85,7 @@ impl Halt {
         let rise = ((acceleration - sign * from.acceleration).max(0.0) / jerk).min(seconds);
         let mut at = from;
         let mut stretch = |jerk: f64, seconds: f64| {
-            let stretch = Stretch { from: at, jerk, seconds };
+            let stretch = JerkStretch { from: at, jerk, seconds };
             at = at.under(jerk, seconds);
             stretch
         };
@@ -219,7 +219,7 @@ impl Halt {
     }
 }
 
-impl Stretch {
+impl JerkStretch {
     /// When its velocity is zero, as seconds from its beginning; its beginning where it is not.
     fn turns(&self) -> [f64; 2] {
         let AxisState { velocity, acceleration, .. } = self.from;

@@ -77,22 +77,22 @@ impl fmt::Display for SendFault {
 
 /// The sending half of [`Ports`](super::Ports), or of a [`Network`]. Clones send by the same sockets.
 #[derive(Debug, Clone)]
-pub struct Sender(Way);
+pub struct Sender(SendWay);
 
 /// Where datagrams go.
 #[derive(Debug, Clone)]
-enum Way {
+enum SendWay {
     Kernel(Arc<[Lane]>),
     Network(Arc<dyn Network>),
 }
 
 impl Sender {
     pub(super) const fn new(lanes: Arc<[Lane]>) -> Self {
-        Self(Way::Kernel(lanes))
+        Self(SendWay::Kernel(lanes))
     }
 
     pub(super) const fn over(network: Arc<dyn Network>) -> Self {
-        Self(Way::Network(network))
+        Self(SendWay::Network(network))
     }
 
     /// Sends one datagram to controller `lane`, counted from 0 in the order in which they were opened.
@@ -104,8 +104,8 @@ impl Sender {
     /// If there is no such lane.
     pub(crate) fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
         let lane = match &self.0 {
-            Way::Kernel(lanes) => &lanes[lane],
-            Way::Network(network) => return network.send(lane, datagram),
+            SendWay::Kernel(lanes) => &lanes[lane],
+            SendWay::Network(network) => return network.send(lane, datagram),
         };
         match lane.send(datagram) {
             Ok(()) => Delivery::Sent,

@@ -17,7 +17,7 @@ use crate::config::{Controller, Station};
 use crate::motion::Pulses;
 use crate::time::MonoTime;
 use crate::wire::{
-    Code, DPFE, Dialect, FrameNo, FromController, MotionReply, PerAxis, ReplyCode, Report, Status,
+    Code, DPFE, Dialect, FrameNo, FromController, MotionReply, PerAxis, RegisterReport, ReplyCode, Status,
     VibrationPort,
 };
 
@@ -52,7 +52,7 @@ impl Watched {
 
 /// What the first reply to a frame says beside positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Answer {
+pub(crate) struct FirstAnswer {
     /// The frame that it answers.
     pub(crate) frame: FrameNo,
     /// How the controller does.
@@ -153,7 +153,7 @@ impl Observer {
     }
 
     /// Hears the first reply to a frame. One to a frame older than the newest that was answered says nothing new.
-    pub(crate) fn on_answer(&mut self, controller: usize, answer: &Answer, at: MonoTime) {
+    pub(crate) fn on_answer(&mut self, controller: usize, answer: &FirstAnswer, at: MonoTime) {
         let smc = self.is_smc(controller);
         let state = &mut self.states[controller];
         if state.answered.is_some_and(|newest| answer.frame.since(newest) <= 0) {
@@ -229,7 +229,7 @@ impl Observer {
     }
 
     /// Hears registers that an IMAX or MBOX controller reports unasked.
-    pub(crate) fn on_report(&mut self, controller: usize, report: &Report<'_>, at: MonoTime) {
+    pub(crate) fn on_report(&mut self, controller: usize, report: &RegisterReport<'_>, at: MonoTime) {
         let state = &mut self.states[controller];
         state.reports += 1;
         state.heard_at = Some(at);

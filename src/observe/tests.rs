@@ -34,7 +34,7 @@ fn reply() -> MotionReply {
 
 /// The first reply to the frame of that number.
 fn answers(observer: &mut Observer, frame: u32, code: ReplyCode, error: u16, inputs: u16, at: MonoTime) {
-    observer.on_answer(0, &Answer { frame: FrameNo(frame), code, error, inputs }, at);
+    observer.on_answer(0, &FirstAnswer { frame: FrameNo(frame), code, error, inputs }, at);
 }
 
 const CALM: Look = Look { stop: StopSign::Over, inputs: None };
@@ -203,7 +203,7 @@ fn a_report_of_registers_is_an_alarm_of_an_mbox_controller_and_else_an_event() {
     let say = |dialect, start, data: &[u16]| {
         let mut observer = observer(dialect);
         let data = Words::from(data);
-        let report = Report { channel: 0, accept: Code::NONE, reply: Code::NONE, start, data };
+        let report = RegisterReport { channel: 0, accept: Code::NONE, reply: Code::NONE, start, data };
         observer.on_report(0, &report, at(5));
         happened(&observer).remove(0).1
     };

@@ -29,7 +29,7 @@ pub(crate) use counts::Counts;
 
 use crate::config::OscPort;
 use crate::control::Handle;
-use port::Port;
+use port::OscPortState;
 
 /// Why the port cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -85,6 +85,6 @@ impl Osc {
     /// If the socket fails; it never ends otherwise.
     pub(crate) async fn serve(self) -> io::Result<std::convert::Infallible> {
         let incoming = tokio::net::UdpSocket::from_std(self.socket.try_clone()?)?;
-        Port::new(self.socket, self.config, self.hall, self.counts).serve(&incoming).await
+        OscPortState::new(self.socket, self.config, self.hall, self.counts).serve(&incoming).await
     }
 }

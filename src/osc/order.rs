@@ -11,7 +11,7 @@ const LONGEST_S: u16 = 3_600;
 
 /// What a message asks.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Order {
+pub(super) enum OscOrder {
     /// Of the hall.
     Command(Command),
     /// Feedback to that port of its sender, for so many seconds; 0 ends it.
@@ -22,7 +22,7 @@ pub(super) enum Order {
 
 /// Why a message is not obeyed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub(super) enum Fault {
+pub(super) enum OscFault {
     #[error("{0:?} is no address of kinocue; docs/show-control.md lists them")]
     Unknown(String),
     #[error("OSC may never {0}; a person does that on the console or with `kinocue {0}`")]
@@ -42,8 +42,8 @@ pub(super) enum Fault {
 }
 
 /// What `message` asks, of what is allowed.
-pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, Fault> {
-    let unknown = || Fault::Unknown(message.addr.clone());
+pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<OscOrder, OscFault> {
+    let unknown = || OscFault::Unknown(message.addr.clone());
     let path = message.addr.strip_prefix("/kinocue/").ok_or_else(unknown)?;
     let parts: Vec<&str> = path.split('/').collect();
     let taken = Taken { message, allow };
@@ -67,15 +67,19 @@ pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, F
         ["effect", name] if !name.is_empty() => {
             let on = taken.allowed(GearWord::Levels)?.switch()?;
             let effects = [(name.to_owned(), on)].into();
-            Ok(Order::Command(Command::Levels(LevelsChange { effects, ..<_>::default() })))
+            Ok(OscOrder::Command(Command::Levels(LevelsChange { effects, ..<_>::default() })))
         }
         ["seat", name, "enable"] if !name.is_empty() => {
             let on = taken.allowed(GearWord::Seats)?.switch()?;
             let name = name.to_owned();
-            Ok(Order::Command(if on { Command::Enable(name) } else { Command::Disable { name, why: None } }))
+            Ok(OscOrder::Command(if on {
+                Command::Enable(name)
+            } else {
+                Command::Disable { name, why: None }
+            }))
         }
         _ => Err(match Command::OF_PEOPLE.into_iter().find(|word| *word == parts[0]) {
-            Some(word) => Fault::Forbidden(word),
+            Some(word) => OscFault::Forbidden(word),
             None => unknown(),
         }),
     }
@@ -89,12 +93,16 @@ struct Taken<'m> {
 }
 
 impl Taken<'_> {
-    fn allowed(self, word: GearWord) -> Result<Self, Fault> {
-        if self.allow.contains(&word) { Ok(self) } else { Err(Fault::NotAllowed(self.message.addr.clone())) }
+    fn allowed(self, word: GearWord) -> Result<Self, OscFault> {
+        if self.allow.contains(&word) {
+            Ok(self)
+        } else {
+            Err(OscFault::NotAllowed(self.message.addr.clone()))
+        }
     }
 
     /// Without an argument, or with one that says whether a button went down or up.
-    fn button(self, ask: Command) -> Result<Order, Fault> {
+    fn button(self, ask: Command) -> Result<OscOrder, OscFault> {
         ask.gear_word().map_or(Ok(self), |word| self.allowed(word))?;
         let pressed = match self.message.args.as_slice() {
             [] => true,
@@ -103,56 +111,56 @@ impl Taken<'_> {
             }
             _ => return Err(self.wants("nothing, or 1 for a button that goes down")),
         };
-        Ok(if pressed { Order::Command(ask) } else { Order::Released })
+        Ok(if pressed { OscOrder::Command(ask) } else { OscOrder::Released })
     }
 
     /// Whatever comes with it, unless that says that a button came up.
-    fn stop(self) -> Order {
+    fn stop(self) -> OscOrder {
         match self.message.args.as_slice() {
-            [value] if switch(value) == Some(false) => Order::Released,
-            _ => Order::Command(Command::Stop),
+            [value] if switch(value) == Some(false) => OscOrder::Released,
+            _ => OscOrder::Command(Command::Stop),
         }
     }
 
-    fn seek(self) -> Result<Order, Fault> {
+    fn seek(self) -> Result<OscOrder, OscFault> {
         let at = self.number().filter(|&s| (0.0..=1e6).contains(&s));
         let at = at.ok_or_else(|| self.wants("a position in seconds, 0 or more"))?;
-        Ok(Order::Command(Command::Seek(ShowTime::from_secs_f64(at))))
+        Ok(OscOrder::Command(Command::Seek(ShowTime::from_secs_f64(at))))
     }
 
-    fn trim(self) -> Result<Order, Fault> {
+    fn trim(self) -> Result<OscOrder, OscFault> {
         let ms = self.number().filter(|ms| (-500.0..=500.0).contains(ms));
         let ms = ms.ok_or_else(|| self.wants("milliseconds, -500 to 500"))?;
         #[expect(clippy::cast_possible_truncation, reason = "it is within -500 to 500")]
-        Ok(Order::Command(Command::Trim(ms.round() as i32)))
+        Ok(OscOrder::Command(Command::Trim(ms.round() as i32)))
     }
 
-    fn nudge(self) -> Result<Order, Fault> {
+    fn nudge(self) -> Result<OscOrder, OscFault> {
         let most = f64::from(TRIM_FRAMES);
         let frames = self.number().filter(|frames| (-most..=most).contains(frames) && frames.fract() == 0.0);
         let frames = frames.ok_or_else(|| self.wants("whole frames of the film, -12 to 12"))?;
         #[expect(clippy::cast_possible_truncation, reason = "it is a whole number within -12 to 12")]
-        Ok(Order::Command(Command::Nudge(frames as i32)))
+        Ok(OscOrder::Command(Command::Nudge(frames as i32)))
     }
 
-    fn levels(self, change: impl FnOnce(f64) -> LevelsChange) -> Result<Order, Fault> {
+    fn levels(self, change: impl FnOnce(f64) -> LevelsChange) -> Result<OscOrder, OscFault> {
         let taken = self.allowed(GearWord::Levels)?;
         let level = taken.number().filter(|level| (0.0..=1.0).contains(level));
         let level = level.ok_or_else(|| taken.wants("a level, 0 to 1"))?;
-        Ok(Order::Command(Command::Levels(change(level))))
+        Ok(OscOrder::Command(Command::Levels(change(level))))
     }
 
-    fn subscribe(self) -> Result<Order, Fault> {
+    fn subscribe(self) -> Result<OscOrder, OscFault> {
         let wants = || self.wants("a port, 1 to 65535, and seconds, 0 to 3600");
         let [OscType::Int(port), OscType::Int(seconds)] = self.message.args.as_slice() else {
             return Err(wants());
         };
         let port = u16::try_from(*port).ok().filter(|&port| port > 0).ok_or_else(wants)?;
         let seconds = u16::try_from(*seconds).ok().filter(|&s| s <= LONGEST_S).ok_or_else(wants)?;
-        Ok(Order::Subscribe { port, seconds })
+        Ok(OscOrder::Subscribe { port, seconds })
     }
 
-    fn switch(self) -> Result<bool, Fault> {
+    fn switch(self) -> Result<bool, OscFault> {
         let on = if let [value] = self.message.args.as_slice() { switch(value) } else { None };
         on.ok_or_else(|| self.wants("1 for on or 0 for off"))
     }
@@ -162,8 +170,8 @@ impl Taken<'_> {
         if let [value] = self.message.args.as_slice() { number(value) } else { None }
     }
 
-    fn wants(self, wanted: &'static str) -> Fault {
-        Fault::Argument { address: self.message.addr.clone(), wanted }
+    fn wants(self, wanted: &'static str) -> OscFault {
+        OscFault::Argument { address: self.message.addr.clone(), wanted }
     }
 }
 
@@ -205,7 +213,7 @@ mod tests {
         GearWord::ALL.map(|(_, word)| word).to_vec()
     }
 
-    fn ordered(addr: &str, args: Vec<OscType>) -> Result<Order, Fault> {
+    fn ordered(addr: &str, args: Vec<OscType>) -> Result<OscOrder, OscFault> {
         order(&OscMessage { addr: addr.to_owned(), args }, &all())
     }
 
@@ -252,14 +260,14 @@ mod tests {
                 Command::Disable { name: "F4".to_owned(), why: None },
             ),
         ] {
-            assert_eq!(ordered(addr, args), Ok(Order::Command(ask)), "{addr}");
+            assert_eq!(ordered(addr, args), Ok(OscOrder::Command(ask)), "{addr}");
         }
     }
 
     #[test]
     fn a_button_that_is_let_go_asks_nothing() {
-        assert_eq!(ordered("/kinocue/go", vec![OscType::Float(0.0)]), Ok(Order::Released));
-        assert!(matches!(ordered("/kinocue/go", vec![OscType::Float(0.5)]), Err(Fault::Argument { .. })));
+        assert_eq!(ordered("/kinocue/go", vec![OscType::Float(0.0)]), Ok(OscOrder::Released));
+        assert!(matches!(ordered("/kinocue/go", vec![OscType::Float(0.5)]), Err(OscFault::Argument { .. })));
     }
 
     #[test]
@@ -267,9 +275,9 @@ mod tests {
         let odd =
             [vec![OscType::Float(0.5)], vec![OscType::String("now".to_owned())], vec![OscType::Int(0); 2]];
         for args in odd {
-            assert_eq!(ordered("/kinocue/stop", args), Ok(Order::Command(Command::Stop)));
+            assert_eq!(ordered("/kinocue/stop", args), Ok(OscOrder::Command(Command::Stop)));
         }
-        assert_eq!(ordered("/kinocue/stop", vec![OscType::Int(0)]), Ok(Order::Released));
+        assert_eq!(ordered("/kinocue/stop", vec![OscType::Int(0)]), Ok(OscOrder::Released));
     }
 
     #[test]
@@ -277,7 +285,7 @@ mod tests {
         for word in ["arm", "disarm", "home", "clear", "load"] {
             for addr in [format!("/kinocue/{word}"), format!("/kinocue/{word}/x")] {
                 let fault = ordered(&addr, vec![OscType::Int(1)]).unwrap_err();
-                assert!(matches!(fault, Fault::Forbidden(said) if said == word), "{fault}");
+                assert!(matches!(fault, OscFault::Forbidden(said) if said == word), "{fault}");
             }
         }
     }
@@ -297,7 +305,7 @@ mod tests {
             ("/kinocue/seat/A1/enable", OscType::Int(2)),
         ] {
             let fault = ordered(addr, vec![value]).unwrap_err();
-            assert!(matches!(fault, Fault::Argument { .. }), "{addr}: {fault}");
+            assert!(matches!(fault, OscFault::Argument { .. }), "{addr}: {fault}");
         }
         assert!(ordered("/kinocue/seek", vec![]).is_err());
         assert!(ordered("/kinocue/seek", vec![OscType::Int(1), OscType::Int(2)]).is_err());
@@ -308,21 +316,21 @@ mod tests {
         for addr in
             ["/kinocue/*", "/kinocue", "/kinocue/", "/go", "/kinocue/go/", "/kinocue/row//level", "/{a,b}"]
         {
-            assert!(matches!(ordered(addr, vec![]), Err(Fault::Unknown(_))), "{addr}");
+            assert!(matches!(ordered(addr, vec![]), Err(OscFault::Unknown(_))), "{addr}");
         }
     }
 
     #[test]
     fn what_is_not_listed_is_not_allowed_but_stop_is() {
         let message = |addr: &str| OscMessage { addr: addr.to_owned(), args: Vec::new() };
-        assert_eq!(order(&message("/kinocue/stop"), &[]), Ok(Order::Command(Command::Stop)));
-        assert!(matches!(order(&message("/kinocue/go"), &[GearWord::Pause]), Err(Fault::NotAllowed(_))));
+        assert_eq!(order(&message("/kinocue/stop"), &[]), Ok(OscOrder::Command(Command::Stop)));
+        assert!(matches!(order(&message("/kinocue/go"), &[GearWord::Pause]), Err(OscFault::NotAllowed(_))));
     }
 
     #[test]
     fn a_subscription_names_a_port_and_how_long() {
         let subscribe = |port, s| ordered("/kinocue/subscribe", vec![OscType::Int(port), OscType::Int(s)]);
-        assert_eq!(subscribe(53001, 60), Ok(Order::Subscribe { port: 53001, seconds: 60 }));
+        assert_eq!(subscribe(53001, 60), Ok(OscOrder::Subscribe { port: 53001, seconds: 60 }));
         for (port, seconds) in [(0, 60), (65_536, 60), (-1, 60), (53001, 3_601), (53001, -1)] {
             assert!(subscribe(port, seconds).is_err(), "{port} {seconds}");
         }
@@ -336,7 +344,7 @@ mod tests {
             with_value in any::<bool>(),
         ) {
             let args = if with_value { vec![OscType::Float(value)] } else { Vec::new() };
-            if let Ok(Order::Command(ask)) = ordered(&addr, args) {
+            if let Ok(OscOrder::Command(ask)) = ordered(&addr, args) {
                 let words =
                     ["go", "pause", "resume", "stop", "park", "seek", "trim", "levels", "enable", "disable"];
                 prop_assert!(words.contains(&ask.word()), "{}", ask.word());

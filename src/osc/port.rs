@@ -13,7 +13,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::counts::{Count, Counts};
 use super::feedback::warn;
-use super::order::{Fault, Order, order};
+use super::order::{OscFault, OscOrder, order};
 use super::packet::{self, Timed};
 use super::repeats::Repeats;
 use super::subscribers::Subscribers;
@@ -32,14 +32,14 @@ const MOST_TOLD: usize = 4;
 const MOST_NAMED: usize = 64;
 
 /// What became of something asked.
-struct Outcome {
+struct OscOutcome {
     from: SocketAddrV4,
     was_levels: bool,
     problem: Option<Problem>,
 }
 
 /// The port and what it remembers.
-pub(super) struct Port {
+pub(super) struct OscPortState {
     /// For what is sent, which never waits.
     out: UdpSocket,
     config: OscPort,
@@ -47,7 +47,7 @@ pub(super) struct Port {
     counts: Arc<Counts>,
     repeats: Repeats,
     subscribers: Subscribers,
-    asked: JoinSet<Outcome>,
+    asked: JoinSet<OscOutcome>,
     /// Levels are asked for one change at a time; faders that move meanwhile add up here.
     levels: LevelsChange,
     levels_asked: bool,
@@ -55,7 +55,7 @@ pub(super) struct Port {
     told: usize,
 }
 
-impl Port {
+impl OscPortState {
     pub(super) fn new(out: UdpSocket, config: OscPort, hall: Handle, counts: Arc<Counts>) -> Self {
         Self {
             out,
@@ -105,33 +105,35 @@ impl Port {
         }
     }
 
-    fn dispatch(&mut self, timed: &Timed, from: SocketAddrV4, now: MonoTime) -> Result<(), Fault> {
+    fn dispatch(&mut self, timed: &Timed, from: SocketAddrV4, now: MonoTime) -> Result<(), OscFault> {
         let Timed { message, early } = timed;
         match order(message, &self.config.allow)? {
-            Order::Released => Ok(()),
-            Order::Subscribe { port, seconds } => {
+            OscOrder::Released => Ok(()),
+            OscOrder::Subscribe { port, seconds } => {
                 self.subscribers.subscribe(SocketAddrV4::new(*from.ip(), port), seconds, now)
             }
             // A stop waits for nothing, least of all for a clock that goes wrong.
-            Order::Command(ask) if *early && ask != Command::Stop => Err(Fault::Early(message.addr.clone())),
-            Order::Command(ask) if self.repeats.is_repeat(&ask, now) => {
+            OscOrder::Command(ask) if *early && ask != Command::Stop => {
+                Err(OscFault::Early(message.addr.clone()))
+            }
+            OscOrder::Command(ask) if self.repeats.is_repeat(&ask, now) => {
                 self.counts.add(Count::Repeated);
                 Ok(())
             }
-            Order::Command(Command::Levels(change)) => self.coalesce(change, from, &message.addr),
-            Order::Command(ask) => self.ask(ask, from, &message.addr),
+            OscOrder::Command(Command::Levels(change)) => self.coalesce(change, from, &message.addr),
+            OscOrder::Command(ask) => self.ask(ask, from, &message.addr),
         }
     }
 
     /// Asks the hall, in the order of the messages, without waiting for its answer.
-    fn ask(&mut self, ask: Command, from: SocketAddrV4, address: &str) -> Result<(), Fault> {
+    fn ask(&mut self, ask: Command, from: SocketAddrV4, address: &str) -> Result<(), OscFault> {
         let is_stop = ask == Command::Stop;
         if is_stop {
             self.hall.stop();
         }
         if self.asked.len() >= MOST_ASKED {
             // A stop is done by now; what would follow is its line in the journal.
-            return if is_stop { Ok(()) } else { Err(Fault::Busy(address.to_owned())) };
+            return if is_stop { Ok(()) } else { Err(OscFault::Busy(address.to_owned())) };
         }
         let was_levels = matches!(ask, Command::Levels(_));
         let who = Who { role: Role::Operate, surface: Surface::Osc, name: from.ip().to_string() };
@@ -141,22 +143,22 @@ impl Port {
                 Ok(posted) => posted.answer().await,
                 Err(problem) => Err(problem),
             };
-            Outcome { from, was_levels, problem: answer.err() }
+            OscOutcome { from, was_levels, problem: answer.err() }
         });
         self.levels_asked |= was_levels;
         Ok(())
     }
 
     /// Changes levels, at once or as soon as the change before is through.
-    fn coalesce(&mut self, change: LevelsChange, from: SocketAddrV4, address: &str) -> Result<(), Fault> {
+    fn coalesce(&mut self, change: LevelsChange, from: SocketAddrV4, address: &str) -> Result<(), OscFault> {
         if self.levels.effects.len() + self.levels.rows.len() >= MOST_NAMED {
-            return Err(Fault::Busy(address.to_owned()));
+            return Err(OscFault::Busy(address.to_owned()));
         }
         merge(&mut self.levels, change);
         if self.levels_asked { Ok(()) } else { self.ask_levels(from, address) }
     }
 
-    fn ask_levels(&mut self, from: SocketAddrV4, address: &str) -> Result<(), Fault> {
+    fn ask_levels(&mut self, from: SocketAddrV4, address: &str) -> Result<(), OscFault> {
         let change = std::mem::take(&mut self.levels);
         if change == LevelsChange::default() {
             Ok(())
@@ -165,8 +167,8 @@ impl Port {
         }
     }
 
-    fn answered(&mut self, outcome: &Outcome) {
-        let Outcome { from, was_levels, problem } = outcome;
+    fn answered(&mut self, outcome: &OscOutcome) {
+        let OscOutcome { from, was_levels, problem } = outcome;
         match problem {
             None => self.counts.add(Count::Done),
             Some(problem) => {
@@ -182,10 +184,10 @@ impl Port {
         }
     }
 
-    fn refuse(&mut self, fault: &Fault, from: SocketAddrV4) {
+    fn refuse(&mut self, fault: &OscFault, from: SocketAddrV4) {
         self.counts.add(match fault {
-            Fault::Forbidden(_) => Count::Forbidden,
-            Fault::Early(_) => Count::Early,
+            OscFault::Forbidden(_) => Count::Forbidden,
+            OscFault::Early(_) => Count::Early,
             _ => Count::Refused,
         });
         self.tell(&fault.to_string(), from);

@@ -4,7 +4,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use std::time::Duration;
 
 use super::feedback::Said;
-use super::order::Fault;
+use super::order::OscFault;
 use crate::time::MonoTime;
 
 /// Receivers at the most.
@@ -25,7 +25,12 @@ pub(super) struct Subscribers(Vec<Subscriber>);
 
 impl Subscribers {
     /// Takes one in, or renews it, for so many seconds; 0 takes it out.
-    pub(super) fn subscribe(&mut self, to: SocketAddrV4, seconds: u16, now: MonoTime) -> Result<(), Fault> {
+    pub(super) fn subscribe(
+        &mut self,
+        to: SocketAddrV4,
+        seconds: u16,
+        now: MonoTime,
+    ) -> Result<(), OscFault> {
         let until = now + Duration::from_secs(u64::from(seconds));
         self.lapse(now);
         if seconds == 0 {
@@ -33,7 +38,7 @@ impl Subscribers {
         } else if let Some(one) = self.0.iter_mut().find(|one| one.to == to) {
             one.until = until;
         } else if self.0.len() == MOST {
-            return Err(Fault::Crowded(MOST));
+            return Err(OscFault::Crowded(MOST));
         } else {
             self.0.push(Subscriber { to, said: Said::default(), until });
         }
@@ -86,7 +91,7 @@ mod tests {
         for port in 1..=16 {
             subscribers.subscribe(to(port), if port == 1 { 10 } else { 100 }, at(0)).unwrap();
         }
-        assert_eq!(subscribers.subscribe(to(17), 10, at(9)), Err(Fault::Crowded(16)));
+        assert_eq!(subscribers.subscribe(to(17), 10, at(9)), Err(OscFault::Crowded(16)));
         assert_eq!(subscribers.subscribe(to(16), 10, at(9)), Ok(()), "it is one of them");
         assert_eq!(subscribers.subscribe(to(17), 10, at(10)), Ok(()), "the first has lapsed");
         assert_eq!(subscribers.of(Ipv4Addr::LOCALHOST).len(), 16);

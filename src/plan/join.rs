@@ -1,7 +1,7 @@
 //! Joins: a move from where a lane is onto the moving cue, met at its position, velocity and acceleration.
 
-use super::seam::{Before, SLACK, roughness_around, roughness_of_leaving};
-use super::solve::{Problem, to_position};
+use super::seam::{Before, LeastRough, SLACK, roughness_around, roughness_of_leaving};
+use super::solve::{MoveProblem, to_position};
 use super::states::following;
 use super::{AxisState, Curve, Plan, PlanError};
 use crate::motion::{Limits, Window};
@@ -31,7 +31,7 @@ pub(super) fn join(
     rate_hz: f64,
     mut before: Option<Before<'_, '_>>,
 ) -> Result<Plan, PlanError> {
-    let mut least_rough: Option<(f64, Plan)> = None;
+    let mut least_rough = LeastRough::default();
     let (mut meeting, mut smoother) = (JOIN_MIN, 0);
     let mut reason = String::new();
     while meeting <= JOIN_MAX && smoother < SMOOTHER {
@@ -42,11 +42,8 @@ pub(super) fn join(
             }
             Ok(mut plan) => {
                 let roughness = roughness(window, &mut plan, cue, start, rate_hz, before.as_deref_mut());
-                if roughness <= SLACK {
-                    return Ok(plan);
-                }
-                if least_rough.as_ref().is_none_or(|(least, _)| roughness < *least) {
-                    least_rough = Some((roughness, plan));
+                if let Some(smooth) = least_rough.smooth_or_keep(plan, roughness) {
+                    return Ok(smooth);
                 }
                 smoother += 1;
                 meeting += LATER;
@@ -58,7 +55,7 @@ pub(super) fn join(
         }
     }
     let no_join = PlanError::NoJoin { at: start, limit_s: JOIN_MAX, reason };
-    least_rough.map(|(_, plan)| plan).ok_or(no_join)
+    least_rough.into_plan().ok_or(no_join)
 }
 
 /// True if a lane at rest in its park pose can take up the cue at `start` without a move: the cue stands there in that
@@ -86,7 +83,7 @@ fn attempt(
         .zip(from.iter().zip(&to))
         .map(|((_, slot), (from, to))| raised(slot.limits, from, to))
         .collect();
-    to_position(&Problem { from, to: &to, limits: &limits, minimum_s: meeting })
+    to_position(&MoveProblem { from, to: &to, limits: &limits, minimum_s: meeting })
 }
 
 /// Ninety per cent of the limits, raised to what the present state and the target need.

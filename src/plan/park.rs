@@ -1,7 +1,7 @@
 //! Parking: from wherever a lane is and however it moves to rest in its park pose, no faster than 50 mm/s, or 10 degrees a second.
 
-use super::seam::{Before, SLACK, roughness_of_leaving};
-use super::solve::{Problem, to_position, to_velocity};
+use super::seam::{Before, LeastRough, roughness_of_leaving};
+use super::solve::{MoveProblem, to_position, to_velocity};
 use super::{AxisState, Plan, PlanError};
 use crate::motion::{AxisGeometry, Limits, SeatType, Window};
 use crate::time::ShowTime;
@@ -27,7 +27,7 @@ pub(super) fn park(
     pace: f64,
     mut before: Option<Before<'_, '_>>,
 ) -> Result<Plan, PlanError> {
-    let mut least_rough: Option<(f64, Plan)> = None;
+    let mut least_rough = LeastRough::default();
     let mut refused = None;
     // Where the pace was changing, that shows as jerk too.
     let shares = if pace == 1.0 { &SHARES[..] } else { &SHARES[1..] };
@@ -50,14 +50,11 @@ pub(super) fn park(
             .as_deref_mut()
             .map(|before| roughness_of_leaving(window, &mut plan, start, rate_hz, before));
         let roughness = leaving.unwrap_or(0.0);
-        if roughness <= SLACK {
-            return Ok(plan);
-        }
-        if least_rough.as_ref().is_none_or(|(least, _)| roughness < *least) {
-            least_rough = Some((roughness, plan));
+        if let Some(smooth) = least_rough.smooth_or_keep(plan, roughness) {
+            return Ok(smooth);
         }
     }
-    least_rough.map(|(_, plan)| plan).ok_or_else(|| PlanError::NoStop(refused.unwrap_or_default()))
+    least_rough.into_plan().ok_or_else(|| PlanError::NoStop(refused.unwrap_or_default()))
 }
 
 fn target(window: &Window) -> Vec<AxisState> {
@@ -68,7 +65,8 @@ fn target(window: &Window) -> Vec<AxisState> {
 fn stop_first(window: &Window, from: &[AxisState]) -> Result<Plan, String> {
     let limits: Vec<Limits> =
         window.moving().zip(from).map(|((_, slot), from)| stopping(slot.limits, from, 1.0)).collect();
-    let mut stop = to_velocity(&Problem { from, to: &target(window), limits: &limits, minimum_s: 0.001 })?;
+    let mut stop =
+        to_velocity(&MoveProblem { from, to: &target(window), limits: &limits, minimum_s: 0.001 })?;
     let ends = stop.seconds();
     let stopped: Vec<AxisState> =
         stop.position_at(ends).iter().map(|position| AxisState::at_rest(*position)).collect();
@@ -98,7 +96,7 @@ fn straight(window: &Window, from: &[AxisState], share: f64) -> Result<Plan, Str
             ..stopping(slot.limits, from, share)
         })
         .collect();
-    to_position(&Problem { from, to: &target(window), limits: &limits, minimum_s: 0.001 })
+    to_position(&MoveProblem { from, to: &target(window), limits: &limits, minimum_s: 0.001 })
 }
 
 /// A share of the seat's own limits, raised to the acceleration it has.

@@ -65,7 +65,7 @@ pub struct Planner {
 }
 
 /// One lane as its leg is planned.
-struct Task<'a> {
+struct LaneTask<'a> {
     index: usize,
     /// Its window, at its level.
     window: Window,
@@ -75,9 +75,9 @@ struct Task<'a> {
     to: To,
 }
 
-impl Task<'_> {
+impl LaneTask<'_> {
     /// True if a leg made for the other serves this one as well: the seats of a hall are mostly alike.
-    fn is_like(&self, other: &Task<'_>) -> bool {
+    fn is_like(&self, other: &LaneTask<'_>) -> bool {
         self.window == other.window
             && self.to == other.to
             && self.scene.out == other.scene.out
@@ -99,7 +99,7 @@ impl Planner {
     /// [`PlanError`] where a lane's move cannot be planned; nothing is remembered then.
     pub fn plan(&mut self, request: &Request, curve: &Curve<'_>) -> Result<Course, PlanError> {
         let mut old = self.course_of(request.from)?;
-        let mut tasks: Vec<Task<'_>> = Vec::with_capacity(self.windows.len());
+        let mut tasks: Vec<LaneTask<'_>> = Vec::with_capacity(self.windows.len());
         let mut legs: Vec<Leg> = Vec::with_capacity(self.windows.len());
         for index in 0..self.windows.len() {
             let task = self.task(index, request, old.as_mut(), curve)?;
@@ -128,7 +128,7 @@ impl Planner {
         request: &'a Request,
         old: Option<&mut Course>,
         curve: &Curve<'_>,
-    ) -> Result<Task<'a>, PlanError> {
+    ) -> Result<LaneTask<'a>, PlanError> {
         let scene = request.scene.lanes.get(index).ok_or(PlanError::UnknownLane(index))?;
         let window = self.windows[index].at_level(scene.level);
         let keeps =
@@ -150,12 +150,12 @@ impl Planner {
             }
             (Place::Away, ..) => Vec::new(),
         };
-        Ok(Task { index, window, scene, states, to })
+        Ok(LaneTask { index, window, scene, states, to })
     }
 
     fn leg(
         &self,
-        task: &Task<'_>,
+        task: &LaneTask<'_>,
         request: &Request,
         curve: &Curve<'_>,
         old: Option<&mut Course>,
@@ -167,12 +167,12 @@ impl Planner {
 
     fn lane_move(
         &self,
-        task: &Task<'_>,
+        task: &LaneTask<'_>,
         request: &Request,
         curve: &Curve<'_>,
         old: Option<&mut Course>,
     ) -> Result<Option<Plan>, PlanError> {
-        let Task { index, window, states: from, .. } = task;
+        let LaneTask { index, window, states: from, .. } = task;
         let (start, rate_hz) = (request.start, self.rate_hz);
         let parked =
             window.moving().zip(from).all(|((_, slot), from)| *from == AxisState::at_rest(slot.park));

@@ -16,6 +16,33 @@ pub(super) type Before<'a, 'b> = &'a mut (dyn FnMut(ShowTime) -> Pose + 'b);
 /// Where the frames fall against a seam is not known beforehand: so many phases of the grid are looked at.
 const PHASES: i64 = 4;
 
+/// Of plans that the measure sees a seam of, the least rough.
+#[derive(Default)]
+pub(super) struct LeastRough(Option<(f64, Plan)>);
+
+impl LeastRough {
+    /// Gives a plan back whose seam the measure does not see; else keeps it, if it is less rough than those before.
+    pub(super) fn smooth_or_keep(&mut self, plan: Plan, roughness: f64) -> Option<Plan> {
+        if roughness <= SLACK {
+            return Some(plan);
+        }
+        if self.0.as_ref().is_none_or(|(least, _)| roughness < *least) {
+            self.0 = Some((roughness, plan));
+        }
+        None
+    }
+
+    /// True if there is none.
+    pub(super) const fn is_none(&self) -> bool {
+        self.0.is_none()
+    }
+
+    /// That plan; `None` if there is none.
+    pub(super) fn into_plan(self) -> Option<Plan> {
+        self.0.map(|(_, plan)| plan)
+    }
+}
+
 /// The worst of velocity, acceleration and jerk around an instant: 1 is just within the limits. A move that meets a fast cue
 /// while it slows down was faster before.
 pub(super) fn roughness_around(

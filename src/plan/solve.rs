@@ -18,7 +18,7 @@ const MISSED: f64 = 1e-5;
 const ROUNDING: f64 = 1e-6;
 
 /// What is asked of the solver, axis by axis.
-pub(super) struct Problem<'a> {
+pub(super) struct MoveProblem<'a> {
     pub(super) from: &'a [AxisState],
     /// Positions are ignored where only a velocity is to be reached.
     pub(super) to: &'a [AxisState],
@@ -27,18 +27,22 @@ pub(super) struct Problem<'a> {
 }
 
 /// A move to the target, all axes arriving together where that can be had, inside the stroke.
-pub(super) fn to_position(problem: &Problem<'_>) -> Result<Plan, String> {
+pub(super) fn to_position(problem: &MoveProblem<'_>) -> Result<Plan, String> {
     solve(problem, Synchronization::Time, ControlInterface::Position)
         .or_else(|_| solve(problem, Synchronization::None, ControlInterface::Position))
 }
 
 /// A move that only reaches the target's velocity; the position is where it ends. Without limits of position, because
 /// the solver gives no best effort where the end of the stroke cannot be kept; poses are held inside it later.
-pub(super) fn to_velocity(problem: &Problem<'_>) -> Result<Plan, String> {
+pub(super) fn to_velocity(problem: &MoveProblem<'_>) -> Result<Plan, String> {
     solve(problem, Synchronization::None, ControlInterface::Velocity)
 }
 
-fn solve(problem: &Problem<'_>, sync: Synchronization, interface: ControlInterface) -> Result<Plan, String> {
+fn solve(
+    problem: &MoveProblem<'_>,
+    sync: Synchronization,
+    interface: ControlInterface,
+) -> Result<Plan, String> {
     let axes = problem.from.len();
     let mut input = InputParameter::<0>::new(Some(axes));
     input.synchronization = sync;
@@ -72,7 +76,7 @@ fn solve(problem: &Problem<'_>, sync: Synchronization, interface: ControlInterfa
 }
 
 /// The plan, if it ends where it was to: of a minimum duration the solver sometimes makes a move that does not, and says nothing.
-fn arrived(problem: &Problem<'_>, mut plan: Plan, interface: ControlInterface) -> Result<Plan, String> {
+fn arrived(problem: &MoveProblem<'_>, mut plan: Plan, interface: ControlInterface) -> Result<Plan, String> {
     let ends = plan.seconds();
     let misses = |(ends, to): (AxisState, &AxisState)| {
         let position =
@@ -85,7 +89,7 @@ fn arrived(problem: &Problem<'_>, mut plan: Plan, interface: ControlInterface) -
     Ok(plan)
 }
 
-fn snapped(problem: &Problem<'_>, axis: usize) -> AxisState {
+fn snapped(problem: &MoveProblem<'_>, axis: usize) -> AxisState {
     let (from, to) = (problem.from[axis], problem.to[axis]);
     let snap = |from: f64, to: f64| if (from - to).abs() < SAME { from } else { to };
     AxisState {

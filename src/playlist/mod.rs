@@ -65,7 +65,7 @@ pub(crate) struct Entry {
     /// When it starts by the wall clock; `None` if a person starts it, or the entry before goes on to it.
     pub(crate) at: Option<At>,
     /// Where the file says what has to be looked up elsewhere.
-    pub(crate) places: Places,
+    pub(crate) places: EntryPlaces,
 }
 
 /// The film of an entry.
@@ -88,7 +88,7 @@ pub(crate) struct At {
 
 /// Lines and columns of an entry, counted from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct Places {
+pub(crate) struct EntryPlaces {
     cue: (usize, usize),
     preset: (usize, usize),
     effects: (usize, usize),

@@ -7,7 +7,7 @@ use jiff::civil::Time;
 use jiff::tz::TimeZone;
 use toml::de::DeTable;
 
-use super::{At, Entry as PlaylistEntry, EntryFilm, Places, Playlist, Then};
+use super::{At, Entry as PlaylistEntry, EntryFilm, EntryPlaces, Playlist, Then};
 use crate::config::{ConfigFaults, Entry, Faults, Section, level, stays_below, switches, trim};
 use crate::film::timecode::Label;
 use crate::library::CueId;
@@ -126,7 +126,7 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<PlaylistEntry> {
         effects,
         then: then.unwrap_or_default(),
         at,
-        places: Places {
+        places: EntryPlaces {
             cue: place("cue"),
             preset: place("preset"),
             effects: place("effects"),

@@ -3,7 +3,7 @@
 use super::text::number;
 use super::{Band, Flag, Lane, Mark, Panel, Picture, Scale, Shade, TimeAxis};
 use crate::channel;
-use crate::cue::{Effects, Place, Step, Vibration};
+use crate::cue::{Effects, Place, TrackStep, Vibration};
 use crate::motion::{AxisGeometry, SeatAxis};
 use crate::proof::{AxisStrain, Quantity, SLACK, strains};
 use crate::time::{Rate, ShowTime};
@@ -252,7 +252,7 @@ impl View<'_> {
                     .filled(steps.as_slice().iter().map(|step| (step.at, full(step.value >> bit & 1 == 1)))),
                 Effects::Words(steps) => {
                     let bit = usage.name.trim_start_matches('Y').parse::<u32>().unwrap_or(1) - 1;
-                    let on = |step: &Step<u16>| (step.at, full(step.value >> bit & 1 == 1));
+                    let on = |step: &TrackStep<u16>| (step.at, full(step.value >> bit & 1 == 1));
                     self.filled(steps.as_slice().iter().map(on))
                 }
             };

@@ -27,7 +27,7 @@ pub(crate) struct LinkSurvey {
     pub(crate) fault: Option<SerialError>,
     /// What nine of ten answers took to begin at the most; none where nobody answered.
     pub(crate) delay: Option<Duration>,
-    /// What came over it.
+    /// What came over it meanwhile: what was on the line before is no trouble of now.
     pub(crate) counts: TalkCounts,
     /// What SilverMax units told, by their numbers.
     pub(crate) units: BTreeMap<u8, Result<UnitFacts, TalkFault>>,
@@ -45,7 +45,7 @@ impl LinkSurvey {
 impl LinkSurvey {
     /// What the SilverMax units among those motors tell; nobody is asked any more once the port is gone.
     pub(crate) fn of_units<P: LinkPort>(talk: &mut silvermax::Talk<P>, motors: &[&Motors]) -> Self {
-        let mut units = BTreeMap::new();
+        let (mut units, before) = (BTreeMap::new(), talk.counts());
         for unit in motors.iter().flat_map(|motors| motors.units()) {
             let facts = silvermax::look(talk, *unit);
             let is_gone = matches!(facts, Err(TalkFault::Link(_)));
@@ -54,7 +54,7 @@ impl LinkSurvey {
                 break;
             }
         }
-        Self { delay: talk.usual_delay(), counts: talk.counts(), units, ..Self::default() }
+        Self { delay: talk.usual_delay(), counts: talk.counts().since(before), units, ..Self::default() }
     }
 
     /// The same of SIXpack 2 units.
@@ -64,7 +64,7 @@ impl LinkSurvey {
             let Motors::Sixpack2 { unit, motors } = motors else { continue };
             asked.entry(*unit).or_default().extend(motors);
         }
-        let mut sixpacks = BTreeMap::new();
+        let (mut sixpacks, before) = (BTreeMap::new(), talk.counts());
         for (unit, motors) in asked {
             let facts = sixpack2::look_for(talk, unit, &motors);
             let is_gone = matches!(facts, Err(sixpack2::TalkFault::Link(_)));
@@ -73,7 +73,7 @@ impl LinkSurvey {
                 break;
             }
         }
-        Self { delay: talk.usual_delay(), counts: talk.counts(), sixpacks, ..Self::default() }
+        Self { delay: talk.usual_delay(), counts: talk.counts().since(before), sixpacks, ..Self::default() }
     }
 }
 

@@ -34,7 +34,7 @@ pub use crate::checks::Check;
 pub(crate) use crate::checks::{Family, Severity};
 pub(crate) use answers::round_trip;
 pub(crate) use drives::{DriveSubject, LinkSurvey};
-pub(crate) use subject::{Subject, Terms, wanted};
+pub(crate) use subject::{ShowTerms, Subject, wanted};
 
 /// One thing that was found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -76,7 +76,11 @@ impl Notes {
 /// Judges all controllers: what was found of each, in the order of `subjects`, the gravest first. `accepted` is what the
 /// hall accepts of any of them.
 #[must_use]
-pub(crate) fn judge(subjects: &[Subject<'_>], terms: &Terms, accepted: &[Acceptance]) -> Vec<Vec<Finding>> {
+pub(crate) fn judge(
+    subjects: &[Subject<'_>],
+    terms: &ShowTerms,
+    accepted: &[Acceptance],
+) -> Vec<Vec<Finding>> {
     let mut all: Vec<Notes> = subjects.iter().map(|subject| one(subject, terms)).collect();
     identity::judge_together(subjects, &mut all);
     geometry::judge_together(subjects, &mut all);
@@ -105,7 +109,7 @@ fn sorted(Notes(mut findings): Notes, own: &[Acceptance], hall: &[Acceptance]) -
     findings
 }
 
-fn one(subject: &Subject<'_>, terms: &Terms) -> Notes {
+fn one(subject: &Subject<'_>, terms: &ShowTerms) -> Notes {
     let mut notes = Notes::default();
     network::judge_way(subject, terms, &mut notes);
     answers::judge(subject, &mut notes);

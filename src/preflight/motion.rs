@@ -1,10 +1,10 @@
 //! How a controller takes frames: what it does with their Time, with a backlog, with silence, and with positions.
 
-use super::{Check, Notes, Subject, Terms};
+use super::{Check, Notes, ShowTerms, Subject};
 use crate::plan::slow_park_time;
 use crate::wire::Dialect;
 
-pub(super) fn judge(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+pub(super) fn judge(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     judge_interval(subject, terms, notes);
     if let Some(after) = subject.pa(0x0d).filter(|after| *after != 0) {
         let found = format!(
@@ -55,7 +55,7 @@ fn judge_source(subject: &Subject<'_>, notes: &mut Notes) {
 }
 
 /// Frames that come faster than the drives are told wait in the controller.
-fn judge_bus(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+fn judge_bus(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     let Some(ms) = subject.pa(0x59) else { return };
     let period = 1e3 / terms.rate_hz;
     if f64::from(ms) > period {
@@ -80,7 +80,7 @@ fn judge_signed(subject: &Subject<'_>, notes: &mut Notes) {
 
 /// By how much the seat is behind its frames. No manual gives the formula of the filter, nor the unit of the delays: the
 /// least and the most that they may mean.
-fn judge_delay(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+fn judge_delay(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     let value = |number| subject.pa(number).unwrap_or(0);
     let (what, least, most) = match subject.controller.connection.dialect {
         Dialect::Mbox => {
@@ -109,7 +109,7 @@ fn judge_delay(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
 }
 
 /// Every Time that is sent has to be executed as it is.
-fn judge_interval(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+fn judge_interval(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     let Some(most) = subject.pa(0x0b) else { return };
     if most == 0 {
         if subject.controller.connection.dialect == Dialect::Mbox {

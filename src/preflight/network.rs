@@ -1,9 +1,9 @@
 //! The way to a controller and back.
 
-use super::{Check, Notes, Subject, Terms};
+use super::{Check, Notes, ShowTerms, Subject};
 
 /// True if datagrams get there, whole.
-pub(super) fn judge_way(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+pub(super) fn judge_way(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     let address = subject.controller.connection.address;
     match &subject.route {
         Err(why) => {
@@ -22,7 +22,7 @@ pub(super) fn judge_way(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes)
 }
 
 /// True if its answers come here.
-pub(super) fn judge_replies(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+pub(super) fn judge_replies(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     if let (Ok(route), Some(host)) = (&subject.route, subject.ip(0x20))
         && host != route.local
     {

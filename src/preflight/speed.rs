@@ -11,13 +11,13 @@ const MARGIN: f64 = 1.1;
 const SLACK: f64 = 0.999;
 
 /// The lowest limit of an axis.
-struct Limit {
+struct SpeedLimit {
     axis: usize,
     rpm: f64,
     source: String,
 }
 
-impl Limit {
+impl SpeedLimit {
     /// What it is for the turns that the axis needs.
     fn share(&self, subject: &Subject<'_>) -> f64 {
         self.rpm / geometry(subject, self.axis).needed_rpm()
@@ -52,10 +52,10 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         );
     }
     judge_axes_of_their_own(subject, notes);
-    let mut limits: Vec<Limit> =
+    let mut limits: Vec<SpeedLimit> =
         (0..subject.working_axes()).filter_map(|axis| limit(subject, axis)).collect();
     limits.sort_by(|a, b| a.share(subject).total_cmp(&b.share(subject)));
-    let needed = |limit: &Limit| geometry(subject, limit.axis).needed_rpm().ceil();
+    let needed = |limit: &SpeedLimit| geometry(subject, limit.axis).needed_rpm().ceil();
     if let Some(slowest) = limits.first().filter(|limit| limit.share(subject) < SLACK) {
         let unit = geometry(subject, slowest.axis).unit.name();
         let remedy =
@@ -85,7 +85,7 @@ fn needed_rpm(subject: &Subject<'_>) -> f64 {
 }
 
 /// The lowest of PA07, PA80.. and PAa0.. times PAb0.. (SMC manual 5.10); those of 0 set none.
-fn limit(subject: &Subject<'_>, axis: usize) -> Option<Limit> {
+fn limit(subject: &Subject<'_>, axis: usize) -> Option<SpeedLimit> {
     let product =
         own(subject, 0xa0, axis).zip(own(subject, 0xb0, axis)).map(|(a, b)| u32::from(a) * u32::from(b));
     let limits = [
@@ -95,7 +95,7 @@ fn limit(subject: &Subject<'_>, axis: usize) -> Option<Limit> {
     ];
     let set = limits.into_iter().filter_map(|(rpm, source)| Some((rpm.filter(|rpm| *rpm > 0)?, source)));
     let (rpm, source) = set.min_by_key(|(rpm, _)| *rpm)?;
-    Some(Limit { axis, rpm: f64::from(rpm), source })
+    Some(SpeedLimit { axis, rpm: f64::from(rpm), source })
 }
 
 /// A register that each of the first six axes has.

@@ -2,7 +2,7 @@
 
 use std::net::SocketAddrV4;
 
-use super::{Check, Notes, Subject, Terms};
+use super::{Check, Notes, ShowTerms, Subject};
 use crate::device::survey::LISTEN;
 use crate::wire::{DeviceError, Dialect, ReplyCode};
 
@@ -13,7 +13,7 @@ const SLOWEST_BEAT_MS: u16 = 100;
 const HOST: u8 = 0x20;
 const SECOND_HOST: u8 = 0x25;
 
-pub(super) fn judge(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+pub(super) fn judge(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     judge_state(subject, notes);
     if subject.controller.connection.dialect == Dialect::Smc {
         judge_reports(subject, terms, notes);
@@ -67,7 +67,7 @@ fn add_error(found: &str, notes: &mut Notes) {
     );
 }
 
-fn judge_reports(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+fn judge_reports(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     match subject.pa(0x1f) {
         Some(1) | None => {}
         Some(2) => judge_second_host(subject, terms, notes),
@@ -102,7 +102,7 @@ fn judge_reports(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
     }
 }
 
-fn judge_second_host(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+fn judge_second_host(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     let (Ok(route), Some(to)) = (&subject.route, host(subject, SECOND_HOST)) else { return };
     let here = SocketAddrV4::new(route.local, terms.frame_port);
     if to != here {
@@ -112,7 +112,7 @@ fn judge_second_host(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
 }
 
 /// True if its reports, if there are any, come here.
-fn report_to_here(subject: &Subject<'_>, terms: &Terms) -> bool {
+fn report_to_here(subject: &Subject<'_>, terms: &ShowTerms) -> bool {
     let to = match subject.pa(0x1f) {
         Some(1) => host(subject, HOST),
         Some(2) => host(subject, SECOND_HOST),

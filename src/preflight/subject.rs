@@ -33,7 +33,7 @@ pub(crate) struct Subject<'a> {
 
 /// What a show will ask of the controllers.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Terms {
+pub(crate) struct ShowTerms {
     /// The port that controllers answer to; 0 if it is another each time.
     pub(crate) frame_port: u16,
     /// Frames a second.
@@ -105,7 +105,7 @@ impl Subject<'_> {
     }
 }
 
-impl Terms {
+impl ShowTerms {
     /// The largest Time of the show's own frames, ms.
     #[must_use]
     pub(crate) fn frame_time_ms(&self) -> u32 {

@@ -4,7 +4,7 @@ use std::net::Ipv4Addr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{Finding, Subject, Terms, judge, wanted};
+use super::{Finding, ShowTerms, Subject, judge, wanted};
 use crate::config::{Controller, Station, from_to_args};
 use crate::device::home::DPF0;
 use crate::device::survey::{ROUNDS, Survey};
@@ -32,7 +32,7 @@ pub(super) struct Case {
     pub(super) axes: Option<usize>,
     pub(super) survey: Survey,
     pub(super) route: Result<Route, String>,
-    pub(super) terms: Terms,
+    pub(super) terms: ShowTerms,
 }
 
 impl Case {
@@ -64,7 +64,7 @@ impl Case {
             axes: Some(3),
             survey,
             route: Ok(Route { local: HOST, mtu: 1_500 }),
-            terms: Terms { frame_port: PORT, rate_hz: 100.0, cue: None },
+            terms: ShowTerms { frame_port: PORT, rate_hz: 100.0, cue: None },
         }
     }
 

@@ -1,7 +1,7 @@
 //! One axis of the cue on one seat: position, velocity, acceleration and jerk, up to rest after the last pose.
 
 use super::end::{Allowed, NoRest, no_rest};
-use super::pieces::{At, Pieces, extremes};
+use super::pieces::{At, AxisPieces, extremes};
 use super::stencil::{Stencils, step_limit};
 use super::sweep::{Swept, sweep};
 use super::violation::{Breach, Quantity};
@@ -79,7 +79,7 @@ impl Subject<'_> {
 
     /// Proves the axis; what is broken goes to `found`.
     pub(super) fn prove(&self, terms: &Terms, stencils: &Stencils, found: &mut Vec<Found>) -> AxisProof {
-        let pieces = Pieces::new(self.timeline, self.axis, &self.slot);
+        let pieces = AxisPieces::new(self.timeline, self.axis, &self.slot);
         let Allowed { limits, step, .. } = self.allowed(terms);
         let mut judge = |quantity, stencils: &[_], order, limit: f64| {
             let swept = sweep(&pieces, stencils, order, limit * SLACK);
@@ -130,7 +130,7 @@ impl Subject<'_> {
         }
     }
 
-    fn restless(&self, pieces: &Pieces, no_rest: NoRest) -> Found {
+    fn restless(&self, pieces: &AxisPieces, no_rest: NoRest) -> Found {
         let (&AxisGeometry { unit, low, high, .. }, mm) = (self.geometry(), self.geometry().stroke());
         let seat = self.seat();
         let at = ShowTime::from_nanos(pieces.end());

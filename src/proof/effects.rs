@@ -4,18 +4,18 @@ use std::time::Duration;
 
 use super::violation::Breach;
 use super::{Found, LimitedEffect, Terms};
-use crate::cue::{Effects, Step};
+use crate::cue::{Effects, TrackStep};
 use crate::time::{ShowTime, nanos};
 use crate::timeline::Timeline;
 
 /// A time for which an effect is on.
 #[derive(Debug, Clone, Copy)]
-struct Run {
+struct EffectRun {
     from: ShowTime,
     until: ShowTime,
 }
 
-impl Run {
+impl EffectRun {
     fn length(&self) -> Duration {
         Duration::from_nanos(self.until.as_nanos().abs_diff(self.from.as_nanos()))
     }
@@ -44,7 +44,7 @@ pub(super) fn prove(timeline: &Timeline, terms: &Terms, found: &mut Vec<Found>) 
 }
 
 /// When the effect is on, in order of time.
-fn runs(timeline: &Timeline, effect: &LimitedEffect) -> Vec<Run> {
+fn runs(timeline: &Timeline, effect: &LimitedEffect) -> Vec<EffectRun> {
     let end = timeline.duration();
     match timeline.cue().effects() {
         Effects::Named { names, steps } => match names.iter().position(|name| *name == effect.limit.name) {
@@ -55,13 +55,13 @@ fn runs(timeline: &Timeline, effect: &LimitedEffect) -> Vec<Run> {
     }
 }
 
-fn on_while<T: Copy>(steps: &[Step<T>], end: ShowTime, is_on: impl Fn(T) -> bool) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
+fn on_while<T: Copy>(steps: &[TrackStep<T>], end: ShowTime, is_on: impl Fn(T) -> bool) -> Vec<EffectRun> {
+    let mut runs: Vec<EffectRun> = Vec::new();
     for (index, step) in steps.iter().enumerate().filter(|(_, step)| is_on(step.value)) {
         let until = steps.get(index + 1).map_or(end, |next| next.at);
         match runs.last_mut().filter(|last| last.until == step.at) {
             Some(last) => last.until = until,
-            None => runs.push(Run { from: step.at, until }),
+            None => runs.push(EffectRun { from: step.at, until }),
         }
     }
     runs
@@ -69,7 +69,7 @@ fn on_while<T: Copy>(steps: &[Step<T>], end: ShowTime, is_on: impl Fn(T) -> bool
 
 /// Frames can only switch every period, wherever they fall: a run is on in as many frames as there are whole periods in it,
 /// or in one more.
-fn wrong_length(run: &Run, effect: &LimitedEffect, period: Duration) -> Option<Breach> {
+fn wrong_length(run: &EffectRun, effect: &LimitedEffect, period: Duration) -> Option<Breach> {
     let (at, on, limit) = (run.from, run.length(), &effect.limit);
     let frames = nanos(on) / nanos(period);
     let shortest = Duration::from_nanos(frames * nanos(period));
@@ -82,14 +82,15 @@ fn wrong_length(run: &Run, effect: &LimitedEffect, period: Duration) -> Option<B
 }
 
 /// The busiest window, where it is too busy: one that begins where a run begins, or ends where one ends.
-fn too_busy(runs: &[Run], effect: &LimitedEffect) -> Option<(ShowTime, Breach)> {
+fn too_busy(runs: &[EffectRun], effect: &LimitedEffect) -> Option<(ShowTime, Breach)> {
     let (most, window) = (effect.limit.max_duty?, effect.limit.duty_window);
     let starts = runs.iter().flat_map(|run| [run.from, run.until - window]);
     let on = |from: ShowTime| -> f64 {
         let until = from + window;
         let first = runs.partition_point(|run| run.until <= from);
         let within = runs[first..].iter().take_while(|run| run.from < until);
-        let parts = within.map(|run| Run { from: run.from.max(from), until: run.until.min(until) }.length());
+        let parts =
+            within.map(|run| EffectRun { from: run.from.max(from), until: run.until.min(until) }.length());
         parts.sum::<Duration>().as_secs_f64()
     };
     let busiest = starts.map(|from| (from, on(from) / window.as_secs_f64()));

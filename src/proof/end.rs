@@ -8,7 +8,7 @@
 //! the last pose alone, as far as the curve itself keeps the limits; where only the measure does, because a corner is too
 //! short for it, the gate finds the stop that the measure takes no more of than of the corner.
 
-use super::pieces::Pieces;
+use super::pieces::AxisPieces;
 use super::stencil::{Stencil, Stencils};
 use super::sweep::sweep;
 use super::{Quantity, SLACK};
@@ -52,7 +52,7 @@ pub(super) struct Allowed {
 }
 
 /// Why the axis cannot come to rest after its last pose; nothing where it can, or rests.
-pub(super) fn no_rest(pieces: &Pieces, allowed: &Allowed, stencils: &Stencils) -> Option<NoRest> {
+pub(super) fn no_rest(pieces: &AxisPieces, allowed: &Allowed, stencils: &Stencils) -> Option<NoRest> {
     let from = pieces.last_motion();
     if from.velocity == 0.0 && from.acceleration == 0.0 {
         return None;
@@ -69,7 +69,7 @@ pub(super) fn no_rest(pieces: &Pieces, allowed: &Allowed, stencils: &Stencils) -
 }
 
 /// What the gentlest way to rest breaks, if it does.
-fn too_rough(pieces: &Pieces, from: AxisState, allowed: &Allowed, stencils: &Stencils) -> Option<NoRest> {
+fn too_rough(pieces: &AxisPieces, from: AxisState, allowed: &Allowed, stencils: &Stencils) -> Option<NoRest> {
     let limits = allowed.limits;
     let reach = stencils.reach();
     let ending = pieces.ending(reach, 1.0, 0.0);

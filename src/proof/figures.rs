@@ -1,7 +1,7 @@
 //! What each axis of a cue asks of the seat that takes it: the figures that people judge a cue by, measured as the proof
 //! measures, however the frames fall.
 
-use super::pieces::Pieces;
+use super::pieces::AxisPieces;
 use super::stencil::{Stencil, Stencils};
 use super::sweep::sweep;
 use crate::motion::SeatAxis;
@@ -36,7 +36,7 @@ pub fn figures(timeline: &Timeline, rate: Rate, seats: &[SeatAxis]) -> Vec<AxisF
 
 fn of_axis(timeline: &Timeline, axis: usize, on: &SeatAxis, stencils: &Stencils) -> AxisFigures {
     let slot = timeline.unit(axis).slot(&on.seat, on.index, Some(axis));
-    let pieces = Pieces::new(timeline, axis, &slot);
+    let pieces = AxisPieces::new(timeline, axis, &slot);
     of_pieces(timeline, axis, on, stencils, &pieces)
 }
 
@@ -46,7 +46,7 @@ pub(super) fn of_pieces(
     axis: usize,
     on: &SeatAxis,
     stencils: &Stencils,
-    pieces: &Pieces,
+    pieces: &AxisPieces,
 ) -> AxisFigures {
     let slot = timeline.unit(axis).slot(&on.seat, on.index, Some(axis));
     let stroke = on.geometry().stroke();

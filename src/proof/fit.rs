@@ -3,7 +3,7 @@
 
 use super::ease::eased;
 use super::end::no_rest;
-use super::pieces::Pieces;
+use super::pieces::AxisPieces;
 use super::smooth::{Resampled, Smoothing};
 use super::stencil::Stencils;
 use super::{Breach, Digest, Proof, SLACK, Subject, Terms, prove, subjects};
@@ -23,7 +23,7 @@ const HALVINGS: usize = 12;
 
 /// How a cue is made to fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Manner {
+pub(crate) struct FitManner {
     /// True if each axis has its own amplitude; else all have the least of them, so that they keep their proportions.
     pub(crate) per_axis: bool,
     /// True if a low-pass may help.
@@ -32,7 +32,7 @@ pub(crate) struct Manner {
 
 /// A change of position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Change {
+pub(crate) struct PositionChange {
     /// How far, in the unit of the axis.
     pub(crate) by: f64,
     /// The axis, from 0.
@@ -53,7 +53,7 @@ pub(crate) struct Fitted {
     /// The low-pass, where one was used.
     pub(crate) smoothing: Option<Smoothing>,
     /// The largest change of a position.
-    pub(crate) change: Change,
+    pub(crate) change: PositionChange,
     /// How many stretches of vibration swing less than they did.
     pub(crate) lowered: usize,
     /// Of the cue as it was.
@@ -92,7 +92,7 @@ fn list(broken: &[String]) -> String {
 ///
 /// # Errors
 /// [`FitError`].
-pub(crate) fn fit(timeline: Timeline, terms: &Terms, manner: Manner) -> Result<Fitted, FitError> {
+pub(crate) fn fit(timeline: Timeline, terms: &Terms, manner: FitManner) -> Result<Fitted, FitError> {
     let before = prove(&timeline, terms.clone());
     refuse_others(&before)?;
     let mut best = best_of(&timeline, timeline.cue().clone(), terms, manner);
@@ -136,11 +136,11 @@ struct Candidate {
     factors: Vec<f64>,
     eased_s: Option<f64>,
     smoothing: Option<Smoothing>,
-    change: Change,
+    change: PositionChange,
 }
 
 /// The way that changes `original` least of those that make `cue` fit.
-fn best_of(original: &Timeline, cue: Cue, terms: &Terms, manner: Manner) -> Option<Candidate> {
+fn best_of(original: &Timeline, cue: Cue, terms: &Terms, manner: FitManner) -> Option<Candidate> {
     let plain = amplitude(original, cue.clone(), terms, manner.per_axis);
     let needs_none = plain.as_ref().is_some_and(|plain| plain.factors.iter().all(|factor| *factor == 1.0));
     if needs_none || !manner.smooth {
@@ -244,7 +244,7 @@ fn within_stroke(subject: &Subject<'_>) -> f64 {
 
 /// How much of its amplitude an axis may keep to come to rest after its last pose.
 fn able_to_rest(subject: &Subject<'_>, terms: &Terms, stencils: &Stencils) -> f64 {
-    let pieces = Pieces::new(subject.timeline, subject.axis, &subject.slot);
+    let pieces = AxisPieces::new(subject.timeline, subject.axis, &subject.slot);
     let allowed = subject.allowed(terms);
     let rests = |factor: f64| {
         no_rest(&pieces.ending(stencils.reach(), factor, subject.slot.neutral), &allowed, stencils).is_none()
@@ -284,7 +284,7 @@ fn scale(cue: &Cue, factors: &[f64], neutral: &[f64; MAX_AXES]) -> Cue {
 }
 
 /// Where a cue stands farthest from where it stood, at its rows.
-fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
+fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> PositionChange {
     let mut per_unit = [0.0; MAX_AXES];
     for part in &terms.parts {
         for (axis, geometry) in part.axes.clone().zip(&part.seat.each).filter(|(axis, _)| *axis < MAX_AXES) {
@@ -292,13 +292,13 @@ fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
         }
     }
     let mut hint = crate::timeline::Hint::default();
-    let mut most = Change::default();
+    let mut most = PositionChange::default();
     for (row, &at) in cue.times().iter().enumerate() {
         let before = original.sample(at, &mut hint);
         for (axis, after) in cue.row(row).iter().enumerate() {
             let change = (after - before[axis]).abs() * per_unit[axis];
             if change > most.by {
-                most = Change { by: change, axis, at };
+                most = PositionChange { by: change, axis, at };
             }
         }
     }
@@ -318,7 +318,7 @@ fn lower_vibration(cue: Cue, terms: &Terms) -> (Cue, usize) {
         (0..timeline.axes()).map(|axis| steps(axis).map(|step| step.value.into()).collect()).collect();
     for subject in subjects(&timeline, terms) {
         let Some(track) = tracks.get_mut(subject.axis) else { continue };
-        let pieces = Pieces::new(&timeline, subject.axis, &subject.slot);
+        let pieces = AxisPieces::new(&timeline, subject.axis, &subject.slot);
         let Some(under) = subject.under(&pieces, terms, &stencils) else { continue };
         for (index, vibration) in track.iter_mut().enumerate() {
             if let Some(most) = subject.most_amplitude(&under, terms, index)

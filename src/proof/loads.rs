@@ -1,9 +1,9 @@
 //! What an axis does at most, stretch by stretch of show time and however the frames fall: what changes of pace and level,
 //! and vibration, are put on top of.
 
-use super::pieces::{Pieces, seconds};
+use super::pieces::{AxisPieces, seconds};
 use super::stencil::{Stencil, Stencils};
-use super::sweep::{Sink, Sweep};
+use super::sweep::{StencilSweep, SumSink};
 use crate::motion::{Limits, Slot};
 use crate::time::Rate;
 use crate::timeline::{Cubic, Timeline};
@@ -35,11 +35,11 @@ impl Loads {
         light: f64,
     ) -> Self {
         let stencils = Stencils::at(rate);
-        Self::over(&Pieces::new(timeline, axis, slot), slot.limits, &stencils, rate, span, light)
+        Self::over(&AxisPieces::new(timeline, axis, slot), slot.limits, &stencils, rate, span, light)
     }
 
     pub(super) fn over(
-        pieces: &Pieces,
+        pieces: &AxisPieces,
         limits: Limits,
         stencils: &Stencils,
         rate: Rate,
@@ -64,13 +64,19 @@ impl Loads {
 }
 
 /// The greatest size of each stretch of `span` nanoseconds over all stencils; what is below `light` may be told as anything up to that.
-pub(super) fn fill(pieces: &Pieces, stencils: &[Stencil], order: usize, light: f64, span: i64) -> Vec<f32> {
+pub(super) fn fill(
+    pieces: &AxisPieces,
+    stencils: &[Stencil],
+    order: usize,
+    light: f64,
+    span: i64,
+) -> Vec<f32> {
     let stretches = usize::try_from(pieces.end() / span).unwrap_or(0) + 1;
     let mut peaks = Peaks { span, most: vec![0.0; stretches] };
     let mut passed_over = vec![0.0_f32; stretches];
     for stencil in stencils {
         let middle = stencil.middle;
-        let mut sweep = Sweep { pieces, stencil, sink: &mut peaks };
+        let mut sweep = StencilSweep { pieces, stencil, sink: &mut peaks };
         let Some(last) = sweep.last() else { continue };
         for run in sweep.runs(order, last) {
             let (from, until) = (run.from + middle, run.until + middle);
@@ -102,7 +108,7 @@ impl Peaks {
     }
 }
 
-impl Sink for Peaks {
+impl SumSink for Peaks {
     fn ignores(&self, from: i64, until: i64) -> f64 {
         self.most[self.touched(from, until)]
             .iter()

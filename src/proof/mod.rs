@@ -33,7 +33,7 @@ pub use drives::{DriveTerms, prove_driven};
 pub(crate) use end::HURRY;
 pub(crate) use figures::AxisFigures;
 pub use figures::figures;
-pub(crate) use fit::{Fitted, Manner, fit};
+pub(crate) use fit::{FitManner, Fitted, fit};
 pub(crate) use links::{LinkPlay, LinksProof, prove_in, prove_links};
 pub(crate) use loads::Loads;
 pub(crate) use strain::{AxisStrain, strains};

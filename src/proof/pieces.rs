@@ -12,7 +12,7 @@ const BLOCK: usize = 16;
 
 /// A cubic of the seconds since its start, in strokes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Piece {
+pub(super) struct CubicPiece {
     /// Show time, nanoseconds.
     pub(super) start: i64,
     pub(super) cubic: Cubic,
@@ -74,14 +74,14 @@ pub(super) fn extremes(timeline: &Timeline, axis: usize, slot: &Slot) -> (At, At
 
 /// The whole axis; its last piece begins at the end of the cue, and has no length.
 #[derive(Debug)]
-pub(super) struct Pieces {
-    list: Vec<Piece>,
+pub(super) struct AxisPieces {
+    list: Vec<CubicPiece>,
     blocks: Vec<Block>,
     /// What the last piece comes to at its end, while they are added.
     reached: Option<Cubic>,
 }
 
-impl Pieces {
+impl AxisPieces {
     /// Where `slot` stands while it follows its axis of the cue.
     pub(super) fn new(timeline: &Timeline, axis: usize, slot: &Slot) -> Self {
         let (ends, (scale, shift)) = (ends(timeline.unit(axis), slot), slot.scale());
@@ -125,7 +125,7 @@ impl Pieces {
         let block = self.blocks.last_mut().expect("one was begun with the first piece");
         (block.pieces.1, block.times.1) = (index + 1, end);
         self.reached = Some(block.take(cubic, end - start, self.reached.unwrap_or(cubic)));
-        self.list.push(Piece { start, cubic });
+        self.list.push(CubicPiece { start, cubic });
     }
 
     /// Adds a cubic over 0 to 1 with what leaves the ends replaced by the end.
@@ -152,7 +152,7 @@ impl Pieces {
     }
 
     /// The cubics, in order of time.
-    pub(super) fn list(&self) -> &[Piece] {
+    pub(super) fn list(&self) -> &[CubicPiece] {
         &self.list
     }
 

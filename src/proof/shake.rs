@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::axis::Subject;
 use super::loads::Loads;
-use super::pieces::{At, Pieces};
+use super::pieces::{At, AxisPieces};
 use super::stencil::Stencils;
 use super::violation::{Breach, Quantity};
 use super::{Found, SLACK, Terms};
@@ -26,12 +26,12 @@ const ROUNDING: f64 = 0.9995;
 
 /// What vibrations are put on top of: the motion of one axis.
 pub(super) struct Under<'a> {
-    pieces: &'a Pieces,
+    pieces: &'a AxisPieces,
     loads: Loads,
 }
 
 /// One vibration, as it is executed.
-struct Swing {
+struct AxisSwing {
     low: At,
     high: At,
     /// In strokes.
@@ -41,7 +41,7 @@ struct Swing {
     moved: [f64; 2],
 }
 
-impl Swing {
+impl AxisSwing {
     /// Velocity and acceleration of an amplitude of 1.
     fn per_amplitude(&self) -> [f64; 2] {
         // Derivatives of A sin (2 pi f t).
@@ -54,7 +54,7 @@ impl Subject<'_> {
     /// The motion of the axis, to put vibrations on; `None` if it never vibrates.
     pub(super) fn under<'a>(
         &self,
-        pieces: &'a Pieces,
+        pieces: &'a AxisPieces,
         terms: &Terms,
         stencils: &Stencils,
     ) -> Option<Under<'a>> {
@@ -72,7 +72,7 @@ impl Subject<'_> {
     /// The ends that the axis reaches while it vibrates; what is broken goes to `found`.
     pub(super) fn shaken(
         &self,
-        pieces: &Pieces,
+        pieces: &AxisPieces,
         terms: &Terms,
         stencils: &Stencils,
         found: &mut Vec<Found>,
@@ -102,7 +102,7 @@ impl Subject<'_> {
     }
 
     /// One of the axis's vibrations; `None` if it stands for none.
-    fn swing(&self, under: &Under<'_>, terms: &Terms, index: usize) -> Option<Swing> {
+    fn swing(&self, under: &Under<'_>, terms: &Terms, index: usize) -> Option<AxisSwing> {
         let steps = self.timeline.cue().tracks().vibration(self.axis).as_slice();
         let (step, next) = (steps.get(index)?, steps.get(index + 1));
         let Vibration { hz, amplitude } = step.value.into();
@@ -117,7 +117,7 @@ impl Subject<'_> {
         let low = At { value: low.value - amplitude, ..low };
         let high = At { value: high.value + amplitude, ..high };
         let hz = executed_hz(hz);
-        Some(Swing { low, high, amplitude, hz, moved: self.moved(under, from, until) })
+        Some(AxisSwing { low, high, amplitude, hz, moved: self.moved(under, from, until) })
     }
 
     fn moved(&self, under: &Under<'_>, from: i64, until: i64) -> [f64; 2] {
@@ -131,8 +131,8 @@ impl Subject<'_> {
         })
     }
 
-    fn past_stroke(&self, swing: &Swing) -> Option<Found> {
-        let Swing { low, high, amplitude, .. } = *swing;
+    fn past_stroke(&self, swing: &AxisSwing) -> Option<Found> {
+        let AxisSwing { low, high, amplitude, .. } = *swing;
         // A pulse for the rounding of the position and that of the amplitude.
         let slack = self.slot.stroke_pulses.recip();
         if low.value >= -slack && high.value <= 1.0 + slack {
@@ -155,7 +155,7 @@ impl Subject<'_> {
     }
 
     /// The sum that is over its limit by the greater part, if one is.
-    fn too_much(&self, swing: &Swing, at: ShowTime) -> Option<Found> {
+    fn too_much(&self, swing: &AxisSwing, at: ShowTime) -> Option<Found> {
         let amplitude = swing.amplitude * self.geometry().stroke();
         let of = |place: usize| {
             let (shaken, moved) = (swing.per_amplitude()[place] * amplitude, swing.moved[place]);
@@ -178,7 +178,7 @@ impl Subject<'_> {
     /// none where nothing vibrates.
     pub(super) fn most_amplitude(&self, under: &Under<'_>, terms: &Terms, index: usize) -> Option<f64> {
         let swing = self.swing(under, terms, index)?;
-        let Swing { low, high, amplitude, moved, .. } = swing;
+        let AxisSwing { low, high, amplitude, moved, .. } = swing;
         let room = (low.value + amplitude).min(1.0 - (high.value - amplitude));
         let limits = self.most_shaken();
         let left = |place: usize| {

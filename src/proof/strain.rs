@@ -5,7 +5,7 @@ use std::thread;
 
 use super::figures::{AxisFigures, of_pieces};
 use super::loads::fill;
-use super::pieces::Pieces;
+use super::pieces::AxisPieces;
 use super::stencil::{Stencil, Stencils};
 use crate::motion::SeatAxis;
 use crate::time::Rate;
@@ -51,7 +51,7 @@ pub(crate) fn strains(timeline: &Timeline, rate: Rate, seats: &[SeatAxis], span:
 
 fn of_axis(timeline: &Timeline, axis: usize, on: &SeatAxis, stencils: &Stencils, span: i64) -> AxisStrain {
     let slot = timeline.unit(axis).slot(&on.seat, on.index, Some(axis));
-    let pieces = Pieces::new(timeline, axis, &slot);
+    let pieces = AxisPieces::new(timeline, axis, &slot);
     let figures = of_pieces(timeline, axis, on, stencils, &pieces);
     let mut strain = AxisStrain { figures, parts: Default::default() };
     let limits = [slot.limits.velocity, slot.limits.acceleration, slot.limits.jerk];

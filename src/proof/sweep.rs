@@ -1,7 +1,7 @@
 //! The greatest size of a divided difference over all phases of the grid: between the rows, shifted by the distances of
 //! the stencil, it is a cubic of the phase, whose extremes are known in closed form.
 
-use super::pieces::{Block, Piece, Pieces, between, larger, seconds};
+use super::pieces::{AxisPieces, Block, CubicPiece, between, larger, seconds};
 use super::stencil::Stencil;
 use crate::timeline::Cubic;
 
@@ -36,11 +36,11 @@ pub(super) struct Swept {
 
 /// Sweeps stencils of the differences of an order (1 to 3) over an axis. The greatest size is given as up to
 /// [`TOLERANCE`] more than it is, never as less, and never as over the threshold where it is not.
-pub(super) fn sweep(pieces: &Pieces, stencils: &[Stencil], order: usize, threshold: f64) -> Swept {
+pub(super) fn sweep(pieces: &AxisPieces, stencils: &[Stencil], order: usize, threshold: f64) -> Swept {
     let mut over = Over { threshold, swept: Swept::default() };
     let mut passed_over = 0.0_f64;
     for stencil in stencils {
-        let mut one = Sweep { pieces, stencil, sink: &mut over };
+        let mut one = StencilSweep { pieces, stencil, sink: &mut over };
         passed_over = passed_over.max(one.run(order));
     }
     let mut swept = over.swept;
@@ -71,7 +71,7 @@ impl Stretch {
 }
 
 /// Show times of the first pose, and what holds for all of them.
-pub(super) struct Run {
+pub(super) struct PhaseRun {
     pub(super) from: i64,
     pub(super) until: i64,
     /// The pieces that the first pose is on: the first, and the one after the last.
@@ -83,7 +83,7 @@ pub(super) struct Run {
 }
 
 /// What is made of a sum, piece by piece.
-pub(super) trait Sink {
+pub(super) trait SumSink {
     /// The size up to which it need not be told what the sum is between two show times.
     fn ignores(&self, from: i64, until: i64) -> f64;
 
@@ -97,7 +97,7 @@ struct Over {
     swept: Swept,
 }
 
-impl Sink for Over {
+impl SumSink for Over {
     fn ignores(&self, _: i64, _: i64) -> f64 {
         self.swept.worst.min(self.threshold)
     }
@@ -126,13 +126,13 @@ impl Over {
 }
 
 /// One stencil on its way over an axis.
-pub(super) struct Sweep<'a, T> {
-    pub(super) pieces: &'a Pieces,
+pub(super) struct StencilSweep<'a, T> {
+    pub(super) pieces: &'a AxisPieces,
     pub(super) stencil: &'a Stencil,
     pub(super) sink: &'a mut T,
 }
 
-impl Sweep<'_, Over> {
+impl StencilSweep<'_, Over> {
     /// Gives the greatest bound of what was passed over.
     fn run(&mut self, order: usize) -> f64 {
         let Some(last) = self.last() else { return 0.0 };
@@ -158,14 +158,14 @@ impl Sweep<'_, Over> {
     }
 }
 
-impl<T: Sink> Sweep<'_, T> {
+impl<T: SumSink> StencilSweep<'_, T> {
     /// The last show time of a first pose; `None` if the axis is too short for the stencil.
     pub(super) fn last(&self) -> Option<i64> {
         let last = self.pieces.end() - self.stencil.reach();
         (last >= self.pieces.list()[0].start).then_some(last)
     }
 
-    pub(super) fn runs(&self, order: usize, last: i64) -> Vec<Run> {
+    pub(super) fn runs(&self, order: usize, last: i64) -> Vec<PhaseRun> {
         let blocks = self.pieces.blocks();
         let mut runs = Vec::with_capacity(blocks.len());
         for (index, block) in blocks.iter().enumerate() {
@@ -180,7 +180,7 @@ impl<T: Sink> Sweep<'_, T> {
             let reached = until + self.stencil.reach();
             let reached = blocks[index + 1..].iter().take_while(|next| next.times.0 <= reached);
             let all = reached.fold(*block, Block::and);
-            let mut run = Run { from, until, pieces, bound: 0.0, span: all.span };
+            let mut run = PhaseRun { from, until, pieces, bound: 0.0, span: all.span };
             let derivative = all.derivatives[order - 1];
             // Of the third derivative its mean over a distance counts, not what it is on the way.
             let derivative = self.mean_jerk(order, &run).map_or(derivative, |mean| mean.min(derivative));
@@ -192,7 +192,7 @@ impl<T: Sink> Sweep<'_, T> {
 
     /// The greatest change of the second derivative over the distance of a third difference, per second: the difference is
     /// a mean of such means. Known where rows and distances are even.
-    fn mean_jerk(&self, order: usize, run: &Run) -> Option<f64> {
+    fn mean_jerk(&self, order: usize, run: &PhaseRun) -> Option<f64> {
         let apart = *self.stencil.offsets.get(1)?;
         if order < 3 || !self.is_aligned(run) || self.stencil.reach() != 3 * apart {
             return None;
@@ -204,16 +204,16 @@ impl<T: Sink> Sweep<'_, T> {
         let bends = list[..list.len() - 1].get(first..=last + 3 * ahead)?;
         // The second derivative runs straight between the rows, so the change is greatest at one; where it jumps there, the
         // bound has the jumps on top.
-        let change = |(here, there): (&Piece, &Piece)| (there.cubic.0[2] - here.cubic.0[2]).abs();
+        let change = |(here, there): (&CubicPiece, &CubicPiece)| (there.cubic.0[2] - here.cubic.0[2]).abs();
         let most = bends.iter().zip(&bends[ahead..]).map(change).fold(0.0, larger);
         Some(2.0 * most / seconds(apart))
     }
 
-    fn is_aligned(&self, run: &Run) -> bool {
+    fn is_aligned(&self, run: &PhaseRun) -> bool {
         run.span > 0 && self.stencil.offsets.iter().all(|offset| offset % run.span == 0)
     }
 
-    pub(super) fn cells(&mut self, run: &Run) {
+    pub(super) fn cells(&mut self, run: &PhaseRun) {
         let aligned = self.is_aligned(run);
         match self.stencil.offsets.len() {
             2 if aligned => self.aligned::<2>(run),
@@ -226,7 +226,7 @@ impl<T: Sink> Sweep<'_, T> {
     /// The same as [`Self::cells_between`] where all rows are equally far apart and the distances are multiples of that, so
     /// that each cell is as long as a row.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few seconds over a row")]
-    fn aligned<const NODES: usize>(&mut self, run: &Run) {
+    fn aligned<const NODES: usize>(&mut self, run: &PhaseRun) {
         let list = self.pieces.list();
         let span = seconds(run.span);
         let ahead: [usize; NODES] =
@@ -324,7 +324,7 @@ mod tests {
         most: Vec<f64>,
     }
 
-    impl Sink for All {
+    impl SumSink for All {
         fn ignores(&self, _: i64, _: i64) -> f64 {
             -1.0
         }
@@ -339,11 +339,11 @@ mod tests {
         }
     }
 
-    fn all(pieces: &Pieces, stencils: &[Stencil], span: i64) -> Vec<f64> {
+    fn all(pieces: &AxisPieces, stencils: &[Stencil], span: i64) -> Vec<f64> {
         let stretches = usize::try_from(pieces.end() / span).unwrap_or(0) + 1;
         let mut all = All { span, most: vec![0.0; stretches] };
         for stencil in stencils {
-            let mut sweep = Sweep { pieces, stencil, sink: &mut all };
+            let mut sweep = StencilSweep { pieces, stencil, sink: &mut all };
             let Some(last) = sweep.last() else { continue };
             sweep.cells_between(pieces.list()[0].start, last);
             sweep.at_the_end(last);
@@ -390,7 +390,7 @@ mod tests {
         ) {
             let timeline = timeline(interpolation, &rows);
             let slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
-            let pieces = Pieces::new(&timeline, 0, &slot);
+            let pieces = AxisPieces::new(&timeline, 0, &slot);
             let stencils = Stencils::at(Rate::from_hz(hz));
             for (stencils, order) in
                 [(&stencils.velocity, 1), (&stencils.step, 2), (&stencils.acceleration, 2), (&stencils.jerk, 3)]
@@ -414,7 +414,7 @@ mod tests {
             const SPAN: i64 = 100_000_000;
             let timeline = timeline(interpolation, &rows);
             let slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
-            let (pieces, rate, light) = (Pieces::new(&timeline, 0, &slot), Rate::from_hz(hz), 0.2);
+            let (pieces, rate, light) = (AxisPieces::new(&timeline, 0, &slot), Rate::from_hz(hz), 0.2);
             let stencils = Stencils::at(rate);
             let loads = Loads::over(&pieces, slot.limits, &stencils, rate, SPAN, light);
             let Limits { velocity, jerk, .. } = slot.limits;

@@ -11,7 +11,7 @@ use crate::drive::Incoming;
 use crate::drive::link::StreamEvent;
 use crate::health::Change;
 use crate::net::{DrainGrid, Origin, Receiver};
-use crate::observe::{Answer, Observer, Watched};
+use crate::observe::{FirstAnswer, Observer, Watched};
 use crate::record::{AckRecord, AckStanding, AckTap, latency_ns};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
@@ -169,7 +169,7 @@ impl AckLoop {
         if clock.now() >= *tell_at {
             self.tell_times();
             *tell_at = clock.now() + TELL;
-        } else if self.watch.as_mut().is_some_and(Watch::take_untold) {
+        } else if self.watch.as_ref().is_some_and(Watch::is_untold) {
             self.tell_table();
         }
         let now = clock.now();
@@ -360,7 +360,7 @@ impl Ledger for Records<'_> {
         copy(self.tap, &AckRecord::Fate(reply.controller, reply.frame, fate, latency_ns(sent_at, reply.at)));
         if let Fate::Answered(code) = fate {
             let Reply { controller, frame, error, inputs, at, .. } = *reply;
-            self.observer.on_answer(controller, &Answer { frame, code, error, inputs }, at);
+            self.observer.on_answer(controller, &FirstAnswer { frame, code, error, inputs }, at);
         }
         // One that was refused leads nowhere.
         if let (Some(live), Fate::Answered(ReplyCode::Running)) = (self.live, fate)

@@ -15,7 +15,7 @@ const ANSWERS: usize = 1024;
 
 /// What both ends share.
 #[derive(Debug)]
-struct Shared {
+struct LineEnds {
     open: AtomicBool,
     /// Nobody else is to ask the controllers anything.
     hushed: AtomicBool,
@@ -38,14 +38,14 @@ struct Answer {
 pub struct Line {
     sender: Sender,
     answers: Consumer<Answer>,
-    shared: Arc<Shared>,
+    shared: Arc<LineEnds>,
 }
 
 /// The ack thread's end.
 #[derive(Debug)]
 pub(crate) struct LineEnd {
     answers: Producer<Answer>,
-    shared: Arc<Shared>,
+    shared: Arc<LineEnds>,
     /// What of the line's datagrams was counted already.
     counted: Box<[u64]>,
 }
@@ -54,7 +54,7 @@ pub(crate) struct LineEnd {
 #[must_use]
 pub(crate) fn line(sender: Sender, controllers: usize) -> (Line, LineEnd) {
     let zeros = || (0..controllers).map(|_| AtomicU64::new(0)).collect();
-    let shared = Arc::new(Shared {
+    let shared = Arc::new(LineEnds {
         open: AtomicBool::new(false),
         hushed: AtomicBool::new(false),
         sent: zeros(),

@@ -10,9 +10,10 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer};
 
 use super::{FrameSink, Live};
+use crate::config::drive::DriveFamily;
 use crate::drive::LinkStream;
 use crate::drive::link::{
-    AxisFigures, LaneWants, LedPose, LinkFigures, LinkPort, LinkPose, RECORD_LEN, StreamEvent,
+    AxisFigures, LaneWants, LedPose, LinkFigures, LinkPort, LinkPose, RECORD_LEN, StreamEvent, StreamTerms,
     lane_number as number,
 };
 use crate::net::{Delivery, SendFault, Sender};
@@ -150,6 +151,10 @@ pub(crate) struct LinkStanding {
 pub(crate) struct LinkEnd {
     /// Its name.
     pub(crate) name: String,
+    /// What its drives are.
+    pub(crate) family: DriveFamily,
+    /// How it plays.
+    pub(crate) terms: StreamTerms,
     /// The controllers of its lanes.
     pub(crate) controllers: Vec<usize>,
     errands: Tell<Errand>,
@@ -158,11 +163,15 @@ pub(crate) struct LinkEnd {
 
 impl LinkEnd {
     /// One, and what its thread has of it.
-    pub(crate) fn new(name: String, controllers: Vec<usize>) -> (Self, LinkTold) {
+    pub(crate) fn new(
+        name: String,
+        (family, terms): (DriveFamily, StreamTerms),
+        controllers: Vec<usize>,
+    ) -> (Self, LinkTold) {
         let (errands, asked) = std::sync::mpsc::channel();
         let standing = Arc::<Mutex<LinkStanding>>::default();
         let told = LinkTold { errands: asked, standing: Arc::clone(&standing) };
-        (Self { name, controllers, errands, standing }, told)
+        (Self { name, family, terms, controllers, errands, standing }, told)
     }
 
     /// Has its thread do that once no lane moves. Where that thread is gone it is dropped.

@@ -179,9 +179,9 @@ impl Watch {
         }
     }
 
-    /// Whether a group stands otherwise than when this was last asked.
-    pub(super) const fn take_untold(&mut self) -> bool {
-        std::mem::replace(&mut self.untold, false)
+    /// True if a group stands otherwise than the table says.
+    pub(super) const fn is_untold(&self) -> bool {
+        self.untold
     }
 
     fn keep(&mut self, change: Change) {
@@ -259,7 +259,7 @@ impl Watch {
             }
             turns.look_up(rows, tracker);
         });
-        self.untold |= !is_told;
+        self.untold = !is_told;
     }
 
     /// Judges all at `now`, an instant up to which all was told.

@@ -37,13 +37,13 @@ pub(crate) struct Kept {
 pub(crate) struct SettingsFile {
     folder: PathBuf,
     given: Option<Settings>,
-    exchange: Arc<Exchange>,
+    exchange: Arc<SettingsExchange>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// Between whoever sets and whoever writes.
 #[derive(Debug, Default)]
-struct Exchange {
+struct SettingsExchange {
     tray: Mutex<Tray>,
     come: Condvar,
 }
@@ -54,7 +54,8 @@ struct Tray {
     due: Option<String>,
     over: bool,
     trouble: Option<String>,
-    mended: bool,
+    /// What became better, until it is said.
+    news: Option<&'static str>,
 }
 
 /// That something is being loaded because it was before the start. Where the program ends meanwhile other than in order, it is
@@ -80,7 +81,7 @@ impl SettingsFile {
             kept.said.push(format!("{} is not loaded: {why}; load it again", show.cue));
         }
         drop(Loading(loading));
-        let exchange = Arc::<Exchange>::default();
+        let exchange = Arc::<SettingsExchange>::default();
         let (of_thread, to) = (Arc::clone(&exchange), folder.to_owned());
         let thread = thread::Builder::new().name("settings".to_owned()).spawn(move || {
             let _ = realtime::normal_priority();
@@ -119,9 +120,9 @@ impl SettingsFile {
         self.exchange.lock().trouble.clone()
     }
 
-    /// True if trouble has ended since this was last asked.
-    pub(crate) fn take_mended(&mut self) -> bool {
-        std::mem::take(&mut self.exchange.lock().mended)
+    /// What has become better since the last time.
+    pub(crate) fn news(&mut self) -> Option<&'static str> {
+        self.exchange.lock().news.take()
     }
 }
 
@@ -137,7 +138,7 @@ impl Drop for SettingsFile {
     }
 }
 
-impl Exchange {
+impl SettingsExchange {
     /// What is behind the lock is whole at any time, also where a thread that held it panicked.
     fn lock(&self) -> MutexGuard<'_, Tray> {
         self.tray.lock().unwrap_or_else(PoisonError::into_inner)
@@ -184,7 +185,9 @@ impl Tray {
     }
 
     fn mend(&mut self) {
-        self.mended |= self.trouble.take().is_some();
+        if self.trouble.take().is_some() {
+            self.news = Some("what people set is kept again");
+        }
     }
 }
 

@@ -159,13 +159,13 @@ fn a_disk_that_takes_nothing_is_told_once_and_what_was_kept_stays() {
         store.put(Settings { trim_ms, ..Settings::default() });
         std::thread::yield_now();
     }
-    assert!(store.trouble().unwrap().contains("; make room in") && !store.take_mended(), "{store:?}");
+    assert!(store.trouble().unwrap().contains("; make room in") && store.news().is_none(), "{store:?}");
     assert_eq!(fs::read_to_string(file(folder.path())).unwrap(), set().text());
 
     fs::remove_dir(&in_the_way).unwrap();
     store.put(Settings { trim_ms: 7, ..Settings::default() });
     becomes(&store, |store| store.trouble().is_none());
-    assert_eq!([store.take_mended(), store.take_mended()], [true, false]);
+    assert_eq!([store.news(), store.news()], [Some("what people set is kept again"), None]);
     drop(store);
     assert_eq!(SettingsFile::open(folder.path()).1.settings.unwrap().trim_ms, 7);
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::net::SocketAddrV4;
 
-use super::errors::{self, Errors, Memory};
+use super::errors::{self, Errors, UdpMemory};
 use super::inputs::Inputs;
 use super::player::{Executed, Pace, Player};
 use super::registers::Registers;
@@ -22,7 +22,7 @@ mod reset;
 mod servo;
 
 use functions::{EmergencyStop, Jog};
-use monitor::Seen;
+use monitor::ReceivedSoFar;
 
 const NEVER: MonoTime = MonoTime::from_nanos(u64::MAX);
 /// Outputs that there are.
@@ -45,7 +45,7 @@ pub struct Controller {
     /// Time of the last motion in absolute time; `None` if the next one is a first one.
     last_absolute: Option<u32>,
     errors: Errors,
-    memory: Memory,
+    memory: UdpMemory,
     /// Until when too many datagrams are an error.
     memory_full_until: MonoTime,
     homing_until: MonoTime,
@@ -60,7 +60,7 @@ pub struct Controller {
     reset_asked: bool,
     /// When something happens by itself next.
     next_event: MonoTime,
-    seen: Seen,
+    seen: ReceivedSoFar,
     counts: Counts,
 }
 
@@ -98,7 +98,7 @@ impl Controller {
             player: Player::new(setup.invented.queue_depth, at),
             last_absolute: None,
             errors: Errors::default(),
-            memory: Memory::new(setup.invented.udp_memory),
+            memory: UdpMemory::new(setup.invented.udp_memory),
             memory_full_until: NEVER,
             homing_until: at,
             silent_until: at,
@@ -109,7 +109,7 @@ impl Controller {
             jog: None,
             reset_asked: false,
             next_event: at,
-            seen: Seen::default(),
+            seen: ReceivedSoFar::default(),
             counts: Counts::default(),
             invented: setup.invented.clone(),
         };
@@ -134,7 +134,7 @@ impl Controller {
         }
         self.seen.datagram(bytes.len(), at);
         if self.memory.overflows(at) {
-            self.memory_full_until = at + Memory::WINDOW;
+            self.memory_full_until = at + UdpMemory::WINDOW;
             self.next_event = self.next_event.min(self.memory_full_until);
             self.fail(errors::UDP_MEMORY, at);
         }

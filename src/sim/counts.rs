@@ -12,7 +12,7 @@ pub struct Counts {
     /// Of these, motion frames.
     pub(crate) motion: u64,
     /// Datagrams that it did not obey, by reason.
-    pub refused: Refused,
+    pub refused: RefusedCounts,
     /// Answers that it gave, those lost on purpose included.
     pub replied: u64,
     /// Status and fault reports that it gave unasked, those lost on purpose included.
@@ -35,7 +35,7 @@ pub struct Counts {
 
 /// Datagrams that were not obeyed, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Refused {
+pub struct RefusedCounts {
     /// No message, or none that a host sends.
     pub(crate) malformed: u64,
     /// From another port than PA24 says.
@@ -54,7 +54,7 @@ pub struct Refused {
     pub(crate) command: u64,
 }
 
-impl Refused {
+impl RefusedCounts {
     /// All of them together.
     #[must_use]
     pub const fn total(&self) -> u64 {

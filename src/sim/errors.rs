@@ -96,13 +96,13 @@ impl Errors {
 
 /// The UDP memory, which too many datagrams at once fill (Err20).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Memory {
+pub(super) struct UdpMemory {
     limit: u32,
     window: MonoTime,
     count: u32,
 }
 
-impl Memory {
+impl UdpMemory {
     /// How long datagrams are counted, and how long it takes to get over too many of them.
     pub(super) const WINDOW: Duration = Duration::from_millis(100);
 
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn the_memory_overflows_within_a_window_only() {
-        let mut memory = Memory::new(2);
+        let mut memory = UdpMemory::new(2);
         let ms = |ms: u64| MonoTime::from_nanos(ms * 1_000_000);
         let seen = [1_000, 1_050, 1_099, 1_100, 1_150].map(|at| memory.overflows(ms(at)));
         assert_eq!(seen, [false, false, true, false, false]);

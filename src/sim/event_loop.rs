@@ -29,7 +29,7 @@ const NEVER: MonoTime = MonoTime::from_nanos(u64::MAX);
 
 /// What the thread is told from outside.
 #[derive(Debug)]
-pub(super) enum Order {
+pub(super) enum LoopOrder {
     /// Have this happen, and say what came of it.
     Do(Command, SyncSender<Result<(), CommandError>>),
     /// Take what has come, and end.
@@ -43,7 +43,7 @@ pub(super) struct EventLoop {
     pub(super) epoll: OwnedFd,
     /// Rings when there are orders.
     pub(super) bell: Arc<OwnedFd>,
-    pub(super) orders: Receiver<Order>,
+    pub(super) orders: Receiver<LoopOrder>,
     /// What happens when, soonest first.
     pub(super) script: VecDeque<(MonoTime, Command)>,
     /// Answers for which there is still room to wait.
@@ -106,7 +106,7 @@ impl EventLoop {
     fn obey(&mut self) -> bool {
         let _ = rustix::io::read(&*self.bell, &mut [0; 8]); // empty where another ring was answered already
         while let Ok(order) = self.orders.try_recv() {
-            let Order::Do(command, told) = order else { return true };
+            let LoopOrder::Do(command, told) = order else { return true };
             let count = self.stations.len();
             let answer = match command.controller {
                 Some(index) if index >= count => Err(CommandError::Controller { index, count }),

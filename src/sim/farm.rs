@@ -6,12 +6,12 @@ use std::net::SocketAddrV4;
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Sender};
-use std::thread::JoinHandle;
 
-use super::event_loop::{DELAYED, EventLoop, Order, wait_for};
+use super::event_loop::{DELAYED, EventLoop, LoopOrder, wait_for};
 use super::log::Logs;
 use super::outcome::Outcome;
 use super::station::{VirtualStation, listen};
+use super::thread::SimThread;
 use super::{Command, CommandError, Options, Setup};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -56,13 +56,13 @@ pub enum FarmError {
 pub struct Farm {
     addresses: Vec<SocketAddrV4>,
     remote: Remote,
-    thread: Option<JoinHandle<io::Result<Vec<Outcome>>>>,
+    thread: SimThread<io::Result<Vec<Outcome>>>,
 }
 
 /// Has things happen to the virtual controllers of a farm, from any thread.
 #[derive(Debug, Clone)]
 pub struct Remote {
-    orders: Sender<Order>,
+    orders: Sender<LoopOrder>,
     bell: Arc<OwnedFd>,
 }
 
@@ -91,9 +91,11 @@ impl Farm {
             logs: Logs::new(start, options.log, options.moves),
             due: start,
         };
-        let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());
-        let thread = thread.spawn(move || event_loop.run()).map_err(system)?;
-        Ok(Self { addresses, remote: Remote { orders: sender, bell }, thread: Some(thread) })
+        let remote = Remote { orders: sender, bell };
+        let ending = remote.clone();
+        let stop = move || drop(ending.order(LoopOrder::Stop));
+        let thread = SimThread::spawn(move || event_loop.run(), stop).map_err(system)?;
+        Ok(Self { addresses, remote, thread })
     }
 
     /// Where the controllers listen, in the order of their setups.
@@ -112,22 +114,8 @@ impl Farm {
     ///
     /// # Errors
     /// A log that could not be written, or a wait that failed.
-    pub fn stop(mut self) -> io::Result<Vec<Outcome>> {
-        self.end()
-    }
-
-    fn end(&mut self) -> io::Result<Vec<Outcome>> {
-        let Some(thread) = self.thread.take() else { return Ok(Vec::new()) };
-        let _ = self.remote.order(Order::Stop); // a thread that has ended needs no telling
-        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-    }
-}
-
-impl Drop for Farm {
-    fn drop(&mut self) {
-        if !std::thread::panicking() {
-            let _ = self.end(); // nobody is left to be told
-        }
+    pub fn stop(self) -> io::Result<Vec<Outcome>> {
+        self.thread.end()
     }
 }
 
@@ -139,11 +127,11 @@ impl Remote {
     pub fn tell(&self, command: Command) -> Result<(), CommandError> {
         command.action.check()?;
         let (told, answer) = mpsc::sync_channel(1);
-        self.order(Order::Do(command, told))?;
+        self.order(LoopOrder::Do(command, told))?;
         answer.recv().map_err(|_| CommandError::Ended)?
     }
 
-    fn order(&self, order: Order) -> Result<(), CommandError> {
+    fn order(&self, order: LoopOrder) -> Result<(), CommandError> {
         self.orders.send(order).map_err(|_| CommandError::Ended)?;
         rustix::io::write(&*self.bell, &1_u64.to_ne_bytes()).map_err(|_| CommandError::Ended)?;
         Ok(())

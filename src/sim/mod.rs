@@ -33,6 +33,7 @@ mod sheet;
 pub(crate) mod silvermax;
 pub(crate) mod sixpack2;
 mod station;
+mod thread;
 
 pub use command::{Action, Command, CommandError};
 pub use controller::Controller;

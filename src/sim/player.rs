@@ -14,7 +14,7 @@ const FAST_FORWARD_ABOVE: usize = 2;
 const VIBRATION_STEP_NS: u64 = 125_000;
 
 /// Positions of all axes that a controller could have.
-pub(super) type Positions = [Pulses; MAX_AXES];
+pub(super) type MotorPositions = [Pulses; MAX_AXES];
 
 /// What a controller's parameters say about moves; taken when a move begins.
 #[derive(Debug, Clone, Copy)]
@@ -27,9 +27,9 @@ pub(super) struct Pace {
 
 /// A move to come.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Leg {
+pub(super) struct PlayedLeg {
     /// Where it ends.
-    pub(super) to: Positions,
+    pub(super) to: MotorPositions,
     /// How long it takes.
     pub(super) duration: Duration,
     /// What shakes the axes meanwhile.
@@ -39,8 +39,8 @@ pub(super) struct Leg {
 /// A move that runs, or the last one that ran.
 #[derive(Debug, Clone, Copy)]
 struct Move {
-    from: Positions,
-    leg: Leg,
+    from: MotorPositions,
+    leg: PlayedLeg,
     start: MonoTime,
     arrived: bool,
 }
@@ -53,9 +53,9 @@ pub(super) struct Executed {
     /// How long it took.
     pub(super) duration: Duration,
     /// Where it began.
-    pub(super) from: Positions,
+    pub(super) from: MotorPositions,
     /// Where it ended.
-    pub(super) to: Positions,
+    pub(super) to: MotorPositions,
 }
 
 /// The queue had no room.
@@ -66,12 +66,12 @@ pub(super) struct Overflow;
 #[derive(Debug)]
 pub(super) struct Player {
     current: Move,
-    waiting: VecDeque<Leg>,
+    waiting: VecDeque<PlayedLeg>,
     depth: usize,
     /// Moves wait for a release.
     paused: bool,
     /// What is left of the move that a pause cut short.
-    interrupted: Option<Leg>,
+    interrupted: Option<PlayedLeg>,
     /// Moves that were taken.
     taken: usize,
     /// Moves that reached their end.
@@ -127,7 +127,7 @@ impl Player {
     }
 
     /// Takes a move, after those that wait.
-    pub(super) fn push(&mut self, leg: Leg, at: MonoTime, pace: &Pace) -> Result<(), Overflow> {
+    pub(super) fn push(&mut self, leg: PlayedLeg, at: MonoTime, pace: &Pace) -> Result<(), Overflow> {
         self.advance(at, pace);
         if self.current.arrived {
             self.begin(leg, at, pace);
@@ -154,7 +154,7 @@ impl Player {
         self.advance(at, pace);
         if !self.current.arrived {
             let duration = self.current.end().since(at);
-            self.interrupted = Some(Leg { duration, ..self.current.leg });
+            self.interrupted = Some(PlayedLeg { duration, ..self.current.leg });
         }
         self.halt(at);
         self.paused = true;
@@ -163,7 +163,7 @@ impl Player {
     /// Moves to zero, as fast as may be, and pauses there.
     pub(super) fn pause_in_zero(&mut self, at: MonoTime, pace: &Pace) {
         self.pause(at, pace);
-        self.begin(Leg::to_zero(Duration::ZERO), at, pace);
+        self.begin(PlayedLeg::to_zero(Duration::ZERO), at, pace);
     }
 
     /// Goes on with the move that was cut short, and then with those that wait.
@@ -179,7 +179,7 @@ impl Player {
     /// Forgets what waits, and from `start` on moves to zero in `duration`, or as long as the speed limits ask for.
     pub(super) fn go_to_zero(&mut self, duration: Duration, start: MonoTime, at: MonoTime, pace: &Pace) {
         self.hold(at, pace);
-        self.begin(Leg::to_zero(duration), start, pace);
+        self.begin(PlayedLeg::to_zero(duration), start, pace);
     }
 
     /// Takes where an axis is for zero.
@@ -189,12 +189,12 @@ impl Player {
     }
 
     /// Where the motors are; the player has been advanced to `at`.
-    pub(super) fn positions(&self, at: MonoTime) -> Positions {
+    pub(super) fn positions(&self, at: MonoTime) -> MotorPositions {
         self.current.positions(at)
     }
 
     /// Where they are with what shakes them, which swings about the position as a sine.
-    pub(super) fn shaken(&self, at: MonoTime) -> Positions {
+    pub(super) fn shaken(&self, at: MonoTime) -> MotorPositions {
         let mut positions = self.positions(at);
         for (position, shake) in positions.iter_mut().zip(self.current.leg.vibration.iter()) {
             if shake.period != 0 && shake.amplitude != 0 {
@@ -215,7 +215,7 @@ impl Player {
     }
 
     /// Where the motors will be when nothing waits any more.
-    pub(super) fn target(&self) -> &Positions {
+    pub(super) fn target(&self) -> &MotorPositions {
         self.waiting.back().map_or(&self.current.leg.to, |last| &last.to)
     }
 
@@ -256,22 +256,22 @@ impl Player {
         }
     }
 
-    fn begin(&mut self, leg: Leg, start: MonoTime, pace: &Pace) {
+    fn begin(&mut self, leg: PlayedLeg, start: MonoTime, pace: &Pace) {
         let from = self.current.positions(start);
         let duration = leg.duration.max(fastest(&from, &leg.to, pace));
-        self.current = Move { from, leg: Leg { duration, ..leg }, start, arrived: false };
+        self.current = Move { from, leg: PlayedLeg { duration, ..leg }, start, arrived: false };
     }
 }
 
-impl Leg {
+impl PlayedLeg {
     fn to_zero(duration: Duration) -> Self {
         Self { to: [Pulses(0); MAX_AXES], duration, vibration: PerAxis::default() }
     }
 }
 
 impl Move {
-    fn rest(to: Positions, at: MonoTime) -> Self {
-        let leg = Leg { to, duration: Duration::ZERO, vibration: PerAxis::default() };
+    fn rest(to: MotorPositions, at: MonoTime) -> Self {
+        let leg = PlayedLeg { to, duration: Duration::ZERO, vibration: PerAxis::default() };
         Self { from: to, leg, start: at, arrived: true }
     }
 
@@ -284,7 +284,7 @@ impl Move {
         clippy::cast_precision_loss,
         reason = "whole pulses come out right up to 104 days of nanoseconds"
     )]
-    fn positions(&self, at: MonoTime) -> Positions {
+    fn positions(&self, at: MonoTime) -> MotorPositions {
         let (gone, whole) = (nanos(at.since(self.start)), nanos(self.leg.duration));
         if gone >= whole {
             return self.leg.to;
@@ -307,7 +307,7 @@ fn shake_pulses(shake: Vibration, at: MonoTime) -> i32 {
 }
 
 /// The shortest time in which all axes stay within their speed.
-fn fastest(from: &Positions, to: &Positions, pace: &Pace) -> Duration {
+fn fastest(from: &MotorPositions, to: &MotorPositions, pace: &Pace) -> Duration {
     let ms = (0..MAX_AXES).map(|axis| {
         let distance = (f64::from(to[axis].0) - f64::from(from[axis].0)).abs();
         distance / pace.limits[axis]

@@ -5,7 +5,7 @@ use std::io;
 use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
-use super::link::{Fate, Link};
+use super::link::{DatagramFate, FaultyLink};
 use super::log::Logs;
 use super::outcome::Outcome;
 use super::{Action, Controller, Counts, Options, Setup};
@@ -23,8 +23,8 @@ pub(super) struct VirtualStation {
     pub(super) address: SocketAddrV4,
     pub(super) socket: UdpSocket,
     controller: Controller,
-    link: Link,
-    report_link: Link,
+    link: FaultyLink,
+    report_link: FaultyLink,
     delay: Duration,
     /// What waits for its time, soonest first.
     delayed: VecDeque<Parcel>,
@@ -59,8 +59,8 @@ impl VirtualStation {
             address,
             socket,
             controller,
-            link: Link::new(&options.faults, options.seed, index),
-            report_link: Link::new(&options.faults, options.seed, REPORTS + index),
+            link: FaultyLink::new(&options.faults, options.seed, index),
+            report_link: FaultyLink::new(&options.faults, options.seed, REPORTS + index),
             delay: options.faults.delay,
             delayed: VecDeque::new(),
             extra: Counts::default(),
@@ -87,7 +87,7 @@ impl VirtualStation {
         let Ok((len, SocketAddr::V4(from))) = self.socket.recv_from(&mut datagram) else { return false };
         let at = now();
         let fate = self.link.fate();
-        if fate == Fate::LostOnTheWay {
+        if fate == DatagramFate::LostOnTheWay {
             self.extra.received += 1;
             self.extra.lost_frames += 1;
             return true;
@@ -137,14 +137,14 @@ impl VirtualStation {
     }
 
     /// Sends a datagram, now or when it is due, unless the link loses it. Parcels never overtake each other.
-    fn post(&mut self, fate: Fate, to: SocketAddrV4, bytes: &[u8], at: MonoTime, room: &mut usize) {
+    fn post(&mut self, fate: DatagramFate, to: SocketAddrV4, bytes: &[u8], at: MonoTime, room: &mut usize) {
         let copies = match fate {
-            Fate::LostOnTheWay | Fate::AnswerLost => {
+            DatagramFate::LostOnTheWay | DatagramFate::AnswerLost => {
                 self.extra.lost_replies += 1;
                 return;
             }
-            Fate::Answered => 1,
-            Fate::AnsweredTwice => {
+            DatagramFate::Answered => 1,
+            DatagramFate::AnsweredTwice => {
                 self.extra.duplicated += 1;
                 2
             }

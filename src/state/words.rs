@@ -7,6 +7,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Cause, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why};
+use crate::plain;
 
 impl State {
     /// The state in one word, as every surface shows it.
@@ -51,65 +52,54 @@ impl fmt::Display for State {
     }
 }
 
-impl fmt::Display for Transition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Home => "home",
-            Self::Arm => "arm",
-            Self::HomeAndArm => "home and arm",
-            Self::Disarm => "disarm",
-            Self::Go => "go",
-            Self::Pause => "pause",
-            Self::Resume => "resume",
-            Self::Seek => "seek",
-            Self::Stop => "stop",
-            Self::Park => "park",
-            Self::Clear => "clear",
-        })
-    }
-}
+plain::displayed!(Transition {
+    Self::Home => "home",
+    Self::Arm => "arm",
+    Self::HomeAndArm => "home and arm",
+    Self::Disarm => "disarm",
+    Self::Go => "go",
+    Self::Pause => "pause",
+    Self::Resume => "resume",
+    Self::Seek => "seek",
+    Self::Stop => "stop",
+    Self::Park => "park",
+    Self::Clear => "clear",
+});
 
-impl fmt::Display for Next {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::AwaitAnswers => {
-                "wait until every controller has answered, or disable the one that does not"
-            }
-            Self::AwaitPositions => "wait until the positions are read, then park",
-            Self::AwaitHome => "wait until the seats are home, and keep clear of them",
-            Self::AwaitRest => "wait until the seats are at rest",
-            Self::ParkOrHome => "park, or home",
-            Self::ParkOrStart => "park, or start a show: it joins slowly",
-            Self::Home => "home, with nobody on the seats; or disable the seat whose position is unknown",
+plain::displayed!(Next {
+    Self::AwaitAnswers =>
+        "wait until every controller has answered, or disable the one that does not",
+    Self::AwaitPositions => "wait until the positions are read, then park",
+    Self::AwaitHome => "wait until the seats are home, and keep clear of them",
+    Self::AwaitRest => "wait until the seats are at rest",
+    Self::ParkOrHome => "park, or home",
+    Self::ParkOrStart => "park, or start a show: it joins slowly",
+    Self::Home => "home, with nobody on the seats; or disable the seat whose position is unknown",
 
-            Self::Load => "load a cue, then arm",
-            Self::Prove => "check the cue against the seats, then arm",
-            Self::Preflight => "run preflight, then arm",
-            Self::Arm => "arm",
-            Self::ArmAndHome => "arm, with nobody on the seats: they home first",
-            Self::Go => "go, or disarm",
-            Self::Watch => "nothing; pause, park or stop as needed",
-            Self::AwaitJoin => "nothing; the seats rejoin by themselves",
-            Self::AwaitFilm => "see to the film; the seats join it by themselves",
-            Self::LetJoin => "see to the film, then resume; or park",
-            Self::Resume => "resume, or park",
-            Self::Release => {
-                "release the emergency-stop button, then clear; or disable a seat that cannot tell that it is"
-            }
+    Self::Load => "load a cue, then arm",
+    Self::Prove => "check the cue against the seats, then arm",
+    Self::Preflight => "run preflight, then arm",
+    Self::Arm => "arm",
+    Self::ArmAndHome => "arm, with nobody on the seats: they home first",
+    Self::Go => "go, or disarm",
+    Self::Watch => "nothing; pause, park or stop as needed",
+    Self::AwaitJoin => "nothing; the seats rejoin by themselves",
+    Self::AwaitFilm => "see to the film; the seats join it by themselves",
+    Self::LetJoin => "see to the film, then resume; or park",
+    Self::Resume => "resume, or park",
+    Self::Release =>
+        "release the emergency-stop button, then clear; or disable a seat that cannot tell that it is",
 
-            Self::PutRight => "clear the error at the controller, then clear the hall; or disable its seat",
+    Self::PutRight => "clear the error at the controller, then clear the hall; or disable its seat",
 
-            Self::AwaitStandstill => "wait until the seats stand still, then clear and home",
-            Self::CheckCue => "check the cue against the seats, then clear",
-            Self::LookAtSeat => "inspect the seat, then clear and home again",
-            Self::StopOtherMaster => "stop the other master, then clear",
-            Self::Clear => "clear, then park or home",
-            Self::Restart => {
-                "clear, then park; where the positions are not read then, start the service anew"
-            }
-        })
-    }
-}
+    Self::AwaitStandstill => "wait until the seats stand still, then clear and home",
+    Self::CheckCue => "check the cue against the seats, then clear",
+    Self::LookAtSeat => "inspect the seat, then clear and home again",
+    Self::StopOtherMaster => "stop the other master, then clear",
+    Self::Clear => "clear, then park or home",
+    Self::Restart =>
+        "clear, then park; where the positions are not read then, start the service anew",
+});
 
 impl Next {
     /// The same where a play in the foreground is led by keys, which neither home nor take out a seat.

@@ -11,7 +11,7 @@ use super::realtime::set_scheduler;
 
 /// What the process may take from now on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Bounds {
+pub(crate) struct ProcessBounds {
     /// Address space, bytes.
     pub(crate) memory: u64,
     /// Processor time of all its threads, s.
@@ -22,12 +22,12 @@ pub(crate) struct Bounds {
 ///
 /// # Errors
 /// If the system refuses a bound. A refused priority is no error: nothing is at stake but the time of others.
-pub(crate) fn lower(bounds: Bounds) -> io::Result<()> {
+pub(crate) fn lower(bounds: ProcessBounds) -> io::Result<()> {
     let _ = set_scheduler(libc::SCHED_IDLE, 0);
     let _ = setpriority_process(None, 19);
     let _ = fs::write("/proc/self/oom_score_adj", "1000");
     set_parent_process_death_signal(Some(Signal::KILL))?;
-    let Bounds { memory, cpu_s } = bounds;
+    let ProcessBounds { memory, cpu_s } = bounds;
     let limits = [(Resource::As, memory), (Resource::Cpu, cpu_s), (Resource::Fsize, 0), (Resource::Core, 0)];
     for (resource, most) in limits {
         // What whoever started it allows at most cannot be raised, and need not.

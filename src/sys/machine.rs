@@ -62,7 +62,7 @@ pub(crate) fn try_memory_lock() -> io::Result<()> {
 
 /// A limit of this process; `None` where there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Limit {
+pub(crate) struct ProcessLimit {
     /// What holds now.
     pub(crate) soft: Option<u64>,
     /// As far as the process may raise it.
@@ -71,23 +71,23 @@ pub(crate) struct Limit {
 
 /// The limits that matter to a play.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Limits {
+pub(crate) struct ProcessLimits {
     /// The highest real-time priority without a right (`RLIMIT_RTPRIO`).
-    pub(crate) priority: Limit,
+    pub(crate) priority: ProcessLimit,
     /// Bytes that may be locked without a right (`RLIMIT_MEMLOCK`).
-    pub(crate) locked: Limit,
+    pub(crate) locked: ProcessLimit,
     /// Files open at once (`RLIMIT_NOFILE`).
-    pub(crate) files: Limit,
+    pub(crate) files: ProcessLimit,
 }
 
 /// Reads the limits of this process.
 #[must_use]
-pub(crate) fn limits() -> Limits {
+pub(crate) fn limits() -> ProcessLimits {
     let limit = |resource| {
         let told = getrlimit(resource);
-        Limit { soft: told.current, hard: told.maximum }
+        ProcessLimit { soft: told.current, hard: told.maximum }
     };
-    Limits {
+    ProcessLimits {
         priority: limit(Resource::Rtprio),
         locked: limit(Resource::Memlock),
         files: limit(Resource::Nofile),

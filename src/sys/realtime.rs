@@ -2,11 +2,13 @@
 //! without a word looks right on an idle desk and fails in the hall.
 
 use std::num::NonZeroU64;
-use std::{fmt, fs, io};
+use std::{fs, io};
 
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::process::{Resource, Rlimit, getrlimit, setpriority_process, setrlimit};
 use rustix::thread::set_current_timer_slack;
+
+use crate::plain;
 
 /// The priority asked for: above every ordinary program, with room for an operator to put something above it.
 pub(crate) const PRIORITY: u8 = 50;
@@ -25,16 +27,11 @@ pub enum Policy {
     Other,
 }
 
-impl fmt::Display for Policy {
-    /// `fifo`, `rr` or `other`, as reports have it.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Fifo => "fifo",
-            Self::RoundRobin => "rr",
-            Self::Other => "other",
-        })
-    }
-}
+plain::displayed!(Policy {
+    Self::Fifo => "fifo",
+    Self::RoundRobin => "rr",
+    Self::Other => "other",
+});
 
 /// What the kernel gave, as read back from it after asking.
 #[derive(Debug, Clone, PartialEq, Eq)]

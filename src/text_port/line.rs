@@ -10,7 +10,7 @@ const LINES: &str = "go, pause, resume, stop, park, status, film, seek 12:30, tr
 
 /// What a line asks.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Order {
+pub(super) enum TextOrder {
     /// Of the hall.
     Command(Command),
     /// How it is.
@@ -21,27 +21,27 @@ pub(super) enum Order {
 
 /// Why a line is not obeyed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Fault {
+pub(super) enum TextFault {
     /// It is an order with a value that is none, or one that may never come from here.
     Refused(Problem),
     /// It is no order: who sends such lines speaks something else, a browser perhaps that somebody else's page leads.
     NoOrder(Problem),
 }
 
-impl From<Problem> for Fault {
+impl From<Problem> for TextFault {
     fn from(problem: Problem) -> Self {
         Self::Refused(problem)
     }
 }
 
 /// What a line asks; it has no end of line any more.
-pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
+pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<TextOrder, TextFault> {
     let text = str::from_utf8(line).ok().filter(|text| text.is_ascii());
-    let no_ascii = || Fault::NoOrder(value("the line is not ASCII".to_owned(), "send plain ASCII"));
+    let no_ascii = || TextFault::NoOrder(value("the line is not ASCII".to_owned(), "send plain ASCII"));
     let words: Vec<&str> = text.ok_or_else(no_ascii)?.split_ascii_whitespace().collect();
-    let order = Order::Command(match words[..] {
-        ["status"] => return Ok(Order::Status),
-        ["film"] => return Ok(Order::Film),
+    let order = TextOrder::Command(match words[..] {
+        ["status"] => return Ok(TextOrder::Status),
+        ["film"] => return Ok(TextOrder::Film),
         [stop] if stop.eq_ignore_ascii_case("stop") => Command::Stop,
         ["go"] => Command::Go,
         ["pause"] => Command::Pause,
@@ -65,15 +65,15 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
         }
         _ => {
             let detail = format!("{:?} is no line of kinocue", text.unwrap_or_default());
-            return Err(Fault::NoOrder(value(detail, &format!("there are {LINES}"))));
+            return Err(TextFault::NoOrder(value(detail, &format!("there are {LINES}"))));
         }
     });
     allowed(order, allow)
 }
 
 /// An order, where the configuration allows it.
-fn allowed(order: Order, allow: &[GearWord]) -> Result<Order, Fault> {
-    let Order::Command(ask) = &order else { return Ok(order) };
+fn allowed(order: TextOrder, allow: &[GearWord]) -> Result<TextOrder, TextFault> {
+    let TextOrder::Command(ask) = &order else { return Ok(order) };
     if ask.gear_word().is_none_or(|word| allow.contains(&word)) {
         return Ok(order);
     }
@@ -107,13 +107,13 @@ mod tests {
     use super::*;
     use crate::time::ShowTime;
 
-    fn ordered(line: &[u8]) -> Result<Order, Fault> {
+    fn ordered(line: &[u8]) -> Result<TextOrder, TextFault> {
         order(line, &GearWord::ALL.map(|(_, word)| word))
     }
 
     fn asked(line: &str) -> Command {
         match ordered(line.as_bytes()) {
-            Ok(Order::Command(ask)) => ask,
+            Ok(TextOrder::Command(ask)) => ask,
             other => panic!("{line}: {other:?}"),
         }
     }
@@ -144,24 +144,27 @@ mod tests {
         ] {
             assert_eq!(asked(line), ask, "{line}");
         }
-        assert_eq!(ordered(b"status"), Ok(Order::Status));
+        assert_eq!(ordered(b"status"), Ok(TextOrder::Status));
     }
 
     #[test]
     fn nothing_arms_homes_clears_or_loads() {
         for line in ["arm", "disarm", "home", "home A1", "clear", "load coaster"] {
             let fault = ordered(line.as_bytes()).unwrap_err();
-            assert!(matches!(fault, Fault::Refused(Problem { code: Code::Role, .. })), "{line}: {fault:?}");
+            assert!(
+                matches!(fault, TextFault::Refused(Problem { code: Code::Role, .. })),
+                "{line}: {fault:?}"
+            );
         }
     }
 
     #[test]
     fn what_is_not_listed_is_not_allowed_but_stop_is() {
-        assert_eq!(order(b"stop", &[]), Ok(Order::Command(Command::Stop)));
-        assert_eq!(order(b"status", &[]), Ok(Order::Status));
-        assert_eq!(order(b"go", &[GearWord::Go]), Ok(Order::Command(Command::Go)));
+        assert_eq!(order(b"stop", &[]), Ok(TextOrder::Command(Command::Stop)));
+        assert_eq!(order(b"status", &[]), Ok(TextOrder::Status));
+        assert_eq!(order(b"go", &[GearWord::Go]), Ok(TextOrder::Command(Command::Go)));
         let fault = order(b"park", &[GearWord::Go]).unwrap_err();
-        assert!(matches!(fault, Fault::Refused(Problem { code: Code::Role, .. })), "{fault:?}");
+        assert!(matches!(fault, TextFault::Refused(Problem { code: Code::Role, .. })), "{fault:?}");
     }
 
     #[test]
@@ -175,11 +178,11 @@ mod tests {
             ("POST / HTTP/1.1", "no line"),
             ("gö", "not ASCII"),
         ] {
-            let Fault::NoOrder(problem) = ordered(line.as_bytes()).unwrap_err() else { panic!("{line}") };
+            let TextFault::NoOrder(problem) = ordered(line.as_bytes()).unwrap_err() else { panic!("{line}") };
             assert_eq!(problem.code, Code::Value, "{line}");
             assert!(problem.to_string().contains(says), "{line}: {problem}");
         }
-        assert!(matches!(ordered(&[0xff, 0xfe]), Err(Fault::NoOrder(_))));
+        assert!(matches!(ordered(&[0xff, 0xfe]), Err(TextFault::NoOrder(_))));
     }
 
     #[test]
@@ -191,7 +194,7 @@ mod tests {
             ("trim xf", "write +2f or -1f"),
             ("level 101%", "write 0% to 100%"),
         ] {
-            let Fault::Refused(problem) = ordered(line.as_bytes()).unwrap_err() else { panic!("{line}") };
+            let TextFault::Refused(problem) = ordered(line.as_bytes()).unwrap_err() else { panic!("{line}") };
             assert!(problem.to_string().contains(says), "{line}: {problem}");
         }
     }
@@ -201,7 +204,7 @@ mod tests {
         fn no_bytes_panic_and_none_arm(bytes in proptest::collection::vec(any::<u8>(), 0..60), word in "[a-z]{2,7}") {
             let line = [word.as_bytes(), b" ", &bytes].concat();
             for line in [bytes.as_slice(), line.as_slice()] {
-                if let Ok(Order::Command(ask)) = ordered(line) {
+                if let Ok(TextOrder::Command(ask)) = ordered(line) {
                     prop_assert!(!["arm", "disarm", "home", "clear", "load"].contains(&ask.word()));
                 }
             }

@@ -27,7 +27,7 @@ use tokio::task::JoinSet;
 
 use crate::config::TextPort;
 use crate::control::{Handle, Places, Role, Surface, Who};
-use talk::Talk;
+use talk::TextTalk;
 
 /// Connections at the most; of more the one that was silent longest goes, before all one that never asked anything.
 const CONNECTIONS: usize = 16;
@@ -101,7 +101,7 @@ impl Text {
             let (place, _) = places.take(Some((*from.ip()).into()));
             let who = Who { role: Role::Operate, surface: Surface::Text, name: from.ip().to_string() };
             let (allow, token) = (config.allow.clone(), config.token);
-            let talk = Talk { hall: hall.clone(), who, allow, token, idle, place };
+            let talk = TextTalk { hall: hall.clone(), who, allow, token, idle, place };
             talks.spawn(async move { talk.run(stream).await });
         }
     }

@@ -11,7 +11,7 @@ use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-use super::line::{Fault, Order, order};
+use super::line::{TextFault, TextOrder, order};
 use crate::config::GearWord;
 use crate::control::{Code, Command, FilmStatus, Handle, Place, Posted, Problem, Status, Who};
 use crate::time::ShowTime;
@@ -26,17 +26,17 @@ const PARTING: Duration = Duration::from_secs(1);
 /// How long a peer may take to read its answer.
 const WRITING: Duration = Duration::from_secs(5);
 
-type Answer = Result<Arc<Status>, Problem>;
+type TextAnswer = Result<Arc<Status>, Problem>;
 
 /// A line that was read, on its way to its answer.
 enum Read {
     Posted(Posted),
-    Answered(Answer),
+    Answered(TextAnswer),
     Film(Box<FilmStatus>),
 }
 
 /// Who speaks on a connection, with which hall, and what they may ask.
-pub(super) struct Talk {
+pub(super) struct TextTalk {
     pub(super) hall: Handle,
     pub(super) who: Who,
     pub(super) allow: Vec<GearWord>,
@@ -56,7 +56,7 @@ enum Then {
     End,
 }
 
-impl Talk {
+impl TextTalk {
     /// Talks until the peer leaves, falls silent, or sends what is no order, or until another needs its place.
     pub(super) async fn run(self, stream: TcpStream) {
         let (mut incoming, outgoing) = stream.into_split();
@@ -115,18 +115,18 @@ impl Talk {
     fn take(&self, line: &[u8]) -> (Read, Then) {
         let order = match order(line, &self.allow) {
             Ok(order) => order,
-            Err(Fault::Refused(problem)) => return (Read::Answered(Err(problem)), Then::Listen),
-            Err(Fault::NoOrder(problem)) => return (Read::Answered(Err(problem)), Then::End),
+            Err(TextFault::Refused(problem)) => return (Read::Answered(Err(problem)), Then::Listen),
+            Err(TextFault::NoOrder(problem)) => return (Read::Answered(Err(problem)), Then::End),
         };
         self.place.show(&self.who.name);
         let read = match order {
-            Order::Status => Read::Answered(Ok(self.hall.status())),
-            Order::Film => match self.hall.status().film.clone() {
+            TextOrder::Status => Read::Answered(Ok(self.hall.status())),
+            TextOrder::Film => match self.hall.status().film.clone() {
                 Some(film) => Read::Film(Box::new(film)),
                 None => Read::Answered(Err(Problem::no_film())),
             },
             // A stop is done with this; its answer is for the journal and the peer.
-            Order::Command(ask) => match self.hall.post(self.who.clone(), ask) {
+            TextOrder::Command(ask) => match self.hall.post(self.who.clone(), ask) {
                 Ok(posted) => Read::Posted(posted),
                 Err(problem) => Read::Answered(Err(problem)),
             },
@@ -136,7 +136,7 @@ impl Talk {
 
     /// The first lines where a token is wanted: it, or a stop, which waits for none.
     fn first(&self, line: &[u8], wanted: &mut Option<[u8; 32]>) -> (Read, Then) {
-        if matches!(order(line, &[]), Ok(Order::Command(Command::Stop))) {
+        if matches!(order(line, &[]), Ok(TextOrder::Command(Command::Stop))) {
             return self.take(line);
         }
         let token = line.strip_prefix(b"token ").map(|token| Sha256::digest(token.trim_ascii()));
@@ -152,7 +152,7 @@ impl Talk {
     }
 
     fn hear_a_stop(&self, line: &[u8]) {
-        if matches!(order(line, &[]), Ok(Order::Command(Command::Stop))) {
+        if matches!(order(line, &[]), Ok(TextOrder::Command(Command::Stop))) {
             self.hall.stop();
             self.hall.note_stop(self.who.clone());
         }
@@ -182,7 +182,7 @@ async fn answer(mut outgoing: OwnedWriteHalf, mut read: mpsc::Receiver<Read>) {
 }
 
 /// `ok STATE POSITION` or `error CODE TEXT; REMEDY`, with the end of the line.
-pub(super) fn reply(answer: &Answer) -> String {
+pub(super) fn reply(answer: &TextAnswer) -> String {
     let text = match answer {
         Ok(status) => {
             let position =

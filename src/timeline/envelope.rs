@@ -47,7 +47,7 @@ impl Timeline {
         let [first, last] =
             [stretches.from, stretches.end()].map(|at| self.row_before(ShowTime::from_secs_f64(at)));
         for row in first..(last + 1).min(times.len() - 1) {
-            let piece = Piece {
+            let piece = CurvePiece {
                 cubic: self.cubic(row, axis),
                 from: times[row].as_secs_f64(),
                 until: times[row + 1].as_secs_f64(),
@@ -64,13 +64,13 @@ impl Timeline {
 }
 
 /// The curve of an axis from a row to the next, with their times in s.
-struct Piece {
+struct CurvePiece {
     cubic: Cubic,
     from: f64,
     until: f64,
 }
 
-impl Piece {
+impl CurvePiece {
     /// The least and greatest value between two times, as far as they are its own.
     fn ends(&self, start: f64, end: f64) -> (f64, f64) {
         let part = |time: f64| ((time - self.from) / (self.until - self.from)).clamp(0.0, 1.0);

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::Timeline;
 use crate::channel::{self, Sample};
-use crate::cue::{Effects, Step, Steps};
+use crate::cue::{Effects, Steps, TrackStep};
 use crate::time::ShowTime;
 
 /// The most that something reaches, and where.
@@ -92,7 +92,7 @@ fn usage<T: Copy + PartialEq + Default>(
 ) -> EffectUse {
     let mut usage = EffectUse { name, times: 0, on: Duration::ZERO, first: None };
     let mut since: Option<ShowTime> = None;
-    let last = Step { at: end, value: T::default() };
+    let last = TrackStep { at: end, value: T::default() };
     for step in steps.as_slice().iter().chain([&last]) {
         match (since, is_on(step.value) == 1) {
             (None, true) => {

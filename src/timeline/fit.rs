@@ -45,7 +45,7 @@ impl Timeline {
             (None, Unit::Fraction) => (0.0, 1.0),
             (None, _) => (f64::NEG_INFINITY, f64::INFINITY),
         };
-        let mut check = Check { timeline: self, faults: Collector::default(), held: Vec::new() };
+        let mut check = FitCheck { timeline: self, faults: Collector::default(), held: Vec::new() };
         for (axis, seat) in axes.clone().enumerate().filter_map(|(index, axis)| Some((axis, (seat?, index))))
         {
             check.unit(axis, seat);
@@ -68,13 +68,13 @@ impl Timeline {
     }
 }
 
-struct Check<'a> {
+struct FitCheck<'a> {
     timeline: &'a Timeline,
     faults: Collector,
     held: Vec<Held>,
 }
 
-impl Check<'_> {
+impl FitCheck<'_> {
     /// The unit of an axis, which is axis `index` of the seat.
     fn unit(&mut self, axis: usize, (seat, index): (&SeatType, usize)) {
         let (unit, geometry) = (self.timeline.unit(axis), &seat.each[index]);

@@ -3,7 +3,7 @@
 use crate::time::MonoTime;
 use crate::wire::{FrameNo, ReplyCode};
 
-use super::in_flight::{Entry, KEPT, Place, Ring, State};
+use super::in_flight::{FrameEntry, FrameState, KEPT, NumberPlace, Ring};
 use super::{ACK_TIMEOUT, Counts, Fate, Histogram, histogram};
 
 /// Fewer frames that asked than these do not tell whether a controller is lost.
@@ -24,7 +24,7 @@ pub(super) struct Account {
     pub(super) latency: Histogram,
     pub(super) last_ack: Option<(FrameNo, MonoTime)>,
     /// The entry of that frame.
-    last_acked: Option<Entry>,
+    last_acked: Option<FrameEntry>,
 }
 
 impl Account {
@@ -48,13 +48,13 @@ impl Account {
 
     /// Whether a frame waits for its reply of which it is known when it was sent.
     pub(super) fn is_timed(&self, frame: FrameNo) -> bool {
-        matches!(self.ring.find(frame), Place::Kept(index) if self.ring.get(index).state == State::InFlight)
+        matches!(self.ring.find(frame), NumberPlace::Kept(index) if self.ring.get(index).state == FrameState::InFlight)
     }
 
     /// When a frame was sent, at the latest; `None` where it is not remembered.
     pub(super) fn sent_at(&self, frame: FrameNo) -> Option<MonoTime> {
         match self.ring.find(frame) {
-            Place::Kept(index) => Some(self.ring.get(index).at),
+            NumberPlace::Kept(index) => Some(self.ring.get(index).at),
             _ => None,
         }
     }
@@ -63,23 +63,23 @@ impl Account {
         let Some(unrecorded) = self.ring.ahead(frame).checked_sub(1) else { return };
         self.recorded_at = at;
         self.record_unrecorded(unrecorded);
-        self.record(if asked { State::InFlight } else { State::Unasked });
+        self.record(if asked { FrameState::InFlight } else { FrameState::Unasked });
     }
 
     pub(super) fn on_send_failed(&mut self, frame: FrameNo) {
         self.record_unrecorded(self.ring.ahead(frame));
-        let Place::Kept(index) = self.ring.find(frame) else { return };
+        let NumberPlace::Kept(index) = self.ring.find(frame) else { return };
         let entry = self.ring.get_mut(index);
         match entry.state {
-            State::Acked | State::Refused | State::Failed => return,
-            State::Unasked => {}
-            State::InFlight | State::InFlightUntimed => self.counts.asked -= 1,
-            State::Lost => {
+            FrameState::Acked | FrameState::Refused | FrameState::Failed => return,
+            FrameState::Unasked => {}
+            FrameState::InFlight | FrameState::InFlightUntimed => self.counts.asked -= 1,
+            FrameState::Lost => {
                 self.counts.asked -= 1;
                 self.counts.lost -= 1;
             }
         }
-        entry.state = State::Failed;
+        entry.state = FrameState::Failed;
         self.counts.sent -= 1;
         self.counts.send_failed += 1;
     }
@@ -100,13 +100,15 @@ impl Account {
         latencies: &mut Histogram,
     ) -> Fate {
         let fate = match self.ring.find(frame) {
-            Place::Never => Fate::Stray,
-            Place::Forgotten => Fate::Stale,
-            Place::Kept(index) => match self.ring.get(index).state {
-                State::Unasked | State::Failed => Fate::Stray,
-                State::Acked | State::Refused => Fate::Duplicate,
-                State::Lost => Fate::Stale,
-                State::InFlight | State::InFlightUntimed => self.settle(index, frame, code, at, latencies),
+            NumberPlace::Never => Fate::Stray,
+            NumberPlace::Forgotten => Fate::Stale,
+            NumberPlace::Kept(index) => match self.ring.get(index).state {
+                FrameState::Unasked | FrameState::Failed => Fate::Stray,
+                FrameState::Acked | FrameState::Refused => Fate::Duplicate,
+                FrameState::Lost => Fate::Stale,
+                FrameState::InFlight | FrameState::InFlightUntimed => {
+                    self.settle(index, frame, code, at, latencies)
+                }
             },
         };
         self.counts.add_reply(fate);
@@ -125,12 +127,12 @@ impl Account {
         let entry = self.ring.get_mut(index);
         let latency = at.since(entry.at);
         if latency > ACK_TIMEOUT {
-            entry.state = State::Lost;
+            entry.state = FrameState::Lost;
             self.counts.lost += 1;
             return Fate::Stale;
         }
-        let timed = entry.state == State::InFlight;
-        entry.state = if code.refused() { State::Refused } else { State::Acked };
+        let timed = entry.state == FrameState::InFlight;
+        entry.state = if code.refused() { FrameState::Refused } else { FrameState::Acked };
         if !code.refused() {
             if timed {
                 let ns = crate::time::nanos(latency);
@@ -156,13 +158,13 @@ impl Account {
     /// Frames are on record in the order of their times, so the first one in flight that is not given up ends the walk.
     fn give_up(&mut self, too_old: impl Fn(MonoTime) -> bool) {
         while self.recorded(self.oldest_open) {
-            if let Place::Kept(index) = self.ring.find(self.oldest_open) {
+            if let NumberPlace::Kept(index) = self.ring.find(self.oldest_open) {
                 let entry = self.ring.get_mut(index);
                 if entry.state.open() {
                     if !too_old(entry.at) {
                         return;
                     }
-                    entry.state = State::Lost;
+                    entry.state = FrameState::Lost;
                     self.counts.lost += 1;
                 }
             }
@@ -193,15 +195,15 @@ impl Account {
         }
         for _ in forgotten..count {
             let asked = self.ring.next().asks(self.ack_every);
-            self.record(if asked { State::InFlightUntimed } else { State::Unasked });
+            self.record(if asked { FrameState::InFlightUntimed } else { FrameState::Unasked });
         }
     }
 
-    fn record(&mut self, state: State) {
+    fn record(&mut self, state: FrameState) {
         self.counts.sent += 1;
         self.counts.asked += u64::from(state.open());
         self.wanted = self.wanted.wrapping_add(u32::from(state.open()));
-        let forgotten = self.ring.push(Entry { state, at: self.recorded_at, wanted: self.wanted });
+        let forgotten = self.ring.push(FrameEntry { state, at: self.recorded_at, wanted: self.wanted });
         self.counts.lost += u64::from(forgotten.state.open());
     }
 }

@@ -8,7 +8,7 @@ pub const KEPT: u32 = 4_096;
 
 /// How a remembered frame stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum State {
+pub(super) enum FrameState {
     /// Sent, asking for nothing.
     Unasked,
     /// Waiting for a reply.
@@ -25,7 +25,7 @@ pub(super) enum State {
     Failed,
 }
 
-impl State {
+impl FrameState {
     pub(super) const fn open(self) -> bool {
         matches!(self, Self::InFlight | Self::InFlightUntimed)
     }
@@ -33,8 +33,8 @@ impl State {
 
 /// A remembered frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Entry {
-    pub(super) state: State,
+pub(super) struct FrameEntry {
+    pub(super) state: FrameState,
     /// When it was sent.
     pub(super) at: MonoTime,
     /// How many frames that wanted a reply there had been with it, round after 4,294,967,295.
@@ -43,7 +43,7 @@ pub(super) struct Entry {
 
 /// Where a frame number leads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum NumberPlace {
     /// No frame of that number has been on record.
     Never,
     /// There was one, too long ago.
@@ -55,7 +55,7 @@ pub(super) enum Place {
 /// A ring of the last [`KEPT`] frames on record.
 #[derive(Debug)]
 pub(super) struct Ring {
-    entries: Box<[Entry]>,
+    entries: Box<[FrameEntry]>,
     newest: FrameNo,
     /// Frames on record so far.
     total: u64,
@@ -64,7 +64,7 @@ pub(super) struct Ring {
 impl Ring {
     /// An empty ring; the first frame will be `first`.
     pub(super) fn new(first: FrameNo) -> Self {
-        let vacant = Entry { state: State::Unasked, at: MonoTime::default(), wanted: 0 };
+        let vacant = FrameEntry { state: FrameState::Unasked, at: MonoTime::default(), wanted: 0 };
         let newest = FrameNo(first.0.wrapping_sub(1));
         Self { entries: vec![vacant; KEPT as usize].into_boxed_slice(), newest, total: 0 }
     }
@@ -75,7 +75,7 @@ impl Ring {
     }
 
     /// Takes the next frame on record; gives the entry that had its place.
-    pub(super) fn push(&mut self, entry: Entry) -> Entry {
+    pub(super) fn push(&mut self, entry: FrameEntry) -> FrameEntry {
         self.skip(1);
         std::mem::replace(&mut self.entries[slot(self.newest)], entry)
     }
@@ -86,20 +86,20 @@ impl Ring {
         self.total += u64::from(count);
     }
 
-    pub(super) fn find(&self, frame: FrameNo) -> Place {
+    pub(super) fn find(&self, frame: FrameNo) -> NumberPlace {
         match u32::try_from(self.newest.since(frame)) {
-            Ok(age) if u64::from(age) >= self.total => Place::Never,
-            Ok(age) if age >= KEPT => Place::Forgotten,
-            Ok(_) => Place::Kept(slot(frame)),
-            Err(_) => Place::Never,
+            Ok(age) if u64::from(age) >= self.total => NumberPlace::Never,
+            Ok(age) if age >= KEPT => NumberPlace::Forgotten,
+            Ok(_) => NumberPlace::Kept(slot(frame)),
+            Err(_) => NumberPlace::Never,
         }
     }
 
-    pub(super) fn get(&self, index: usize) -> Entry {
+    pub(super) fn get(&self, index: usize) -> FrameEntry {
         self.entries[index]
     }
 
-    pub(super) fn get_mut(&mut self, index: usize) -> &mut Entry {
+    pub(super) fn get_mut(&mut self, index: usize) -> &mut FrameEntry {
         &mut self.entries[index]
     }
 

@@ -1,6 +1,6 @@
 //! What a controller may send, told apart once for each datagram.
 
-use super::{ImaxRegisters, Message, MotionReply, RegisterReply, Report, Status, VibrationPort};
+use super::{ImaxRegisters, Message, MotionReply, RegisterReply, RegisterReport, Status, VibrationPort};
 
 /// A datagram of a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub enum FromController<'a> {
     /// Its state, sent unasked by an SMC controller.
     Status(Status),
     /// Registers, sent unasked by an IMAX or MBOX controller.
-    Report(Report<'a>),
+    Report(RegisterReport<'a>),
     /// Anything else, be it no message at all.
     Other,
 }

@@ -16,6 +16,7 @@ mod motion;
 mod per_axis;
 mod position;
 mod register;
+mod register_request;
 mod reply;
 mod report;
 mod servo;
@@ -44,8 +45,9 @@ pub(crate) use position::{DP_INPUTS, DP_POSITIONS, position_reads, positions};
 pub use position::{position, position_words};
 pub(crate) use register::Space;
 pub use register::{Access, ReadRequest, RegisterReply, WriteRequest};
+pub use register_request::{RegisterAsk, RegisterWords};
 pub(crate) use report::DPFE;
-pub use report::Report;
+pub use report::RegisterReport;
 pub(crate) use servo::MAX_SERVO_READ;
 pub use servo::{ServoRead, ServoReply, ServoWrite};
 pub use status::Status;
@@ -79,7 +81,7 @@ pub enum Message<'a> {
     /// 0x3101.
     Status(Status),
     /// 0x1001.
-    Report(Report<'a>),
+    Report(RegisterReport<'a>),
 }
 
 impl<'a> Message<'a> {
@@ -115,7 +117,7 @@ impl<'a> Message<'a> {
             (servo::WRITE, 1) => ServoWrite::parse(bytes).map(Self::ServoWrite),
             (servo::READ | servo::WRITE, _) => ServoReply::parse(bytes).map(Self::ServoReply),
             (status::FAMILY, _) => Status::parse(bytes).map(Self::Status),
-            (report::FAMILY, _) => Report::parse(bytes).map(Self::Report),
+            (report::FAMILY, _) => RegisterReport::parse(bytes).map(Self::Report),
             _ => Err(WireError::Function { found }),
         }
     }

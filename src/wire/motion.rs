@@ -78,7 +78,7 @@ impl Motion<'_> {
     pub fn emit_as<'b>(&self, port: VibrationPort, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = request_function(family(self.timing, self.vibration.is_some()));
         let header = Header { function, slot: self.channel, accept: self.accept, reply: self.reply };
-        let body = Body {
+        let body = MotionBody {
             frame: self.frame,
             time_ms: self.time_ms,
             positions: self.positions,
@@ -161,7 +161,7 @@ impl MotionRequest {
     pub fn emit_as<'b>(&self, port: VibrationPort, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = self.function();
         let header = Header { function, slot: self.channel, accept: self.accept, reply: self.reply };
-        let body = Body {
+        let body = MotionBody {
             frame: self.frame,
             time_ms: self.time_ms,
             positions: &self.positions,
@@ -279,7 +279,7 @@ impl MotionReply {
     pub fn emit_as<'b>(&self, port: VibrationPort, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = reply_function(family(self.timing, self.vibration.is_some()), self.code);
         let slot = if self.code == ReplyCode::Running { self.channel } else { self.error };
-        let body = Body {
+        let body = MotionBody {
             frame: self.frame,
             time_ms: self.time_ms,
             positions: &self.positions,
@@ -356,7 +356,7 @@ fn axes_of_request(channel: u16, bytes: usize, vibrating: Option<VibrationPort>)
 }
 
 /// What follows the header, to write.
-struct Body<'a> {
+struct MotionBody<'a> {
     frame: FrameNo,
     time_ms: u32,
     positions: &'a [Pulses],
@@ -365,7 +365,7 @@ struct Body<'a> {
     vibration: Option<&'a [Vibration]>,
 }
 
-impl Body<'_> {
+impl MotionBody<'_> {
     fn emit<'b>(&self, header: Header, port: VibrationPort, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let vibrating = self.vibration.map(|_| port);
         header.emit(buf);

@@ -1,9 +1,10 @@
 //! Registers of the controller: 0x1101 reads, 0x1201 writes, and their replies (SMC manual 2.2.2.1 to 2.2.2.4).
 
 use super::header::Header;
+use super::register_request::{RegisterAsk, RegisterWords};
 use super::reply::ReplyParts;
 use super::words::{self, Words};
-use super::{Code, Dialect, MAX_LEN, ReplyCode, WireError};
+use super::{Dialect, MAX_LEN, ReplyCode, WireError};
 
 pub(super) const READ: u8 = 0x11;
 pub(super) const WRITE: u8 = 0x12;
@@ -44,71 +45,9 @@ impl Space {
 }
 
 /// Host to controller, 0x1101: what stands in these registers?
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReadRequest {
-    /// Object channel: 0 DP, 1 PA.
-    pub channel: u16,
-    /// Who shall receive it.
-    pub accept: Code,
-    /// Who shall answer.
-    pub reply: Code,
-    /// The first register.
-    pub start: u16,
-    /// How many.
-    pub num: u16,
-}
-
-impl ReadRequest {
-    /// Writes the request to the front of `buf` and returns it.
-    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        Header::request(READ, self.channel, self.accept, self.reply).emit(buf);
-        words::emit_ask(buf, self.start, self.num)
-    }
-
-    /// Reads a request; bytes after it are let pass ("extra data").
-    ///
-    /// # Errors
-    /// [`WireError::Length`] where it ends before its count, and those of a broken header or another function.
-    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
-        let Header { slot: channel, accept, reply, .. } = Header::parse_request(bytes, READ)?;
-        let (start, num) = words::ask(bytes)?;
-        Ok(Self { channel, accept, reply, start, num })
-    }
-}
-
-/// Host to controller, 0x1201: put these words into registers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WriteRequest<'a> {
-    /// Object channel; see [`Space::of_write`].
-    pub channel: u16,
-    /// Who shall obey.
-    pub accept: Code,
-    /// Who shall answer.
-    pub reply: Code,
-    /// The first register.
-    pub start: u16,
-    /// A word for each register; at most 256.
-    pub data: Words<'a>,
-}
-
-impl<'a> WriteRequest<'a> {
-    /// Writes the request to the front of `buf` and returns it.
-    pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        Header::request(WRITE, self.channel, self.accept, self.reply).emit(buf);
-        words::emit_all(buf, self.start, self.data)
-    }
-
-    /// Reads a request; bytes after it are let pass.
-    ///
-    /// # Errors
-    /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
-    /// a broken header or another function.
-    pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
-        let Header { slot: channel, accept, reply, .. } = Header::parse_request(bytes, WRITE)?;
-        let (start, data) = words::all(bytes)?;
-        Ok(Self { channel, accept, reply, start, data })
-    }
-}
+pub type ReadRequest = RegisterAsk<READ>;
+/// Host to controller, 0x1201: put these words into registers; [`Space::of_write`] is what the object channel means.
+pub type WriteRequest<'a> = RegisterWords<'a, WRITE>;
 
 /// What a register reply answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -17,24 +17,24 @@ pub(crate) const MAX_WORDS: usize = 256;
 
 /// 16-bit words, borrowed from a message as it came or from whoever fills one; at most [`MAX_WORDS`] are sent.
 #[derive(Clone, Copy)]
-pub struct Words<'a>(Source<'a>);
+pub struct Words<'a>(WordSource<'a>);
 
 #[derive(Clone, Copy)]
-enum Source<'a> {
+enum WordSource<'a> {
     Bytes(&'a [u8]),
     Native(&'a [u16]),
 }
 
 impl<'a> Words<'a> {
     /// No words.
-    pub const EMPTY: Self = Self(Source::Native(&[]));
+    pub const EMPTY: Self = Self(WordSource::Native(&[]));
 
     /// How many there are.
     #[must_use]
     pub const fn len(self) -> usize {
         match self.0 {
-            Source::Bytes(bytes) => bytes.len() / 2,
-            Source::Native(words) => words.len(),
+            WordSource::Bytes(bytes) => bytes.len() / 2,
+            WordSource::Native(words) => words.len(),
         }
     }
 
@@ -48,8 +48,8 @@ impl<'a> Words<'a> {
     #[must_use]
     pub fn get(self, index: usize) -> Option<u16> {
         match self.0 {
-            Source::Bytes(bytes) => (index < bytes.len() / 2).then(|| u16_at(bytes, 2 * index)),
-            Source::Native(words) => words.get(index).copied(),
+            WordSource::Bytes(bytes) => (index < bytes.len() / 2).then(|| u16_at(bytes, 2 * index)),
+            WordSource::Native(words) => words.get(index).copied(),
         }
     }
 
@@ -61,7 +61,7 @@ impl<'a> Words<'a> {
 
 impl<'a> From<&'a [u16]> for Words<'a> {
     fn from(words: &'a [u16]) -> Self {
-        Self(Source::Native(words))
+        Self(WordSource::Native(words))
     }
 }
 
@@ -123,7 +123,7 @@ pub(super) fn answer(bytes: &[u8]) -> Result<(u16, u16, Words<'_>), WireError> {
     }
     let need = field::DATA + 2 * words;
     let data = bytes.get(field::DATA..need).ok_or(WireError::Length { len: bytes.len(), need })?;
-    Ok((start, num, Words(Source::Bytes(data))))
+    Ok((start, num, Words(WordSource::Bytes(data))))
 }
 
 /// First register, count and the words there are, which may be fewer than the count.
@@ -131,5 +131,5 @@ pub(super) fn refusal(bytes: &[u8]) -> Result<(u16, u16, Words<'_>), WireError> 
     let (start, num) = ask(bytes)?;
     let there = (bytes.len() - field::DATA) / 2;
     let words = there.min(usize::from(num)).min(MAX_WORDS);
-    Ok((start, num, Words(Source::Bytes(&bytes[field::DATA..field::DATA + 2 * words]))))
+    Ok((start, num, Words(WordSource::Bytes(&bytes[field::DATA..field::DATA + 2 * words]))))
 }

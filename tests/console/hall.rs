@@ -2,8 +2,10 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::io::BufRead as _;
 use std::net::SocketAddr;
 
+use rustix::process::Signal;
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 
@@ -21,6 +23,8 @@ pub(crate) struct Hall {
     sims: Vec<Option<Sim>>,
     serving: Option<Serving>,
     url: String,
+    /// Virtual SilverMax units, and the folder with their line.
+    drives: Option<(Guarded, TempDir)>,
 }
 
 impl Hall {
@@ -44,6 +48,34 @@ impl Hall {
         Self::open_with("none", &sync)
     }
 
+    /// The same, with a seat on three SilverMax units, which nobody has homed, at a rate that is left on a busy machine.
+    pub(crate) fn open_beside_drives() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let port = folder.path().join("stalls");
+        let line = port.to_str().expect("text");
+        let mut sim =
+            Guarded::start(&["sim", "--dialect", "silvermax", "--tty", line, "--units", "16,17,18"]);
+        let ready = sim.stderr().lines().map_while(Result::ok).any(|line| line.starts_with("ready "));
+        assert!(ready, "the line is there");
+        let drives = format!(
+            "[link.stalls]\nport = \"{line}\"\nrate_hz = 25\n\
+             [seat.lift]\naxes = 3\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 4000\nmax_velocity_mm_s = 160\n\
+             max_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n\
+             [seat.lift.drive]\ntorque = {{ hold = \"60%\", move = \"100%\", full = 20000 }}\n\
+             home = {{ way = \"switch\", input = 1, toward = \"down\", travel_mm = 165, zero_mm = -2 }}\n\
+             [[controller]]\nname = \"L1\"\nseat = \"lift\"\naddress = \"link:stalls\"\ndialect = \"silvermax\"\n\
+             units = [16, 17, 18]\n\n"
+        );
+        Self { drives: Some((sim, folder)), ..Self::open_with("none", &drives) }
+    }
+
+    /// Pulls the plug of the line.
+    pub(crate) fn unplug(&mut self) {
+        let (sim, _folder) = self.drives.take().expect("it has drives");
+        sim.signal(Signal::TERM);
+        sim.finish();
+    }
+
     fn open_with(role: &str, sync: &str) -> Self {
         let dir = tempfile::tempdir().expect("a folder");
         let sims: Vec<Sim> = (0..2).map(|_| Sim::start(SEATS, &["--safe"])).collect();
@@ -58,7 +90,7 @@ impl Hall {
         fs::write(dir.path().join("cues/swell.csv"), swell()).expect("it can be written");
         let serving = Serving::start(dir.path());
         let url = format!("http://{}/", address_of(&serving));
-        Self { dir, sims: sims.into_iter().map(Some).collect(), serving: Some(serving), url }
+        Self { dir, sims: sims.into_iter().map(Some).collect(), serving: Some(serving), url, drives: None }
     }
 
     /// Where the console is.

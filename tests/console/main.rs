@@ -66,9 +66,9 @@ fn a_show_is_armed_played_paused_turned_down_and_stopped_from_the_page() {
     browser.shot("01-parked");
     assert_eq!(
         browser
-            .eval("return ['follow-panel', 'follow-badge'].map((id) => document.getElementById(id).hidden)"),
-        json!([true, true]),
-        "this hall follows no film"
+            .eval("return ['follow-panel', 'follow-badge', 'links-panel'].map((id) => document.getElementById(id).hidden)"),
+        json!([true, true, true]),
+        "this hall follows no film, and has no serial links"
     );
     assert_eq!(browser.eval("return document.getElementById('go').disabled"), json!(true), "behind ARM");
 
@@ -297,6 +297,40 @@ fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_pr
     browser.reads("follow-word", "locked");
     drop(reel);
     browser.reads("follow-word", "lost");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn serial_links_and_their_axes_are_shown_in_words_and_a_port_that_vanishes_is_named() {
+    let Some(browser) = Browser::start() else { return };
+    let mut hall = Hall::open_beside_drives();
+    browser.resize(1280, 800);
+    browser.open(hall.url());
+    browser.wait("!document.getElementById('token').hidden");
+    browser.press("#token-text");
+    browser.type_text(TOKEN);
+    browser.press("#token [type=submit]");
+    for words in ["stalls, silvermax", "25.0 hz", "260 ms", "no cue", "open"] {
+        browser.reads("links", words);
+    }
+    browser.wait("document.querySelectorAll('#links tbody tr').length === 3");
+    browser.wait("document.querySelector('#links tbody .look-away b').textContent === 'excluded'"); // it is not home
+    browser
+        .wait("/^[1-9]\\d* of /.test(document.querySelector('#links dl div:nth-child(5) dd').textContent)");
+    for (width, height) in [(1280, 800), (390, 844)] {
+        browser.resize(width, height);
+        browser
+            .wait(&format!("innerWidth === {width} && document.documentElement.scrollWidth <= innerWidth"));
+        let cut_off =
+            "const words = document.getElementById('state'); return words.scrollWidth > words.clientWidth";
+        assert_eq!(browser.eval(cut_off), json!(false), "the state is wider than its place at {width}");
+        browser.eval("document.getElementById('links-panel').scrollIntoView()");
+        browser.shot(&format!("70-links-{width}x{height}"));
+    }
+    hall.unplug();
+    browser.wait("document.querySelector('#links .link-state').classList.contains('look-bad')");
+    browser.reads("links", "there is no such port; plug the adapter in");
+    browser.shot("71-links-gone");
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 

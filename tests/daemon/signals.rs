@@ -76,7 +76,7 @@ fn a_hall_is_not_read_anew_as_one_with_drives_that_nothing_plays() {
         .replace("rs485", "can");
     hall.rewrite(|config| format!("{}{drives}", config.replace("Hall 1", "Hall 2")));
     let run = hall.run(&["reload"]);
-    assert!(run.stderr.contains("drives are not played yet: D2"), "{run:?}");
+    assert!(run.stderr.contains("no CAN bus is opened yet: D2"), "{run:?}");
     assert_eq!(run.code, Some(1), "{run:?}");
     let status = hall.lives_on(50);
     assert_eq!((status["hall"].as_str(), status["state"].as_str()), (Some("Hall 1"), Some("parked")));

@@ -202,3 +202,61 @@ fn on_a_terminal_the_console_stays_after_the_ride_to_go_again_until_ctrl_c() {
     assert_all_acked(&report);
     assert!(is_empty(&folder.path("")));
 }
+
+/// A ride on drives, and each line about a unit at its end. True with it if all frames were confirmed: a busy machine may keep a
+/// unit from being asked for so long that its seat is lost for a while.
+fn ride_on_drives(dialect: &str) -> (Vec<String>, bool) {
+    let folder = Folder::new();
+    let args = ["--json", "--dialect", dialect];
+    let mut demo = Playing::demo(&folder.path(""), &args, Stdio::null(), Stdio::piped());
+    let begun = demo.wait_for("homing: homed by the operator");
+    assert!(begun.contains("the demo plays that person"), "{begun}");
+    demo.wait_for("playing: the seats are on the cue");
+    let run = demo.finish();
+    let report = run.report_of(0);
+    assert_eq!(report["result"], "completed");
+    let events = report["events"].as_array().expect("a list");
+    let is_undisturbed =
+        !events.iter().any(|event| event["what"].as_str().is_some_and(|what| what.starts_with("lost")));
+    let controllers = report["controllers"].as_array().expect("a list");
+    assert_eq!(controllers.len(), 2);
+    for one in controllers.iter().filter(|_| is_undisturbed) {
+        assert_eq!(one["acked"], one["asked"], "{one}");
+        assert!(one["sent"].as_u64() > Some(1_700), "the whole cue: {one}");
+    }
+    assert!(is_empty(&folder.path("")), "it leaves no file behind");
+    let units = run.stderr.lines().filter(|line| line.contains(": unit 1"));
+    (units.map(str::to_owned).collect(), is_undisturbed)
+}
+
+fn assert_all_say(units: &[String], fine: &[&str]) {
+    let wrong = units.iter().find(|unit| fine.iter().any(|fine| !unit.contains(fine)));
+    assert_eq!(wrong, None, "not all of {fine:?}");
+}
+
+#[test]
+fn the_demo_of_silvermax_units_homes_them_first_and_plays_the_ride_and_none_lets_go_or_jumps() {
+    let (units, is_undisturbed) = ride_on_drives("silvermax");
+    assert_eq!(units.len(), 6, "{units:?}");
+    assert_all_say(&units, &["refused 0", "killed 0", "jumps 0"]);
+    if is_undisturbed {
+        assert_all_say(&units, &["dry 0", "position 0"]);
+    }
+}
+
+#[test]
+fn the_demo_of_sixpack_2_units_homes_them_first_and_plays_the_ride_and_no_step_is_lost() {
+    let (units, _) = ride_on_drives("sixpack2");
+    assert_eq!(units.len(), 2, "{units:?}");
+    let fine = ["unknown 0", "settings while moving 0", "searches by itself 0", "most lost 0 microsteps"];
+    assert_all_say(&units, &fine);
+}
+
+#[test]
+fn the_demo_of_mbox_controllers_plays_the_ride_with_every_frame_acked() {
+    let folder = Folder::new();
+    let args = ["--json", "--dialect", "mbox"];
+    let report = Playing::demo(&folder.path(""), &args, Stdio::null(), Stdio::piped()).finish().report_of(0);
+    assert_eq!(report["result"], "completed");
+    assert_all_acked(&report);
+}

@@ -2,6 +2,7 @@
 
 use super::hall::HallContext;
 use crate::config::Link;
+use crate::config::drive::DriveFamily;
 use crate::control::{LinkAxisStatus, LinkStatus};
 use crate::drive::link::AxisFigures;
 use crate::rt::LinkEnd;
@@ -28,6 +29,10 @@ fn one(hall: &HallContext, link: &LinkEnd) -> LinkStatus {
     LinkStatus {
         name: link.name.clone(),
         port: port.unwrap_or_default(),
+        dialect: link.family.word().to_owned(),
+        rate_hz: link.terms.period.as_secs_f64().recip(),
+        lead_ms: link.terms.lead(link.family).as_secs_f64() * 1e3,
+        deviation_mm: hall.cued.as_ref().and_then(|cued| cued.deviation_on(&link.name)),
         fault: standing.fault.as_ref().map(ToString::to_string),
         asked: talk.asked,
         answered: talk.answered,
@@ -38,22 +43,25 @@ fn one(hall: &HallContext, link: &LinkEnd) -> LinkStatus {
         axes: lanes
             .flat_map(|(lane, axes)| {
                 let name = &hall.config.controllers[*lane].name;
-                (1..).zip(axes).map(|(number, axis)| of_axis(name, number, axis))
+                (1..).zip(axes).map(|(number, axis)| of_axis(name, number, axis, link.family))
             })
             .collect(),
     }
 }
 
-fn of_axis(controller: &str, axis: usize, figures: &AxisFigures) -> LinkAxisStatus {
+fn of_axis(controller: &str, axis: usize, figures: &AxisFigures, family: DriveFamily) -> LinkAxisStatus {
     let account = figures.account;
+    let confirms = family == DriveFamily::SilverMax;
     LinkAxisStatus {
         controller: controller.to_owned(),
         axis,
         made: account.made,
         acked: account.acked,
+        unconfirmed: if confirms { 0 } else { account.sent },
         refused: account.refused,
         in_doubt: account.in_doubt,
         skipped: account.skipped,
+        queued: figures.queued,
         dry: figures.dry,
         error_mm: figures.error_mm,
         off_course_mm: figures.off_course_mm,

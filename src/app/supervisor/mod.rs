@@ -40,7 +40,7 @@ mod testing;
 mod tests;
 mod warnings;
 
-pub(crate) use reload::{Carryover, Signals};
+pub(crate) use reload::{Carryover, SystemSignals};
 pub(crate) use service_log::ServiceLog;
 
 use std::collections::VecDeque;
@@ -94,7 +94,7 @@ pub(crate) struct SupervisorPorts {
     /// When the program started.
     pub(crate) began: MonoTime,
     /// What the system asks of the program.
-    pub(crate) signals: Signals,
+    pub(crate) signals: SystemSignals,
     /// Whom to tell what happens.
     pub(crate) service_log: ServiceLog,
     /// What was set in the hall before, or before the program started.
@@ -315,9 +315,7 @@ impl Supervisor {
         let log = &self.ports.service_log;
         self.features.records.settle_folds(now).iter().for_each(|action| log.say_ask(action));
         log.say_journal(self.features.records.news());
-        if self.ports.settings_file.take_mended() {
-            log.say_mended();
-        }
+        log.say_settings(self.ports.settings_file.news());
         self.keep_settings();
         self.publish();
     }

@@ -7,7 +7,7 @@ use crate::control::{PreflightStatus, Severity, Warning};
 use crate::device::survey::Survey;
 use crate::drive::rates::LinkLoad;
 use crate::net::{Route, route};
-use crate::preflight::{self, Check, DriveSubject, LinkSurvey, Subject, Terms, judge, judge_driven};
+use crate::preflight::{self, Check, DriveSubject, LinkSurvey, ShowTerms, Subject, judge, judge_driven};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -38,7 +38,8 @@ impl Preflighted {
                 survey: Some(survey),
             })
             .collect();
-        let terms = Terms { frame_port: config.show.bind.port(), rate_hz: config.show.rate_hz, cue: None };
+        let terms =
+            ShowTerms { frame_port: config.show.bind.port(), rate_hz: config.show.rate_hz, cue: None };
         let mut found = judge(&subjects, &terms, &config.show.accept_findings);
         let on_links: Vec<_> = config.on_links().filter_map(|one| driven(config, one, links)).collect();
         found.extend(judge_driven(&on_links, &config.show.accept_findings));

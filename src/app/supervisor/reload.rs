@@ -55,14 +55,14 @@ impl Carryover {
 
 /// What the system asks of the program; set by signals.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Signals {
+pub(crate) struct SystemSignals {
     /// Park, and end.
     pub(crate) leave: Arc<AtomicBool>,
     /// Read the configuration anew.
     pub(crate) reload: Arc<AtomicBool>,
 }
 
-impl Signals {
+impl SystemSignals {
     /// True if the program is to end.
     #[must_use]
     pub(crate) fn is_leaving(&self) -> bool {

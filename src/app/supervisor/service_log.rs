@@ -94,9 +94,9 @@ impl ServiceLog {
         news.into_iter().for_each(|news| self.say(Priority::Warning, "journal", news));
     }
 
-    /// Says that what people set is kept again.
-    pub(super) fn say_mended(&self) {
-        self.say(Priority::Notice, "settings", "what people set is kept again");
+    /// Says what became better in keeping what people set.
+    pub(super) fn say_settings(&self, news: Option<&'static str>) {
+        news.into_iter().for_each(|news| self.say(Priority::Notice, "settings", news));
     }
 
     /// Says that the hall is in another state.

@@ -12,7 +12,7 @@ use crate::engine::{Headroom, Show};
 use crate::film::chase::ChaseRules;
 use crate::library::{CueId, IdError, Library};
 use crate::playlist::EntryFilm;
-use crate::proof::{self, Digest, Terms};
+use crate::proof::{self, Digest, LinkPlay, Terms};
 use crate::rt::{FilmStart, Loaded};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -44,9 +44,17 @@ pub(super) struct ProvedShow {
     pub(super) film: Option<FilmStart>,
     /// The film that is shown with it from here.
     pub(super) movie: Option<Movie>,
+    /// What the links of the hall execute of it.
+    links: Vec<LinkPlay>,
 }
 
 impl ProvedShow {
+    /// How far drives on a link are beside it at the most, mm; none where nobody on it plays it.
+    pub(super) fn deviation_on(&self, link: &str) -> Option<f64> {
+        let axes = self.links.iter().filter(|play| play.link == link).flat_map(|play| &play.axes);
+        axes.map(|axis| axis.deviation.value).reduce(f64::max)
+    }
+
     /// Proves a cue for a hall.
     ///
     /// # Errors
@@ -107,6 +115,7 @@ impl ProvedShow {
             join_s: 0.0,
             film,
             movie: None,
+            links: proof.links,
         })
     }
 

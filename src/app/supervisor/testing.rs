@@ -17,7 +17,7 @@ use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::HallContext;
 use super::hall_settings::HallSettings;
 use super::show::ProvedShow;
-use super::{Carryover, ServiceLog, Signals, Supervisor, SupervisorPorts};
+use super::{Carryover, ServiceLog, Supervisor, SupervisorPorts, SystemSignals};
 use crate::app::runtime::RuntimeHandle;
 use crate::config::{self, Config};
 use crate::control::{
@@ -402,7 +402,7 @@ fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, Supe
         handle(Arc::clone(desk), Status::starting("Hall 1"));
     let service_log = ServiceLog::new(Log::start(|_| {}).unwrap());
     let config = folder.join("hall.toml");
-    let (began, signals) = (Monotonic.now(), Signals::default());
+    let (began, signals) = (Monotonic.now(), SystemSignals::default());
     let (settings_file, _) = SettingsFile::open(folder);
     (
         handle,

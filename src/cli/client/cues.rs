@@ -25,7 +25,7 @@ const PIECE: usize = 64 << 10;
 
 /// The commands of the library.
 #[derive(Debug, clap::Subcommand)]
-pub(in crate::cli) enum Command {
+pub(in crate::cli) enum CuesCommand {
     /// Lists the cues of the daemon's library.
     #[command(after_help = "Examples:\n  kinocue cues\n  kinocue cues --json")]
     Cues(ServerArgs),
@@ -57,26 +57,26 @@ pub(in crate::cli) struct UploadArgs {
 /// One cue of the library.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct Cue {
+struct ListedCue {
     id: String,
     title: Option<String>,
     length_s: Option<f64>,
     axes: Option<usize>,
     effects: Vec<String>,
-    proof: Proved,
+    proof: ProvedCue,
 }
 
 /// True if it keeps the limits of the hall.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct Proved {
+struct ProvedCue {
     state: String,
 }
 
-pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+pub(super) fn run(command: &CuesCommand) -> Result<Exit, Failure> {
     match command {
-        Command::Cues(server) => list(server),
-        Command::Upload(args) => upload(args),
+        CuesCommand::Cues(server) => list(server),
+        CuesCommand::Upload(args) => upload(args),
     }
 }
 
@@ -85,15 +85,15 @@ fn list(server: &ServerArgs) -> Result<Exit, Failure> {
     server.show(&reply)?;
     reply::done(&reply)?;
     if !server.json {
-        let cues: Vec<Cue> =
+        let cues: Vec<ListedCue> =
             serde_json::from_str(&reply.text).context("the reply is no list").or_exit(Exit::Internal)?;
         let header = ["cue", "title", "length", "axes", "effects", "proved"];
-        print::out(&table(header, cues.iter().map(Cue::row)))?;
+        print::out(&table(header, cues.iter().map(ListedCue::row)))?;
     }
     Ok(Exit::Done)
 }
 
-impl Cue {
+impl ListedCue {
     fn row(&self) -> [String; 6] {
         let or = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
         [

@@ -9,7 +9,7 @@ use hyper::Method;
 use hyper::body::{Bytes, Incoming};
 use tokio::time::timeout;
 
-use super::http::{Reply, request, send};
+use super::http::{HttpReply, request, send};
 use super::reply;
 use crate::cli::{Exit, Failure, OrExit as _};
 
@@ -23,7 +23,7 @@ const LONGEST: usize = 64 << 20;
 /// A stream of events.
 pub(super) struct Events {
     body: Incoming,
-    lines: Lines,
+    lines: EventLines,
 }
 
 impl Events {
@@ -39,10 +39,10 @@ impl Events {
         if status != 200 {
             let text = response.into_body().collect().await.map(|body| body.to_bytes()).unwrap_or_default();
             let text = String::from_utf8_lossy(&text).into_owned();
-            reply::done(&Reply { status, text })?;
+            reply::done(&HttpReply { status, text })?;
             return Err(anyhow!("the daemon has no events for us ({status})")).or_exit(Exit::Internal);
         }
-        Ok(Self { body: response.into_body(), lines: Lines::default() })
+        Ok(Self { body: response.into_body(), lines: EventLines::default() })
     }
 
     /// The data of the next event; nothing where none came for [`QUIET`]. Why there will be none any more otherwise.
@@ -66,7 +66,7 @@ impl Events {
 
 /// What has come of the stream and is no event yet.
 #[derive(Debug, Default)]
-struct Lines {
+struct EventLines {
     bytes: Vec<u8>,
     /// How much of that has been looked through.
     seen: usize,
@@ -74,7 +74,7 @@ struct Lines {
     data: Option<String>,
 }
 
-impl Lines {
+impl EventLines {
     fn take(&mut self, piece: &[u8]) -> Result<(), &'static str> {
         self.bytes.drain(..self.seen);
         self.seen = 0;
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     fn events(pieces: &[&[u8]]) -> Vec<String> {
-        let mut lines = Lines::default();
+        let mut lines = EventLines::default();
         let mut events = Vec::new();
         for piece in pieces {
             lines.take(piece).unwrap();

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use super::panel::Panel;
+use super::panel::WatchPanel;
 use super::reply;
 use super::server::ServerArgs;
 use super::table::table;
@@ -74,7 +74,7 @@ pub(in crate::cli) fn show(server: &ServerArgs) -> Result<Exit, Failure> {
         print::out(&first)?;
         return Ok(Exit::Done);
     }
-    let (mut panel, mut at) = (Panel::new(), Monotonic.now());
+    let (mut panel, mut at) = (WatchPanel::new(), Monotonic.now());
     panel.draw(&first);
     loop {
         at = Monotonic.now().max(at + EVERY);

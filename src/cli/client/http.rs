@@ -25,7 +25,7 @@ const LONGEST: usize = 64 << 20;
 
 /// A reply, whole.
 #[derive(Debug)]
-pub(super) struct Reply {
+pub(super) struct HttpReply {
     pub(super) status: u16,
     pub(super) text: String,
 }
@@ -62,7 +62,7 @@ pub(super) async fn exchange<B>(
     socket: &Path,
     request: Request<B>,
     patience: Duration,
-) -> Result<Reply, Failure>
+) -> Result<HttpReply, Failure>
 where
     B: Body + Send + 'static,
     B::Data: Send,
@@ -74,7 +74,7 @@ where
         let body = Limited::new(response.into_body(), LONGEST).collect().await;
         let body =
             body.map_err(|error| anyhow!(error)).context(cut_off(socket)).or_exit(Exit::Unavailable)?;
-        Ok(Reply { status, text: String::from_utf8_lossy(&body.to_bytes()).into_owned() })
+        Ok(HttpReply { status, text: String::from_utf8_lossy(&body.to_bytes()).into_owned() })
     };
     timeout(patience, whole).await.unwrap_or_else(|_| {
         let seconds = patience.as_secs();

@@ -14,7 +14,7 @@ use crate::time::{TrimChange, parse_trim_change};
 
 /// The commands that set what lasts.
 #[derive(Debug, clap::Subcommand)]
-pub(in crate::cli) enum Command {
+pub(in crate::cli) enum LevelsCommand {
     /// Offsets the motion against the film, later or earlier.
     #[command(
         after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0\n  kinocue trim +2f"
@@ -125,9 +125,9 @@ pub(in crate::cli) struct DisableArgs {
     server: ServerArgs,
 }
 
-pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+pub(super) fn run(command: &LevelsCommand) -> Result<Exit, Failure> {
     match command {
-        Command::Trim(TrimArgs { trim, server }) => {
+        LevelsCommand::Trim(TrimArgs { trim, server }) => {
             let asked = match trim {
                 TrimChange::To(ms) => json!({ "offset_s": f64::from(*ms) / 1e3 }),
                 TrimChange::ByFrames(frames) => json!({ "frames": frames }),
@@ -135,7 +135,7 @@ pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
             let status = server.put("/api/v1/trim", &asked)?;
             Ok(told(server, &status))
         }
-        Command::Level(args) => {
+        LevelsCommand::Level(args) => {
             let row = args.row.as_deref();
             set(
                 &args.server,
@@ -144,15 +144,15 @@ pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
                     .or_exit(Exit::Usage)?,
             )
         }
-        Command::Effects(args) => effects(args),
-        Command::Preset(NameArgs { name, server }) => {
+        LevelsCommand::Effects(args) => effects(args),
+        LevelsCommand::Preset(NameArgs { name, server }) => {
             let status = server.post(&format!("/api/v1/presets/{}", in_path(name)), &json!({}))?;
             Ok(told(server, &status))
         }
-        Command::Enable(NameArgs { name, server }) => {
+        LevelsCommand::Enable(NameArgs { name, server }) => {
             server.act(&format!("/api/v1/controllers/{}/enable", in_path(name)), &json!({}))
         }
-        Command::Disable(DisableArgs { name, why, server }) => {
+        LevelsCommand::Disable(DisableArgs { name, why, server }) => {
             let body = why.as_ref().map_or_else(|| json!({}), |why| json!({ "why": why }));
             server.act(&format!("/api/v1/controllers/{}/disable", in_path(name)), &body)
         }

@@ -26,30 +26,30 @@ use super::{Exit, Failure};
 
 /// The client's commands.
 #[derive(Debug, clap::Subcommand)]
-pub(super) enum Command {
+pub(super) enum ClientCommand {
     Status(status::Args),
     Watch(watch::Args),
     #[command(flatten)]
-    Show(show::Command),
+    Show(show::ShowCommand),
     Stop(stop::Args),
     #[command(flatten)]
-    Playlist(playlist::Command),
+    Playlist(playlist::PlaylistCommand),
     #[command(flatten)]
-    Levels(levels::Command),
+    Levels(levels::LevelsCommand),
     #[command(flatten)]
-    Cues(cues::Command),
+    Cues(cues::CuesCommand),
     Test(test::Args),
 }
 
-pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+pub(super) fn run(command: &ClientCommand) -> Result<Exit, Failure> {
     match command {
-        Command::Status(args) => status::run(args),
-        Command::Watch(args) => watch::run(args),
-        Command::Show(command) => show::run(command),
-        Command::Stop(args) => stop::run(args),
-        Command::Playlist(command) => playlist::run(command),
-        Command::Levels(command) => levels::run(command),
-        Command::Cues(command) => cues::run(command),
-        Command::Test(args) => test::run(args),
+        ClientCommand::Status(args) => status::run(args),
+        ClientCommand::Watch(args) => watch::run(args),
+        ClientCommand::Show(command) => show::run(command),
+        ClientCommand::Stop(args) => stop::run(args),
+        ClientCommand::Playlist(command) => playlist::run(command),
+        ClientCommand::Levels(command) => levels::run(command),
+        ClientCommand::Cues(command) => cues::run(command),
+        ClientCommand::Test(args) => test::run(args),
     }
 }

@@ -12,13 +12,13 @@ const FEW: usize = 6;
 const FILM: usize = 40;
 
 /// The lines.
-pub(super) struct Panel {
+pub(super) struct WatchPanel {
     bar: ProgressBar,
     /// What was shown last.
     last: String,
 }
 
-impl Panel {
+impl WatchPanel {
     /// Takes over the lower end of the terminal on standard output.
     pub(super) fn new() -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stdout());

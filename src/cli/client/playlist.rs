@@ -10,7 +10,7 @@ use crate::control::{EntryStatus, PlaylistStatus};
 
 /// The commands that choose what is played.
 #[derive(Debug, clap::Subcommand)]
-pub(in crate::cli) enum Command {
+pub(in crate::cli) enum PlaylistCommand {
     /// Loads a cue of the daemon's library.
     ///
     /// The cue is read and proved before the command ends.
@@ -68,18 +68,20 @@ pub(in crate::cli) struct SelectArgs {
     server: ServerArgs,
 }
 
-pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+pub(super) fn run(command: &PlaylistCommand) -> Result<Exit, Failure> {
     match command {
-        Command::Load(LoadArgs { cue, server }) => server.act("/api/v1/show/load", &json!({ "cue": cue })),
-        Command::Playlist(PlaylistArgs { id: None, none: false, server }) => show(server),
-        Command::Playlist(PlaylistArgs { id, server, .. }) => {
+        PlaylistCommand::Load(LoadArgs { cue, server }) => {
+            server.act("/api/v1/show/load", &json!({ "cue": cue }))
+        }
+        PlaylistCommand::Playlist(PlaylistArgs { id: None, none: false, server }) => show(server),
+        PlaylistCommand::Playlist(PlaylistArgs { id, server, .. }) => {
             let status = server.put("/api/v1/playlist", &json!({ "id": id }))?;
             if let Some(playlist) = status.playlist.as_ref().filter(|_| !server.json) {
                 print::out(&entries(playlist))?;
             }
             Ok(server.tell(&status))
         }
-        Command::Select(SelectArgs { entry, server }) => {
+        PlaylistCommand::Select(SelectArgs { entry, server }) => {
             server.act("/api/v1/playlist/select", &json!({ "entry": entry - 1 }))
         }
     }

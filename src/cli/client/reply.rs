@@ -4,14 +4,14 @@ use anyhow::anyhow;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::http::Reply;
+use super::http::HttpReply;
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::control::{FilmStatus, HallFacts, Status};
 
 /// Why something was not done (RFC 9457), as the daemon writes it.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct Problem {
+struct ServiceProblem {
     code: String,
     detail: String,
     remedy: String,
@@ -21,16 +21,16 @@ struct Problem {
 }
 
 /// The status in a reply, or why there is none.
-pub(super) fn status(reply: &Reply) -> Result<Status, Failure> {
+pub(super) fn status(reply: &HttpReply) -> Result<Status, Failure> {
     parsed(reply, "status")
 }
 
 /// The film in a reply, or why there is none.
-pub(super) fn film(reply: &Reply) -> Result<FilmStatus, Failure> {
+pub(super) fn film(reply: &HttpReply) -> Result<FilmStatus, Failure> {
     parsed(reply, "film")
 }
 
-fn parsed<T: DeserializeOwned>(reply: &Reply, what: &str) -> Result<T, Failure> {
+fn parsed<T: DeserializeOwned>(reply: &HttpReply, what: &str) -> Result<T, Failure> {
     done(reply)?;
     serde_json::from_str(&reply.text).map_err(|error| Failure {
         exit: Exit::Internal,
@@ -39,15 +39,15 @@ fn parsed<T: DeserializeOwned>(reply: &Reply, what: &str) -> Result<T, Failure> 
 }
 
 /// Nothing where the reply says that it was done.
-pub(super) fn done(reply: &Reply) -> Result<(), Failure> {
+pub(super) fn done(reply: &HttpReply) -> Result<(), Failure> {
     if (200..300).contains(&reply.status) {
         return Ok(());
     }
-    let problem: Problem = serde_json::from_str(&reply.text).unwrap_or_default();
+    let problem: ServiceProblem = serde_json::from_str(&reply.text).unwrap_or_default();
     Err(anyhow!(problem.text(reply.status))).or_exit(exit(&problem.code, reply.status))
 }
 
-impl Problem {
+impl ServiceProblem {
     fn text(&self, status: u16) -> String {
         if self.detail.is_empty() {
             return format!("the daemon sent {status} with an empty body; see its log");
@@ -82,7 +82,7 @@ mod tests {
     use crate::control::Code;
 
     fn failure(status: u16, text: &str) -> Failure {
-        done(&Reply { status, text: text.to_owned() }).unwrap_err()
+        done(&HttpReply { status, text: text.to_owned() }).unwrap_err()
     }
 
     #[test]
@@ -122,6 +122,6 @@ mod tests {
     #[test]
     fn a_reply_that_is_no_json_is_no_reason_to_panic() {
         assert_eq!(failure(431, "Request Header Fields Too Large").exit, Exit::Usage);
-        assert!(status(&Reply { status: 200, text: "<html>".to_owned() }).is_err());
+        assert!(status(&HttpReply { status: 200, text: "<html>".to_owned() }).is_err());
     }
 }

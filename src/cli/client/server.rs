@@ -8,7 +8,7 @@ use hyper::Method;
 use hyper::body::Bytes;
 use serde_json::Value;
 
-use super::http::{self, Reply};
+use super::http::{self, HttpReply};
 use super::reply;
 use crate::cli::{Exit, Failure, print};
 use crate::control::Status;
@@ -39,7 +39,7 @@ impl ServerArgs {
     }
 
     /// Looks something up.
-    pub(super) fn get(&self, path: &str) -> Result<Reply, Failure> {
+    pub(super) fn get(&self, path: &str) -> Result<HttpReply, Failure> {
         let request = http::request(Method::GET, path, None, Full::<Bytes>::default())?;
         http::block_on(http::exchange(&self.socket(), request, PATIENCE))
     }
@@ -100,7 +100,7 @@ impl ServerArgs {
     }
 
     /// Prints a reply where its JSON is wanted.
-    pub(super) fn show(&self, reply: &Reply) -> Result<(), Failure> {
+    pub(super) fn show(&self, reply: &HttpReply) -> Result<(), Failure> {
         if self.json { print::json_text(&reply.text) } else { Ok(()) }
     }
 }

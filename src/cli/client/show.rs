@@ -13,7 +13,7 @@ const FEW: usize = 9;
 
 /// The commands that lead a show.
 #[derive(Debug, clap::Subcommand)]
-pub(in crate::cli) enum Command {
+pub(in crate::cli) enum ShowCommand {
     /// Arms the hall: ready to go.
     ///
     /// A cue is loaded, its limits proved, preflight passed. It lapses after ten minutes.
@@ -104,9 +104,9 @@ pub(in crate::cli) struct SeekArgs {
     server: ServerArgs,
 }
 
-pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+pub(super) fn run(command: &ShowCommand) -> Result<Exit, Failure> {
     let (word, server) = match command {
-        Command::Arm(ArmArgs { seats_empty, server }) => {
+        ShowCommand::Arm(ArmArgs { seats_empty, server }) => {
             let body = if *seats_empty { json!({ "seats_empty": true }) } else { json!({}) };
             let status = server.post("/api/v1/show/arm", &body)?;
             // Whoever arms hears who is out, and what is as it was before the service started.
@@ -114,19 +114,19 @@ pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
             lasts.for_each(|one| print::tell(&format!("kinocue: {}", one.said())));
             return Ok(server.tell(&status));
         }
-        Command::Disarm(server) => ("disarm", server),
-        Command::Go(GoArgs { from: Some(from), server }) => {
+        ShowCommand::Disarm(server) => ("disarm", server),
+        ShowCommand::Go(GoArgs { from: Some(from), server }) => {
             return server.act("/api/v1/show/go", &json!({ "from_s": from.as_secs_f64() }));
         }
-        Command::Go(GoArgs { from: None, server }) => ("go", server),
-        Command::Pause(server) => ("pause", server),
-        Command::Resume(server) => ("resume", server),
-        Command::Park(server) => ("park", server),
-        Command::Clear(server) => ("clear", server),
-        Command::Seek(SeekArgs { at, server }) => {
+        ShowCommand::Go(GoArgs { from: None, server }) => ("go", server),
+        ShowCommand::Pause(server) => ("pause", server),
+        ShowCommand::Resume(server) => ("resume", server),
+        ShowCommand::Park(server) => ("park", server),
+        ShowCommand::Clear(server) => ("clear", server),
+        ShowCommand::Seek(SeekArgs { at, server }) => {
             return server.act("/api/v1/show/seek", &json!({ "position_s": at.as_secs_f64() }));
         }
-        Command::Reload(server) => return server.act("/api/v1/reload", &json!({})),
+        ShowCommand::Reload(server) => return server.act("/api/v1/reload", &json!({})),
     };
     server.act(&format!("/api/v1/show/{word}"), &json!({}))
 }

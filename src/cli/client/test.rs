@@ -21,12 +21,12 @@ use crate::control::{Status, TestRow, TestStatus};
 #[command(after_help = "Example:\n  kinocue test sweep --rows A-C")]
 pub(in crate::cli) struct Args {
     #[command(subcommand)]
-    what: What,
+    what: TestedPart,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
-    Sweep(Sweep),
+enum TestedPart {
+    Sweep(TestSweep),
 }
 
 /// Moves each axis and switches each effect of empty, armed seats slowly in turn, and ends with a table of acks and latency.
@@ -40,7 +40,7 @@ Examples:
   kinocue test sweep --rows A,C --seats-empty --json
 
 Exit codes: 0 all passed, 1 something did not, 75 the hall is not armed")]
-struct Sweep {
+struct TestSweep {
     /// The rows whose seats move, as A, A,C or A-C [default: all].
     #[arg(long, value_name = "ROWS")]
     rows: Option<String>,
@@ -52,7 +52,7 @@ struct Sweep {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let What::Sweep(Sweep { rows, seats_empty, server }) = &args.what;
+    let TestedPart::Sweep(TestSweep { rows, seats_empty, server }) = &args.what;
     let rows =
         rows.as_deref().map(parse_rows).transpose().map_err(anyhow::Error::msg).or_exit(Exit::Usage)?;
     let rows = rows.unwrap_or_default();
@@ -82,14 +82,14 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 /// A test that is over.
-struct Outcome {
+struct TestOutcome {
     test: TestStatus,
     /// The same as the daemon wrote it.
     json: String,
 }
 
 /// Waits for the end of the test, with progress on a terminal.
-fn follow(server: &ServerArgs, begun: Status) -> Result<Outcome, Failure> {
+fn follow(server: &ServerArgs, begun: Status) -> Result<TestOutcome, Failure> {
     let bar = std::io::stderr().is_terminal().then(|| {
         let style =
             ProgressStyle::with_template("{msg} [{wide_bar}] {pos} of {len}").expect("the template is fixed");
@@ -117,7 +117,7 @@ fn follow(server: &ServerArgs, begun: Status) -> Result<Outcome, Failure> {
     outcome
 }
 
-async fn listen(server: &ServerArgs, bar: Option<&ProgressBar>) -> Result<Outcome, Failure> {
+async fn listen(server: &ServerArgs, bar: Option<&ProgressBar>) -> Result<TestOutcome, Failure> {
     let mut events = Events::open(&server.socket()).await?;
     loop {
         let gone = |why| anyhow!("the daemon is gone: {why}; look at the seats, and at `kinocue status`");
@@ -130,7 +130,7 @@ async fn listen(server: &ServerArgs, bar: Option<&ProgressBar>) -> Result<Outcom
         let test = status.test.context("the daemon has no result of the test").or_exit(Exit::Internal)?;
         if !test.running {
             let whole: serde_json::Value = serde_json::from_str(&data).or_exit(Exit::Internal)?;
-            return Ok(Outcome { test, json: whole["test"].to_string() });
+            return Ok(TestOutcome { test, json: whole["test"].to_string() });
         }
         if let Some(bar) = bar {
             bar.set_length(test.total as u64);

@@ -8,7 +8,7 @@ use tokio::time::sleep;
 
 use super::events::{Events, QUIET};
 use super::http::block_on;
-use super::panel::Panel;
+use super::panel::WatchPanel;
 use super::server::ServerArgs;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::control::{ControllerStatus, Status, Warning};
@@ -36,14 +36,14 @@ pub(in crate::cli) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut shown = match (args.server.json, io::stdout().is_terminal()) {
-        (true, _) => Shown::Json,
-        (false, true) => Shown::Panel(Panel::new()),
-        (false, false) => Shown::Lines(None),
+        (true, _) => WatchShown::Json,
+        (false, true) => WatchShown::Panel(WatchPanel::new()),
+        (false, false) => WatchShown::Lines(None),
     };
     block_on(follow(&args.server, &mut shown))
 }
 
-async fn follow(server: &ServerArgs, shown: &mut Shown) -> Result<Exit, Failure> {
+async fn follow(server: &ServerArgs, shown: &mut WatchShown) -> Result<Exit, Failure> {
     // A daemon that is not there at all is a fault; one that goes is waited for.
     let mut events = Events::open(&server.socket()).await?;
     loop {
@@ -65,7 +65,7 @@ async fn follow(server: &ServerArgs, shown: &mut Shown) -> Result<Exit, Failure>
 }
 
 /// Shows what comes until it ends, and why it ended; nothing where nobody reads any more.
-async fn listen(events: &mut Events, shown: &mut Shown) -> Result<Option<&'static str>, Failure> {
+async fn listen(events: &mut Events, shown: &mut WatchShown) -> Result<Option<&'static str>, Failure> {
     let mut is_old = false;
     loop {
         match events.next().await {
@@ -89,14 +89,14 @@ async fn listen(events: &mut Events, shown: &mut Shown) -> Result<Option<&'stati
 }
 
 /// The way it is shown.
-enum Shown {
+enum WatchShown {
     Json,
-    Panel(Panel),
+    Panel(WatchPanel),
     /// With the status before.
     Lines(Option<Box<Status>>),
 }
 
-impl Shown {
+impl WatchShown {
     /// Shows an event; false where nobody reads any more.
     fn show(&mut self, data: &str) -> Result<bool, Failure> {
         if matches!(self, Self::Json) {

@@ -96,12 +96,12 @@ fn digits_of(word: &str) -> &str {
 }
 
 /// A stream of messages, told by how it opens.
-pub(super) enum Stream {
+pub(super) enum MessageStream {
     Capture(Box<dyn Read>),
     Lines(BufReader<Box<dyn Read>>),
 }
 
-impl Stream {
+impl MessageStream {
     /// Opens a file.
     pub(super) fn open(path: &Path) -> Result<Self, Failure> {
         let opened = File::open(path).with_context(|| format!("cannot open {}", path.display()));

@@ -1,7 +1,7 @@
 //! The messages of the protocol to their sheets.
 
 use super::names::{motion_name, space_name};
-use super::sheet::{self, Sheet};
+use super::sheet::{self, FieldSheet};
 use crate::wire::{
     Access, Dialect, ImaxMotion, ImaxRegisters, MAX_SERVO_READ, Message, MotionReply, MotionRequest,
     RegisterReply, ReplyCode, Space, Status, VibrationPort, WireError,
@@ -9,7 +9,7 @@ use crate::wire::{
 
 /// How to read a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum Reading {
+pub(super) enum MessageReading {
     Smc,
     Mbox,
     Imax,
@@ -17,7 +17,7 @@ pub(super) enum Reading {
     Sixpack2,
 }
 
-impl Reading {
+impl MessageReading {
     const fn dialect(self) -> Dialect {
         match self {
             Self::Mbox | Self::Imax => Dialect::Mbox,
@@ -31,9 +31,13 @@ impl Reading {
 ///
 /// # Errors
 /// At which byte, and why, these bytes are none.
-pub(super) fn sheet(bytes: &[u8], reading: Reading, port: VibrationPort) -> Result<Sheet, WireError> {
-    let mut sheet = Sheet::default();
-    if reading == Reading::Imax {
+pub(super) fn sheet(
+    bytes: &[u8],
+    reading: MessageReading,
+    port: VibrationPort,
+) -> Result<FieldSheet, WireError> {
+    let mut sheet = FieldSheet::default();
+    if reading == MessageReading::Imax {
         if let Ok(motion) = ImaxMotion::parse(bytes) {
             sheet.imax_motion(bytes, &motion);
             return Ok(sheet);
@@ -51,7 +55,7 @@ pub(super) fn sheet(bytes: &[u8], reading: Reading, port: VibrationPort) -> Resu
 /// Bytes of a message about registers before its words.
 const WORDS: usize = 16;
 
-impl Sheet {
+impl FieldSheet {
     fn message(&mut self, bytes: &[u8], message: &Message<'_>, dialect: Dialect, port: VibrationPort) {
         match message {
             Message::Motion(motion) => {
@@ -138,7 +142,7 @@ impl Sheet {
             Message::ServoRead(read) => {
                 self.head(bytes, "read servo registers", true);
                 self.codes(read.accept, read.reply);
-                self.numbered("servo", u32::from(read.servo));
+                self.numbered("servo", u32::from(read.channel));
                 self.asked(read.start, read.num, None);
                 if read.num > MAX_SERVO_READ {
                     self.line(
@@ -151,7 +155,7 @@ impl Sheet {
             Message::ServoWrite(write) => {
                 self.head(bytes, "write servo registers", true);
                 self.codes(write.accept, write.reply);
-                self.numbered("servo", u32::from(write.servo));
+                self.numbered("servo", u32::from(write.channel));
                 self.registers(write.start, write.data, None);
                 self.surplus(bytes, WORDS + 2 * write.data.len());
             }
@@ -229,7 +233,7 @@ mod tests {
 
     use super::*;
 
-    fn read(hex: &str, reading: Reading) -> Sheet {
+    fn read(hex: &str, reading: MessageReading) -> FieldSheet {
         let bytes: Vec<u8> =
             (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect();
         sheet(&bytes, reading, VibrationPort::Two).unwrap()
@@ -240,7 +244,7 @@ mod tests {
         let sheet = read(
             "55aa000019010000ffff00000000000300000032ffffffff00000000000000018802\
              0190000a0000000000000000",
-            Reading::Smc,
+            MessageReading::Smc,
         );
         assert_eq!(
             sheet.text(),
@@ -267,7 +271,7 @@ v3         none
 
     #[test]
     fn a_refusal_is_told_with_its_error_in_words() {
-        let text = read("55aa00001203000a00000000005500010005", Reading::Smc).text();
+        let text = read("55aa00001203000a00000000005500010005", MessageReading::Smc).text();
         assert!(text.contains("x = 3: running with an error"), "{text}");
         assert!(text.contains("Err10: alarm of the servo of axis 1"), "{text}");
     }
@@ -275,27 +279,27 @@ v3         none
     #[test]
     fn position_registers_are_told_as_positions_too() {
         let hex = "55aa00001102000000000000000600041a800006ff9cffff";
-        let text = read(hex, Reading::Smc).text();
+        let text = read(hex, MessageReading::Smc).text();
         assert!(text.contains("DP06       6784 (0x1a80)"), "{text}");
         assert!(
             text.contains("a1         400000 pulses") && text.contains("a2         -100 pulses"),
             "{text}"
         );
-        let json = read(hex, Reading::Smc).into_object();
+        let json = read(hex, MessageReading::Smc).into_object();
         assert_eq!(json["words"], json!([6784, 6, 65436, 65535]));
     }
 
     #[test]
     fn the_same_write_means_another_table_in_another_dialect() {
         let hex = "55aa000012010000ffffffff009000010001";
-        assert!(read(hex, Reading::Smc).text().contains("DP90"));
-        assert!(read(hex, Reading::Mbox).text().contains("PA90"));
+        assert!(read(hex, MessageReading::Smc).text().contains("DP90"));
+        assert!(read(hex, MessageReading::Mbox).text().contains("PA90"));
     }
 
     #[test]
     fn the_printed_imax_layout_is_read_where_asked_for() {
         let hex = "55aa000014010000ffffffff000000320000000100000002fffffffd0000000000000000";
-        let text = read(hex, Reading::Imax).text();
+        let text = read(hex, MessageReading::Imax).text();
         assert!(text.contains("IMAX layout") && text.contains("a3                -3 pulses"), "{text}");
     }
 }

@@ -7,8 +7,8 @@ use serde_json::{Map, Value, json};
 
 use super::Filter;
 use super::input::{MAX_BYTES, bytes};
-use super::message::{Reading, sheet};
-use super::tally::Tally;
+use super::message::{MessageReading, sheet};
+use super::tally::MessageTally;
 use crate::capture::{Capture, CaptureError, Content, Datagram, Fragment, Packet};
 use crate::wire::VibrationPort;
 
@@ -19,8 +19,8 @@ const MAX_LINE: usize = 16 * MAX_BYTES;
 
 /// How messages are written.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Manner {
-    pub(super) reading: Reading,
+pub(super) struct PrintManner {
+    pub(super) reading: MessageReading,
     /// How vibration frames have Port Out.
     pub(super) port: VibrationPort,
     pub(super) json: bool,
@@ -31,20 +31,20 @@ pub(super) struct Manner {
 /// Writes messages, and counts them.
 pub(super) struct Printer<W> {
     out: W,
-    manner: Manner,
-    tally: Tally,
+    manner: PrintManner,
+    tally: MessageTally,
     written: u64,
 }
 
 /// Where a message comes from.
 #[derive(Debug, Clone, Copy)]
-enum Place {
+enum MessagePlace {
     Argument,
     Line(u64),
     Packet { number: u64, time_ns: Option<u64>, after_s: Option<f64>, source: SocketAddrV4, to: SocketAddrV4 },
 }
 
-impl Place {
+impl MessagePlace {
     fn text(self) -> String {
         match self {
             Self::Argument => String::new(),
@@ -75,35 +75,38 @@ impl Place {
 }
 
 impl<W: Write> Printer<W> {
-    pub(super) fn new(out: W, manner: Manner) -> Self {
-        Self { out, manner, tally: Tally::default(), written: 0 }
+    pub(super) fn new(out: W, manner: PrintManner) -> Self {
+        Self { out, manner, tally: MessageTally::default(), written: 0 }
     }
 
     /// Decodes messages of the command line.
     pub(super) fn messages(&mut self, messages: &[Vec<u8>]) -> io::Result<()> {
-        messages.iter().try_for_each(|bytes| self.message(Place::Argument, bytes))
+        messages.iter().try_for_each(|bytes| self.message(MessagePlace::Argument, bytes))
     }
 
     /// Decodes lines of hex, a message each; empty lines are let pass, unless there is nothing else.
-    pub(super) fn lines(&mut self, mut input: impl BufRead) -> Result<(), Halt> {
+    pub(super) fn lines(&mut self, mut input: impl BufRead) -> Result<(), StreamEnd> {
         let mut line = Vec::new();
         let mut is_empty = true;
         for number in 1.. {
             line.clear();
-            let read =
-                input.by_ref().take(MAX_LINE as u64).read_until(b'\n', &mut line).map_err(Halt::Input)?;
+            let read = input
+                .by_ref()
+                .take(MAX_LINE as u64)
+                .read_until(b'\n', &mut line)
+                .map_err(StreamEnd::Input)?;
             if read == 0 {
                 break;
             }
             if read == MAX_LINE && !line.ends_with(b"\n") {
-                skip_line(&mut input).map_err(Halt::Input)?; // what there is holds more than a datagram already
+                skip_line(&mut input).map_err(StreamEnd::Input)?; // what there is holds more than a datagram already
             }
             let text = String::from_utf8_lossy(&line);
             if text.trim().is_empty() {
                 continue;
             }
             is_empty = false;
-            let place = Place::Line(number);
+            let place = MessagePlace::Line(number);
             match bytes(&text) {
                 Ok(bytes) => self.message(place, &bytes)?,
                 Err(error) => {
@@ -112,13 +115,13 @@ impl<W: Write> Printer<W> {
                 }
             }
         }
-        if is_empty { Err(Halt::Empty) } else { Ok(()) }
+        if is_empty { Err(StreamEnd::Empty) } else { Ok(()) }
     }
 
     /// Decodes the messages in a capture.
-    pub(super) fn capture(&mut self, input: impl Read, filter: Filter<'_>) -> Result<(), Halt> {
-        let mut capture = Capture::open(input).map_err(Halt::Capture)?;
-        while let Some(packet) = capture.packet().map_err(Halt::Capture)? {
+    pub(super) fn capture(&mut self, input: impl Read, filter: Filter<'_>) -> Result<(), StreamEnd> {
+        let mut capture = Capture::open(input).map_err(StreamEnd::Capture)?;
+        while let Some(packet) = capture.packet().map_err(StreamEnd::Capture)? {
             self.packet(&packet, filter)?;
         }
         Ok(())
@@ -141,7 +144,7 @@ impl<W: Write> Printer<W> {
 
     fn packet(&mut self, packet: &Packet<'_>, filter: Filter<'_>) -> io::Result<()> {
         let after_s = packet.at.map(|at| self.tally.time(at));
-        let place = |source, to| Place::Packet {
+        let place = |source, to| MessagePlace::Packet {
             number: packet.number,
             time_ns: packet.at.and_then(|at| u64::try_from(at.as_nanos()).ok()),
             after_s,
@@ -176,7 +179,7 @@ impl<W: Write> Printer<W> {
         }
     }
 
-    fn datagram(&mut self, place: Place, datagram: &Datagram<'_>) -> io::Result<()> {
+    fn datagram(&mut self, place: MessagePlace, datagram: &Datagram<'_>) -> io::Result<()> {
         if !datagram.is_cut() {
             return self.message(place, datagram.payload);
         }
@@ -186,20 +189,20 @@ impl<W: Write> Printer<W> {
         self.refuse(place, "cut", json!({ "kept": kept, "bytes": len }), &why)
     }
 
-    fn message(&mut self, place: Place, bytes: &[u8]) -> io::Result<()> {
+    fn message(&mut self, place: MessagePlace, bytes: &[u8]) -> io::Result<()> {
         match sheet(bytes, self.manner.reading, self.manner.port) {
             Ok(sheet) => {
                 self.tally.message(&sheet);
                 match self.manner {
-                    Manner { json: true, .. } => self.object(place, sheet.into_object()),
-                    Manner { full: true, .. } => self.block(place, &sheet.text()),
+                    PrintManner { json: true, .. } => self.object(place, sheet.into_object()),
+                    PrintManner { full: true, .. } => self.block(place, &sheet.text()),
                     _ => self.line(place, &sheet.brief()),
                 }
             }
             Err(error) => {
                 self.tally.malformed += 1;
-                let literal = self.manner.reading != Reading::Imax
-                    && sheet(bytes, Reading::Imax, self.manner.port).is_ok();
+                let literal = self.manner.reading != MessageReading::Imax
+                    && sheet(bytes, MessageReading::Imax, self.manner.port).is_ok();
                 let hint = if literal { "; with --dialect imax it is one" } else { "" };
                 let why = format!("{error}{hint}");
                 let object = json!({ "byte": error.offset(), "why": why, "hex": hex(bytes) });
@@ -209,34 +212,34 @@ impl<W: Write> Printer<W> {
     }
 
     /// Tells what cannot be read.
-    fn refuse(&mut self, place: Place, what: &str, object: Value, why: &str) -> io::Result<()> {
+    fn refuse(&mut self, place: MessagePlace, what: &str, object: Value, why: &str) -> io::Result<()> {
         if self.manner.json {
             return self.object(place, Map::from_iter([(what.to_owned(), object)]));
         }
         self.line(place, &format!("{what}: {why}"))
     }
 
-    fn object(&mut self, place: Place, mut object: Map<String, Value>) -> io::Result<()> {
+    fn object(&mut self, place: MessagePlace, mut object: Map<String, Value>) -> io::Result<()> {
         place.put(&mut object);
         writeln!(self.out, "{}", Value::Object(object))
     }
 
-    fn line(&mut self, place: Place, text: &str) -> io::Result<()> {
+    fn line(&mut self, place: MessagePlace, text: &str) -> io::Result<()> {
         self.written += 1;
         match place {
-            Place::Argument => writeln!(self.out, "{text}"),
+            MessagePlace::Argument => writeln!(self.out, "{text}"),
             place => writeln!(self.out, "{}  {text}", place.text()),
         }
     }
 
     /// Several lines, apart from what stands above.
-    fn block(&mut self, place: Place, text: &str) -> io::Result<()> {
+    fn block(&mut self, place: MessagePlace, text: &str) -> io::Result<()> {
         if self.written > 0 {
             writeln!(self.out)?;
         }
         self.written += 1;
         match place {
-            Place::Argument => {}
+            MessagePlace::Argument => {}
             place => writeln!(self.out, "{}", place.text())?,
         }
         self.out.write_all(text.as_bytes())
@@ -245,7 +248,7 @@ impl<W: Write> Printer<W> {
 
 /// What ends a stream before its end.
 #[derive(Debug)]
-pub(super) enum Halt {
+pub(super) enum StreamEnd {
     /// The output cannot be written.
     Output(io::Error),
     /// The lines cannot be read.
@@ -256,7 +259,7 @@ pub(super) enum Halt {
     Capture(CaptureError),
 }
 
-impl From<io::Error> for Halt {
+impl From<io::Error> for StreamEnd {
     fn from(error: io::Error) -> Self {
         Self::Output(error)
     }

@@ -43,7 +43,7 @@ impl<T> EachWay<T> {
 
 /// One message, or octets that are none.
 #[derive(Debug)]
-pub(super) struct Said {
+pub(super) struct SerialSaid {
     /// Which way it went, if anybody knows.
     pub(super) direction: Option<Direction>,
     /// For a person.
@@ -54,7 +54,7 @@ pub(super) struct Said {
     pub(super) is_message: bool,
 }
 
-impl Said {
+impl SerialSaid {
     /// Octets that are no message, and why.
     pub(super) fn stray(direction: Option<Direction>, octets: &[u8], why: &str) -> Self {
         let hex: Vec<String> = octets.iter().map(|octet| format!("{octet:02x}")).collect();
@@ -67,12 +67,12 @@ impl Said {
 }
 
 /// Makes messages of the octets of one dialect.
-pub(super) trait Decoder {
+pub(super) trait SerialDecoder {
     /// Octets that came together; what is complete with them.
-    fn take(&mut self, direction: Option<Direction>, octets: &[u8]) -> Vec<Said>;
+    fn take(&mut self, direction: Option<Direction>, octets: &[u8]) -> Vec<SerialSaid>;
 
     /// What nothing completes any more.
-    fn rest(&mut self) -> Vec<Said>;
+    fn rest(&mut self) -> Vec<SerialSaid>;
 }
 
 impl Direction {
@@ -86,8 +86,9 @@ impl Direction {
 }
 
 /// Decodes what the arguments name.
-pub(super) fn run(args: &Args, decoder: impl Decoder) -> Result<Exit, Failure> {
-    let mut printer = Printer { out: io::stdout().lock(), decoder, json: args.json, messages: 0, strays: 0 };
+pub(super) fn run(args: &Args, decoder: impl SerialDecoder) -> Result<Exit, Failure> {
+    let mut printer =
+        SerialPrinter { out: io::stdout().lock(), decoder, json: args.json, messages: 0, strays: 0 };
     let (name, mut input): (String, Box<dyn BufRead>) = match Input::of(&args.input)? {
         Input::Messages(messages) => {
             let written = printer.octets(None, None, &messages.concat());
@@ -142,7 +143,7 @@ fn logged(line: &str) -> Option<(f64, Direction, &str)> {
     Some((seconds.parse().ok()?, Direction::of(direction)?, hex))
 }
 
-struct Printer<W, D> {
+struct SerialPrinter<W, D> {
     out: W,
     decoder: D,
     json: bool,
@@ -150,7 +151,7 @@ struct Printer<W, D> {
     strays: u64,
 }
 
-impl<W: Write, D: Decoder> Printer<W, D> {
+impl<W: Write, D: SerialDecoder> SerialPrinter<W, D> {
     /// All of a stream; an error outside is the input's, one inside the output's.
     fn stream(&mut self, form: Form, input: &mut dyn BufRead) -> io::Result<io::Result<()>> {
         let mut chunk = Vec::new();
@@ -190,7 +191,7 @@ impl<W: Write, D: Decoder> Printer<W, D> {
             Err(error) => {
                 let fields = Map::from_iter([("not_hex".to_owned(), json!(error.to_string()))]);
                 let text = format!("not hex: {error}");
-                self.say(at, Said { direction, text, fields, is_message: false })
+                self.say(at, SerialSaid { direction, text, fields, is_message: false })
             }
         }
     }
@@ -205,7 +206,7 @@ impl<W: Write, D: Decoder> Printer<W, D> {
         said.into_iter().try_for_each(|said| self.say(None, said))
     }
 
-    fn say(&mut self, at: Option<f64>, mut said: Said) -> io::Result<()> {
+    fn say(&mut self, at: Option<f64>, mut said: SerialSaid) -> io::Result<()> {
         *(if said.is_message { &mut self.messages } else { &mut self.strays }) += 1;
         if self.json {
             said.fields.insert("at_s".to_owned(), json!(at));

@@ -15,14 +15,14 @@ const REGISTERS_IN_A_LINE: usize = 8;
 
 /// The fields of a message in the order they stand.
 #[derive(Debug, Default)]
-pub(super) struct Sheet {
+pub(super) struct FieldSheet {
     function: u16,
     lines: Vec<(String, String)>,
     brief: Vec<String>,
     object: Map<String, Value>,
 }
 
-impl Sheet {
+impl FieldSheet {
     /// The function code.
     pub(super) const fn function(&self) -> u16 {
         self.function

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::serial::{Decoder, Direction, EachWay, Said};
+use super::serial::{Direction, EachWay, SerialDecoder, SerialSaid};
 use crate::wire::silvermax::{
     AnyRequest, Collected, Internal, Io, LineCollector, NineBit, Poll, Reply, StatusWord as _, Words,
     command, register,
@@ -30,17 +30,17 @@ impl Default for SilverDecoder {
 }
 
 impl SilverDecoder {
-    fn line(&mut self, direction: Option<Direction>, line: &[u8]) -> Said {
+    fn line(&mut self, direction: Option<Direction>, line: &[u8]) -> SerialSaid {
         let request = AnyRequest::parse(line);
         let (text, fields) = match (request, Reply::parse(line)) {
             (Ok(request), _) => self.request(request),
             (_, Ok(reply)) => self.reply(&reply),
             (Err(why), Err(_)) if line.first() == Some(&b'@') => {
-                return Said::stray(direction, line, &why.to_string());
+                return SerialSaid::stray(direction, line, &why.to_string());
             }
-            (_, Err(why)) => return Said::stray(direction, line, &why.to_string()),
+            (_, Err(why)) => return SerialSaid::stray(direction, line, &why.to_string()),
         };
-        Said { direction, text, fields, is_message: true }
+        SerialSaid { direction, text, fields, is_message: true }
     }
 
     fn request(&mut self, request: AnyRequest) -> (String, Map<String, Value>) {
@@ -127,14 +127,14 @@ impl SilverDecoder {
     }
 
     /// A message in nine bits, where a log has one on a line; `None` where it is none.
-    fn nine_bit(&mut self, direction: Direction, octets: &[u8]) -> Option<Said> {
+    fn nine_bit(&mut self, direction: Direction, octets: &[u8]) -> Option<SerialSaid> {
         let read = match direction {
             Direction::ToDrive => NineBit::request(octets),
             Direction::FromDrive => NineBit::reply(octets),
         };
         let read = read.ok()?;
         if OPENINGS.contains(octets.first()?) {
-            return Some(Said::stray(
+            return Some(SerialSaid::stray(
                 Some(direction),
                 octets,
                 "it may be in nine bits or a piece of a line; which of them cannot be told",
@@ -145,7 +145,7 @@ impl SilverDecoder {
             NineBit::Reply(reply) => self.reply(&reply),
         };
         fields.insert("nine_bits".to_owned(), json!(true));
-        Some(Said {
+        Some(SerialSaid {
             direction: Some(direction),
             text: format!("{text}  (nine bits)"),
             fields,
@@ -154,8 +154,8 @@ impl SilverDecoder {
     }
 }
 
-impl Decoder for SilverDecoder {
-    fn take(&mut self, direction: Option<Direction>, octets: &[u8]) -> Vec<Said> {
+impl SerialDecoder for SilverDecoder {
+    fn take(&mut self, direction: Option<Direction>, octets: &[u8]) -> Vec<SerialSaid> {
         let is_between = self.collectors.of(direction).is_empty();
         let opens = octets.first().is_some_and(|first| OPENINGS.contains(first));
         let may_be_a_line = opens && octets.last() == Some(&b'\r');
@@ -174,18 +174,18 @@ impl Decoder for SilverDecoder {
             said.push(if is_line {
                 self.line(direction, &kept)
             } else {
-                Said::stray(direction, &kept, "no line")
+                SerialSaid::stray(direction, &kept, "no line")
             });
         }
         said
     }
 
-    fn rest(&mut self) -> Vec<Said> {
+    fn rest(&mut self) -> Vec<SerialSaid> {
         let mut said = Vec::new();
         for direction in EachWay::<LineCollector>::WAYS {
             let rest = self.collectors.of(direction).rest();
             if !rest.is_empty() {
-                said.push(Said::stray(direction, rest, "it ends in the middle of a line"));
+                said.push(SerialSaid::stray(direction, rest, "it ends in the middle of a line"));
             }
         }
         said

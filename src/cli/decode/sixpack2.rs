@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use super::serial::{Decoder, Direction, EachWay, Said};
+use super::serial::{Direction, EachWay, SerialDecoder, SerialSaid};
 use crate::wire::sixpack2::{FrameCollector, SixpackCommand, SixpackFrame, SixpackReply, action};
 
 /// The flags of P5 and P6 of `$15` (motor parameters, page 38).
@@ -38,14 +38,15 @@ impl Default for SixpackDecoder {
 
 impl SixpackDecoder {
     /// Octets that no frame will ever have: the next begins anew.
-    fn give_up(&mut self, direction: Option<Direction>, why: &str) -> Option<Said> {
+    fn give_up(&mut self, direction: Option<Direction>, why: &str) -> Option<SerialSaid> {
         let collector = self.collectors.of(direction);
-        let said = (!collector.begun().is_empty()).then(|| Said::stray(direction, collector.begun(), why));
+        let said =
+            (!collector.begun().is_empty()).then(|| SerialSaid::stray(direction, collector.begun(), why));
         collector.clear();
         said
     }
 
-    fn frame(&mut self, direction: Option<Direction>, frame: SixpackFrame) -> Said {
+    fn frame(&mut self, direction: Option<Direction>, frame: SixpackFrame) -> SerialSaid {
         let reply = self.asked.and_then(|asked| asked.answered_by(frame));
         let reply = match direction {
             Some(Direction::FromDrive) => Some(reply.unwrap_or_else(|| SixpackReply::of(frame))),
@@ -68,12 +69,12 @@ impl SixpackDecoder {
                 worded(("request", "unit"), frame, known, |to| command.tell(to))
             }
         };
-        Said { direction, text, fields, is_message: true }
+        SerialSaid { direction, text, fields, is_message: true }
     }
 }
 
-impl Decoder for SixpackDecoder {
-    fn take(&mut self, direction: Option<Direction>, octets: &[u8]) -> Vec<Said> {
+impl SerialDecoder for SixpackDecoder {
+    fn take(&mut self, direction: Option<Direction>, octets: &[u8]) -> Vec<SerialSaid> {
         let mut said = Vec::new();
         if direction == Some(Direction::ToDrive) {
             // A host hands over whole frames; what is behind a piece of one is none of it.
@@ -90,7 +91,7 @@ impl Decoder for SixpackDecoder {
         said
     }
 
-    fn rest(&mut self) -> Vec<Said> {
+    fn rest(&mut self) -> Vec<SerialSaid> {
         let ways = EachWay::<FrameCollector>::WAYS;
         let rest = ways.map(|direction| self.give_up(direction, "it ends in the middle of a frame"));
         rest.into_iter().flatten().collect()

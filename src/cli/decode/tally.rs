@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::sheet::Sheet;
+use super::sheet::FieldSheet;
 
 /// Counts of all that was read.
 #[derive(Debug, Default)]
-pub(super) struct Tally {
+pub(super) struct MessageTally {
     /// By function code: what it is called, and how many there were.
     messages: BTreeMap<u16, (String, u64)>,
     /// Bytes that are no message.
@@ -31,8 +31,8 @@ pub(super) struct Tally {
     last: Option<Duration>,
 }
 
-impl Tally {
-    pub(super) fn message(&mut self, sheet: &Sheet) {
+impl MessageTally {
+    pub(super) fn message(&mut self, sheet: &FieldSheet) {
         let of_function = self.messages.entry(sheet.function());
         of_function.or_insert_with(|| (sheet.name().to_owned(), 0)).1 += 1;
     }

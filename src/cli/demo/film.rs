@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow};
 
-use super::{CUE_ID, CUE_NAME};
+use super::seats::quoted;
 use crate::app::player::film_length_s;
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::control::Command;
@@ -57,11 +57,6 @@ impl DemoFilm {
         (Command::Playlist { id: Some(ID.to_owned()) }, NAME)
     }
 
-    /// The same of the demo without a film.
-    pub(super) fn none() -> (Command, &'static str) {
-        (Command::Load { cue: CUE_ID.to_owned() }, CUE_NAME)
-    }
-
     /// What the configuration says of it.
     pub(super) fn tables(&self) -> String {
         format!(
@@ -88,9 +83,4 @@ impl DemoFilm {
         }
         text
     }
-}
-
-/// A text of JSON is one of TOML.
-fn quoted(text: &str) -> String {
-    serde_json::Value::from(text).to_string()
 }

@@ -8,13 +8,13 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 
 use super::play;
+use super::sim::SimFamily;
 use super::token::Token;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::serve::{Parts, Places, serve};
-use crate::app::supervisor::Signals;
-use crate::control::Role;
+use crate::app::supervisor::SystemSignals;
+use crate::control::{Command, Role};
 use crate::log::Log;
-use crate::sim::{Farm, Options};
 use crate::sys::own_folder::OwnFolder;
 use crate::{config, console};
 
@@ -22,31 +22,37 @@ mod film;
 mod screen;
 mod script;
 mod seats;
+mod virtual_hall;
 
 use film::DemoFilm;
 use screen::Screen;
-use script::Script;
-use seats::SEATS;
+use script::{DemoShow, Script};
+use virtual_hall::VirtualHall;
 
 /// The cue as the report names it.
 const CUE_NAME: &str = "cues/bench-ride.csv";
 /// Its id in the library.
 const CUE_ID: &str = "bench-ride";
-const CUE: &[u8] = include_bytes!("../../../cues/bench-ride.csv");
+const CUE: &str = include_str!("../../../cues/bench-ride.csv");
 
-/// Plays the bench ride to four virtual controllers, with nothing to set up.
+/// Plays the bench ride to virtual seats, with nothing to set up.
 ///
 /// It is the daemon itself, with its web console, whose address is printed at once. On a terminal the console stays up after the
-/// ride until Ctrl-C, to arm and go again there. Two of the controllers are a pair that shares one frame (PA95). Everything
-/// stays on this machine, in a folder that is gone at the end.
+/// ride until Ctrl-C, to arm and go again there. There are four controllers, two of them a pair that shares one frame (PA95); or,
+/// by --dialect, two seats on serial drives, which the demo homes first, as a person has to with real ones. Everything stays on this
+/// machine, in a folder that is gone at the end.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json\n  kinocue demo --film film.mkv"
+    after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json\n  kinocue demo --film film.mkv\n  \
+                  kinocue demo --dialect silvermax"
 )]
 pub(super) struct Args {
     /// Ticks per second, 1 to 1000.
     #[arg(long, value_name = "HZ", value_parser = super::load::parse_rate, default_value = "100")]
     rate: f64,
+    /// What moves the seats: controllers, or serial drives at the ends of pseudo-terminals.
+    #[arg(long, value_enum, default_value_t = SimFamily::Smc)]
+    dialect: SimFamily,
     /// Show this film with mpv, and play a gentle cue of its length to it. mpv has to be installed.
     #[arg(long, value_name = "FILE")]
     film: Option<PathBuf>,
@@ -57,20 +63,19 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let film = args.film.as_deref().map(DemoFilm::find).transpose()?;
-    let signals = Signals::default();
+    let signals = SystemSignals::default();
     play::leave_on_signals(&signals.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let temporary = env::temp_dir();
     let no_folder = || format!("cannot make a folder in {}; set TMPDIR to another", temporary.display());
     let folder = OwnFolder::make(&temporary).with_context(no_folder).or_exit(Exit::Io)?;
     let port = FreePort::find().context("no port for the frames").or_exit(Exit::System)?;
     let host = SocketAddrV4::new(Ipv4Addr::LOCALHOST, port.number);
-    let setups = SEATS.iter().map(|seat| seat.setup(host)).collect();
-    let farm = Farm::start(Options::loopback(setups)).or_exit(Exit::System)?;
+    let seats = VirtualHall::start(args.dialect, host, &folder)?;
     let token = Token::new("visitor", Role::Engineer).or_exit(Exit::System)?;
-    let mut hall = seats::hall(args.rate, host, &farm.addresses(), &token.config, &folder);
+    let mut hall = seats::hall(args.rate, host, &seats, &token.config, &folder);
     hall.extend(film.iter().map(DemoFilm::tables));
-    let places = furnish(&folder, &hall, film.as_ref())?;
-    let (load, cue_name) = film.as_ref().map_or_else(DemoFilm::none, DemoFilm::load);
+    let places = furnish(&folder, &hall, film.as_ref(), &seats)?;
+    let (load, cue_name) = film.as_ref().map_or_else(|| bench_ride(&seats), DemoFilm::load);
     let config = config::load(&places.config).or_exit(Exit::Internal)?;
     let on_terminal = stdin().is_terminal() && stderr().is_terminal();
     let screen = Screen::new();
@@ -81,13 +86,14 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut script = None;
     let served = serve(parts, |handle, addresses| {
         let console = addresses.first().map(|address| link(*address, &token.token)).unwrap_or_default();
-        welcome(&farm.addresses(), &console, cue_name);
-        script = Some(Script::start(handle, signals, screen, on_terminal.then_some(console), load));
+        welcome(&seats, &console, cue_name);
+        let show = DemoShow { needs_home: seats.needs_home(), load };
+        script = Some(Script::start(handle, signals, screen, on_terminal.then_some(console), show));
     });
     // Over by now, as nothing of the hall is left.
     let guided = script.transpose().or_exit(Exit::System)?.map_or(Ok(()), Script::finish);
     let reported = play::tell(&served?.sum_up(cue_name.to_owned()), args.json);
-    farm.stop().or_exit(Exit::Io)?;
+    seats.stop()?;
     folder.remove().context("the folder of the demo is left").or_exit(Exit::Io)?;
     guided.or_exit(Exit::Internal)?;
     reported
@@ -98,25 +104,45 @@ fn link(address: SocketAddr, token: &str) -> String {
     format!("http://{address}/#token={token}")
 }
 
-fn welcome(controllers: &[SocketAddrV4], console: &str, cue_name: &str) {
-    let names = SEATS.iter().zip(controllers).map(|(seat, address)| format!("{} {address}", seat.name));
-    let controllers: Vec<String> = names.collect();
+fn welcome(seats: &VirtualHall, console: &str, cue_name: &str) {
     print::tell(&format!("the console: {console}"));
-    print::tell(&format!(
-        "playing {cue_name} to virtual controllers {}; nothing leaves this machine",
-        controllers.join(", ")
-    ));
+    print::tell(&format!("playing {cue_name} to {}; nothing leaves this machine", seats.who()));
+}
+
+/// What loads the bench ride, and what is played then.
+fn bench_ride(seats: &VirtualHall) -> (Command, &'static str) {
+    let load = Command::Load { cue: CUE_ID.to_owned() };
+    (load, if seats.vibrates() { CUE_NAME } else { "cues/bench-ride.csv without its vibration" })
+}
+
+/// A cue without the columns of vibration, which MBOX controllers do not have, and which is faster than what serial lines carry.
+fn without_vibration(cue: &str) -> String {
+    let is_row = |line: &&str| !line.starts_with('#');
+    let header = cue.lines().find(is_row).unwrap_or_default();
+    let kept: Vec<bool> = header.split(',').map(|name| !name.starts_with('v')).collect();
+    let row = |line: &str| {
+        let cells = line.split(',').zip(&kept).filter(|(_, kept)| **kept);
+        cells.map(|(cell, _)| cell).collect::<Vec<_>>().join(",")
+    };
+    let lines = cue.lines().map(|line| if is_row(&line) { row(line) } else { line.to_owned() });
+    lines.map(|line| line + "\n").collect()
 }
 
 /// Puts everything that the daemon reads where it reads it.
-fn furnish(folder: &OwnFolder, hall: &str, film: Option<&DemoFilm>) -> Result<Places, Failure> {
+fn furnish(
+    folder: &OwnFolder,
+    hall: &str,
+    film: Option<&DemoFilm>,
+    seats: &VirtualHall,
+) -> Result<Places, Failure> {
     let put = |name: &str, bytes: &[u8]| {
         folder
             .write(name, bytes)
             .with_context(|| format!("cannot write {name} of the demo"))
             .or_exit(Exit::Io)
     };
-    put(&format!("cues/{CUE_ID}.csv"), CUE)?;
+    let cue = if seats.vibrates() { CUE.to_owned() } else { without_vibration(CUE) };
+    put(&format!("cues/{CUE_ID}.csv"), cue.as_bytes())?;
     for (name, text) in film.map(DemoFilm::files).into_iter().flatten() {
         put(&name, text.as_bytes())?;
     }

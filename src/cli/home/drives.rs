@@ -8,7 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::super::play::leave_on_signals;
-use super::super::targets::{Driven, Troubles};
+use super::super::targets::{DrivenTargets, Troubles};
 use super::super::{Exit, Failure, OrExit as _, print};
 use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
@@ -20,16 +20,16 @@ use crate::drive::link::{LinkLine, Step, TalkTerms};
 use crate::drive::{motors_of, silvermax, sixpack2, units_of};
 
 /// How the homing of a seat went: how long it took, or why it is not home.
-pub(super) type Homed = Result<Duration, String>;
+pub(super) type HomingResult = Result<Duration, String>;
 
 /// What the thread of a link tells of a seat, which it names by its place.
-enum Told {
+enum HomingTold {
     Step(usize, Step),
-    Over(usize, Result<Duration, Fault>),
+    Over(usize, Result<Duration, HomingFault>),
 }
 
 /// Why a seat is not home.
-enum Fault {
+enum HomingFault {
     /// It did not answer, or its line is gone.
     Silent(String),
     /// It did, and is not home.
@@ -37,7 +37,7 @@ enum Fault {
 }
 
 /// Says what the seats will do; an error for each that cannot be homed, of which it has told.
-pub(super) fn explain(driven: &Driven, troubles: &mut Troubles) -> Vec<Homed> {
+pub(super) fn explain(driven: &DrivenTargets, troubles: &mut Troubles) -> Vec<HomingResult> {
     let one = |controller: &Controller| {
         let drives = controller.drives().ok_or("it is on no link")?;
         let is_bus = |link: &Link| link.name == drives.link && link.wiring == LinkWiring::Can;
@@ -78,8 +78,8 @@ fn way(homing: &DriveHoming) -> String {
 
 /// Homes those of the seats that can be; the results take the place of theirs. Says whether somebody ended it.
 pub(super) fn home_all(
-    driven: &Driven,
-    results: &mut [Homed],
+    driven: &DrivenTargets,
+    results: &mut [HomingResult],
     troubles: &mut Troubles,
 ) -> Result<bool, Failure> {
     let abort = Arc::new(AtomicBool::new(false));
@@ -104,14 +104,19 @@ pub(super) fn home_all(
     Ok(abort.load(Ordering::Relaxed))
 }
 
-fn show(driven: &Driven, told: &Receiver<Told>, results: &mut [Homed], troubles: &mut Troubles) {
+fn show(
+    driven: &DrivenTargets,
+    told: &Receiver<HomingTold>,
+    results: &mut [HomingResult],
+    troubles: &mut Troubles,
+) {
     for told in told {
         let (index, result) = match told {
-            Told::Step(index, step) => {
+            HomingTold::Step(index, step) => {
                 print::tell(&format!("{}: {}", driven.controllers[index].name, words(step)));
                 continue;
             }
-            Told::Over(index, result) => (index, result),
+            HomingTold::Over(index, result) => (index, result),
         };
         let name = &driven.controllers[index].name;
         results[index] = match result {
@@ -119,11 +124,11 @@ fn show(driven: &Driven, told: &Receiver<Told>, results: &mut [Homed], troubles:
                 print::tell(&format!("{name}: home after {:.1} s", took.as_secs_f64()));
                 Ok(took)
             }
-            Err(Fault::Silent(why)) => {
+            Err(HomingFault::Silent(why)) => {
                 troubles.miss(name, &why);
                 Err(why)
             }
-            Err(Fault::Refused(why)) => {
+            Err(HomingFault::Refused(why)) => {
                 troubles.refuse(name, &why);
                 Err(why)
             }
@@ -145,23 +150,23 @@ fn words(step: Step) -> String {
 /// Homes the seats of a link, which tells each axis something new each period.
 fn home_link(
     (link, period): (&Link, Duration),
-    driven: &Driven,
+    driven: &DrivenTargets,
     seats: &[usize],
     abort: &AtomicBool,
-    tell: &Sender<Told>,
+    tell: &Sender<HomingTold>,
 ) {
     // Whoever shows it listens until all have told.
-    let over = |index, result| drop(tell.send(Told::Over(index, result)));
+    let over = |index, result| drop(tell.send(HomingTold::Over(index, result)));
     let line = match LinkLine::open(link) {
         Ok(line) => line,
         Err(error) => {
-            seats.iter().for_each(|index| over(*index, Err(Fault::Silent(error.to_string()))));
+            seats.iter().for_each(|index| over(*index, Err(HomingFault::Silent(error.to_string()))));
             return;
         }
     };
     let mut talk = LinkTalk::over(line, link, period);
     for &index in seats {
-        let step = &mut |step| drop(tell.send(Told::Step(index, step)));
+        let step = &mut |step| drop(tell.send(HomingTold::Step(index, step)));
         over(index, talk.home(&driven.controllers[index], abort, step));
     }
 }
@@ -188,16 +193,16 @@ impl LinkTalk {
         controller: &Controller,
         abort: &AtomicBool,
         told: &mut dyn FnMut(Step),
-    ) -> Result<Duration, Fault> {
+    ) -> Result<Duration, HomingFault> {
         if abort.load(Ordering::Relaxed) {
-            return Err(Fault::Refused("not begun, as you asked for the end".to_owned()));
+            return Err(HomingFault::Refused("not begun, as you asked for the end".to_owned()));
         }
-        let none = || Fault::Refused("it has no drives of that link".to_owned());
+        let none = || HomingFault::Refused("it has no drives of that link".to_owned());
         let (begun, goes_on) = (Instant::now(), &|| !abort.load(Ordering::Relaxed));
         match self {
             Self::SilverMax(talk) => {
                 let canary = canary()
-                    .map_err(|error| Fault::Refused(format!("the system gives no chance: {error}")))?;
+                    .map_err(|error| HomingFault::Refused(format!("the system gives no chance: {error}")))?;
                 let seat = units_of(controller).ok_or_else(none)?;
                 silvermax::home(talk, seat, silvermax::Homing { canary, goes_on, told })?;
             }
@@ -210,7 +215,7 @@ impl LinkTalk {
     }
 }
 
-impl From<silvermax::HomeError> for Fault {
+impl From<silvermax::HomeError> for HomingFault {
     fn from(error: silvermax::HomeError) -> Self {
         use silvermax::{HomeError, TalkFault};
         match error {
@@ -220,7 +225,7 @@ impl From<silvermax::HomeError> for Fault {
     }
 }
 
-impl From<sixpack2::HomeError> for Fault {
+impl From<sixpack2::HomeError> for HomingFault {
     fn from(error: sixpack2::HomeError) -> Self {
         use sixpack2::{FindError, HomeError};
         match error {

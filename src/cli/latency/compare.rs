@@ -7,14 +7,14 @@ use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
 use crate::cli::{Exit, Failure, OrExit as _, print};
-use crate::latency::{Comparison, Row, read};
+use crate::latency::{Comparison, TimesRow, read};
 use crate::rt::Times;
 
 /// A log of an hour is some megabytes; what is longer than this is none of ours.
 const MAX_LEN: u64 = 256 << 20;
 
 #[derive(Debug, Serialize)]
-struct Report<'a> {
+struct CompareReport<'a> {
     a: String,
     b: String,
     #[serde(flatten)]
@@ -25,7 +25,7 @@ pub(super) fn run(a: &Path, b: &Path, json: bool) -> Result<Exit, Failure> {
     let comparison = Comparison::of(&load(a)?, &load(b)?);
     let [a, b] = [a, b].map(|path| path.display().to_string());
     if json {
-        print::json(&Report { a, b, comparison: &comparison })?;
+        print::json(&CompareReport { a, b, comparison: &comparison })?;
     } else {
         print::out(&text(&a, &b, &comparison))?;
     }
@@ -58,7 +58,7 @@ fn text(a: &str, b: &str, comparison: &Comparison) -> String {
     format!("A = {a}\nB = {b}\n\n{table}\n\n{}\n{}\n", lateness.verdict, ack_latency.verdict)
 }
 
-fn add(table: &mut Table, name: &str, row: &Row) {
+fn add(table: &mut Table, name: &str, row: &TimesRow) {
     let shown = |us: Option<f64>| us.map_or_else(|| "-".to_owned(), |us| format!("{us:.1}"));
     for (place, figure) in row.figures.iter().enumerate() {
         let ratio = figure.ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.2}"));

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use crate::app::{Played, Report as PlayReport};
+use crate::app::{PlayReport, Played};
 use crate::cli::Exit;
 use crate::device::stand::StandError;
 use crate::doctor::chart::draw;
@@ -14,14 +14,14 @@ use crate::tracker::Histogram;
 
 /// A controller that was sent no frame.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Refused {
+pub(super) struct RefusedFrames {
     name: String,
     why: String,
     #[serde(skip)]
     answered: bool,
 }
 
-impl Refused {
+impl RefusedFrames {
     pub(super) fn new(name: String, error: &StandError) -> Self {
         Self { name, why: error.to_string(), answered: error.answered() }
     }
@@ -38,7 +38,7 @@ impl Refused {
 
 /// What programs read. Fields may be added, never changed.
 #[derive(Debug, Serialize)]
-pub(super) struct Report<'a> {
+pub(super) struct LatencyReport<'a> {
     /// The rate and the controllers, in words.
     about: &'a str,
     seconds: u32,
@@ -48,18 +48,18 @@ pub(super) struct Report<'a> {
     lateness_us: Percentiles,
     ack_us: Percentiles,
     /// Controllers that were left out.
-    refused: &'a [Refused],
+    refused: &'a [RefusedFrames],
     /// The report of the sending, as `play` has it.
     report: &'a PlayReport,
 }
 
-impl<'a> Report<'a> {
+impl<'a> LatencyReport<'a> {
     pub(super) fn new(
         about: &'a str,
         seconds: u32,
         of_our_own: bool,
         times: &Times,
-        refused: &'a [Refused],
+        refused: &'a [RefusedFrames],
         played: &'a Played,
     ) -> Self {
         let [lateness_us, ack_us] = [&times.lateness, &times.acks].map(Percentiles::of);

@@ -27,13 +27,13 @@ const LOOK: Duration = Duration::from_millis(100);
 const INTERVAL: Duration = Duration::from_secs(1);
 
 /// A file that has its name only once it is whole.
-pub(super) struct Out {
+pub(super) struct UnfinishedFile {
     path: PathBuf,
     part: PathBuf,
     file: File,
 }
 
-impl Out {
+impl UnfinishedFile {
     /// Creates the file under another name.
     pub(super) fn create(path: &Path) -> Result<Self, Failure> {
         let mut part = path.as_os_str().to_owned();
@@ -46,19 +46,19 @@ impl Out {
 }
 
 /// The thread.
-pub(super) struct Watch {
+pub(super) struct LatencyWatch {
     done: Arc<AtomicBool>,
     thread: JoinHandle<io::Result<()>>,
     /// The name that the file is to have, and the one that it has.
     names: Option<(PathBuf, PathBuf)>,
 }
 
-impl Watch {
+impl LatencyWatch {
     pub(super) fn start(
         live: Arc<Live>,
         seconds: u32,
         about: &str,
-        out: Option<Out>,
+        out: Option<UnfinishedFile>,
     ) -> Result<Self, Failure> {
         let names = out.as_ref().map(|out| (out.path.clone(), out.part.clone()));
         let done = Arc::new(AtomicBool::new(false));
@@ -101,7 +101,7 @@ struct Diary {
 }
 
 impl Diary {
-    fn begin(about: &str, out: Option<Out>) -> io::Result<Self> {
+    fn begin(about: &str, out: Option<UnfinishedFile>) -> io::Result<Self> {
         let start = SystemTime::UNIX_EPOCH + Duration::from_nanos(wall_now_ns());
         let log =
             out.map(|out| Log::begin(BufWriter::new(out.file), &format!("kinocue latency, {about}"), start));

@@ -5,10 +5,10 @@ use crate::rt::Row;
 
 /// How the controllers stood when they were looked at last; empty before that.
 #[derive(Debug, Default)]
-pub(super) struct HealthMessages(Vec<Seen>);
+pub(super) struct HealthMessages(Vec<StandingsSeen>);
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Seen {
+struct StandingsSeen {
     /// What was said of it last; `None` if all was well.
     trouble: Option<(HealthState, Why)>,
     /// True if a refusal was said.
@@ -18,7 +18,7 @@ struct Seen {
 impl HealthMessages {
     /// What is new, a line for each controller that stands otherwise. Acks that are missing now and then are for the report.
     pub(super) fn changes(&mut self, rows: &[Row], names: &[String]) -> Vec<String> {
-        self.0.resize(rows.len(), Seen::default());
+        self.0.resize(rows.len(), StandingsSeen::default());
         let mut lines: Vec<String> = Vec::new();
         for ((seen, row), name) in self.0.iter_mut().zip(rows).zip(names) {
             let trouble = (!is_well(row.standing)).then_some((row.standing, row.why));
@@ -39,7 +39,7 @@ impl HealthMessages {
             if refuses && line.is_none() {
                 lines.push(format!("{name}: it refuses frames (x = 3, 4 or 5); the report has their number"));
             }
-            *seen = Seen { trouble, refused: seen.refused || refuses };
+            *seen = StandingsSeen { trouble, refused: seen.refused || refuses };
             lines.extend(line.filter(|line| !lines.contains(line)));
         }
         lines

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use rtrb::Producer;
 
-use super::keys::{Action, Decoder, HELP};
+use super::keys::{HELP, KeyAction, KeyDecoder};
 use crate::app::Control;
 use crate::app::film::SharedTable;
 use crate::engine::Mix;
@@ -51,24 +51,24 @@ impl Leader {
     }
 
     /// Does it; returns what there is to say at once.
-    fn act(&mut self, action: Action, now: MonoTime) -> Option<&'static str> {
+    fn act(&mut self, action: KeyAction, now: MonoTime) -> Option<&'static str> {
         match action {
-            Action::PauseOrResume if self.control.live.state() == State::Paused => {
+            KeyAction::PauseOrResume if self.control.live.state() == State::Paused => {
                 self.ask(Command::Request(Transition::Resume))
             }
-            Action::PauseOrResume => self.ask(Command::Request(Transition::Pause)),
-            Action::Jump(seconds) => self.jump(seconds, now),
-            Action::Clear => self.ask(Command::Request(Transition::Clear)),
-            Action::Park => self.ask(Command::Request(Transition::Park)),
-            Action::Stop => self.stop(),
-            Action::Level(step) => self.level(step),
-            Action::Trim(step) => self.trim(step),
-            Action::Nudge(frames) => self.trim(self.film.read().frames_ms(frames)),
-            Action::Leave => {
+            KeyAction::PauseOrResume => self.ask(Command::Request(Transition::Pause)),
+            KeyAction::Jump(seconds) => self.jump(seconds, now),
+            KeyAction::Clear => self.ask(Command::Request(Transition::Clear)),
+            KeyAction::Park => self.ask(Command::Request(Transition::Park)),
+            KeyAction::Stop => self.stop(),
+            KeyAction::Level(step) => self.level(step),
+            KeyAction::Trim(step) => self.trim(step),
+            KeyAction::Nudge(frames) => self.trim(self.film.read().frames_ms(frames)),
+            KeyAction::Leave => {
                 self.control.leave.store(true, Ordering::Relaxed);
                 None
             }
-            Action::Help => Some(HELP),
+            KeyAction::Help => Some(HELP),
         }
     }
 
@@ -145,7 +145,7 @@ pub(super) fn start(
     over: Arc<AtomicBool>,
 ) -> io::Result<JoinHandle<()>> {
     Builder::new().name("keys".to_owned()).spawn(move || {
-        let mut decoder = Decoder::default();
+        let mut decoder = KeyDecoder::default();
         let mut bytes = [0; 64];
         while !over.load(Ordering::Relaxed) {
             let Ok(count) = keyboard.read(&mut bytes, WAIT) else {
@@ -218,7 +218,7 @@ mod tests {
         let plays = [PlayMode::Following, PlayMode::Joining].map(State::Playing);
         for state in [plays[0], State::Paused, plays[1]] {
             leader.control.live.enter(state);
-            assert_eq!(leader.act(Action::PauseOrResume, at(0)), None);
+            assert_eq!(leader.act(KeyAction::PauseOrResume, at(0)), None);
         }
         let expected = [Transition::Pause, Transition::Resume, Transition::Pause].map(Ok);
         assert_eq!(asked(&mut commands), expected);
@@ -229,7 +229,7 @@ mod tests {
         let (mut leader, mut commands) = leading(1.0);
         let presses = [(5, 0), (5, 100), (-5, 200), (-5, 5_000), (-50, 9_000), (90, 9_200)];
         let targets = presses.map(|(seconds, ms)| {
-            assert_eq!(leader.act(Action::Jump(seconds), at(ms)), None);
+            assert_eq!(leader.act(KeyAction::Jump(seconds), at(ms)), None);
             asked(&mut commands)
         });
         let expected = [35, 40, 35, 25, 0, 60].map(|s| vec![Err(ShowTime::from_millis(s * 1_000))]);
@@ -241,13 +241,13 @@ mod tests {
         let (mut leader, _commands) = leading(0.62);
         let desk = Arc::clone(&leader.control.desk);
         let levels = || [0, 1].map(|lane| (desk.mix(lane).motion * 1000.0).round());
-        assert!(leader.act(Action::Level(5), at(0)).is_some_and(|said| said.contains("began with")));
+        assert!(leader.act(KeyAction::Level(5), at(0)).is_some_and(|said| said.contains("began with")));
         assert_eq!(levels(), [620.0, 310.0]);
-        assert_eq!(leader.act(Action::Level(-5), at(0)), None);
+        assert_eq!(leader.act(KeyAction::Level(-5), at(0)), None);
         assert_eq!(levels(), [570.0, 285.0]);
-        (0..20).for_each(|_| assert_eq!(leader.act(Action::Level(-5), at(0)), None));
+        (0..20).for_each(|_| assert_eq!(leader.act(KeyAction::Level(-5), at(0)), None));
         assert_eq!(levels(), [0.0, 0.0]);
-        (0..13).for_each(|_| assert_eq!(leader.act(Action::Level(5), at(0)), None));
+        (0..13).for_each(|_| assert_eq!(leader.act(KeyAction::Level(5), at(0)), None));
         assert_eq!(levels(), [620.0, 310.0]);
         assert_eq!(desk.mix(0).vibration.to_bits(), desk.mix(0).motion.to_bits());
     }
@@ -255,23 +255,23 @@ mod tests {
     #[test]
     fn trim_goes_as_far_as_the_engine_takes_it() {
         let (mut leader, _commands) = leading(1.0);
-        leader.act(Action::Trim(-10), at(0));
+        leader.act(KeyAction::Trim(-10), at(0));
         assert_eq!(leader.control.desk.trim_ms(), -10);
-        (0..60).for_each(|_| assert_eq!(leader.act(Action::Trim(10), at(0)), None));
+        (0..60).for_each(|_| assert_eq!(leader.act(KeyAction::Trim(10), at(0)), None));
         assert_eq!(leader.control.desk.trim_ms(), TRIM_MS);
-        leader.act(Action::Nudge(-2), at(0));
+        leader.act(KeyAction::Nudge(-2), at(0));
         assert_eq!(leader.control.desk.trim_ms(), TRIM_MS - 80, "two frames of 25 a second");
         leader.film = SharedTable::default();
-        leader.act(Action::Nudge(-1), at(0));
+        leader.act(KeyAction::Nudge(-1), at(0));
         assert_eq!(leader.control.desk.trim_ms(), TRIM_MS - 122, "one more of 24");
     }
 
     #[test]
     fn a_stop_needs_no_place_among_the_commands() {
         let (mut leader, _commands) = leading(1.0);
-        (0..4).for_each(|_| assert_eq!(leader.act(Action::Park, at(0)), None));
-        assert!(leader.act(Action::Park, at(0)).is_some_and(|said| said.contains("again")));
-        assert_eq!(leader.act(Action::Stop, at(0)), None);
+        (0..4).for_each(|_| assert_eq!(leader.act(KeyAction::Park, at(0)), None));
+        assert!(leader.act(KeyAction::Park, at(0)).is_some_and(|said| said.contains("again")));
+        assert_eq!(leader.act(KeyAction::Stop, at(0)), None);
         assert!(leader.control.desk.take_stop());
     }
 
@@ -279,10 +279,10 @@ mod tests {
     fn before_the_cue_begins_a_stop_and_leaving_count_and_all_else_is_told_to_wait() {
         let (mut leader, _commands) = leading(1.0);
         leader.commands = None;
-        assert!(leader.act(Action::Clear, at(0)).is_some_and(|said| said.contains("not begun")));
-        assert!(leader.act(Action::Stop, at(0)).is_some_and(|said| said.contains("hard-wired")));
+        assert!(leader.act(KeyAction::Clear, at(0)).is_some_and(|said| said.contains("not begun")));
+        assert!(leader.act(KeyAction::Stop, at(0)).is_some_and(|said| said.contains("hard-wired")));
         assert!(leader.control.desk.take_stop());
-        assert_eq!(leader.act(Action::Leave, at(0)), None);
+        assert_eq!(leader.act(KeyAction::Leave, at(0)), None);
         assert!(leader.control.leave.load(Ordering::Relaxed));
     }
 }

@@ -2,7 +2,7 @@
 
 /// What a key asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Action {
+pub(super) enum KeyAction {
     /// Pause, or go on after a pause.
     PauseOrResume,
     /// Go on so many seconds of the film later, or earlier.
@@ -56,19 +56,19 @@ enum Within {
 
 /// Puts bytes together to keys.
 #[derive(Debug, Default)]
-pub(super) struct Decoder(Within);
+pub(super) struct KeyDecoder(Within);
 
-impl Decoder {
+impl KeyDecoder {
     /// Takes the next byte; the action, if it ends a key that has one.
-    pub(super) const fn take(&mut self, byte: u8) -> Option<Action> {
+    pub(super) const fn take(&mut self, byte: u8) -> Option<KeyAction> {
         match (self.0, byte) {
             (_, 0x1b) => self.0 = Within::Escape,
             (Within::Escape, b'[' | b'O') => self.0 = Within::Sequence,
             (Within::Sequence, b'@'..=b'~') => {
                 self.0 = Within::None;
                 return match byte {
-                    b'C' => Some(Action::Jump(5)),
-                    b'D' => Some(Action::Jump(-5)),
+                    b'C' => Some(KeyAction::Jump(5)),
+                    b'D' => Some(KeyAction::Jump(-5)),
                     _ => None,
                 };
             }
@@ -88,20 +88,20 @@ impl Decoder {
     }
 }
 
-const fn of_letter(byte: u8) -> Option<Action> {
+const fn of_letter(byte: u8) -> Option<KeyAction> {
     Some(match byte.to_ascii_lowercase() {
-        b' ' => Action::PauseOrResume,
-        b's' => Action::Stop,
-        b'c' => Action::Clear,
-        b'p' => Action::Park,
-        b'+' | b'=' => Action::Level(5),
-        b'-' | b'_' => Action::Level(-5),
-        b'.' => Action::Trim(10),
-        b',' => Action::Trim(-10),
-        b'>' => Action::Nudge(1),
-        b'<' => Action::Nudge(-1),
-        b'q' => Action::Leave,
-        b'?' | b'h' => Action::Help,
+        b' ' => KeyAction::PauseOrResume,
+        b's' => KeyAction::Stop,
+        b'c' => KeyAction::Clear,
+        b'p' => KeyAction::Park,
+        b'+' | b'=' => KeyAction::Level(5),
+        b'-' | b'_' => KeyAction::Level(-5),
+        b'.' => KeyAction::Trim(10),
+        b',' => KeyAction::Trim(-10),
+        b'>' => KeyAction::Nudge(1),
+        b'<' => KeyAction::Nudge(-1),
+        b'q' => KeyAction::Leave,
+        b'?' | b'h' => KeyAction::Help,
         _ => return None,
     })
 }
@@ -110,27 +110,27 @@ const fn of_letter(byte: u8) -> Option<Action> {
 mod tests {
     use super::*;
 
-    fn typed(bytes: &[u8]) -> Vec<Action> {
-        let mut decoder = Decoder::default();
+    fn typed(bytes: &[u8]) -> Vec<KeyAction> {
+        let mut decoder = KeyDecoder::default();
         bytes.iter().filter_map(|byte| decoder.take(*byte)).collect()
     }
 
     #[test]
     fn every_key_of_the_help_does_what_it_says() {
         let all = [
-            (" ", Action::PauseOrResume),
-            ("s", Action::Stop),
-            ("c", Action::Clear),
-            ("p", Action::Park),
-            ("+", Action::Level(5)),
-            ("-", Action::Level(-5)),
-            (",", Action::Trim(-10)),
-            (".", Action::Trim(10)),
-            ("<", Action::Nudge(-1)),
-            (">", Action::Nudge(1)),
-            ("q", Action::Leave),
-            ("?", Action::Help),
-            ("h", Action::Help),
+            (" ", KeyAction::PauseOrResume),
+            ("s", KeyAction::Stop),
+            ("c", KeyAction::Clear),
+            ("p", KeyAction::Park),
+            ("+", KeyAction::Level(5)),
+            ("-", KeyAction::Level(-5)),
+            (",", KeyAction::Trim(-10)),
+            (".", KeyAction::Trim(10)),
+            ("<", KeyAction::Nudge(-1)),
+            (">", KeyAction::Nudge(1)),
+            ("q", KeyAction::Leave),
+            ("?", KeyAction::Help),
+            ("h", KeyAction::Help),
         ];
         for (key, action) in all {
             assert_eq!(typed(key.as_bytes()), [action], "{key}");
@@ -140,13 +140,13 @@ mod tests {
     #[test]
     fn a_stop_is_a_stop_also_with_caps_lock_on_or_after_an_escape() {
         for bytes in ["S", "\u{1b}s", "\u{1b}\u{1b}s"] {
-            assert_eq!(typed(bytes.as_bytes()), [Action::Stop], "{bytes:?}");
+            assert_eq!(typed(bytes.as_bytes()), [KeyAction::Stop], "{bytes:?}");
         }
     }
 
     #[test]
     fn arrows_seek_in_both_modes_that_terminals_have() {
-        let both = [Action::Jump(-5), Action::Jump(5)];
+        let both = [KeyAction::Jump(-5), KeyAction::Jump(5)];
         assert_eq!(typed(b"\x1b[D\x1b[C"), both);
         assert_eq!(typed(b"\x1bOD\x1bOC"), both);
     }
@@ -161,10 +161,10 @@ mod tests {
 
     #[test]
     fn a_sequence_that_does_not_go_on_swallows_no_later_key() {
-        let mut decoder = Decoder::default();
+        let mut decoder = KeyDecoder::default();
         assert_eq!((decoder.take(0x1b), decoder.take(b'[')), (None, None));
         decoder.forget();
-        assert_eq!(decoder.take(b's'), Some(Action::Stop));
+        assert_eq!(decoder.take(b's'), Some(KeyAction::Stop));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::thread;
 
-use super::super::targets::Driven;
+use super::super::targets::DrivenTargets;
 use crate::config::drive::DriveFamily;
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Link};
@@ -11,7 +11,7 @@ use crate::drive::{silvermax, sixpack2};
 use crate::preflight::{DriveSubject, LinkSurvey};
 
 /// What was read of the links that somebody is on, in the order of the links; none where nobody is.
-pub(super) fn look_at_all(driven: &Driven) -> Vec<Option<LinkSurvey>> {
+pub(super) fn look_at_all(driven: &DrivenTargets) -> Vec<Option<LinkSurvey>> {
     thread::scope(|scope| {
         let look = |link| {
             let motors = motors_on(driven, link);
@@ -25,7 +25,7 @@ pub(super) fn look_at_all(driven: &Driven) -> Vec<Option<LinkSurvey>> {
 }
 
 /// What is meant on a link; none where nothing is.
-fn motors_on<'a>(driven: &'a Driven, link: &Link) -> Option<Vec<&'a Motors>> {
+fn motors_on<'a>(driven: &'a DrivenTargets, link: &Link) -> Option<Vec<&'a Motors>> {
     let drives = driven.controllers.iter().filter_map(|one| one.drives());
     let on_it: Vec<_> =
         drives.filter(|drives| drives.link == link.name).map(|drives| &drives.motors).collect();
@@ -45,7 +45,10 @@ fn look_at(link: &Link, motors: &[&Motors]) -> LinkSurvey {
 }
 
 /// What is judged: the controllers with what was read of their links.
-pub(super) fn subjects<'a>(driven: &'a Driven, looked: &'a [Option<LinkSurvey>]) -> Vec<DriveSubject<'a>> {
+pub(super) fn subjects<'a>(
+    driven: &'a DrivenTargets,
+    looked: &'a [Option<LinkSurvey>],
+) -> Vec<DriveSubject<'a>> {
     let subject = |controller: &'a Controller| {
         let name = &controller.drives()?.link;
         let at = driven.links.iter().position(|link| link.name == *name)?;

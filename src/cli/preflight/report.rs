@@ -18,7 +18,7 @@ const FEW: usize = 8;
 
 /// The report, as `--json` prints it.
 #[derive(Debug, Serialize)]
-pub(super) struct Report {
+pub(super) struct PreflightReport {
     passed: bool,
     /// No controller answered where this is 0.
     answered: usize,
@@ -27,12 +27,12 @@ pub(super) struct Report {
     failed: usize,
     warned: usize,
     accepted: usize,
-    controllers: Vec<ControllerReport>,
+    controllers: Vec<ControllerChecks>,
 }
 
 /// What was found of one controller.
 #[derive(Debug, Serialize)]
-pub(super) struct ControllerReport {
+pub(super) struct ControllerChecks {
     name: String,
     row: Option<String>,
     address: String,
@@ -60,8 +60,8 @@ struct FindingReport {
     finding: Finding,
 }
 
-impl Report {
-    pub(super) fn new(controllers: Vec<ControllerReport>, took: Duration) -> Self {
+impl PreflightReport {
+    pub(super) fn new(controllers: Vec<ControllerChecks>, took: Duration) -> Self {
         let all = || controllers.iter().flat_map(|one| &one.findings).map(|one| &one.finding);
         let failed = all().filter(|finding| finding.fails()).count();
         let warned = all().filter(|one| one.severity() == Severity::Warn && one.accepted.is_none()).count();
@@ -143,7 +143,7 @@ impl Report {
     }
 }
 
-impl ControllerReport {
+impl ControllerChecks {
     fn new(subject: &Subject<'_>, findings: Vec<Finding>) -> Self {
         let controller = subject.controller;
         let registers = subject.survey.iter().flat_map(|survey| &survey.values);

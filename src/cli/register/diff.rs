@@ -6,11 +6,12 @@ use anyhow::{Context as _, anyhow};
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
+use super::drives::{self, DriveFound, DriveRegisters};
 use super::read_values;
-use crate::cli::targets::{TargetArgs, Targets, Troubles, read_file};
+use crate::cli::targets::{DrivenTargets, TargetArgs, Targets, Troubles, read_file};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::{Controller, Station};
-use crate::device::settings::{self, Difference, Saved, differences};
+use crate::device::settings::{self, Difference, Saved, SavedDrives, SavedHall, differences};
 use crate::device::{Address, table};
 
 /// Compares controllers with a file that `kinocue register save` wrote. Ends with 0 where nothing differs, with 1 where
@@ -42,13 +43,33 @@ pub(super) struct Args {
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
+struct DiffReport<'a> {
     same: bool,
-    controllers: Vec<ControllerReport<'a>>,
+    controllers: Vec<ControllerDiff<'a>>,
+    /// Seats on serial links.
+    drives: Vec<DrivesDiff<'a>>,
 }
 
 #[derive(Serialize)]
-struct ControllerReport<'a> {
+struct DrivesDiff<'a> {
+    name: &'a str,
+    address: String,
+    saved_as: &'a str,
+    differences: Vec<DriveDifference>,
+    faults: Vec<String>,
+}
+
+/// A register of a unit that differs.
+#[derive(Serialize)]
+struct DriveDifference {
+    register: String,
+    name: String,
+    saved: i64,
+    found: i64,
+}
+
+#[derive(Serialize)]
+struct ControllerDiff<'a> {
     name: &'a str,
     address: String,
     saved_as: &'a str,
@@ -57,17 +78,25 @@ struct ControllerReport<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let targets = args.targets.resolve(&args.name)?;
+    let (targets, driven) = args.targets.resolve_all(&args.name)?;
+    let driven = drives::asked(driven, &DriveRegisters::settings());
     let file = load(&args.file)?;
-    let saved =
-        matched(&file, &targets, args.like.as_deref()).with_context(|| args.file.display().to_string());
-    let saved = saved.or_exit(Exit::Usage)?;
-    let wanted: Vec<Vec<Address>> = saved.iter().map(|one| one.values.keys().copied().collect()).collect();
-    let mut talk = targets.open()?;
+    let place = || args.file.display().to_string();
+    let like = args.like.as_deref();
+    let saved = matched(&file.controllers, &targets, like).with_context(place).or_exit(Exit::Usage)?;
+    let saved_drives =
+        matched_drives(&file.drives, &driven, like).with_context(place).or_exit(Exit::Usage)?;
     let mut troubles = Troubles::default();
-    let found = read_values(&mut talk, &targets, &wanted, &mut troubles);
+    let found = if targets.controllers.is_empty() {
+        Vec::new()
+    } else {
+        let wanted: Vec<Vec<Address>> =
+            saved.iter().map(|one| one.values.keys().copied().collect()).collect();
+        read_values(&mut targets.open()?, &targets, &wanted, &mut troubles)
+    };
+    let on_links = drives::read(&driven, &DriveRegisters::settings(), &mut troubles)?;
     let reports = targets.controllers.iter().zip(&saved).zip(found).map(|((controller, saved), found)| {
-        ControllerReport {
+        ControllerDiff {
             name: &controller.name,
             address: controller.connection.address.to_string(),
             saved_as: &saved.name,
@@ -76,8 +105,13 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         }
     });
     let controllers: Vec<_> = reports.collect();
-    let same = troubles.none() && controllers.iter().all(|one| one.differences.is_empty());
-    let report = Report { same, controllers };
+    let of_drives = driven.controllers.iter().zip(saved_drives).zip(on_links);
+    let drives: Vec<_> =
+        of_drives.map(|((controller, saved), found)| DrivesDiff::new(controller, saved, found)).collect();
+    let same = troubles.none()
+        && controllers.iter().all(|one| one.differences.is_empty())
+        && drives.iter().all(|one| one.differences.is_empty());
+    let report = DiffReport { same, controllers, drives };
     if args.json {
         print::json(&report)?
     } else {
@@ -89,8 +123,35 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     })
 }
 
+impl<'a> DrivesDiff<'a> {
+    fn new(controller: &'a Controller, saved: &'a SavedDrives, found: DriveFound) -> Self {
+        let differs = |value: &drives::DriveValue| {
+            let saved = *saved.registers.get(&value.register)?;
+            let (register, name) = (value.register.clone(), value.name.clone());
+            (saved != value.value).then_some(DriveDifference { register, name, saved, found: value.value })
+        };
+        let differences = found.values.iter().filter_map(differs).collect();
+        let (name, address) = (&*controller.name, controller.address());
+        Self { name, address, saved_as: &saved.name, differences, faults: found.faults }
+    }
+}
+
+/// For each seat on a link what the file has of it.
+fn matched_drives<'f>(
+    file: &'f [SavedDrives],
+    driven: &DrivenTargets,
+    like: Option<&str>,
+) -> anyhow::Result<Vec<&'f SavedDrives>> {
+    let of = |controller: &Controller| {
+        let name = like.unwrap_or(&controller.name);
+        let saved = file.iter().find(|one| one.name == name);
+        saved.ok_or_else(|| anyhow!("has no settings of the drives of {name}; --as NAME chooses"))
+    };
+    driven.controllers.iter().map(of).collect()
+}
+
 /// Reads a settings file.
-pub(super) fn load(path: &Path) -> Result<Vec<Saved>, Failure> {
+pub(super) fn load(path: &Path) -> Result<SavedHall, Failure> {
     let text = read_file(path)?;
     settings::parse(&text).with_context(|| path.display().to_string()).or_exit(Exit::Config)
 }
@@ -117,7 +178,7 @@ pub(super) fn matched<'f>(
     targets.controllers.iter().map(of).collect()
 }
 
-fn tell(report: &Report<'_>, all: bool) -> Result<(), Failure> {
+fn tell(report: &DiffReport<'_>, all: bool) -> Result<(), Failure> {
     let mut table_of = Table::new();
     table_of.load_style(presets::NOTHING);
     table_of.set_header(["controller", "register", "in the file", "in the controller", "name", "meaning"]);
@@ -136,6 +197,13 @@ fn tell(report: &Report<'_>, all: bool) -> Result<(), Failure> {
             ]);
         }
     }
+    for one in &report.drives {
+        for DriveDifference { register, name, saved, found } in &one.differences {
+            differing += 1;
+            let cells = [one.name, register, &saved.to_string(), &found.to_string(), name, ""];
+            table_of.add_row(cells);
+        }
+    }
     for column in table_of.column_iter_mut().skip(2).take(2) {
         column.set_cell_alignment(CellAlignment::Right);
     }
@@ -144,7 +212,7 @@ fn tell(report: &Report<'_>, all: bool) -> Result<(), Failure> {
     } else if report.same {
         print::tell("nothing differs");
     }
-    if !all {
+    if !all && !report.controllers.is_empty() {
         print::tell("PA10-14 and PA16-1b, which are each controller's own, were not compared; --all does");
     }
     Ok(())

@@ -3,6 +3,7 @@
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
+use super::drives::{self, DriveRegister, DriveRegisters};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::device::{Family, Flags, Register, selections, table};
 
@@ -11,7 +12,7 @@ use crate::device::{Family, Flags, Register, selections, table};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  kinocue register list\n  kinocue register list PA90..98 dpf0\n  kinocue \
-                        register list --json"
+                        register list R0..40 R200..211\n  kinocue register list --json"
 )]
 pub(super) struct Args {
     /// Registers, or ranges of them [default: all].
@@ -25,16 +26,30 @@ pub(super) struct Args {
 #[derive(Serialize)]
 struct Listing {
     registers: Vec<&'static Register>,
+    /// Of serial drives.
+    drives: Vec<DriveRegister>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let selections = selections(&args.registers).or_exit(Exit::Usage)?;
-    let addresses = selections.iter().flat_map(|selection| &selection.addresses);
-    let registers: Vec<_> = addresses.filter_map(|address| table().get(*address)).collect();
-    if args.json {
-        print::json(&Listing { registers })?;
+    let (rest, of_drives) = drives::take(&args.registers).or_exit(Exit::Usage)?;
+    let (registers, of_drives) = if rest.is_empty() && !of_drives.is_empty() {
+        (Vec::new(), of_drives)
     } else {
+        let selections = selections(&rest).or_exit(Exit::Usage)?;
+        let addresses = selections.iter().flat_map(|selection| &selection.addresses);
+        let registers = addresses.filter_map(|address| table().get(*address)).collect();
+        (registers, if args.registers.is_empty() { DriveRegisters::all() } else { of_drives })
+    };
+    let drives = of_drives.rows();
+    if args.json {
+        print::json(&Listing { registers, drives })?;
+        return Ok(Exit::Done);
+    }
+    if !registers.is_empty() {
         print::out(&format!("{}\n", text(&registers)))?;
+    }
+    if !drives.is_empty() {
+        print::out(&format!("{}\n", text_of_drives(&drives)))?;
     }
     Ok(Exit::Done)
 }
@@ -63,6 +78,16 @@ fn text(registers: &[&Register]) -> Table {
     }
     for column in table.column_iter_mut().skip(4).take(2) {
         column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn text_of_drives(drives: &[DriveRegister]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header(["register", "dialect", "name"]);
+    for one in drives {
+        table.add_row([&one.register, one.dialect, one.name]);
     }
     table
 }

@@ -4,8 +4,9 @@ use anyhow::anyhow;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
+use super::drives::{self, DriveFound, DriveRegisters, DriveValue};
 use super::{Found, read_values};
-use crate::cli::targets::{TargetArgs, Targets, Troubles};
+use crate::cli::targets::{DrivenTargets, TargetArgs, Targets, Troubles};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::{Controller, Station};
 use crate::device::change::dialect_name;
@@ -19,9 +20,12 @@ Examples:
   kinocue register read PA95 --to 192.168.15.201:7408
   kinocue register read pa 0x90..98 dp 06..0b dpf0 --config hall.toml --row A
   kinocue register read servo 1 508..511 --config hall.toml --name A1
+  kinocue register read R0 R1 R38..40 --config hall.toml --name L1      SilverMax units
+  kinocue register read '$20' '$43' --config hall.toml --name L2        a SIXpack 2
   kinocue register read --config hall.toml --json")]
 pub(super) struct Args {
-    /// What to read: PA95, pa 0x95, dp 06..0b, dpf0, axis-offset, servo 1 508 [default: all PA and DP].
+    /// What to read: PA95, pa 0x95, dp 06..0b, dpf0, axis-offset, servo 1 508, R38, $20 [default: all PA and DP, and all
+    /// that can be read of drives].
     #[arg(value_name = "REGISTER")]
     registers: Vec<String>,
     #[command(flatten)]
@@ -35,19 +39,38 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let selections = selections(&args.registers).or_exit(Exit::Usage)?;
-    let targets = args.targets.resolve(&args.name)?;
-    let wanted: Vec<Vec<Address>> = (targets.controllers.iter())
-        .map(|controller| wanted(&selections, controller))
-        .collect::<Result<_, _>>()
-        .or_exit(Exit::Usage)?;
-    let mut talk = targets.open()?;
+    let (rest, of_drives) = drives::take(&args.registers).or_exit(Exit::Usage)?;
+    let (targets, driven) = args.targets.resolve_all(&args.name)?;
+    let of_drives = if args.registers.is_empty() { DriveRegisters::all() } else { of_drives };
+    let driven = drives::asked(driven, &of_drives);
+    let is_asked = args.registers.is_empty() || !rest.is_empty();
+    let targets = Targets { controllers: if is_asked { targets.controllers } else { Vec::new() }, ..targets };
+    if targets.controllers.is_empty() && driven.controllers.is_empty() {
+        let why = "none of these controllers has such registers: PA and DP are of controllers on the network, R0 to R211 of \
+                   SilverMax units, $20, $30 and $43 of a SIXpack 2";
+        return Err(anyhow!(why)).or_exit(Exit::Usage);
+    }
     let mut troubles = Troubles::default();
-    let found = read_values(&mut talk, &targets, &wanted, &mut troubles);
+    let found = if targets.controllers.is_empty() {
+        Vec::new()
+    } else {
+        let selections = selections(&rest).or_exit(Exit::Usage)?;
+        let wanted: Vec<Vec<Address>> = (targets.controllers.iter())
+            .map(|controller| wanted(&selections, controller))
+            .collect::<Result<_, _>>()
+            .or_exit(Exit::Usage)?;
+        read_values(&mut targets.open()?, &targets, &wanted, &mut troubles)
+    };
+    let on_links = drives::read(&driven, &of_drives, &mut troubles)?;
     if args.json {
-        print::json(&Report::new(&targets, &found))?;
-    } else if found.iter().any(|one| !one.values.is_empty()) {
+        print::json(&ReadReport::new((&targets, &found), (&driven, &on_links)))?;
+        return Ok(troubles.exit());
+    }
+    if found.iter().any(|one| !one.values.is_empty()) {
         print::out(&format!("{}\n", text(&targets, &found)))?;
+    }
+    if on_links.iter().any(|one| !one.values.is_empty()) {
+        print::out(&format!("{}\n", text_of_drives(&driven, &on_links)))?;
     }
     Ok(troubles.exit())
 }
@@ -69,23 +92,34 @@ fn wanted(selections: &[Selection], controller: &Controller<Station>) -> anyhow:
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
-    controllers: Vec<ControllerReport<'a>>,
+struct ReadReport<'a> {
+    controllers: Vec<ControllerRegisters<'a>>,
+    /// Seats on serial links.
+    drives: Vec<SeatRegisters<'a>>,
 }
 
 #[derive(Serialize)]
-struct ControllerReport<'a> {
+struct SeatRegisters<'a> {
+    name: &'a str,
+    address: String,
+    dialect: &'static str,
+    registers: &'a [DriveValue],
+    faults: &'a [String],
+}
+
+#[derive(Serialize)]
+struct ControllerRegisters<'a> {
     name: &'a str,
     address: String,
     dialect: &'static str,
     /// Null where it is the normal one, or the controller did not answer.
     state: Option<&'a str>,
-    registers: Vec<RegisterReport>,
+    registers: Vec<RegisterRow>,
     faults: &'a [String],
 }
 
 #[derive(Serialize)]
-struct RegisterReport {
+struct RegisterRow {
     register: Address,
     name: &'static str,
     value: u16,
@@ -93,9 +127,12 @@ struct RegisterReport {
     says: Option<String>,
 }
 
-impl<'a> Report<'a> {
-    fn new(targets: &'a Targets, found: &'a [Found]) -> Self {
-        let one = |(controller, found): (&'a Controller<Station>, &'a Found)| ControllerReport {
+impl<'a> ReadReport<'a> {
+    fn new(
+        (targets, found): (&'a Targets, &'a [Found]),
+        (driven, on_links): (&'a DrivenTargets, &'a [DriveFound]),
+    ) -> Self {
+        let one = |(controller, found): (&'a Controller<Station>, &'a Found)| ControllerRegisters {
             name: &controller.name,
             address: controller.connection.address.to_string(),
             dialect: dialect_name(controller.connection.dialect),
@@ -103,14 +140,24 @@ impl<'a> Report<'a> {
             registers: registers(controller, &found.values),
             faults: &found.faults,
         };
-        Self { controllers: targets.controllers.iter().zip(found).map(one).collect() }
+        let of_drives = |(controller, found): (&'a Controller, &'a DriveFound)| SeatRegisters {
+            name: &controller.name,
+            address: controller.address(),
+            dialect: controller.drives().map_or("", |drives| drives.motors.family().word()),
+            registers: &found.values,
+            faults: &found.faults,
+        };
+        Self {
+            controllers: targets.controllers.iter().zip(found).map(one).collect(),
+            drives: driven.controllers.iter().zip(on_links).map(of_drives).collect(),
+        }
     }
 }
 
-fn registers(controller: &Controller<Station>, values: &Values) -> Vec<RegisterReport> {
+fn registers(controller: &Controller<Station>, values: &Values) -> Vec<RegisterRow> {
     let one = |(&address, &value)| {
         let register = table().get(address);
-        RegisterReport {
+        RegisterRow {
             register: address,
             name: register.map_or("", |register| register.name.as_str()),
             value,
@@ -146,6 +193,22 @@ fn text(targets: &Targets, found: &[Found]) -> Table {
                 register.name.to_owned(),
                 register.says.unwrap_or_default(),
             ]);
+        }
+    }
+    for column in table.column_iter_mut().skip(2).take(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn text_of_drives(driven: &DrivenTargets, found: &[DriveFound]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header(["controller", "register", "value", "name", "meaning"]);
+    for (controller, one) in driven.controllers.iter().zip(found) {
+        for DriveValue { register, name, value, says } in &one.values {
+            let says = says.clone().unwrap_or_default();
+            table.add_row([controller.name.clone(), register.clone(), value.to_string(), name.clone(), says]);
         }
     }
     for column in table.column_iter_mut().skip(2).take(1) {

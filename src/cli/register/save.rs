@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 
+use super::drives::{self, DriveRegisters};
 use super::read_values;
 use crate::cli::targets::{TargetArgs, Troubles, write_file};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::device::Address;
-use crate::device::settings::{Saved, parameters, text};
+use crate::device::settings::{Saved, SavedDrives, parameters, text};
 
-/// Keeps the parameters of controllers as a file, to compare others with or to write back.
+/// Keeps the parameters of controllers, and the settings of SilverMax units, as a file, to compare others with or to write back.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -28,13 +29,25 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let targets = args.targets.resolve(&args.name)?;
-    let wanted: Vec<Vec<Address>> = (targets.controllers.iter())
-        .map(|one| parameters(one.connection.dialect).map(|register| register.address).collect())
-        .collect();
-    let mut talk = targets.open()?;
+    let (targets, driven) = args.targets.resolve_all(&args.name)?;
+    let none = drives::unreadable(&driven);
+    if !none.is_empty() {
+        print::tell(&format!(
+            "kinocue: {}: left out, as no setting of a SIXpack 2 can be read; `kinocue home` writes them whole",
+            none.join(", ")
+        ));
+    }
+    let driven = drives::asked(driven, &DriveRegisters::settings());
     let mut troubles = Troubles::default();
-    let found = read_values(&mut talk, &targets, &wanted, &mut troubles);
+    let found = if targets.controllers.is_empty() {
+        Vec::new()
+    } else {
+        let wanted: Vec<Vec<Address>> = (targets.controllers.iter())
+            .map(|one| parameters(one.connection.dialect).map(|register| register.address).collect())
+            .collect();
+        read_values(&mut targets.open()?, &targets, &wanted, &mut troubles)
+    };
+    let on_links = drives::read(&driven, &DriveRegisters::settings(), &mut troubles)?;
     if !troubles.none() {
         return Err(anyhow!("nothing saved: some controllers did not return all registers"))
             .or_exit(troubles.exit());
@@ -47,11 +60,23 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             values: found.values,
         })
         .collect();
+    let of_drives: Vec<SavedDrives> = (driven.controllers.iter().zip(&on_links))
+        .map(|(controller, found)| SavedDrives {
+            name: controller.name.clone(),
+            address: controller.address(),
+            registers: drives::kept(found),
+        })
+        .collect();
+    let names: Vec<_> =
+        saved.iter().map(|one| &*one.name).chain(of_drives.iter().map(|one| &*one.name)).collect();
+    if names.is_empty() {
+        return Err(anyhow!("nothing saved: none of these has settings that can be read"))
+            .or_exit(Exit::Usage);
+    }
     if args.file == Path::new("-") {
-        print::out(&text(&saved))?;
+        print::out(&text(&saved, &of_drives))?;
     } else {
-        write_file(&args.file, &text(&saved))?;
-        let names: Vec<_> = saved.iter().map(|one| one.name.as_str()).collect();
+        write_file(&args.file, &text(&saved, &of_drives))?;
         print::tell(&format!("saved the parameters of {} to {}", names.join(", "), args.file.display()));
     }
     Ok(Exit::Done)

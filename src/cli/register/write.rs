@@ -59,7 +59,7 @@ pub(super) struct Args {
 
 /// One register that changes.
 #[derive(Debug, Serialize)]
-struct Change {
+struct RegisterChange {
     #[serde(skip)]
     lane: usize,
     register: Address,
@@ -72,17 +72,17 @@ struct Change {
 }
 
 #[derive(Serialize)]
-struct Report<'a> {
+struct WriteReport<'a> {
     written: bool,
     kept: bool,
-    controllers: Vec<ControllerReport<'a>>,
+    controllers: Vec<ControllerChanges<'a>>,
 }
 
 #[derive(Serialize)]
-struct ControllerReport<'a> {
+struct ControllerChanges<'a> {
     name: &'a str,
     address: String,
-    changes: Vec<&'a Change>,
+    changes: Vec<&'a RegisterChange>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
@@ -153,7 +153,7 @@ fn from_file(
     targets: &Targets,
 ) -> Result<Vec<Vec<Assignment>>, Failure> {
     let file = diff::load(path)?;
-    let saved = diff::matched(&file, targets, None).with_context(|| path.display().to_string());
+    let saved = diff::matched(&file.controllers, targets, None).with_context(|| path.display().to_string());
     let saved = saved.or_exit(Exit::Usage)?;
     let writable = |address: Address, dialect: Dialect| {
         let register = table().get(address);
@@ -172,7 +172,11 @@ fn from_file(
 }
 
 /// What would change. Every controller has to tell what it holds now, else nothing is written to any.
-fn changes(talk: &mut Talk, targets: &Targets, wanted: &[Vec<Assignment>]) -> Result<Vec<Change>, Failure> {
+fn changes(
+    talk: &mut Talk,
+    targets: &Targets,
+    wanted: &[Vec<Assignment>],
+) -> Result<Vec<RegisterChange>, Failure> {
     let addresses: Vec<Vec<Address>> =
         wanted.iter().map(|all| all.iter().map(|one| one.address).collect()).collect();
     let mut troubles = Troubles::default();
@@ -185,7 +189,7 @@ fn changes(talk: &mut Talk, targets: &Targets, wanted: &[Vec<Assignment>]) -> Re
         for &Assignment { address, value } in assignments {
             let old = found.values.get(&address).copied().unwrap_or(0);
             if old != value || !keeps(address) {
-                changes.push(Change {
+                changes.push(RegisterChange {
                     lane,
                     register: address,
                     old,
@@ -199,7 +203,7 @@ fn changes(talk: &mut Talk, targets: &Targets, wanted: &[Vec<Assignment>]) -> Re
     Ok(changes)
 }
 
-fn warn_of_moves(changes: &[Change]) {
+fn warn_of_moves(changes: &[RegisterChange]) {
     if let Some(change) = changes.iter().find(|change| moves(change.register)) {
         print::tell(&format!(
             "warning: {} moves the seat, which must be empty; `kinocue home` does this with more care",
@@ -209,8 +213,14 @@ fn warn_of_moves(changes: &[Change]) {
 }
 
 /// Writes one register after the other, to all controllers side by side; a controller that fails gets no more.
-fn write(talk: &mut Talk, targets: &Targets, changes: &mut [Change], keep: bool, troubles: &mut Troubles) {
-    let mut queues: BTreeMap<usize, Vec<&mut Change>> = BTreeMap::new();
+fn write(
+    talk: &mut Talk,
+    targets: &Targets,
+    changes: &mut [RegisterChange],
+    keep: bool,
+    troubles: &mut Troubles,
+) {
+    let mut queues: BTreeMap<usize, Vec<&mut RegisterChange>> = BTreeMap::new();
     for change in changes {
         queues.entry(change.lane).or_default().push(change);
     }
@@ -235,9 +245,9 @@ fn write(talk: &mut Talk, targets: &Targets, changes: &mut [Change], keep: bool,
 }
 
 /// Reads what was written, and tells where it is not what it should be.
-fn read_back(talk: &mut Talk, targets: &Targets, changes: &mut [Change], troubles: &mut Troubles) {
+fn read_back(talk: &mut Talk, targets: &Targets, changes: &mut [RegisterChange], troubles: &mut Troubles) {
     let mut wanted = vec![Vec::new(); targets.controllers.len()];
-    let proved = |change: &Change| change.written && keeps(change.register);
+    let proved = |change: &RegisterChange| change.written && keeps(change.register);
     for change in changes.iter().filter(|change| proved(change)) {
         wanted[change.lane].push(change.register);
     }
@@ -262,8 +272,9 @@ fn keep(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) {
 }
 
 /// What a power cycle makes of the changes.
-fn outlook(changes: &[Change], keep: bool) -> &'static str {
-    let lasting = |change: &Change| table().get(change.register).is_none_or(|register| register.saved);
+fn outlook(changes: &[RegisterChange], keep: bool) -> &'static str {
+    let lasting =
+        |change: &RegisterChange| table().get(change.register).is_none_or(|register| register.saved);
     match (keep, changes.iter().any(lasting)) {
         (true, _) => " and read back; kept over a power cycle",
         (false, true) => " and read back; a power cycle undoes it; --keep keeps it",
@@ -271,21 +282,21 @@ fn outlook(changes: &[Change], keep: bool) -> &'static str {
     }
 }
 
-fn finish(args: &Args, targets: &Targets, changes: &[Change], kept: bool) -> Result<(), Failure> {
+fn finish(args: &Args, targets: &Targets, changes: &[RegisterChange], kept: bool) -> Result<(), Failure> {
     if !args.json {
         return Ok(());
     }
-    let one = |(lane, controller): (usize, &Controller<Station>)| ControllerReport {
+    let one = |(lane, controller): (usize, &Controller<Station>)| ControllerChanges {
         name: targets.name(lane),
         address: controller.connection.address.to_string(),
         changes: changes.iter().filter(|change| change.lane == lane).collect(),
     };
     let controllers = targets.controllers.iter().enumerate().map(one).collect();
-    print::json(&Report { written: changes.iter().any(|change| change.written), kept, controllers })
+    print::json(&WriteReport { written: changes.iter().any(|change| change.written), kept, controllers })
 }
 
 /// The diff: old and new.
-fn text(targets: &Targets, changes: &[Change]) -> Table {
+fn text(targets: &Targets, changes: &[RegisterChange]) -> Table {
     let mut lines = Table::new();
     lines.load_style(presets::NOTHING);
     lines.set_header(["controller", "register", "old", "", "new", "name", "meaning"]);

@@ -1,7 +1,7 @@
 //! A report as CSV (RFC 4180).
 
 use crate::control::model::{FrameCounts, Percentiles};
-use crate::journal::{Report, Shown};
+use crate::journal::{JournalReport, ReportShown};
 use crate::plain::escaped;
 
 const SHOWS: &str = "start,end,took_s,result,hall,cue,sha256,title,playlist,entry,level,vibration,trim_ms,effects_off,\
@@ -10,13 +10,13 @@ const SHOWS: &str = "start,end,took_s,result,hall,cue,sha256,title,playlist,entr
     film_sources,film_switches,film_error_max_ms";
 
 /// One record a show; what is not known is empty.
-pub(super) fn shows(report: &Report) -> String {
+pub(super) fn shows(report: &JournalReport) -> String {
     let head = SHOWS.split(',').map(str::to_owned).collect();
     [head].into_iter().chain(report.shows.iter().map(show)).map(|cells| record(&cells)).collect()
 }
 
 /// One record for each thing that was asked.
-pub(super) fn actions(report: &Report) -> String {
+pub(super) fn actions(report: &JournalReport) -> String {
     let head = ["at", "who", "what", "result", "state", "times"].map(str::to_owned);
     let rows = report.actions.iter();
     let rows = rows.map(|one| {
@@ -26,7 +26,7 @@ pub(super) fn actions(report: &Report) -> String {
     [head].into_iter().chain(rows).map(|cells| record(&cells)).collect()
 }
 
-fn show(show: &Shown) -> Vec<String> {
+fn show(show: &ReportShown) -> Vec<String> {
     let (record, outcome) = (&show.record, show.record.outcome.as_ref());
     let place = record.playlist.as_ref();
     let mut cells = vec![

@@ -3,13 +3,13 @@
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::control::model::FrameCounts;
-use crate::journal::{FilmProof, Report, Shown, Totals};
+use crate::journal::{FilmProof, JournalReport, ReportShown, Totals};
 
 /// A line under the header, and no other lines.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// One row a show, and a line for all together.
-pub(super) fn shows(report: &Report) -> String {
+pub(super) fn shows(report: &JournalReport) -> String {
     let days = days(report);
     if report.shows.is_empty() {
         return format!("nothing was played {days}\n");
@@ -34,7 +34,7 @@ pub(super) fn shows(report: &Report) -> String {
 }
 
 /// One row for each thing that was asked.
-pub(super) fn actions(report: &Report) -> String {
+pub(super) fn actions(report: &JournalReport) -> String {
     if report.actions.is_empty() {
         return format!("nothing was asked {}\n", days(report));
     }
@@ -49,7 +49,7 @@ pub(super) fn actions(report: &Report) -> String {
     format!("{}\n", table.trim_fmt())
 }
 
-fn days(report: &Report) -> String {
+fn days(report: &JournalReport) -> String {
     if report.from == report.to {
         format!("on {}", report.from)
     } else {
@@ -57,7 +57,7 @@ fn days(report: &Report) -> String {
     }
 }
 
-fn show(show: &Shown) -> Vec<String> {
+fn show(show: &ReportShown) -> Vec<String> {
     let record = &show.record;
     let mut row = vec![
         short(&record.start),
@@ -84,7 +84,7 @@ fn show(show: &Shown) -> Vec<String> {
 }
 
 /// What happened in a show, under its start, and first how it followed its film.
-fn events(show: &Shown) -> String {
+fn events(show: &ReportShown) -> String {
     let outcome = show.record.outcome.as_ref();
     let film = outcome.and_then(|outcome| outcome.film.as_ref()).map(film);
     let events = outcome.iter().flat_map(|outcome| &outcome.events).cloned();

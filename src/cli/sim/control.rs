@@ -48,7 +48,7 @@ fn accept(listener: &UnixListener, carry_out: &CarryOut) {
     let open = Arc::new(AtomicUsize::new(0));
     for stream in listener.incoming() {
         let Ok(stream) = stream else { continue };
-        let place = Place::take(&open);
+        let place = ControlPlace::take(&open);
         let Some(place) = place else {
             let _ = (&stream).write_all(b"error too many connections\n");
             continue;
@@ -63,16 +63,16 @@ fn accept(listener: &UnixListener, carry_out: &CarryOut) {
 }
 
 /// One of the connections that there may be.
-struct Place(Arc<AtomicUsize>);
+struct ControlPlace(Arc<AtomicUsize>);
 
-impl Place {
+impl ControlPlace {
     fn take(open: &Arc<AtomicUsize>) -> Option<Self> {
         let place = Self(Arc::clone(open));
         (open.fetch_add(1, Ordering::Relaxed) < CONNECTIONS).then_some(place)
     }
 }
 
-impl Drop for Place {
+impl Drop for ControlPlace {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }

@@ -6,7 +6,7 @@ use anyhow::{Context as _, bail};
 use serde_json::{Value, json};
 
 use super::tty::{self, Drives};
-use super::{Args, Signals, parse};
+use super::{Args, SignalSocket, parse};
 use crate::cli::{Exit, Failure};
 use crate::sim::serial::Deed;
 use crate::sim::silvermax::{Action, SilverBus, UnitSetup};
@@ -17,7 +17,7 @@ use crate::time::Clock as _;
 const WAKING_BAUD: u32 = 57_600;
 
 /// Runs units until a signal comes.
-pub(super) fn run(args: &Args, path: &Path, signals: Signals) -> Result<Exit, Failure> {
+pub(super) fn run(args: &Args, path: &Path, signals: SignalSocket) -> Result<Exit, Failure> {
     let units = args.tty.units::<SilverBus>();
     let setups: Vec<UnitSetup> = units.into_iter().map(UnitSetup::new).collect();
     let bus = SilverBus::new(&setups, args.tty.baud.unwrap_or(WAKING_BAUD), Monotonic.now());

@@ -6,7 +6,7 @@ use anyhow::{Context as _, anyhow, bail};
 use serde_json::{Value, json};
 
 use super::tty::{self, Drives};
-use super::{Args, Signals, parse};
+use super::{Args, SignalSocket, parse};
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::sim::serial::Deed;
 use crate::sim::sixpack2::{
@@ -16,7 +16,7 @@ use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
 /// Runs units until a signal comes.
-pub(super) fn run(args: &Args, path: &Path, signals: Signals) -> Result<Exit, Failure> {
+pub(super) fn run(args: &Args, path: &Path, signals: SignalSocket) -> Result<Exit, Failure> {
     if args.tty.baud.is_some() {
         let refusal = anyhow!("a SIXpack 2 wakes at 19200 baud, and its host switches it; leave --baud out");
         return Err(refusal).or_exit(Exit::Usage);

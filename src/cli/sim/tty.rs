@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Context as _, anyhow, bail};
 use serde_json::Value;
 
-use super::{Args, Signals, control, parse, seed};
+use super::{Args, SignalSocket, control, parse, seed};
 use crate::cli::print::{self, tell};
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::sim::serial::{Bus, Deed, LineFaults, PtyError, PtyLoop, SerialLine};
@@ -44,7 +44,7 @@ impl TtyArgs {
 }
 
 /// Drives that can be run on a line: what happens to them in words, and what became of them.
-pub(super) trait Drives: Bus + Send + Sized + 'static {
+pub(in crate::cli) trait Drives: Bus + Send + Sized + 'static {
     /// Bits of an octet with start and stop.
     const BITS: u32;
     /// The number of a unit that nobody gave one.
@@ -58,7 +58,12 @@ pub(super) trait Drives: Bus + Send + Sized + 'static {
 }
 
 /// Runs drives on the line until a signal comes.
-pub(super) fn run<B: Drives>(bus: B, args: &Args, path: &Path, signals: Signals) -> Result<Exit, Failure> {
+pub(super) fn run<B: Drives>(
+    bus: B,
+    args: &Args,
+    path: &Path,
+    signals: SignalSocket,
+) -> Result<Exit, Failure> {
     let deed = {
         let units = args.tty.units::<B>();
         move |text: &str| deed::<B>(text, &units)
@@ -79,7 +84,7 @@ pub(super) fn run<B: Drives>(bus: B, args: &Args, path: &Path, signals: Signals)
     let _control = control(args, Arc::new(carry_out))?; // its file goes when this does
     tell(&format!("ready {}", path.display()));
     signals.wait()?;
-    let (object, lines) = running.stop().map(|line| line.bus().report()).unwrap_or_default();
+    let (object, lines) = running.stop().bus().report();
     if args.json {
         print::json(&object)?;
     } else {
@@ -115,10 +120,10 @@ fn named(unit: &str, units: &[u8]) -> anyhow::Result<u8> {
 }
 
 /// A change of what a line does to octets.
-type Change = Box<dyn FnOnce(&mut LineFaults) + Send>;
+type LineChange = Box<dyn FnOnce(&mut LineFaults) + Send>;
 
 /// What a word does to a line; nothing where it is a word of its drives.
-fn fault(name: &str, value: &str) -> anyhow::Result<Option<Change>> {
+fn fault(name: &str, value: &str) -> anyhow::Result<Option<LineChange>> {
     let chance = || parse::chance(value);
     let span = |text: &str| parse_duration(text).map_err(|why| anyhow!(why));
     Ok(Some(match name {
@@ -142,6 +147,6 @@ fn fault(name: &str, value: &str) -> anyhow::Result<Option<Change>> {
     }))
 }
 
-fn set<T: Send + 'static>(value: T, change: fn(&mut LineFaults, T)) -> Change {
+fn set<T: Send + 'static>(value: T, change: fn(&mut LineFaults, T)) -> LineChange {
     Box::new(move |faults| change(faults, value))
 }

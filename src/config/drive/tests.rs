@@ -88,17 +88,17 @@ fn a_seat_on_a_sixpack_reads_as_it_is_written_and_its_link_has_the_rate_that_is_
 }
 
 #[test]
-fn a_hall_mixes_families_and_only_the_reading_of_it_takes_drives_so_far() {
+fn a_hall_mixes_families_and_what_asks_the_network_alone_names_those_on_links() {
     let udp = "[[controller]]\nname = \"A2\"\nseat = \"s\"\naddress = \"10.0.0.1:7408\"\naxis_offset = 3\n";
     let hall = silver(udp).unwrap();
     let names = |all: Vec<&Controller>| all.iter().map(|one| one.name.clone()).collect::<Vec<_>>().join(" ");
     assert_eq!(names(hall.controllers.iter().collect()), "A2 A1", "those on links come last");
     assert_eq!(names(hall.on_links().collect()), "A1");
     assert_eq!(hall.untaken_axes(6), [0; 0]);
-    let refused = hall.playable().unwrap_err().to_string();
-    assert!(refused.starts_with("drives are not played yet: A1 on links"), "{refused}");
+    let refused = hall.without_drives().unwrap_err().to_string();
+    assert!(refused.starts_with("A1 on serial links, which this does not reach"), "{refused}");
     let by_udp = hall.controllers[..1].to_vec();
-    assert_eq!(Config { controllers: by_udp, ..hall }.playable(), Ok(()));
+    assert_eq!(Config { controllers: by_udp, ..hall }.without_drives(), Ok(()));
 }
 
 #[test]

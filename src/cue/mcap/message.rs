@@ -68,7 +68,7 @@ impl<'de> Visitor<'de> for MessageOf {
 /// `/cue/io`: effects that change, or the raw output word.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Io {
+pub(super) struct IoMessage {
     pub(super) effects: Option<Switches>,
     pub(super) word: Option<u16>,
 }
@@ -76,7 +76,7 @@ pub(super) struct Io {
 /// `/cue/marker`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Marker {
+pub(super) struct MarkerMessage {
     pub(super) name: String,
 }
 

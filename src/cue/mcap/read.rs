@@ -27,7 +27,7 @@ const REASON_TOLD: usize = 200;
 
 /// Reads an MCAP cue; `path` names it in faults.
 pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
-    let mut reading = Reading::new(path);
+    let mut reading = McapReading::new(path);
     if let Err((place, problem)) = record::each(input, |opcode, body| reading.take(opcode, body)) {
         reading.faults.add(place, None, problem);
     }
@@ -40,7 +40,7 @@ pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaul
 /// # Errors
 /// Where what is complete makes no cue.
 pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), CueFaults> {
-    let mut reading = Reading::new(path);
+    let mut reading = McapReading::new(path);
     let lost = match record::each(input, |opcode, body| reading.take(opcode, body)) {
         Ok(()) => None,
         Err((_, problem @ (Problem::CutShort | Problem::Damaged(_)))) => Some(problem),
@@ -74,7 +74,7 @@ impl At {
 }
 
 /// A file while it is read. Units may be declared behind the messages, so values are checked at the end.
-struct Reading {
+struct McapReading {
     faults: Collector,
     schemas: HashSet<u16>,
     channels: HashMap<u16, Option<Topic>>,
@@ -86,7 +86,7 @@ struct Reading {
     switched: u32,
 }
 
-impl Reading {
+impl McapReading {
     fn new(path: &Path) -> Self {
         Self {
             faults: Collector::default(),
@@ -239,7 +239,7 @@ impl Reading {
         Ok(())
     }
 
-    fn io(&mut self, at: At, io: message::Io) -> Result<(), Problem> {
+    fn io(&mut self, at: At, io: message::IoMessage) -> Result<(), Problem> {
         let begun = self.seen.get(&Topic::Io).is_some_and(|(count, _)| *count > 1);
         match (io.effects, io.word, &mut self.cue.effects) {
             (None, Some(word), Effects::Words(steps)) => steps.push(at.time(), value::outputs(word)?),
@@ -262,7 +262,7 @@ impl Reading {
         Ok(())
     }
 
-    fn marker(&mut self, at: At, marker: message::Marker) -> Result<(), Problem> {
+    fn marker(&mut self, at: At, marker: message::MarkerMessage) -> Result<(), Problem> {
         if self.cue.markers.len() == MAX_MARKERS {
             return Err(Problem::TooManyMarkers);
         }

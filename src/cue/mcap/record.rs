@@ -84,7 +84,7 @@ fn problem(error: &McapError, read: u64, begun: bool) -> Problem {
 
 /// Schema record: its id.
 pub(super) fn schema(body: &[u8]) -> Option<u16> {
-    Body(body).u16()
+    RecordBody(body).u16()
 }
 
 /// ChannelRecord record.
@@ -98,14 +98,14 @@ pub(super) struct ChannelRecord<'a> {
 
 impl<'a> ChannelRecord<'a> {
     pub(super) fn parse(body: &'a [u8]) -> Option<Self> {
-        let mut body = Body(body);
+        let mut body = RecordBody(body);
         Some(Self { id: body.u16()?, schema: body.u16()?, topic: body.text()?, encoding: body.text()? })
     }
 }
 
 /// Message record: channel, log time and data.
 pub(super) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
-    let mut body = Body(body);
+    let mut body = RecordBody(body);
     let channel = body.u16()?;
     body.u32()?; // sequence
     let log_time = body.u64()?;
@@ -115,10 +115,10 @@ pub(super) fn message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
 
 /// Metadata record: name and entries.
 pub(super) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
-    let mut body = Body(body);
+    let mut body = RecordBody(body);
     let name = body.text()?;
     let length = body.u32()?;
-    let mut entries = Body(body.bytes(length)?);
+    let mut entries = RecordBody(body.bytes(length)?);
     let mut map = BTreeMap::new();
     while !entries.0.is_empty() {
         map.insert(entries.text()?, entries.text()?);
@@ -127,9 +127,9 @@ pub(super) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
 }
 
 /// What is left of a record's body; little-endian, texts behind their length (mcap.dev/spec).
-struct Body<'a>(&'a [u8]);
+struct RecordBody<'a>(&'a [u8]);
 
-impl<'a> Body<'a> {
+impl<'a> RecordBody<'a> {
     fn bytes(&mut self, count: u32) -> Option<&'a [u8]> {
         let (front, rest) = self.0.split_at_checked(usize::try_from(count).ok()?)?;
         self.0 = rest;

@@ -27,7 +27,7 @@ pub fn write(cue: &Cue, out: impl Write + Seek) -> io::Result<()> {
 }
 
 fn write_mcap(cue: &Cue, out: impl Write + Seek) -> Result<(), McapError> {
-    let mut file = Messages::begin(cue, out)?;
+    let mut file = McapMessages::begin(cue, out)?;
     let mut changes = Changes::new(cue);
     for (row, time) in cue.times().iter().enumerate() {
         changes.write_until(*time, &mut file)?;
@@ -43,13 +43,13 @@ fn write_mcap(cue: &Cue, out: impl Write + Seek) -> Result<(), McapError> {
 }
 
 /// An open file and its channels.
-struct Messages<W: Write + Seek> {
+struct McapMessages<W: Write + Seek> {
     writer: Writer<W>,
     channels: BTreeMap<&'static str, (u16, u32)>,
     json: String,
 }
 
-impl<W: Write + Seek> Messages<W> {
+impl<W: Write + Seek> McapMessages<W> {
     fn begin(cue: &Cue, out: W) -> Result<Self, McapError> {
         let mut writer = WriteOptions::new()
             .library(concat!("kinocue ", env!("CARGO_PKG_VERSION")))
@@ -97,7 +97,7 @@ impl<W: Write + Seek> Messages<W> {
 
 /// A change of something that holds until its next change.
 #[derive(Debug, Clone, Copy)]
-enum Change {
+enum ChannelChange {
     /// The nth step of a track.
     Track(TrackId, usize),
     /// The nth step of the effects.
@@ -109,24 +109,32 @@ enum Change {
 /// All changes of a cue in order of time.
 struct Changes<'a> {
     cue: &'a Cue,
-    order: std::iter::Peekable<std::vec::IntoIter<(ShowTime, Change)>>,
+    order: std::iter::Peekable<std::vec::IntoIter<(ShowTime, ChannelChange)>>,
 }
 
 impl<'a> Changes<'a> {
     fn new(cue: &'a Cue) -> Self {
         let mut order = Vec::new();
         for (track, steps) in cue.tracks().used() {
-            order.extend(steps.as_slice().iter().enumerate().map(|(n, s)| (s.at, Change::Track(track, n))));
+            order.extend(
+                steps.as_slice().iter().enumerate().map(|(n, s)| (s.at, ChannelChange::Track(track, n))),
+            );
         }
         match cue.effects() {
             Effects::Named { steps, .. } => {
-                order.extend(steps.as_slice().iter().enumerate().map(|(n, s)| (s.at, Change::Effects(n))));
+                order.extend(
+                    steps.as_slice().iter().enumerate().map(|(n, s)| (s.at, ChannelChange::Effects(n))),
+                );
             }
             Effects::Words(steps) => {
-                order.extend(steps.as_slice().iter().enumerate().map(|(n, s)| (s.at, Change::Effects(n))));
+                order.extend(
+                    steps.as_slice().iter().enumerate().map(|(n, s)| (s.at, ChannelChange::Effects(n))),
+                );
             }
         }
-        order.extend(cue.markers().iter().enumerate().map(|(n, marker)| (marker.at, Change::Marker(n))));
+        order.extend(
+            cue.markers().iter().enumerate().map(|(n, marker)| (marker.at, ChannelChange::Marker(n))),
+        );
         order.sort_by_key(|(at, _)| *at);
         Self { cue, order: order.into_iter().peekable() }
     }
@@ -135,18 +143,18 @@ impl<'a> Changes<'a> {
     fn write_until<W: Write + Seek>(
         &mut self,
         time: ShowTime,
-        file: &mut Messages<W>,
+        file: &mut McapMessages<W>,
     ) -> Result<(), McapError> {
         while let Some((at, change)) = self.order.next_if(|(at, _)| *at <= time) {
             match change {
-                Change::Track(track, n) => {
+                ChannelChange::Track(track, n) => {
                     let sample = self.cue.tracks().of(track).as_slice()[n].value;
                     file.write(Topic::Channel(track.channel), at, |json| push_sample(json, track, sample))?;
                 }
-                Change::Effects(n) => {
+                ChannelChange::Effects(n) => {
                     file.write(Topic::Io, at, |json| push_io(json, self.cue.effects(), n))?
                 }
-                Change::Marker(n) => {
+                ChannelChange::Marker(n) => {
                     let name = serde_json::to_string(&self.cue.markers()[n].name).map_err(io::Error::from)?;
                     file.write(Topic::Marker, at, |json| json.push_str(&format!("{{\"name\":{name}}}")))?;
                 }

@@ -47,7 +47,7 @@ fn run(
     peer: Endpoint,
     request: &Request,
     mut replies: impl FnMut(Vec<u8>) -> Vec<Vec<u8>>,
-) -> (Outcome, u64) {
+) -> (RequestOutcome, u64) {
     let mut exchange = Exchange::new(&[peer]);
     exchange.begin(vec![(0, request.clone())], Patience::default());
     for ms in 0..5_000 {

@@ -46,6 +46,22 @@ pub(crate) struct TalkCounts {
     pub(crate) echo_differs: u64,
 }
 
+impl TalkCounts {
+    /// What was counted since these were.
+    #[must_use]
+    pub(crate) const fn since(self, before: Self) -> Self {
+        Self {
+            asked: self.asked - before.asked,
+            answered: self.answered - before.answered,
+            late: self.late - before.late,
+            doubled: self.doubled - before.doubled,
+            malformed: self.malformed - before.malformed,
+            foreign: self.foreign - before.foreign,
+            echo_differs: self.echo_differs - before.echo_differs,
+        }
+    }
+}
+
 /// When an exchange happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Moment {

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use super::super::axis::Subject;
-use super::super::pieces::Pieces;
+use super::super::pieces::AxisPieces;
 use crate::cue::Vibration;
 use crate::drive::Shaker;
 use crate::motion::{AxisState, Halt, Limits, Slot};
@@ -81,7 +81,7 @@ impl WantedCourse {
 
 /// How an axis moves at the first row of the cue and at the last, and the show time of that, nanoseconds.
 pub(super) fn edges(subject: &Subject<'_>) -> (AxisState, AxisState, i64) {
-    let pieces = Pieces::new(subject.timeline, subject.axis, &subject.slot);
+    let pieces = AxisPieces::new(subject.timeline, subject.axis, &subject.slot);
     let [position, velocity, bend, _] = pieces.list()[0].cubic.0;
     let first = AxisState { position, velocity, acceleration: 2.0 * bend };
     (first, pieces.last_motion(), pieces.end())

@@ -6,7 +6,7 @@ use super::{Controller, NEVER};
 use crate::device::Address;
 use crate::motion::{MAX_AXES, Pulses};
 use crate::sim::pa;
-use crate::sim::player::{Leg, Positions};
+use crate::sim::player::{MotorPositions, PlayedLeg};
 use crate::sim::registers::{OWN_REGISTERS, has};
 use crate::time::MonoTime;
 use crate::wire::{Dialect, PerAxis};
@@ -189,12 +189,12 @@ impl Controller {
 
     /// Out, at the safe speed of each axis; or back to zero, no axis faster than that.
     #[expect(clippy::cast_possible_truncation, reason = "a saturating cast is what is wanted")]
-    fn jog_leg(&self, way: Jog, at: MonoTime) -> Leg {
+    fn jog_leg(&self, way: Jog, at: MonoTime) -> PlayedLeg {
         let here = self.player.positions(at);
         let axes = self.registers.axes();
         let speeds: [f64; MAX_AXES] = std::array::from_fn(|axis| self.jog_speed(axis));
         let seconds = LONGEST_JOG.as_secs_f64();
-        let (to, duration): (Positions, _) = match way {
+        let (to, duration): (MotorPositions, _) = match way {
             Jog::Out => {
                 let out = |axis: usize| f64::from(here[axis].0) + speeds[axis] * seconds * 1e3;
                 let end = |axis: usize| if axis < axes { Pulses(out(axis) as i32) } else { here[axis] };
@@ -206,7 +206,7 @@ impl Controller {
                 ([Pulses(0); MAX_AXES], duration.unwrap_or(LONGEST_JOG))
             }
         };
-        Leg { to, duration, vibration: PerAxis::default() }
+        PlayedLeg { to, duration, vibration: PerAxis::default() }
     }
 
     /// Speed of an axis that jogs, pulses per millisecond.

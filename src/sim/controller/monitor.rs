@@ -43,7 +43,7 @@ const TORQUE_OF_SPEED: f64 = 20.0 / 3_000.0;
 
 /// What a controller remembers of what came.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Seen {
+pub(super) struct ReceivedSoFar {
     packets: u16,
     len: u16,
     last: Option<MonoTime>,
@@ -53,7 +53,7 @@ pub(super) struct Seen {
     duration: Duration,
 }
 
-impl Seen {
+impl ReceivedSoFar {
     pub(super) fn datagram(&mut self, len: usize, at: MonoTime) {
         self.packets = self.packets.wrapping_add(1);
         self.len = u16::try_from(len).unwrap_or(u16::MAX);

@@ -6,7 +6,7 @@ use super::{Controller, OUTPUTS};
 use crate::motion::Pulses;
 use crate::sim::errors;
 use crate::sim::pa;
-use crate::sim::player::{Leg, Positions};
+use crate::sim::player::{MotorPositions, PlayedLeg};
 use crate::time::MonoTime;
 use crate::wire::{Dialect, MotionReply, MotionRequest, ReplyCode, Timing};
 
@@ -50,7 +50,7 @@ impl Controller {
         }
         self.end_jog(at);
         let duration = self.duration(motion);
-        let leg = Leg {
+        let leg = PlayedLeg {
             to: self.target(&motion.positions),
             duration,
             vibration: motion.vibration.unwrap_or_default(),
@@ -110,7 +110,7 @@ impl Controller {
 
     /// Where the axes go: each takes its own axis of the command, past the axis offset; those that the command does
     /// not reach, and those that do not work, stay.
-    fn target(&self, commanded: &[Pulses]) -> Positions {
+    fn target(&self, commanded: &[Pulses]) -> MotorPositions {
         let mut to = *self.player.target();
         let offset = usize::from(self.registers.get(pa::OFFSET));
         let window = commanded.get(offset..).unwrap_or_default();

@@ -7,7 +7,7 @@ use super::monitor::dp;
 use super::{Controller, NEVER};
 use crate::sim::pa;
 use crate::time::MonoTime;
-use crate::wire::{Code, Dialect, MAX_LEN, PerAxis, Report, Status, Words};
+use crate::wire::{Code, Dialect, MAX_LEN, PerAxis, RegisterReport, Status, Words};
 
 impl Controller {
     /// When it says something unasked next; `None` where it does not.
@@ -42,7 +42,7 @@ impl Controller {
             let data = [self.servo_alarm_kind()];
             let start = u16::try_from(dp::MINOR_VERSION).expect("a register of the table");
             let data = Words::from(&data[..]);
-            let report = Report { channel: 0, accept: Code::NONE, reply: Code::NONE, start, data };
+            let report = RegisterReport { channel: 0, accept: Code::NONE, reply: Code::NONE, start, data };
             return report.emit(buf);
         }
         let axes = self.registers.axes();

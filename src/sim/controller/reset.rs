@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::monitor::Seen;
+use super::monitor::ReceivedSoFar;
 use super::{Controller, NEVER, OUTPUTS};
 use crate::sim::pa;
 use crate::time::MonoTime;
@@ -52,7 +52,7 @@ impl Controller {
         self.registers.restart();
         self.errors.restart();
         self.estop.restart();
-        self.seen = Seen::default();
+        self.seen = ReceivedSoFar::default();
         self.player.restart();
         self.outputs = self.registers.get(pa::START_OUTPUTS) & OUTPUTS;
         self.extend = 0;

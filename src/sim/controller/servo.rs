@@ -9,17 +9,17 @@ use crate::wire::{
 impl Controller {
     /// Writes the answer to the front of `buf` and returns it; nothing on MBOX, which has no such message.
     pub(super) fn on_servo_read<'b>(&mut self, read: &ServoRead, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let verdict = self.servo_verdict(read.servo, read.start, read.num);
+        let verdict = self.servo_verdict(read.channel, read.start, read.num);
         let mut words = [0; MAX_SERVO_READ as usize];
         let mut there = 0;
         if verdict.is_ok() {
             for (word, register) in words.iter_mut().zip(read.start..read.start + read.num) {
-                *word = self.servos.get(&(read.servo, register)).copied().unwrap_or(0);
+                *word = self.servos.get(&(read.channel, register)).copied().unwrap_or(0);
                 there += 1;
             }
         }
         let data = Words::from(&words[..there]);
-        self.emit_servo(verdict, Access::Read, (read.servo, read.start, read.num), data, buf)
+        self.emit_servo(verdict, Access::Read, (read.channel, read.start, read.num), data, buf)
     }
 
     /// Writes the answer to the front of `buf` and returns it; nothing on MBOX.
@@ -29,12 +29,12 @@ impl Controller {
         buf: &'b mut [u8; MAX_LEN],
     ) -> &'b [u8] {
         let num = u16::try_from(write.data.len()).unwrap_or(u16::MAX);
-        let verdict = self.servo_verdict(write.servo, write.start, num);
+        let verdict = self.servo_verdict(write.channel, write.start, num);
         if verdict.is_ok() {
             self.servos
-                .extend((write.start..).map(|register| (write.servo, register)).zip(write.data.iter()));
+                .extend((write.start..).map(|register| (write.channel, register)).zip(write.data.iter()));
         }
-        self.emit_servo(verdict, Access::Write, (write.servo, write.start, num), write.data, buf)
+        self.emit_servo(verdict, Access::Write, (write.channel, write.start, num), write.data, buf)
     }
 
     /// True if a drive is there, can be spoken to and has these registers; else x and the error of the refusal.

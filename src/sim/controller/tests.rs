@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use super::*;
-use crate::sim::counts::Refused;
+use crate::sim::counts::RefusedCounts;
 use crate::wire::{
     Analogue, FrameNo, Motion, MotionReply, ReadRequest, RegisterReply, Timing, Vibration, VibrationPort,
     Words, WriteRequest,
@@ -105,7 +105,7 @@ impl Bench {
         u64::try_from(end.since(at(self.at_ms)).as_millis()).unwrap()
     }
 
-    fn refused(&self) -> Refused {
+    fn refused(&self) -> RefusedCounts {
         self.controller.counts().refused
     }
 }

@@ -6,12 +6,12 @@ fn ms(ms: u64) -> MonoTime {
     MonoTime::from_nanos(ms * 1_000_000)
 }
 
-fn all(position: i32) -> Positions {
+fn all(position: i32) -> MotorPositions {
     [Pulses(position); MAX_AXES]
 }
 
-fn leg(to: i32, duration_ms: u64) -> Leg {
-    Leg { to: all(to), duration: Duration::from_millis(duration_ms), vibration: PerAxis::default() }
+fn leg(to: i32, duration_ms: u64) -> PlayedLeg {
+    PlayedLeg { to: all(to), duration: Duration::from_millis(duration_ms), vibration: PerAxis::default() }
 }
 
 fn push(player: &mut Player, to: i32, duration_ms: u64, at_ms: u64) -> Result<(), Overflow> {
@@ -122,7 +122,7 @@ fn a_vibration_swings_about_the_move_and_ends_with_it() {
     let mut player = Player::new(200, ms(0));
     let shake = Vibration { period: 400, amplitude: 100 }; // 50 ms
     let vibration = PerAxis::new(&[Vibration::NONE, shake]);
-    player.push(Leg { vibration, ..leg(0, 100) }, ms(0), &PACE).unwrap();
+    player.push(PlayedLeg { vibration, ..leg(0, 100) }, ms(0), &PACE).unwrap();
     let shaken = |player: &Player, t| player.shaken(ms(t)).map(|position| position.0);
     assert_eq!(shaken(&player, 0)[..3], [0, 0, 0]);
     assert_eq!((shaken(&player, 12)[1], shaken(&player, 37)[1]), (100, -100));

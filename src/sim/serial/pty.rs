@@ -6,12 +6,13 @@ use std::io;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::{Bus, SerialLine};
 use crate::plain;
+use crate::sim::thread::SimThread;
 use crate::sys::clock::Monotonic;
+use crate::sys::realtime;
 use crate::sys::serial::pty::Pty;
 use crate::time::{Clock as _, MonoTime};
 
@@ -46,31 +47,31 @@ pub(crate) enum PtyError {
 /// Something that happens to a line, or to what hangs on it.
 pub(crate) type Deed<B> = Box<dyn FnOnce(&mut SerialLine<B>, MonoTime) + Send>;
 
-enum Order<B> {
+enum LineOrder<B> {
     Do(Deed<B>, SyncSender<()>),
     Stop,
 }
 
 /// A line on a pseudo-terminal, run by a thread of its own until this is stopped or dropped.
 pub(crate) struct PtyLoop<B> {
-    remote: Remote<B>,
-    thread: Option<JoinHandle<SerialLine<B>>>,
+    remote: LineRemote<B>,
+    thread: SimThread<SerialLine<B>>,
 }
 
 /// Has things happen to a line, from any thread.
-pub(crate) struct Remote<B>(Sender<Order<B>>);
+pub(crate) struct LineRemote<B>(Sender<LineOrder<B>>);
 
-impl<B> Clone for Remote<B> {
+impl<B> Clone for LineRemote<B> {
     fn clone(&self) -> Self {
         Self(self.0.clone())
     }
 }
 
-impl<B> Remote<B> {
+impl<B> LineRemote<B> {
     /// Has something happen, and returns once it has; false where the line has ended.
     pub(crate) fn tell(&self, deed: Deed<B>) -> bool {
         let (told, done) = mpsc::sync_channel(1);
-        self.0.send(Order::Do(deed, told)).is_ok() && done.recv().is_ok()
+        self.0.send(LineOrder::Do(deed, told)).is_ok() && done.recv().is_ok()
     }
 }
 
@@ -88,48 +89,40 @@ impl<B: Bus + Send + 'static> PtyLoop<B> {
         let mut script: Vec<_> = script.into_iter().map(|(after, deed)| (start + after, deed)).collect();
         script.sort_by_key(|(at, _)| *at);
         let (sender, orders) = mpsc::channel();
-        let running = Running { line, plug: Plug::new(path)?, orders, script: script.into() };
-        let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());
-        let thread = thread.spawn(move || running.run()).map_err(PtyError::System)?;
-        Ok(Self { remote: Remote(sender), thread: Some(thread) })
+        let running = LineRunning { line, plug: Plug::new(path)?, orders, script: script.into() };
+        let ending = sender.clone();
+        let stop = move || drop(ending.send(LineOrder::Stop));
+        let run = move || {
+            // Drives answer in their time however busy this machine is.
+            let _ = realtime::request_below(realtime::PRIORITY);
+            running.run()
+        };
+        let thread = SimThread::spawn(run, stop).map_err(PtyError::System)?;
+        Ok(Self { remote: LineRemote(sender), thread })
     }
 }
 
 impl<B> PtyLoop<B> {
     /// What has things happen to the line.
-    pub(crate) fn remote(&self) -> Remote<B> {
+    pub(crate) fn remote(&self) -> LineRemote<B> {
         self.remote.clone()
     }
 
     /// Ends the thread, which takes the link away; gives the line back.
-    pub(crate) fn stop(mut self) -> Option<SerialLine<B>> {
-        self.end()
-    }
-
-    fn end(&mut self) -> Option<SerialLine<B>> {
-        let thread = self.thread.take()?;
-        let _ = self.remote.0.send(Order::Stop); // a thread that has ended needs no telling
-        Some(thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    }
-}
-
-impl<B> Drop for PtyLoop<B> {
-    fn drop(&mut self) {
-        if !std::thread::panicking() {
-            let _ = self.end(); // nobody is left to be given the line
-        }
+    pub(crate) fn stop(self) -> SerialLine<B> {
+        self.thread.end()
     }
 }
 
 /// All that the thread owns.
-struct Running<B> {
+struct LineRunning<B> {
     line: SerialLine<B>,
     plug: Plug,
-    orders: Receiver<Order<B>>,
+    orders: Receiver<LineOrder<B>>,
     script: VecDeque<(MonoTime, Deed<B>)>,
 }
 
-impl<B: Bus> Running<B> {
+impl<B: Bus> LineRunning<B> {
     fn run(mut self) -> SerialLine<B> {
         let mut octets = [0; OCTETS];
         while self.obey(Monotonic.now()) {
@@ -157,7 +150,7 @@ impl<B: Bus> Running<B> {
             deed(&mut self.line, now);
         }
         while let Ok(order) = self.orders.try_recv() {
-            let Order::Do(deed, told) = order else { return false };
+            let LineOrder::Do(deed, told) = order else { return false };
             deed(&mut self.line, now);
             let _ = told.send(()); // whoever asked may be gone
         }

@@ -53,7 +53,7 @@ impl SilverBus {
     /// All units hear a line.
     fn hear(&mut self, line: &[u8], now: MonoTime) {
         let Ok(request) = AnyRequest::parse(line) else { return };
-        let mut answer = Answer::default();
+        let mut answer = LineAnswer::default();
         for unit in &mut self.units {
             if let Some(reply) = unit.hear(&request) {
                 let delay = TURN + Duration::from_nanos(u64::from(TICK_NS) * u64::from(unit.setup.adl));
@@ -72,11 +72,11 @@ impl SilverBus {
 
 /// What units say together: where two speak at once a bit is 0 if one of them has it so.
 #[derive(Debug, Default)]
-struct Answer {
+struct LineAnswer {
     octets: Vec<(MonoTime, u8)>,
 }
 
-impl Answer {
+impl LineAnswer {
     fn add(&mut self, reply: &Reply, at: MonoTime) {
         let mut buf = [0; MAX_LINE];
         let octets = reply.emit(&mut buf);

@@ -1,14 +1,14 @@
 //! What a unit takes, refuses and answers.
 
-use super::mover::{Mode, Segment, StopWords};
-use super::trajectory::{Goal, Trajectory};
+use super::mover::{MoverMode, QueuedSegment, StopWords};
+use super::trajectory::{Trajectory, TrajectoryGoal};
 use super::unit::Unit;
 use crate::wire::silvermax::{
     ALL_UNITS, AnyRequest, Class, Internal, NakReason, Poll, Reply, Words, register,
 };
 
 /// What commands answer: data, or that they are done.
-type Answer = Result<Option<Words>, NakReason>;
+type CommandAnswer = Result<Option<Words>, NakReason>;
 
 /// HLT, RST, SPR, VMI, GOP, KDD, RSM, RSN, TIM.
 const FORBIDDEN: [u8; 9] = [2, 4, 13, 15, 143, 183, 196, 198, 218];
@@ -49,7 +49,7 @@ impl Unit {
         }
     }
 
-    fn take(&mut self, request: &AnyRequest) -> Answer {
+    fn take(&mut self, request: &AnyRequest) -> CommandAnswer {
         let command = request.command().ok_or(NakReason::Command)?;
         let parameters = request.parameters.as_slice();
         let fit = command.parameters.iter().zip(parameters).all(|(parameter, value)| parameter.takes(*value));
@@ -79,7 +79,7 @@ impl Unit {
     }
 
     /// Commands of class A.
-    fn take_at_once(&mut self, number: u8, parameters: &[i64]) -> Answer {
+    fn take_at_once(&mut self, number: u8, parameters: &[i64]) -> CommandAnswer {
         let word = |word: u16| Ok(Some(Words::of(&[word])));
         match (number, parameters) {
             (0, _) => {
@@ -97,13 +97,13 @@ impl Unit {
             (11, [register, value]) => self.write(*register, *value),
             (12, [register]) => return self.read(*register).map(|value| Some(Words::of_value(value))),
             (15, [acceleration, velocity, enable, state]) => {
-                let goal = Goal::Velocity { to: *velocity, acceleration: acceleration.abs() };
-                self.mode = Mode::Move { goal, stop: StopWords { enable: *enable, state: *state } };
+                let goal = TrajectoryGoal::Velocity { to: *velocity, acceleration: acceleration.abs() };
+                self.mode = MoverMode::Move { goal, stop: StopWords { enable: *enable, state: *state } };
             }
             (20, _) => return word(self.internal()),
             (21, _) => return word(self.io()),
             (25, [ticks, position, acceleration, velocity]) => {
-                let segment = Segment {
+                let segment = QueuedSegment {
                     ticks: u32::try_from(*ticks).unwrap_or(u32::MAX),
                     position: i32::try_from(*position).unwrap_or(0),
                     acceleration: *acceleration,
@@ -125,7 +125,7 @@ impl Unit {
         } else if let Some(running) = self.mode.acceleration() {
             self.brake(if deceleration == 0 { running } else { deceleration });
         } else {
-            self.mode = Mode::Hold;
+            self.mode = MoverMode::Hold;
         }
     }
 
@@ -163,18 +163,19 @@ impl Unit {
     pub(super) fn begin(&mut self, request: &AnyRequest) {
         self.trajectory = Trajectory::at_rest(self.target);
         let &[to, acceleration, velocity, enable, state] = request.parameters.as_slice() else {
-            self.mode = Mode::Queue { running: None, left: 0 };
+            self.mode = MoverMode::Queue { running: None, left: 0 };
             return;
         };
         let to = self.twice_of(i32::try_from(to).unwrap_or(0));
         let twice = if request.number == 134 { to } else { self.target + to };
         // At most half the velocity (page 99).
-        let goal = Goal::Place { twice, acceleration: acceleration.min(velocity / 2).max(1), velocity };
-        self.mode = Mode::Move { goal, stop: StopWords { enable, state } };
+        let goal =
+            TrajectoryGoal::Place { twice, acceleration: acceleration.min(velocity / 2).max(1), velocity };
+        self.mode = MoverMode::Move { goal, stop: StopWords { enable, state } };
     }
 
     /// What is no motion, of class D.
-    fn set(&mut self, number: u8, parameters: &[i64]) -> Answer {
+    fn set(&mut self, number: u8, parameters: &[i64]) -> CommandAnswer {
         match (number, parameters) {
             (142 | 145, _) => self.count_from(self.axis.place()),
             (146, _) => {

@@ -1,6 +1,6 @@
 //! What a unit senses, tells and is killed by.
 
-use super::mover::{Mode, StopWords};
+use super::mover::{MoverMode, StopWords};
 use super::unit::Unit;
 use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
 
@@ -38,7 +38,7 @@ impl Unit {
     fn error_bits(&self) -> u16 {
         let error = (self.target - self.actual()).abs() >> (self.setup.bits + 1);
         let [moving, holding, _] = self.settings.errors.map(i64::from);
-        let is_holding = self.mode == Mode::Hold && self.status.settling == 0;
+        let is_holding = self.mode == MoverMode::Hold && self.status.settling == 0;
         let is_past = |limit: i64| self.settings.is_driving && limit > 0 && error > limit;
         let moving = if is_past(moving) { Internal::MOVING_ERROR } else { 0 };
         moving | if is_holding && is_past(holding) { Internal::HOLDING_ERROR } else { 0 }

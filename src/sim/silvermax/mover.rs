@@ -2,14 +2,14 @@
 
 use std::collections::VecDeque;
 
-use super::trajectory::Goal;
+use super::trajectory::TrajectoryGoal;
 
 /// Segments that wait, beside the one that runs (IMW, page 95).
 const QUEUE: usize = 4;
 
 /// A segment of the timed queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Segment {
+pub(super) struct QueuedSegment {
     pub(super) ticks: u32,
     pub(super) position: i32,
     pub(super) acceleration: i64,
@@ -25,19 +25,19 @@ pub(super) struct StopWords {
 
 /// What a unit does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mode {
+pub(super) enum MoverMode {
     /// Holds its target.
     Hold,
     /// Moves until the goal is reached or something is sensed.
-    Move { goal: Goal, stop: StopWords },
+    Move { goal: TrajectoryGoal, stop: StopWords },
     /// Executes the timed queue; nothing runs yet where there is no segment.
-    Queue { running: Option<Goal>, left: u32 },
+    Queue { running: Option<TrajectoryGoal>, left: u32 },
 }
 
-impl Mode {
+impl MoverMode {
     /// Comes to rest and holds.
     pub(super) const fn brake(deceleration: i64) -> Self {
-        let goal = Goal::Velocity { to: 0, acceleration: deceleration };
+        let goal = TrajectoryGoal::Velocity { to: 0, acceleration: deceleration };
         Self::Move { goal, stop: StopWords { enable: 0, state: 0 } }
     }
 
@@ -45,7 +45,8 @@ impl Mode {
     pub(super) const fn acceleration(&self) -> Option<i64> {
         match *self {
             Self::Move { goal, .. } | Self::Queue { running: Some(goal), .. } => match goal {
-                Goal::Velocity { acceleration, .. } | Goal::Place { acceleration, .. } => Some(acceleration),
+                TrajectoryGoal::Velocity { acceleration, .. }
+                | TrajectoryGoal::Place { acceleration, .. } => Some(acceleration),
             },
             Self::Hold | Self::Queue { running: None, .. } => None,
         }
@@ -54,11 +55,11 @@ impl Mode {
 
 /// The timed queue.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Queue(VecDeque<Segment>);
+pub(super) struct Queue(VecDeque<QueuedSegment>);
 
 impl Queue {
     /// One more; false where there is no room.
-    pub(super) fn push(&mut self, segment: Segment) -> bool {
+    pub(super) fn push(&mut self, segment: QueuedSegment) -> bool {
         let has_room = self.0.len() < QUEUE;
         if has_room {
             self.0.push_back(segment);
@@ -66,7 +67,7 @@ impl Queue {
         has_room
     }
 
-    pub(super) fn pop(&mut self) -> Option<Segment> {
+    pub(super) fn pop(&mut self) -> Option<QueuedSegment> {
         self.0.pop_front()
     }
 
@@ -79,19 +80,19 @@ impl Queue {
     }
 }
 
-impl Segment {
+impl QueuedSegment {
     /// What it is for, where a count is so many of the generator's units; full scale says the direction alone.
-    pub(super) fn goal(&self, twice_of: impl Fn(i32) -> i64) -> Goal {
+    pub(super) fn goal(&self, twice_of: impl Fn(i32) -> i64) -> TrajectoryGoal {
         let acceleration = self.acceleration;
         match self.position {
-            i32::MAX => Goal::Velocity { to: self.velocity, acceleration },
-            i32::MIN => Goal::Velocity { to: -self.velocity, acceleration },
-            place => Goal::Place { twice: twice_of(place), acceleration, velocity: self.velocity },
+            i32::MAX => TrajectoryGoal::Velocity { to: self.velocity, acceleration },
+            i32::MIN => TrajectoryGoal::Velocity { to: -self.velocity, acceleration },
+            place => TrajectoryGoal::Place { twice: twice_of(place), acceleration, velocity: self.velocity },
         }
     }
 
     /// The same for the last one, an ordinary move to its position.
-    pub(super) const fn last_goal(&self, twice: i64) -> Goal {
-        Goal::Place { twice, acceleration: self.acceleration, velocity: self.velocity }
+    pub(super) const fn last_goal(&self, twice: i64) -> TrajectoryGoal {
+        TrajectoryGoal::Place { twice, acceleration: self.acceleration, velocity: self.velocity }
     }
 }

@@ -264,5 +264,5 @@ fn units_answer_whoever_opens_their_line() {
         }
     };
     assert_eq!((reply.unit(), reply.command()), (16, Some(5)));
-    assert_eq!(running.stop().unwrap().bus().units()[0].tally().requests, 1);
+    assert_eq!(running.stop().bus().units()[0].tally().requests, 1);
 }

@@ -5,7 +5,7 @@
 
 /// What a motion is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Goal {
+pub(super) enum TrajectoryGoal {
     /// A velocity, positive upwards, by an acceleration.
     Velocity { to: i64, acceleration: i64 },
     /// Rest at a place, as [`Trajectory::twice`] has it, no faster than a velocity.
@@ -28,15 +28,17 @@ impl Trajectory {
     }
 
     /// One tick; says how far it moved, and whether the goal is reached.
-    pub(super) fn tick(&mut self, goal: Goal) -> (i64, bool) {
+    pub(super) fn tick(&mut self, goal: TrajectoryGoal) -> (i64, bool) {
         let before = self.twice;
         let is_there = match goal {
-            Goal::Velocity { to, acceleration } => {
+            TrajectoryGoal::Velocity { to, acceleration } => {
                 let next = self.velocity + (to - self.velocity).clamp(-acceleration, acceleration);
                 self.step(next);
                 next == to
             }
-            Goal::Place { twice, acceleration, velocity } => self.approach(twice, acceleration, velocity),
+            TrajectoryGoal::Place { twice, acceleration, velocity } => {
+                self.approach(twice, acceleration, velocity)
+            }
         };
         (self.twice - before, is_there)
     }
@@ -70,7 +72,7 @@ mod tests {
 
     /// Ticks to a place, with the greatest velocity and change of velocity on the way.
     fn run(mut from: Trajectory, place: i64, acceleration: i64, velocity: i64) -> (u32, i64, i64) {
-        let goal = Goal::Place { twice: place, acceleration, velocity };
+        let goal = TrajectoryGoal::Place { twice: place, acceleration, velocity };
         let (mut ticks, mut fastest, mut hardest) = (0, 0, 0);
         loop {
             let before = from.velocity;

@@ -1,7 +1,7 @@
 //! One unit: what it remembers, and what it does in each tick.
 
 use super::axis::Axis;
-use super::mover::{Mode, Queue, StopWords};
+use super::mover::{MoverMode, Queue, StopWords};
 use super::trajectory::Trajectory;
 use super::{Executed, TICK_NS, UnitSetup};
 use crate::time::MonoTime;
@@ -43,7 +43,7 @@ pub(crate) struct Unit {
     pub(super) trajectory: Trajectory,
     /// The target, as far from the origin as the trajectory says, but within soft limits.
     pub(super) target: i64,
-    pub(super) mode: Mode,
+    pub(super) mode: MoverMode,
     pub(super) queue: Queue,
     /// A motion that waits for the running one.
     pub(super) pending: Option<AnyRequest>,
@@ -123,7 +123,7 @@ impl Unit {
             origin,
             trajectory: Trajectory::at_rest(0),
             target: 0,
-            mode: Mode::Hold,
+            mode: MoverMode::Hold,
             queue: Queue::default(),
             pending: None,
             settings: Settings::after_reset(),
@@ -171,7 +171,7 @@ impl Unit {
 
     /// True if something is under way.
     pub(crate) fn is_moving(&self) -> bool {
-        self.mode != Mode::Hold
+        self.mode != MoverMode::Hold
     }
 
     /// Segments that wait.
@@ -183,7 +183,7 @@ impl Unit {
     /// Ticks left of the running segment.
     pub(crate) const fn ticks_left(&self) -> u32 {
         match self.mode {
-            Mode::Queue { left, .. } => left,
+            MoverMode::Queue { left, .. } => left,
             _ => 0,
         }
     }
@@ -230,9 +230,9 @@ impl Unit {
     /// True if the next tick is like this one until somebody does something.
     fn is_idle(&self) -> bool {
         let waits = match self.mode {
-            Mode::Hold => true,
-            Mode::Queue { running, .. } => running.is_none() && self.queue.len() == 0,
-            Mode::Move { .. } => false,
+            MoverMode::Hold => true,
+            MoverMode::Queue { running, .. } => running.is_none() && self.queue.len() == 0,
+            MoverMode::Move { .. } => false,
         };
         waits && self.pending.is_none() && self.status.settling == 0
     }
@@ -240,14 +240,14 @@ impl Unit {
     fn run_tick(&mut self) {
         self.feed();
         match &mut self.mode {
-            Mode::Hold => self.status.settling = self.status.settling.saturating_sub(1),
-            Mode::Queue { running: None, .. } => {}
-            Mode::Queue { running: Some(goal), left } => {
+            MoverMode::Hold => self.status.settling = self.status.settling.saturating_sub(1),
+            MoverMode::Queue { running: None, .. } => {}
+            MoverMode::Queue { running: Some(goal), left } => {
                 *left -= 1;
                 let (moved, _) = self.trajectory.tick(*goal);
                 self.shift(moved);
             }
-            Mode::Move { goal, stop } => {
+            MoverMode::Move { goal, stop } => {
                 let stop = *stop;
                 let (moved, is_there) = self.trajectory.tick(*goal);
                 self.shift(moved);
@@ -267,7 +267,7 @@ impl Unit {
 
     /// The next segment, where the running one is over.
     fn feed(&mut self) {
-        let Mode::Queue { running, left: 0 } = self.mode else { return };
+        let MoverMode::Queue { running, left: 0 } = self.mode else { return };
         let Some(segment) = self.queue.pop() else {
             if running.is_some() {
                 self.run_dry();
@@ -286,13 +286,13 @@ impl Unit {
             self.settings.registers[usize::from(number)] = value;
         }
         self.mode = if segment.ticks == 0 {
-            Mode::Move {
+            MoverMode::Move {
                 goal: segment.last_goal(self.twice_of(segment.position)),
                 stop: StopWords::default(),
             }
         } else {
             let goal = segment.goal(|counts| self.twice_of(counts));
-            Mode::Queue { running: Some(goal), left: segment.ticks }
+            MoverMode::Queue { running: Some(goal), left: segment.ticks }
         };
     }
 
@@ -306,7 +306,7 @@ impl Unit {
     /// Comes to rest by a deceleration; at once without one.
     pub(super) fn brake(&mut self, deceleration: i64) {
         if deceleration > 0 {
-            self.mode = Mode::brake(deceleration);
+            self.mode = MoverMode::brake(deceleration);
         } else {
             self.trajectory = Trajectory::at_rest(self.target);
             self.finish();
@@ -332,7 +332,7 @@ impl Unit {
 
     /// A motion is over: it holds, and what waited begins.
     pub(super) fn finish(&mut self) {
-        self.mode = Mode::Hold;
+        self.mode = MoverMode::Hold;
         self.trajectory = Trajectory::at_rest(self.target);
         self.status.news |= Poll::DONE;
         self.status.settling = u32::from(self.settings.errors[2]) + 1;
@@ -352,7 +352,7 @@ impl Unit {
     /// Ends all motion at once and forgets what waits.
     pub(super) fn halt(&mut self) {
         self.pending = None;
-        self.mode = Mode::Hold;
+        self.mode = MoverMode::Hold;
         self.trajectory = Trajectory::at_rest(self.target);
     }
 

@@ -85,6 +85,7 @@ impl Links {
         live: &Arc<Live>,
     ) -> Result<(), String> {
         let terms = StreamTerms::of(link, config)?.ok_or("no seat is on it")?;
+        let family = link.family.ok_or("no seat is on it")?;
         let on_it: Vec<_> = seats(config, link).collect();
         let stations = config.controllers.len() - self.led.len();
         for (own, (lane, ..)) in (0..).zip(&on_it) {
@@ -100,7 +101,7 @@ impl Links {
         self.poses.push(poses);
         self.news.push(LinkNews { events, controllers: on_it.iter().map(|(lane, ..)| *lane).collect() });
         let controllers = on_it.iter().map(|(lane, ..)| *lane).collect();
-        let (end, told) = LinkEnd::new(link.name.clone(), controllers);
+        let (end, told) = LinkEnd::new(link.name.clone(), (family, terms), controllers);
         self.loops.push(LinkLoop::new(stream, wants, Arc::clone(live), told));
         self.ends.push(end);
         Ok(())

@@ -8,6 +8,7 @@ import { showFilm, startFilm } from './film.js';
 import { showFollow, startFollow } from './follow.js';
 import { showHistograms } from './histogram.js';
 import { showLevels } from './levels.js';
+import { showLinks } from './links.js';
 import { showMap, startMap } from './map.js';
 import { readLists, showPlaylist, startPlaylist } from './playlist.js';
 import { showReports, startReports } from './reports.js';
@@ -25,7 +26,7 @@ const STARTS = [
 ];
 const SHOWS = [
   showHeadline, showTransport, showFilm, showFollow, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,
-  showHistograms, showReports, showCurves,
+  showLinks, showHistograms, showReports, showCurves,
 ];
 
 for (const start of STARTS) start();

@@ -1,5 +1,5 @@
 use super::*;
-use crate::wire::{Report, Status};
+use crate::wire::{RegisterReport, Status};
 
 /// The next report, if one is due.
 fn report(bench: &mut Bench) -> Option<(String, Vec<u8>)> {
@@ -80,7 +80,7 @@ fn an_mbox_reports_its_alarm_register_once() {
     let mut bench = Bench::new(&Setup { dialect: Dialect::Mbox, ..Setup::default() });
     bench.controller.act(&Action::Error(11), at(0));
     let (to, bytes) = report(&mut bench).unwrap();
-    let told = Report::parse(&bytes).unwrap();
+    let told = RegisterReport::parse(&bytes).unwrap();
     assert_eq!((to.as_str(), told.start, told.data), ("192.168.15.101:8410", 0xfe, Words::from(&[11][..])));
     assert_eq!((bench.word(0, 0xfe), report(&mut bench)), (11, None));
 }

@@ -222,13 +222,13 @@ fn drives_keep_what_is_written_to_their_registers_at_most_six_at_a_time() {
     let mut bench = Bench::with(&[]);
     let mut buf = [0; MAX_LEN];
     let mut ask = |bench: &mut Bench, servo_id, start, num| {
-        let read = ServoRead { servo: servo_id, accept: Code::ALL, reply: Code::ALL, start, num };
+        let read = ServoRead { channel: servo_id, accept: Code::ALL, reply: Code::ALL, start, num };
         servo(bench, read.emit(&mut buf))
     };
     assert_eq!(ask(&mut bench, 1, 508, 1), Some((2, 1, vec![0])));
     let mut buf = [0; MAX_LEN];
     let data = Words::from(&[7, 8][..]);
-    let write = ServoWrite { servo: 3, accept: Code::ALL, reply: Code::ALL, start: 508, data };
+    let write = ServoWrite { channel: 3, accept: Code::ALL, reply: Code::ALL, start: 508, data };
     assert_eq!(servo(&mut bench, write.emit(&mut buf)), Some((2, 3, vec![7, 8])));
     assert_eq!(ask(&mut bench, 3, 507, 6), Some((2, 3, vec![0, 7, 8, 0, 0, 0])));
     assert_eq!(ask(&mut bench, 2, 508, 1), Some((2, 2, vec![0])));

@@ -113,6 +113,6 @@ fn on_a_pseudo_terminal_a_unit_is_found_switched_and_led_and_the_books_come_back
         other => panic!("{other:?}"),
     };
     assert!((0..2_000).any(|_| is_there()));
-    let books = books(&running.stop().unwrap());
+    let books = books(&running.stop());
     assert!(books.frames >= 5 && books.unknown == 0 && books.collisions == 0, "{books:?}");
 }
