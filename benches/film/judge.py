@@ -1,8 +1,10 @@
 """What a judge needs who trusts nothing of kinocue: a ramp as a cue, a relay that has the kernel stamp each frame, and a player
 that is asked on a connection of the judge's own."""
 
+import array
 import contextlib
 import json
+import math
 import multiprocessing
 import os
 import pathlib
@@ -14,6 +16,7 @@ import struct
 import subprocess
 import threading
 import time
+import wave
 
 STROKE = 300_000  # pulses
 EASE_S = 2.0  # at either end of the ramp
@@ -188,19 +191,60 @@ class Player:
         self.line.close()
 
 
+class Sender:
+    """Sends Art-Net timecode of 25 frames a second, each frame as much as 10 ms late, by a film that is the machine's clock."""
+
+    def __init__(self, host, seconds):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+            free.bind((host, 0))
+            self.to = "%s:%d" % free.getsockname()
+        self.begun = time.monotonic() + 0.1
+        self.process = multiprocessing.Process(target=self.send, args=(host, int(seconds * 25)), daemon=True)
+        self.process.start()
+
+    def send(self, host, frames):
+        hurry()
+        port = self.to.rsplit(":", 1)[1]
+        out, dice = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), random.Random(4)
+        out.bind((host, 0))
+        for n in range(frames):
+            time.sleep(max(self.begun + n / 25 + 0.01 * dice.random() - time.monotonic(), 0))
+            label = bytes([n % 25, n // 25 % 60, n // 1_500 % 60, n // 90_000])
+            with contextlib.suppress(ConnectionRefusedError):
+                out.sendto(b"Art-Net\0\0\x97\0\x0e\0\0" + label + b"\1", (host, int(port)))
+
+    def clock(self, *_):
+        return (lambda t: t - self.begun), 1.0, 0.0
+
+    def close(self):
+        self.process.terminate()
+        self.process.join()
+
+
 class Between:
     """Stands between kinocue and the player: answers are lost, or say another place, as the judge will have it."""
 
     def __init__(self, folder, player, lost=0.0):
-        self.socket, self.lost, self.ahead_s, self.chance = folder / "between.sock", lost, 0.0, random.Random(5)
-        self.first = None  # when a position was passed on first
+        self.socket, self.lost, self.chance = folder / "between.sock", lost, random.Random(5)
+        self.ahead, self.passed = multiprocessing.Value("d", 0.0), multiprocessing.Value("d", 0.0)
         self.socket.unlink(missing_ok=True)
         self.door = socket.socket(socket.AF_UNIX)
         self.door.bind(str(self.socket))
         self.door.listen(1)
-        threading.Thread(target=self.serve, args=(str(player.socket),), daemon=True).start()
+        # A process of its own: beside the judge's threads answers would wait for one another by up to 5 ms, and seats follow what they are told.
+        self.process = multiprocessing.Process(target=self.serve, args=(str(player.socket),), daemon=True)
+        self.process.start()
+
+    @property
+    def first(self):
+        """When a position was passed on first since `forget`."""
+        return self.passed.value
+
+    def forget(self):
+        self.passed.value = 0.0
 
     def serve(self, player):
+        hurry()
         ours, theirs = self.door.accept()[0], socket.socket(socket.AF_UNIX)
         theirs.connect(player)
         kept = {ours: b"", theirs: b""}
@@ -221,16 +265,20 @@ class Between:
         if is_told and told.get("request_id") and isinstance(told.get("data"), float):
             if self.chance.random() < self.lost:
                 return
-            self.first = self.first or time.monotonic()
-            line = json.dumps(told | {"data": told["data"] + self.ahead_s}).encode()
+            self.passed.value = self.passed.value or time.monotonic()
+            line = json.dumps(told | {"data": told["data"] + self.ahead.value}).encode()
         to.sendall(line + b"\n")
+
+    def close(self):
+        self.process.terminate()
+        self.process.join()
 
 
 class Play:
     """kinocue at work, and what it says."""
 
-    def __init__(self, program, cue, to, source, rate):
-        command = [program, "play", cue, "--to", f"{to},axes=6", "--bind", "127.0.0.1:0", "--rate", rate, "--chase", source]
+    def __init__(self, program, cue, to, source, rate, more=()):
+        command = [program, "play", cue, "--to", f"{to},axes=6", "--bind", "127.0.0.1:0", "--rate", rate, "--chase", source, *more]
         self.lines = []
         self.process = subprocess.Popen(
             list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
@@ -258,4 +306,18 @@ def film(folder, seconds):
     path = pathlib.Path(folder) / "film.mkv"
     made = f"av://lavfi:testsrc=size=64x48:rate=24:duration={seconds}[out0];sine=frequency=440:sample_rate=48000:duration={seconds}[out1]"
     subprocess.run(["mpv", "--no-config", "--no-terminal", made, f"--o={path}", "--ovc=mpeg4", "--oac=pcm_s16le"], check=True)
+    return path
+
+
+def chords(folder, seconds):
+    """The sound of a film: other chords every third of a second, over noise."""
+    path, dice, rate = pathlib.Path(folder) / "chords.wav", random.Random(7), 8_000
+    sound = array.array("h")
+    for n in range(int(seconds * rate)):
+        if n % 2_400 == 0:
+            turns = [2 * math.pi * 120 * 20 ** dice.random() / rate for _ in range(4)]
+        sound.append(int(2_000 * sum(math.sin(turn * n) for turn in turns) + 3_000 * (dice.random() - 0.5)))
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, rate, 0, "NONE", None))
+        file.writeframes(sound.tobytes())
     return path

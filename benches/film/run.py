@@ -5,11 +5,12 @@ the film is, mpv is asked on a connection of the judge's own. Prints the table o
 
     cargo build --release && benches/film/run.py [--seconds 120] [--only "idle"] [--rate 100]
 
-Loopback only, in a folder of its own. Needs mpv; for "jack" also jackd. Python 3.10 or later, nothing besides.
+Loopback only, in a folder of its own. Needs mpv; for "jack" also jackd, for "ltc" and "sound" jack_capture as well. Python 3.10 or later, nothing besides.
 """
 
 import argparse
 import contextlib
+import json
 import multiprocessing
 import os
 import pathlib
@@ -19,7 +20,7 @@ import subprocess
 import tempfile
 import time
 
-from judge import Between, Play, Player, Ramp, Seat, film
+from judge import Between, Play, Player, Ramp, Seat, Sender, chords, film
 
 SETTLED_S = 10.0  # after a join; of five in a minute the next waits for a person
 
@@ -33,15 +34,15 @@ def spread(values):
 class Show:
     """One play of one film."""
 
-    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0, until="playing: "):
+    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0, until="playing: ", source=None, film=None, more=(), shown=None):
         self.ramp = Ramp(seconds)
         self.seat = Seat(args.program, folder)
-        self.player = Player(folder, args.film, player)
+        self.player = shown or Player(folder, film or args.film, player)
         self.between = Between(folder, self.player, lost) if lost or between else None
         self.until = until
-        socket = (self.between or self.player).socket
+        source = source or f"mpv:{(self.between or self.player).socket}"
         cue = self.ramp.write(folder / "ramp.csv")
-        self.play = Play(args.program, cue, self.seat.to, f"mpv:{socket}", args.rate)
+        self.play = Play(args.program, cue, self.seat.to, source, args.rate, more)
 
     def __enter__(self):
         try:
@@ -64,6 +65,8 @@ class Show:
 
     def __exit__(self, *_):
         self.play.close()
+        if self.between:
+            self.between.close()
         self.player.close()
         self.seat.close()
 
@@ -94,18 +97,73 @@ def spin():
         pass
 
 
-def jack(args, folder):
-    if not shutil.which("jackd"):
-        return "not measured: no jackd"
-    server = subprocess.Popen(
-        ["jackd", "--no-realtime", "-d", "dummy", "-r", "48000", "-p", "256"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+@contextlib.contextmanager
+def jack_server():
+    """JACK without a sound card, under a name of its own."""
+    os.environ["JACK_DEFAULT_SERVER"] = name = f"kinocue-{os.getpid()}"
+    command = ["jackd", "--no-realtime", "-n", name, "-d", "dummy", "-r", "48000", "-p", "256"]
+    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         time.sleep(2)
-        return follow(args, folder, ["--ao=jack", "--jack-autostart=no"])
+        yield
     finally:
         server.terminate()
         server.wait()
+
+
+JACK = ["--ao=jack", "--jack-autostart=no"]
+CAPTURE = "pipe:jack_capture -ws --channels 1 --port mpv:out_0 --no-stdin"
+
+
+def jack(args, folder):
+    if not shutil.which("jackd"):
+        return "not measured: no jackd"
+    with jack_server():
+        return follow(args, folder, JACK)
+
+
+def captured(args, folder, source, more, film, begin_s):
+    """A film that is heard of JACK's port, against the player's own clock; what is late on the whole is calibrated."""
+    with jack_server(), Show(args, folder, JACK, seconds=args.seconds + 40, source=source, film=film, more=more) as show:
+        time.sleep(begin_s)
+        since = time.monotonic()
+        measuring = [args.program, "sync", "calibrate", source, "--against", f"mpv:{show.player.socket}", "--seconds", "20", *more, "--json"]
+        told = json.loads(subprocess.run(list(map(str, measuring)), capture_output=True, text=True, check=True).stdout)["median_ms"]
+        time.sleep(max(since + args.seconds - time.monotonic(), 0))
+        frames = show.seat.frames()
+        holds = show.holds()
+    errors = [error for _, error in show.errors(frames, since, since + args.seconds)]
+    bias = statistics.median(errors)
+    off = spread(abs(error - bias) for error in errors)
+    return f"|error - bias| {off}; bias {bias:+.2f} ms, calibrated as {told:+.2f} ms: {abs(bias - told):.2f} ms are left; holds {holds}"
+
+
+def ltc(args, folder):
+    if not shutil.which("jackd") or not shutil.which("jack_capture"):
+        return "not measured: no jackd, or no jack_capture"
+    tape = folder / "tape.wav"
+    made = [args.program, "sync", "send", "--ltc", "--film-fps", "25", "--seconds", f"{args.seconds + 60:.0f}", "-o", tape]
+    subprocess.run(list(map(str, made)), check=True)
+    return captured(args, folder, f"ltc:{CAPTURE}", ["--film-fps", "25"], tape, SETTLED_S)
+
+
+def artnet(args, folder):
+    sender = Sender("127.0.0.1", args.seconds + 60)
+    more = ["--film-fps", "25"]
+    with Show(args, folder, seconds=args.seconds + 40, source=f"artnet:127.0.0.1,bind={sender.to}", more=more, shown=sender) as show:
+        time.sleep(SETTLED_S + args.seconds)
+        frames = show.seat.frames()
+        holds = show.holds()
+    errors = [error for _, error in show.errors(frames, show.began + SETTLED_S, show.began + SETTLED_S + args.seconds)]
+    return f"sent 0 to 10 ms late: |error| {spread(map(abs, errors))}; bias {statistics.median(errors):+.2f} ms, holds {holds}"
+
+
+def sound(args, folder):
+    if not shutil.which("jackd") or not shutil.which("jack_capture"):
+        return "not measured: no jackd, or no jack_capture"
+    storm, index = chords(folder, args.seconds + 60), folder / "storm.kidx"
+    subprocess.run([args.program, "sync", "index", storm, "-o", index], check=True, stdout=subprocess.DEVNULL)
+    return captured(args, folder, f"sound:{CAPTURE},index={index}", [], storm, SETTLED_S)
 
 
 def lock(args, folder):
@@ -113,7 +171,7 @@ def lock(args, folder):
     for _ in range(args.times):
         with Show(args, folder, ["--pause"], between=True, until="waiting: ") as show:
             time.sleep(1.0)
-            show.between.first = None
+            show.between.forget()
             show.player.tell("set_property", "pause", False)
             show.play.says("playing: ")
             time.sleep(0.3)
@@ -127,9 +185,9 @@ def step(args, folder):
         time.sleep(SETTLED_S)
         for turn in range(6):
             since = time.monotonic()
-            show.between.ahead_s = 0.038 * ((turn + 1) % 2)
+            ahead_s = show.between.ahead.value = 0.038 * ((turn + 1) % 2)
             time.sleep(7.0)
-            errors = show.errors(show.seat.frames(), since, since + 7.0, show.between.ahead_s)
+            errors = show.errors(show.seat.frames(), since, since + 7.0, ahead_s)
             worst = lambda first: max(abs(error) for at, error in errors if at - since >= first)
             sign = 1 if turn % 2 == 0 else -1
             after.append((worst(3.0), worst(4.5), max(-sign * error for _, error in errors)))
@@ -187,6 +245,9 @@ CASES = {
     "idle": follow,
     "busy": loaded,
     "jack": jack,
+    "artnet": artnet,
+    "ltc": ltc,
+    "sound": sound,
     "300 ppm": lambda args, folder: follow(args, folder, ["--ao-null-speed=1.0003"]),
     "losses": lambda args, folder: follow(args, folder, lost=0.2),
     "step": step,

@@ -221,7 +221,7 @@ pub struct FilmStatus {
     pub(crate) error_ms: Option<f64>,
     /// The label of the frame that the leading source is at, if it has labels.
     pub(crate) timecode: Option<String>,
-    /// A source that ranks higher and says something else.
+    /// A source that ranks higher, or any where a person chose, and says something else.
     pub(crate) disagrees: Option<FilmDisagreement>,
     /// The source that a person chose; null while the ranking decides.
     pub(crate) chosen: Option<String>,
@@ -233,7 +233,7 @@ pub struct FilmStatus {
     pub(crate) sources: Vec<FilmSourceStatus>,
 }
 
-/// A source that ranks higher than the one that leads, and says something else; a person has to decide.
+/// A source that says something else than the one that leads, and ranks higher or was passed over by hand; a person has to decide.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
 pub(crate) struct FilmDisagreement {

@@ -45,7 +45,8 @@ pub(crate) struct ChosenFilm {
     /// Its place in the ranking; `None` while nothing was good enough yet.
     pub(crate) source: Option<usize>,
     pub(crate) point: FilmPoint,
-    /// A source that ranks higher and says something else, and by how much it is ahead: a person has to decide.
+    /// A source that ranks higher, or any other than the one that a person chose, and says something else, and by how much it is
+    /// ahead: a person has to decide.
     pub(crate) disagrees: Option<(usize, ShowTime)>,
 }
 
@@ -81,7 +82,7 @@ impl Chooser {
         }
         let disagrees = if let Some(by_hand) = by_hand.filter(|place| *place < views.len()) {
             self.switch(by_hand, views);
-            None
+            self.apart_from_choice(by_hand, views, now)
         } else {
             self.go_down(views);
             self.go_up(views, now)
@@ -115,14 +116,31 @@ impl Chooser {
     /// Takes a source that ranks higher, if it has been good for long enough and says the same.
     fn go_up(&mut self, views: &[SourceView], now: MonoTime) -> Option<(usize, ShowTime)> {
         let present = self.present?;
-        let is_long = |since: &Option<MonoTime>| since.is_some_and(|since| now.since(since) >= UP_AFTER);
         // Only those that rank higher: between lower ones nobody has to choose.
-        let higher = self.leads_since[..present].iter().position(is_long)?;
+        let higher = (0..present).find(|place| self.has_led(*place, now))?;
         if !views[present].leads() || !views[present].agrees(&views[higher]) {
             return Some((higher, views[present].behind(&views[higher])));
         }
         self.switch(higher, views);
         None
+    }
+
+    /// The highest of the other sources that says something else than the one that a person chose.
+    fn apart_from_choice(
+        &self,
+        chosen: usize,
+        views: &[SourceView],
+        now: MonoTime,
+    ) -> Option<(usize, ShowTime)> {
+        let present = &views[chosen];
+        let is_apart = |place: &usize| self.has_led(*place, now) && !present.agrees(&views[*place]);
+        let other = (0..views.len()).find(is_apart).filter(|_| present.leads())?;
+        Some((other, present.behind(&views[other])))
+    }
+
+    /// Whether a source has been able to lead for long enough.
+    fn has_led(&self, place: usize, now: MonoTime) -> bool {
+        self.leads_since[place].is_some_and(|since| now.since(since) >= UP_AFTER)
     }
 
     fn switch(&mut self, to: usize, views: &[SourceView]) {

@@ -27,7 +27,7 @@ fn whole(film: &FilmStatus) -> Vec<MetricFamily> {
         ),
         MetricFamily::gauge(
             "sync_disagreement_seconds",
-            "How far a source that ranks higher is ahead of the one that leads",
+            "How far a source that ranks higher, or was passed over by hand, is ahead of the one that leads",
             apart,
         ),
         MetricFamily::counter("sync_switches", "How often another source took over", film.switches),

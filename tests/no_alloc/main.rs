@@ -104,6 +104,32 @@ fn commands_alarms_levels_and_a_stop_neither_allocate_nor_free_on_the_tick_threa
     }
 }
 
+#[test]
+fn a_show_that_chases_a_film_neither_allocates_nor_frees_on_the_tick_thread() {
+    let film =
+        |at: u64, media_ms: i64, rate, state| (at, Deed::Film(ShowTime::from_millis(media_ms), rate, state));
+    let script = [
+        film(100, -5_000, 1.000_3, FilmState::Locked), // seats join, and wait for the cue
+        film(3_100, -1_965, 1.000_3, FilmState::Locked), // a frame off: slewed
+        (5_000, Deed::Trim(40)),
+        film(6_000, 900, 0.0, FilmState::Stopped),
+        film(7_000, 900, 1.0, FilmState::Locked),
+        film(9_500, 500, 1.0, FilmState::Locked), // it jumps: they hold, and join
+        (10_500, Deed::Oversleep(3)),
+        (11_000, Deed::Oversleep(80)),
+        film(12_000, 2_900, 1.0, FilmState::Ended),
+    ];
+    let Outcome { ended, calls, news, .. } = play(&script, false, Duration::ZERO);
+    assert_eq!(calls, NOTHING);
+    let states: Vec<State> = news.iter().filter_map(entered).collect();
+    let of = |mode| states.iter().filter(|state| **state == State::Playing(mode)).count();
+    assert!(of(PlayMode::Joining) >= 3 && of(PlayMode::Following) >= 1, "{states:?}");
+    assert!(
+        ended.ticks > 10_000 && states.ends_with(&[State::Parking, State::Parked]),
+        "{ended:?}, {states:?}"
+    );
+}
+
 fn entered(news: &News) -> Option<State> {
     match news {
         News::Entered { state, .. } => Some(*state),

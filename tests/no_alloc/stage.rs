@@ -14,13 +14,15 @@ use kinocue::harness::belief::Reading;
 use kinocue::harness::config::from_to_args;
 use kinocue::harness::drive::{Lane, Manner};
 use kinocue::harness::engine::{Mix, Show};
+use kinocue::harness::film::chase::ChaseRules;
+use kinocue::harness::film::point::{FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
 use kinocue::harness::net::{Delivery, DrainGrid, Ports, Sender};
 use kinocue::harness::observe::Watched;
 use kinocue::harness::record::{Asked, FrameKind, RecordedSeat, Tap, TickHead, ack_tap, tap};
 use kinocue::harness::rt::{
-    Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News,
-    Places, PlanLoop, Planning, Spinning, TickLoop, mailboxes,
+    Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FilmLead, FrameSink, Live, Loaded, MailEnds,
+    News, Places, PlanLoop, Planning, Spinning, TickLoop, mailboxes,
 };
 use kinocue::harness::state::Transition;
 use kinocue::harness::sys::clock::Monotonic;
@@ -55,6 +57,8 @@ pub(crate) enum Deed {
     Mix(usize, Mix),
     /// Somebody sets the trim.
     Trim(i32),
+    /// The film that leads is there from now on, and runs so fast.
+    Film(ShowTime, f64, FilmState),
     /// Somebody presses stop.
     Stop,
     /// Somebody wants the play to end.
@@ -133,6 +137,9 @@ struct Jumps<'a> {
     alarms: RefCell<Producer<Alarm>>,
     /// The show to exchange the first for.
     next: Cell<Option<Box<Loaded>>>,
+    /// The film that leads, and where it was said to be last.
+    film: Arc<PublishedPoint>,
+    shown: Cell<Option<FilmPoint>>,
     live: Arc<Live>,
     now: Cell<MonoTime>,
     /// Show time at the tick before.
@@ -165,6 +172,10 @@ impl Jumps<'_> {
             Deed::See(alarm) => self.alarms.borrow_mut().push(alarm).expect("there is room"),
             Deed::Mix(lane, mix) => self.desk.set(lane, mix),
             Deed::Trim(ms) => self.desk.set_trim_ms(ms),
+            Deed::Film(media, rate, state) => {
+                let epoch = self.shown.get().map_or(0, |before| before.epoch + 1);
+                self.shown.set(Some(FilmPoint { at: self.now.get(), media, rate, epoch, state }));
+            }
             Deed::Stop => self.desk.stop(),
             Deed::Leave => self.pace.leave.store(true, Ordering::Relaxed),
         }
@@ -189,6 +200,9 @@ impl Clock for Jumps<'_> {
         }
         self.now.set(deadline);
         self.script.iter().filter(|(at, _)| *at == tick).for_each(|(_, deed)| self.happen(*deed));
+        if let Some(point) = self.shown.get() {
+            self.film.publish(&FilmPoint { at: deadline, media: point.media_at(deadline), ..point });
+        }
     }
 }
 
@@ -314,7 +328,13 @@ fn play_to(
     let (staged, watched) = staged(addresses);
     let rate = staged.show.rate;
     let desk = &staged.desk();
-    let (engine, lanes, planner, timeline) = staged.split();
+    let (mut engine, lanes, planner, timeline) = staged.split();
+    let film: Arc<PublishedPoint> = Arc::default();
+    let rules = ChaseRules::until(timeline.duration());
+    let lead = script.iter().any(|(_, deed)| matches!(deed, Deed::Film(..)));
+    if lead {
+        engine = engine.waiting();
+    }
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, addresses).expect("loopback has a free port").split();
     let live = Arc::new(Live::new(CONTROLLERS));
@@ -344,6 +364,8 @@ fn play_to(
             commands: RefCell::new(commands),
             alarms: RefCell::new(alarms),
             next: Cell::new(Some(next.loaded())),
+            film: Arc::clone(&film),
+            shown: Cell::default(),
             live,
             now: Cell::new(origin),
             show: Cell::default(),
@@ -359,7 +381,8 @@ fn play_to(
             clock: &spinning,
             grid: TickGrid::new(origin, rate),
             engine,
-            conductor: Conductor::of_a_play(origin, attended),
+            conductor: Conductor::of_a_play(origin, attended)
+                .chasing(lead.then(|| FilmLead::new(Arc::clone(&film), rules, origin))),
             lanes,
             places,
             sink: Counted { sender, pace, tap },

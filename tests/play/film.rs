@@ -7,12 +7,14 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use kinocue::harness::sys::clock::Monotonic;
-use kinocue::harness::time::{Clock as _, MonoTime};
+use kinocue::harness::time::{Clock as _, MonoTime, Rate};
+use kinocue::harness::worst_of_lines;
 
 use rustix::process::Signal;
 use serde_json::{Value, json};
 
-use super::process::{Guarded, Playing, Sim, kinocue};
+use super::motion::fastest;
+use super::process::{Guarded, Playing, Row, Seen, Sim, kinocue};
 use super::{Folder, STROKE, pulses, undisturbed};
 
 /// A cue that rises a third of the stroke in so many seconds, from rest to rest, and stays there for one more.
@@ -52,7 +54,15 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
     assert!(seen.rest_in_park());
     let said = |what: &str| run.stderr.find(what).unwrap_or_else(|| panic!("{what}: {}", run.stderr));
     assert!(said("joining: the seats join the film") < said("playing: the seats are on the cue"));
-    // It is where the cue is at a time that goes on as the frames do.
+    let (count, spread_s) = followed(&seen, 4, 0.1);
+    // A frame of the film lasts 40 ms: it stays nearer to its own than to any other. How near is judged in virtual time and, on a
+    // machine of which more is known, by `benches/film`.
+    assert!(count > 50 && spread_s < 0.02, "{count} frames, {spread_s} s");
+}
+
+/// Of a seat that was led through a rise of so many seconds: its frames from a height on to the top, and by how much the instants of
+/// the cue that they were made for go on other than the frames do, seconds.
+fn followed(seen: &Seen, seconds: u32, from: f64) -> (usize, f64) {
     let rows: Vec<_> = seen.rows.iter().map(|row| (f64::from(row.frame), row.commanded[0])).collect();
     let media_s = |at: i32| {
         let wanted = f64::from(at) / STROKE * 3.0;
@@ -62,17 +72,15 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
             let risen = part.powi(3) * (10.0 - 15.0 * part + 6.0 * part * part);
             if risen < wanted { low = part } else { high = part }
         }
-        4.0 * low
+        f64::from(seconds) * low
     };
     // What comes down to park after the cue is no part of it.
     let top = rows.iter().position(|(_, at)| *at >= pulses(0.33)).expect("it comes to the top");
-    let rising = rows[..top].iter().filter(|(_, at)| *at > pulses(0.1));
+    let rising = rows[..top].iter().filter(|(_, at)| *at > pulses(from));
     let off: Vec<f64> = rising.map(|(frame, at)| media_s(*at) - frame * 0.01).collect();
     let (least, most) =
         off.iter().fold((f64::MAX, f64::MIN), |(least, most), off| (least.min(*off), most.max(*off)));
-    // A frame of the film lasts 40 ms: it stays nearer to its own than to any other. How near is judged in virtual time and, on a
-    // machine of which more is known, by `benches/film`.
-    assert!(off.len() > 50 && most - least < 0.02, "{} frames, {least}..{most}", off.len());
+    (off.len(), most - least)
 }
 
 #[test]
@@ -373,4 +381,100 @@ fn a_film_is_found_by_its_sound_with_the_index_that_was_made_of_it() {
     assert!(foreign.code != Some(0) && foreign.stderr.contains("mpv"), "{foreign:?}");
     let short = kinocue(&["sync", "index", &path("short.wav", film_sound(2)), "-o", &index]);
     assert!(short.code != Some(0) && short.stderr.contains("s are needed"), "{short:?}");
+}
+
+#[test]
+fn a_film_that_is_found_by_its_sound_leads_the_seat_through_its_cue_and_back_to_park() {
+    let (run, seen) = undisturbed(|| {
+        let (folder, sim) = (Folder::new(), Sim::one(&[]));
+        let path =
+            |name: &str, octets: Vec<u8>| folder.write(name, octets).to_str().expect("text").to_owned();
+        let (film, index) = (path("storm.wav", film_sound(15)), path("storm.kidx", Vec::new()));
+        let made = kinocue(&["sync", "index", &film, "-o", &index]);
+        assert_eq!(made.code, Some(0), "{made:?}");
+        let chase = format!("sound:{film},index={index}");
+        let run = Playing::start(&rise(&folder, 12), &sim.to(), &["--json", "--chase", &chase]).finish();
+        let report = run.report_of(0);
+        assert_eq!(report["result"], "completed", "{}", run.stderr);
+        ((run, sim.end()), vec![report])
+    });
+    assert!(run.stderr.contains("joining: the seats join the film"), "{}", run.stderr);
+    // It has joined by the middle of the rise.
+    let (count, spread_s) = followed(&seen, 12, 0.2);
+    assert!(count > 300 && spread_s < 0.02, "{count} frames, {spread_s} s");
+    assert!(seen.rest_in_park());
+}
+
+/// Serves positions of a film that runs as it should for 4 s, and then lies about everything, a while each.
+fn lie(stream: UnixStream, seed: u32) {
+    let mut out = stream.try_clone().expect("it can be cloned");
+    let (mut lines, mut line, mut dice) = (BufReader::new(stream), String::new(), seed);
+    let mut throw = |sides: u32| {
+        dice = dice.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (dice >> 8) % sides
+    };
+    let (begun, mut from, mut rate, mut lie, mut until_s) = (Monotonic.now(), (0.0, 5.0), 1.0, 99, 4.0);
+    while lines.read_line(&mut line).is_ok_and(|count| count > 0) {
+        let now_s = Monotonic.now().since(begun).as_secs_f64();
+        if now_s > 10.0 {
+            let _ = writeln!(out, "{}", json!({ "event": "end-file", "reason": "eof" })); // it may have left
+            return;
+        }
+        let media_s = from.1 + rate * (now_s - from.0);
+        if now_s > until_s {
+            let step_s = [0.0, 0.03, -0.04, 0.3, -5.0, 9.0][throw(6) as usize];
+            (from, lie, until_s) = ((now_s, media_s + step_s), throw(9), now_s + 0.1 * f64::from(throw(12)));
+            rate = [1.0, 1.0, 1.0, 1.02, 0.9, 3.0, -1.0, 0.0][throw(8) as usize];
+            let speed = [1.0, 0.99, 1e300, -2.0][throw(4) as usize];
+            let told = [
+                json!({ "event": "property-change", "name": "speed", "data": speed }),
+                json!({ "event": "property-change", "name": "pause", "data": throw(3) == 0 }),
+                json!({ "event": "seek" }),
+                json!({ "event": "playback-restart" }),
+                json!({ "garbage": "x".repeat(1_000_000) }),
+            ];
+            if writeln!(out, "{}", told[throw(5) as usize]).is_err() {
+                return;
+            }
+        }
+        let asked: Value = serde_json::from_str(&line).expect("JSON");
+        line.clear();
+        let said = match lie {
+            0 => json!(media_s + 1e-3 * f64::from(throw(100))),
+            1 => json!(throw(100_000)),
+            2 => json!("soon"),
+            3 => json!(media_s.floor()),
+            4 => continue,
+            _ => json!(media_s),
+        };
+        let answer = json!({ "data": said, "error": "success", "request_id": asked["request_id"] });
+        if asked["command"][0] == "get_property" && writeln!(out, "{answer}").is_err() {
+            return;
+        }
+    }
+}
+
+#[test]
+fn a_player_that_lies_moves_its_seat_no_faster_and_no_more_suddenly_than_that_may_by_the_times_of_its_frames()
+{
+    for seed in 1..3 {
+        let (folder, sim) = (Folder::new(), Sim::one(&["--pa", "06=0"]));
+        let socket = folder.path("mpv.sock");
+        let listener = UnixListener::bind(&socket).expect("the socket is free");
+        std::thread::spawn(move || lie(listener.accept().expect("kinocue connects").0, seed));
+        let chase = format!("mpv:{}", socket.display());
+        let run = Playing::start(&folder.wave(40), &sim.to(), &["--chase", &chase]).finish();
+        assert_eq!(run.code, Some(0), "seed {seed}: {}", run.stderr);
+        let seen = sim.end();
+        assert!(seen.rest_in_park(), "seed {seed}");
+        let line = |row: &Row| {
+            (Duration::from_millis(row.time_ms.into()), f64::from(row.commanded[0]) / STROKE * 150.0)
+        };
+        let worst = worst_of_lines(Rate::from_hz(100.0), 0.0, seen.rows.iter().map(line));
+        let shares = [worst.velocity, worst.acceleration, worst.jerk];
+        assert!(seen.motion() > 300, "seed {seed}: {} frames", seen.motion());
+        assert!(shares.iter().all(|share| *share <= 1.01), "seed {seed}: {shares:?} of its limits");
+        let (_, executed) = fastest(&seen.rows);
+        assert!(executed < 2_000.0 * 240.0, "seed {seed}: its motors moved at {executed} pulses/s");
+    }
 }

@@ -27,7 +27,7 @@ fn swing(folder: &Folder) -> std::path::PathBuf {
 }
 
 /// The fastest that any axis was commanded, and that it moved from frame to frame, pulses/s.
-fn fastest(rows: &[Row]) -> (f64, f64) {
+pub(super) fn fastest(rows: &[Row]) -> (f64, f64) {
     let (mut commanded, mut executed) = (0.0_f64, 0.0_f64);
     for pair in rows.windows(2) {
         let [before, now] = pair else { continue };

@@ -72,12 +72,14 @@ fn one_that_comes_and_goes_never_takes_over() {
 }
 
 #[test]
-fn what_a_person_chose_leads_until_they_choose_anew_and_a_change_that_is_far_is_told_as_a_jump() {
+fn what_a_person_chose_leads_until_they_choose_anew_and_that_another_says_something_else_is_told() {
     let mut chooser = Chooser::default();
     chooser.choose(&two(0.0, (Locked, Locked), 9.0), None, mono(0.0));
     for t in 1..60 {
         let chosen = chooser.choose(&two(t.into(), (Locked, Locked), 9.0), Some(1), mono(t.into()));
-        assert_eq!((chosen.source, chosen.point.epoch, chosen.disagrees), (Some(1), 1, None));
+        assert_eq!((chosen.source, chosen.point.epoch), (Some(1), 1), "what is far off is told as a jump");
+        let disagrees = (t >= 10).then_some((0, ShowTime::from_secs_f64(9.0)));
+        assert_eq!(chosen.disagrees, disagrees, "{t} s");
     }
     let far = chooser.choose(&two(60.0, (Locked, Locked), 9.0), None, mono(60.0));
     assert_eq!((far.source, far.point.epoch), (Some(1), 1), "by the ranking a person decides again");

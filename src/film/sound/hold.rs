@@ -11,6 +11,8 @@ const KEPT: usize = 12_800;
 const PIECES: usize = 12;
 const APART: usize = 512;
 const LEAST_PIECES: usize = 4;
+/// What stands out by less after those is no place: of a film by 8 and more, of chance by 4 or 5.
+const GLANCE_Z: f64 = 5.5;
 /// How much faster or slower a copy may run that is thought to run at a speed.
 const SLOPE: f64 = 2.5e-4;
 const SLOPES: usize = 13;
@@ -120,7 +122,6 @@ impl Comparer {
         let thought =
             FilmPlace { film: proposed.film, at: newest as f64, media, speed: proposed.speed, z: 0.0 };
         let (mut sums, mut pieces) = ([[0.0; WIDTH]; SLOPES], 0);
-        let slope = |n: usize| (n as f64 - (SLOPES / 2) as f64) * SLOPE;
         for piece in 0..PIECES {
             let Some(middle) = newest.checked_sub(piece * APART).filter(|middle| *middle >= PIECE / 2) else {
                 break;
@@ -130,15 +131,29 @@ impl Comparer {
             for (n, sum) in sums.iter_mut().enumerate() {
                 add_moved(sum, &fit, slope(n) * (newest - middle) as f64);
             }
+            // Most proposals are chance, and that is seen soon.
+            if pieces == LEAST_PIECES && best_slope(&sums)?.0.z < GLANCE_Z {
+                return None;
+            }
         }
         if pieces < LEAST_PIECES {
             return None;
         }
-        let bests = sums.iter().enumerate().filter_map(|(n, sum)| Some((best(sum)?, slope(n))));
-        let (BestLag { lag, z }, slope) = bests.max_by(|one, other| one.0.z.total_cmp(&other.0.z))?;
+        let (BestLag { lag, z }, slope) = best_slope(&sums)?;
         let speed = thought.speed * (1.0 + slope);
         Some(FilmPlace { media: thought.media - lag * thought.speed, speed, z, ..thought })
     }
+}
+
+/// How much faster a copy runs that is thought to, by the number of its slope.
+fn slope(n: usize) -> f64 {
+    (n as f64 - (SLOPES / 2) as f64) * SLOPE
+}
+
+/// The best lag of the sums of each slope, and that slope.
+fn best_slope(sums: &[Fit; SLOPES]) -> Option<(BestLag, f64)> {
+    let bests = sums.iter().enumerate().filter_map(|(n, sum)| Some((best(sum)?, slope(n))));
+    bests.max_by(|one, other| one.0.z.total_cmp(&other.0.z))
 }
 
 /// Holds on to a place.

@@ -25,13 +25,13 @@ impl SoundIndex {
         self.trace.len() as f64 / TRACE_RATE
     }
 
-    /// Where landmarks of these hashes stand.
-    pub(crate) fn with_hashes(&self, hashes: RangeInclusive<u32>) -> impl Iterator<Item = u32> {
+    /// Landmarks of these hashes, and where they stand.
+    pub(crate) fn with_hashes(&self, hashes: RangeInclusive<u32>) -> impl Iterator<Item = (u32, u32)> {
         let from = self.landmarks.partition_point(|mark| mark.hash < *hashes.start());
         self.landmarks[from..]
             .iter()
             .take_while(move |mark| mark.hash <= *hashes.end())
-            .map(|mark| mark.frame)
+            .map(|mark| (mark.hash, mark.frame))
     }
 }
 

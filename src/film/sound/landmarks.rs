@@ -40,9 +40,9 @@ pub(crate) struct Density {
 
 impl Density {
     /// Of an index: few that are likely to be found again.
-    pub(crate) const INDEX: Self = Self { lines: 22, frames: 7, pairs: 2 };
+    pub(crate) const INDEX: Self = Self { lines: 22, frames: 7, pairs: 3 };
     /// Of a line: more, so that those of the index are among them where something else is heard over it.
-    pub(crate) const LINE: Self = Self { lines: 8, frames: 3, pairs: 14 };
+    pub(crate) const LINE: Self = Self { lines: 8, frames: 3, pairs: 28 };
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -164,9 +164,14 @@ fn hash(first: u32, second: u32, apart: u32) -> u32 {
     first << 15 | second << 6 | apart
 }
 
+/// Both lines and the spectra between them.
+pub(crate) const fn parts(hash: u32) -> [u32; 3] {
+    [hash >> 15, hash >> 6 & 0x1ff, hash & 0x3f]
+}
+
 /// The hashes of pairs whose peaks were found up to one line or spectrum beside where they are.
 pub(crate) fn alike(of: u32) -> impl Iterator<Item = RangeInclusive<u32>> {
-    let (first, second, apart) = (of >> 15, of >> 6 & 0x1ff, of & 0x3f);
+    let [first, second, apart] = parts(of);
     (0..9).map(move |n| {
         let middle = hash(first + n % 3 - 1, second + n / 3 - 1, apart);
         middle - 1..=middle + 1
