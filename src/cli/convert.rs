@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::load::cue_exit;
 use super::record::{open, unread};
-use super::{Exit, Failure, OrExit as _, print};
+use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
 use crate::record::{Places, RecordedAxis, tracks};
 
@@ -81,7 +81,7 @@ pub(super) enum ConvertTarget {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let target = target(&args.output).or_exit(Exit::Usage)?;
-    refuse_to_replace(&args.output, args.force)?;
+    exit::refuse_to_replace(&args.output, args.force)?;
     let read = match (&args.seat, args.take) {
         (Some(seat), Some(take)) => of_recording(&args.input, seat, take)?,
         _ => read(args),
@@ -104,15 +104,6 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let axes_in_words = if axes == 1 { "1 axis".to_owned() } else { format!("{axes} axes") };
     print::tell(&format!("{}: {rows} rows, {axes_in_words}, {length}", args.output.display()));
     Ok(Exit::Done)
-}
-
-/// An output that exists is replaced only where that was asked for.
-pub(super) fn refuse_to_replace(output: &Path, force: bool) -> Result<(), Failure> {
-    if !force && output.try_exists().or_exit(Exit::Io)? {
-        let error = anyhow!("{} exists; --force replaces it", output.display());
-        return Err(error).or_exit(Exit::Usage);
-    }
-    Ok(())
 }
 
 /// What the name of an output says that it is to be.

@@ -1,7 +1,10 @@
 //! Exit codes (sysexits) and the error that carries one.
 
 use std::fmt;
+use std::path::Path;
 use std::process::ExitCode;
+
+use anyhow::anyhow;
 
 /// How the program ends; the numbers are those of `sysexits.h`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,4 +76,13 @@ impl<T, E: Into<anyhow::Error>> OrExit<T> for Result<T, E> {
     fn or_exit(self, exit: Exit) -> Result<T, Failure> {
         self.map_err(|error| Failure { exit, error: error.into() })
     }
+}
+
+/// An output that exists is replaced only where that was asked for.
+pub(super) fn refuse_to_replace(output: &Path, force: bool) -> Result<(), Failure> {
+    if !force && output.try_exists().or_exit(Exit::Io)? {
+        let error = anyhow!("{} exists; --force replaces it", output.display());
+        return Err(error).or_exit(Exit::Usage);
+    }
+    Ok(())
 }

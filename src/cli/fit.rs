@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::convert;
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
-use super::{Exit, Failure, OrExit as _, print};
+use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::config::parse_level;
 use crate::motion::AxisUnit;
 use crate::proof::{self, FitManner, Fitted};
@@ -67,7 +67,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let target = convert::target(&args.output).or_exit(Exit::Usage)?;
     refuse_the_input(&args.cue, &args.output)?;
-    convert::refuse_to_replace(&args.output, args.force)?;
+    exit::refuse_to_replace(&args.output, args.force)?;
     let hall = args.seat.config.as_deref().map(load::config).transpose()?;
     let judge = args.seat.judge(hall)?;
     let timeline = Timeline::new(load::cue(&args.cue, &args.source.source())?);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 
 use super::load::{self, SeatArgs};
-use super::{Exit, Failure, OrExit as _, convert, figures, plot_recording, print};
+use super::{Exit, Failure, OrExit as _, convert, exit, figures, plot_recording, print};
 use crate::cue::Source;
 use crate::motion::SeatAxis;
 use crate::plot::{self, Columns, Picture, Subject, Theme};
@@ -88,7 +88,7 @@ enum PlotFormat {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let file = args.output.as_deref().map(|path| Ok::<_, Failure>((path, format(path)?))).transpose()?;
     if let Some((path, _)) = file {
-        convert::refuse_to_replace(path, args.force)?;
+        exit::refuse_to_replace(path, args.force)?;
     }
     if let Some(recording) = plot_recording::meant(&args.cue)? {
         let (from, until) = args.stretch();

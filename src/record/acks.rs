@@ -191,33 +191,9 @@ impl<'a> AckChunk<'a> {
 
 impl<'a> AckRecord<'a> {
     fn write(&self, out: &mut Vec<u8>) {
-        let of = |out: &mut Vec<u8>, kind: u8, controller: usize| {
-            out.push(kind);
-            out.extend_from_slice(&u16::try_from(controller).unwrap_or(u16::MAX).to_le_bytes());
-        };
         match *self {
-            Self::Reply(Reply { controller, frame, code, error, inputs, at }) => {
-                of(out, 0, controller);
-                out.extend_from_slice(&frame.0.to_le_bytes());
-                out.push(code as u8);
-                out.extend_from_slice(&error.to_le_bytes());
-                out.extend_from_slice(&inputs.to_le_bytes());
-                out.extend_from_slice(&at.as_nanos().to_le_bytes());
-            }
-            Self::Heard(origin, at, octets) => {
-                match origin {
-                    Origin::Controller(controller) => of(out, 1, controller),
-                    Origin::Stranger(from) => {
-                        out.push(2);
-                        out.extend_from_slice(&from.ip().octets());
-                        out.extend_from_slice(&from.port().to_le_bytes());
-                    }
-                }
-                out.extend_from_slice(&at.as_nanos().to_le_bytes());
-                let len = u16::try_from(octets.len()).unwrap_or(u16::MAX);
-                out.extend_from_slice(&len.to_le_bytes());
-                out.extend_from_slice(&octets[..usize::from(len)]);
-            }
+            Self::Reply(reply) => write_reply(out, reply),
+            Self::Heard(origin, at, octets) => write_heard(out, origin, at, octets),
             Self::Posted(frames) => {
                 out.push(3);
                 out.extend_from_slice(&frames.to_le_bytes());
@@ -240,12 +216,7 @@ impl<'a> AckRecord<'a> {
             }
             Self::Fate(controller, frame, fate, latency_ns) => {
                 of(out, 9, controller);
-                out.extend_from_slice(&frame.0.to_le_bytes());
-                out.push(match fate {
-                    Fate::Answered(code) => code as u8,
-                    other => 16 + place(&FATES, &other),
-                });
-                out.extend_from_slice(&latency_ns.to_le_bytes());
+                write_fate(out, frame, fate, latency_ns);
             }
             Self::Lost(controller, total) | Self::Closed(controller, total) => {
                 of(out, if matches!(self, Self::Lost(..)) { 10 } else { 11 }, controller);
@@ -310,6 +281,45 @@ impl<'a> AckRecord<'a> {
             _ => return None,
         })
     }
+}
+
+/// Begins a record that is of a controller.
+fn of(out: &mut Vec<u8>, kind: u8, controller: usize) {
+    out.push(kind);
+    out.extend_from_slice(&u16::try_from(controller).unwrap_or(u16::MAX).to_le_bytes());
+}
+
+fn write_reply(out: &mut Vec<u8>, Reply { controller, frame, code, error, inputs, at }: Reply) {
+    of(out, 0, controller);
+    out.extend_from_slice(&frame.0.to_le_bytes());
+    out.push(code as u8);
+    out.extend_from_slice(&error.to_le_bytes());
+    out.extend_from_slice(&inputs.to_le_bytes());
+    out.extend_from_slice(&at.as_nanos().to_le_bytes());
+}
+
+fn write_heard(out: &mut Vec<u8>, origin: Origin, at: MonoTime, octets: &[u8]) {
+    match origin {
+        Origin::Controller(controller) => of(out, 1, controller),
+        Origin::Stranger(from) => {
+            out.push(2);
+            out.extend_from_slice(&from.ip().octets());
+            out.extend_from_slice(&from.port().to_le_bytes());
+        }
+    }
+    out.extend_from_slice(&at.as_nanos().to_le_bytes());
+    let len = u16::try_from(octets.len()).unwrap_or(u16::MAX);
+    out.extend_from_slice(&len.to_le_bytes());
+    out.extend_from_slice(&octets[..usize::from(len)]);
+}
+
+fn write_fate(out: &mut Vec<u8>, frame: FrameNo, fate: Fate, latency_ns: u32) {
+    out.extend_from_slice(&frame.0.to_le_bytes());
+    out.push(match fate {
+        Fate::Answered(code) => code as u8,
+        other => 16 + place(&FATES, &other),
+    });
+    out.extend_from_slice(&latency_ns.to_le_bytes());
 }
 
 fn heard<'a>(origin: Origin, from: &mut Cursor<'a>) -> Option<AckRecord<'a>> {

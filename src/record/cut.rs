@@ -34,7 +34,7 @@ impl Stretch {
 
 /// How it is written.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Manner {
+pub(crate) struct CutManner {
     /// Times are those of the film, and not of the clock.
     pub(crate) film_time: bool,
     /// Without names of seats, hall and cue, and without addresses.
@@ -106,7 +106,7 @@ pub(crate) fn each_tick(
 pub(crate) fn cut<W: Write + Seek>(
     input: impl Read,
     stretch: &Stretch,
-    manner: Manner,
+    manner: CutManner,
     out: W,
 ) -> Result<W, CutError> {
     let mut out = Some(out);
@@ -144,7 +144,7 @@ struct Cutting<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> Cutting<W> {
-    fn begin(contents: &Contents, stretch: &Stretch, manner: Manner, out: W) -> Result<Self, McapError> {
+    fn begin(contents: &Contents, stretch: &Stretch, manner: CutManner, out: W) -> Result<Self, McapError> {
         let anonymous = |(index, seat): (usize, &RecordedSeat)| seat.without_names(index);
         let seats: Vec<RecordedSeat> = if manner.anonymous {
             contents.seats.iter().enumerate().map(anonymous).collect()

@@ -8,12 +8,12 @@ pub(crate) fn descriptors() -> Vec<u8> {
     const MESSAGE: i32 = 11;
     const BYTES: i32 = 12;
     const SINT64: i32 = 18;
-    let field = |(number, (name, of)): (i32, &(&str, Kind))| {
+    let field = |(number, (name, of)): (i32, &(&str, FieldKind))| {
         let (kind, is_repeated, type_name) = match of {
-            Kind::Count => (UINT32, false, None),
-            Kind::Bytes => (BYTES, false, None),
-            Kind::Numbers => (SINT64, true, None),
-            Kind::Many(message) => (MESSAGE, true, Some(format!(".kinocue.{message}"))),
+            FieldKind::Count => (UINT32, false, None),
+            FieldKind::Bytes => (BYTES, false, None),
+            FieldKind::Numbers => (SINT64, true, None),
+            FieldKind::Many(message) => (MESSAGE, true, Some(format!(".kinocue.{message}"))),
         };
         let label = if is_repeated { 3 } else { 1 };
         FieldDescriptor {
@@ -24,7 +24,7 @@ pub(crate) fn descriptors() -> Vec<u8> {
             type_name: type_name.unwrap_or_default(),
         }
     };
-    let message = |(name, fields): (&str, &[(&str, Kind)])| MessageDescriptor {
+    let message = |(name, fields): (&str, &[(&str, FieldKind)])| MessageDescriptor {
         name: name.to_owned(),
         field: (1..).zip(fields).map(field).collect(),
     };
@@ -37,32 +37,36 @@ pub(crate) fn descriptors() -> Vec<u8> {
     FileDescriptors { file: vec![file] }.encode_to_vec()
 }
 
-enum Kind {
+enum FieldKind {
     Count,
     Bytes,
     Numbers,
     Many(&'static str),
 }
 
-const MESSAGES: [(&str, &[(&str, Kind)]); 4] = [
+const MESSAGES: [(&str, &[(&str, FieldKind)]); 4] = [
     (
         "Sent",
-        &[("ticks", Kind::Count), ("tick_columns", Kind::Many("Column")), ("lanes", Kind::Many("Lane"))],
+        &[
+            ("ticks", FieldKind::Count),
+            ("tick_columns", FieldKind::Many("Column")),
+            ("lanes", FieldKind::Many("Lane")),
+        ],
     ),
     (
         "Lane",
         &[
-            ("lane", Kind::Count),
-            ("frames", Kind::Count),
-            ("frame_columns", Kind::Many("Column")),
-            ("positions", Kind::Many("Column")),
-            ("asked", Kind::Many("Column")),
-            ("vibration", Kind::Many("Column")),
-            ("raw", Kind::Bytes),
+            ("lane", FieldKind::Count),
+            ("frames", FieldKind::Count),
+            ("frame_columns", FieldKind::Many("Column")),
+            ("positions", FieldKind::Many("Column")),
+            ("asked", FieldKind::Many("Column")),
+            ("vibration", FieldKind::Many("Column")),
+            ("raw", FieldKind::Bytes),
         ],
     ),
-    ("Acks", &[("drains", Kind::Bytes)]),
-    ("Column", &[("second_differences", Kind::Numbers)]),
+    ("Acks", &[("drains", FieldKind::Bytes)]),
+    ("Column", &[("second_differences", FieldKind::Numbers)]),
 ];
 
 #[derive(Clone, PartialEq, prost::Message)]

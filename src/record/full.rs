@@ -79,7 +79,7 @@ fn columns<'a, const N: usize>(rows: impl Iterator<Item = &'a [i64; N]> + Clone)
 }
 
 /// A frame on its way into columns.
-struct Row {
+struct LaneRow {
     fields: [i64; OF_FRAME],
     positions: [i64; MAX_AXES],
     asked: [i64; MAX_AXES],
@@ -135,7 +135,7 @@ impl Block {
 /// These chunks as a block.
 fn pack(octets: &[u8], seats: &[RecordedSeat]) -> Sent {
     let mut ticks: Vec<[i64; OF_TICK]> = Vec::new();
-    let mut lanes: Vec<(Vec<Row>, Vec<u8>)> = seats.iter().map(|_| (Vec::new(), Vec::new())).collect();
+    let mut lanes: Vec<(Vec<LaneRow>, Vec<u8>)> = seats.iter().map(|_| (Vec::new(), Vec::new())).collect();
     let mut rest = octets;
     while let Some((chunk, behind)) = Chunk::parse(rest) {
         rest = behind;
@@ -151,7 +151,7 @@ fn pack(octets: &[u8], seats: &[RecordedSeat]) -> Sent {
             }
         }
     }
-    let lane = |(lane, (rows, raw)): (usize, (Vec<Row>, Vec<u8>))| {
+    let lane = |(lane, (rows, raw)): (usize, (Vec<LaneRow>, Vec<u8>))| {
         (!rows.is_empty()).then(|| lane_of(lane, &rows, raw))
     };
     let lanes = lanes.into_iter().enumerate().filter_map(lane).collect();
@@ -162,7 +162,7 @@ fn count(len: usize) -> u32 {
     u32::try_from(len).unwrap_or(u32::MAX)
 }
 
-fn lane_of(lane: usize, rows: &[Row], raw: Vec<u8>) -> Lane {
+fn lane_of(lane: usize, rows: &[LaneRow], raw: Vec<u8>) -> Lane {
     // Columns at the end that hold nothing are none.
     let trimmed = |mut columns: Vec<Column>| {
         let used = columns.iter().rposition(|column| !column.second_differences.is_empty());
@@ -180,12 +180,18 @@ fn lane_of(lane: usize, rows: &[Row], raw: Vec<u8>) -> Lane {
     }
 }
 
-fn row(frame: &SentFrame<'_>, seat: &RecordedSeat, tick: i64, deadline: MonoTime, raw: &mut Vec<u8>) -> Row {
+fn row(
+    frame: &SentFrame<'_>,
+    seat: &RecordedSeat,
+    tick: i64,
+    deadline: MonoTime,
+    raw: &mut Vec<u8>,
+) -> LaneRow {
     let asked = frame.asked;
     let after = frame.at.as_nanos().wrapping_sub(deadline.as_nanos()).cast_signed().div_euclid(1_000);
     #[expect(clippy::cast_possible_truncation, reason = "a chunk has it in so many bits")]
     let (level, handed) = (i64::from((asked.level as f32).to_bits()), frame.handed as i64);
-    let mut row = Row {
+    let mut row = LaneRow {
         fields: [0; OF_FRAME],
         positions: [0; MAX_AXES],
         asked: [0; MAX_AXES],
@@ -220,7 +226,7 @@ fn request(kind: FrameKind, datagram: &[u8]) -> Option<MotionRequest> {
     (request.emit_as(port, &mut [0; MAX_LEN]) == datagram).then_some(request)
 }
 
-fn fields(row: &mut Row, request: &MotionRequest) {
+fn fields(row: &mut LaneRow, request: &MotionRequest) {
     let MotionRequest {
         timing,
         channel,

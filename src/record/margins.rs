@@ -76,20 +76,20 @@ impl Margin {
 #[derive(Debug)]
 pub(crate) struct Margins {
     spacing: Spacing,
-    lanes: Vec<Lane>,
+    lanes: Vec<LaneMargins>,
 }
 
 #[derive(Debug)]
-struct Lane {
+struct LaneMargins {
     last: Option<MonoTime>,
     /// When its last frame is reached by the Times of its frames, which seats go by; and the Time of that.
     reached: ShowTime,
     time_ms: u32,
-    axes: Vec<Axis>,
+    axes: Vec<AxisMargins>,
 }
 
 #[derive(Debug)]
-struct Axis {
+struct AxisMargins {
     measure: Measure,
     /// The greatest so far, and the show time of each.
     most: [(f64, ShowTime); 3],
@@ -102,8 +102,8 @@ impl Margins {
     /// A measure of frames at that rate.
     pub(crate) fn new(seats: &[RecordedSeat], rate: Rate) -> Self {
         let spacing = Spacing::at_rate(rate.hz());
-        let axis = || Axis { measure: Measure::new(spacing), most: [(0.0, ShowTime::ZERO); 3] };
-        let lane = |seat: &RecordedSeat| Lane {
+        let axis = || AxisMargins { measure: Measure::new(spacing), most: [(0.0, ShowTime::ZERO); 3] };
+        let lane = |seat: &RecordedSeat| LaneMargins {
             last: None,
             reached: ShowTime::ZERO,
             time_ms: 0,
@@ -155,7 +155,7 @@ impl Margins {
 
     /// The most of each axis.
     pub(crate) fn most(&self, seats: &[RecordedSeat]) -> Vec<Margin> {
-        let of_axis = |seat: &RecordedSeat, index: usize, axis: &Axis| {
+        let of_axis = |seat: &RecordedSeat, index: usize, axis: &AxisMargins| {
             let limits = seat.axes()[index].limits();
             let name = seat.name.clone();
             let margin = move |(quantity, (value, film)): (Quantity, (f64, ShowTime))| Margin {
@@ -168,7 +168,7 @@ impl Margins {
             };
             Quantity::ALL.into_iter().zip(axis.most).map(margin).collect::<Vec<_>>()
         };
-        let of_lane = |(lane, seat): (&Lane, &RecordedSeat)| {
+        let of_lane = |(lane, seat): (&LaneMargins, &RecordedSeat)| {
             lane.axes
                 .iter()
                 .enumerate()
@@ -179,7 +179,7 @@ impl Margins {
     }
 }
 
-impl Axis {
+impl AxisMargins {
     /// Takes a place, and gives what that showed.
     fn push(&mut self, now: ShowTime, film: ShowTime, place: f64, limits: [f64; 3]) -> Parts {
         let seen = self.measure.push(now, place);

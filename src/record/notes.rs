@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::recording::{schema, state_schema};
+use super::schemas::{schema, state_schema};
 
 /// How the hall stands.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]

@@ -179,7 +179,7 @@ impl Wanted<'_> {
 
 /// What the messages of a channel are.
 #[derive(Debug, Clone)]
-enum Topic {
+enum RecordedTopic {
     Seat(usize),
     Tick,
     Hall,
@@ -234,7 +234,7 @@ pub(crate) fn beginning(input: impl Read) -> Result<BTreeMap<String, String>, Re
 
 struct Reading<'a, 'b> {
     contents: Contents,
-    topics: BTreeMap<u16, (String, Topic)>,
+    topics: BTreeMap<u16, (String, RecordedTopic)>,
     wanted: Wanted<'a>,
     take: &'b mut dyn FnMut(&Contents, MonoTime, Told<'_>),
 }
@@ -269,15 +269,15 @@ impl Reading<'_, '_> {
         Ok(())
     }
 
-    fn topic(&self, topic: &str) -> Topic {
+    fn topic(&self, topic: &str) -> RecordedTopic {
         match topic {
-            "/tick" => Topic::Tick,
-            "/hall" => Topic::Hall,
-            SENT => Topic::Sent,
-            ACKS => Topic::Acks,
+            "/tick" => RecordedTopic::Tick,
+            "/hall" => RecordedTopic::Hall,
+            SENT => RecordedTopic::Sent,
+            ACKS => RecordedTopic::Acks,
             other => {
                 let seat = other.strip_prefix("/seat/").and_then(|name| self.contents.seat(name));
-                seat.map_or_else(|| Topic::Other(other.to_owned()), Topic::Seat)
+                seat.map_or_else(|| RecordedTopic::Other(other.to_owned()), RecordedTopic::Seat)
             }
         }
     }
@@ -293,25 +293,25 @@ impl Reading<'_, '_> {
         let (first, last) = contents.span.unwrap_or((log_time, log_time));
         contents.span = Some((first.min(log_time), last.max(log_time)));
         let told = match topic {
-            Topic::Seat(lane) => {
+            RecordedTopic::Seat(lane) => {
                 let is_wanted = wanted.seat.is_none_or(|name| contents.seats[*lane].name == name);
                 if !wanted.samples || !is_wanted {
                     return;
                 }
                 json(data).map(|sample| Told::Seat(*lane, sample))
             }
-            Topic::Tick => json(data).map(Told::Tick),
-            Topic::Hall => json::<Value>(data).and_then(|hall| {
+            RecordedTopic::Tick => json(data).map(Told::Tick),
+            RecordedTopic::Hall => json::<Value>(data).and_then(|hall| {
                 hall["state"].as_u64().map(Told::State).ok_or_else(|| "no state".to_owned())
             }),
             // For programs that judge acks again; there is none yet.
-            Topic::Acks => return,
-            Topic::Sent if !wanted.full => return,
-            Topic::Sent => {
+            RecordedTopic::Acks => return,
+            RecordedTopic::Sent if !wanted.full => return,
+            RecordedTopic::Sent => {
                 let chunks = full::unpack(data, &contents.seats);
                 chunks.map(Told::Chunks).ok_or_else(|| "not a block of ticks".to_owned())
             }
-            Topic::Other(name) => Ok(Told::Other(name, data)),
+            RecordedTopic::Other(name) => Ok(Told::Other(name, data)),
         };
         match told {
             Ok(told) => take(contents, contents.instant(log_time), told),

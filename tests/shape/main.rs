@@ -22,24 +22,23 @@ type Row = (&'static str, fn(&[File]) -> (f64, String), Better, f64, f64);
 /// What is counted, how, which way is better, what it was when it was noted last, and the target.
 const ROWS: &[Row] = &[
     // The streams of the two families of drives, counted together, as both have one name in one room.
-    ("methods on one type", counts::methods_of_one_type, Less, 77.0, 25.0),
+    ("methods on one type", counts::methods_of_one_type, Less, 74.0, 25.0),
     ("bool fields in one struct", counts::bools_of_one_struct, Less, 6.0, 3.0),
     ("enums with the words of the hall's state", counts::encodings_of_state, Less, 1.0, 1.0),
     ("compositions", counts::compositions, Less, 1.0, 1.0),
     ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 109.0, 30.0),
-    ("uses of one type name", counts::uses_of_one_type_name, Less, 8.0, 2.0),
+    ("uses of one type name", counts::uses_of_one_type_name, Less, 5.0, 2.0),
     // One left is the stop, which is a flag by design: whoever asks for it waits for nobody. Of the nine before, four were no
     // such flags, but said that something was due, or took a pose; they are named so now.
     ("polled said-once flags", counts::flags_told_once, Less, 2.0, 0.0),
     ("polling sleeps in the supervisor", counts::sleeps_of_the_supervisor, Less, 0.0, 0.0),
-    // To be undone: three came with the second family of drives that is played, one with drives in the demo.
-    ("circles within rooms", circles::within_rooms, Less, 4.0, 0.0),
+    ("circles within rooms", circles::within_rooms, Less, 0.0, 0.0),
     ("rooms that know config", counts::rooms_that_know_config, Less, 17.0, 9.0),
     // By this count 49 where the target of 170 was set, of what were 192 then, lists of public fields among them.
     // Two more for one more command in the list of commands.
     // Six more for two families of drives that are simulated and decoded side by side, most of them rows of tables.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 58.0, 43.0),
-    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 12.0, 2.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 60.0, 43.0),
+    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 9.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
     // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 1,040 for films
@@ -53,7 +52,7 @@ const ROWS: &[Row] = &[
     // families of drives, read and written, and virtual units of both; 2,200 for the host's end of a SilverMax line, and 180 for homing by it;
     // 2,510 for drives in the service and in its status, pictures of cues and recordings of plays.
     // 5,430 more for SIXpack 2 seats in plays and halls, drives in the demo and in `register`, and recordings in the service.
-    ("lines of code", counts::lines_of_code, Less, 81_080.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 82_460.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     ("public items and fields", counts::public_items, Less, 1_222.0, 400.0),

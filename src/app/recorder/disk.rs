@@ -86,7 +86,7 @@ impl Drop for Unbegun {
 
 /// A recording that is there.
 #[derive(Debug, Clone)]
-struct Kept {
+struct KeptFile {
     path: PathBuf,
     len: u64,
     modified: SystemTime,
@@ -160,7 +160,7 @@ impl Disk {
         all = kept;
         for (is_incident, most_gib) in [(false, self.record.max_total_gib), (true, self.record.incidents_gib)]
         {
-            let of_kind = |one: &&Kept| one.is_incident == is_incident;
+            let of_kind = |one: &&KeptFile| one.is_incident == is_incident;
             let mut total: u64 = all.iter().filter(of_kind).map(|one| one.len).sum();
             let mut gone = Vec::new();
             for one in all.iter().filter(of_kind).take_while(|one| {
@@ -203,7 +203,7 @@ impl Disk {
     }
 
     /// Recordings that are whole, oldest first. What has another name is none.
-    fn kept(&self) -> io::Result<Vec<Kept>> {
+    fn kept(&self) -> io::Result<Vec<KeptFile>> {
         let mut all = Vec::new();
         for entry in fs::read_dir(&self.dir)? {
             let entry = entry?;
@@ -211,7 +211,7 @@ impl Disk {
             if about.is_file() && is_recording(&name) {
                 let is_incident = name.get(19..).is_some_and(|rest| rest.starts_with("-incident-"));
                 let modified = about.modified()?;
-                all.push(Kept { path: entry.path(), len: about.len(), modified, is_incident });
+                all.push(KeptFile { path: entry.path(), len: about.len(), modified, is_incident });
             }
         }
         all.sort_by(|one, other| one.path.cmp(&other.path));
@@ -242,7 +242,7 @@ fn gib(octets: u64) -> f64 {
 }
 
 /// What cannot be removed is tried again the next time.
-fn remove(one: &Kept) {
+fn remove(one: &KeptFile) {
     let _ = fs::remove_file(&one.path);
 }
 

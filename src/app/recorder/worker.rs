@@ -45,7 +45,7 @@ struct OpenFile {
 }
 
 /// A show that is recorded, whether a file of it is open or not.
-struct OpenShow {
+struct OpenRecording {
     start: ShowStart,
     part: u32,
     file: Option<OpenFile>,
@@ -71,7 +71,7 @@ pub(super) struct Worker {
     recent: VecDeque<Entry>,
     /// How the hall stands, for files that are begun later.
     hall: Option<Entry>,
-    show: Option<OpenShow>,
+    show: Option<OpenRecording>,
     incidents: Incidents,
     incident: Option<OpenFile>,
     closes: bool,
@@ -251,7 +251,8 @@ impl Worker {
         if self.record.mode == RecordMode::Off {
             return;
         }
-        self.show = Some(OpenShow { start, part: 0, file: None, again_at: None, until: None, report: None });
+        self.show =
+            Some(OpenRecording { start, part: 0, file: None, again_at: None, until: None, report: None });
         self.open_part(now);
     }
 
@@ -393,7 +394,7 @@ impl Worker {
     }
 
     fn close_show(&mut self, now: MonoTime) {
-        let Some(OpenShow { file, report, .. }) = self.show.take() else { return };
+        let Some(OpenRecording { file, report, .. }) = self.show.take() else { return };
         self.link.tell(|status| status.recording = None);
         if let Some(Err(error)) = file.map(|open| self.close_file(open, report.as_deref())) {
             self.fail_show(&error, now);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow};
 
-use super::super::{Exit, Failure, OrExit as _, convert, print};
+use super::super::{Exit, Failure, OrExit as _, exit, print};
 use super::open;
 use crate::record::{CutError, CutManner, RecordedSeat, Stretch, cut, each_tick};
 use crate::time::{ShowTime, parse_time};
@@ -58,7 +58,7 @@ fn stretch(text: &str) -> Result<(ShowTime, ShowTime), String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    convert::refuse_to_replace(&args.output, args.force)?;
+    exit::refuse_to_replace(&args.output, args.force)?;
     let (from, until) = args.film.unwrap_or((ShowTime::from_nanos(i64::MIN), ShowTime::from_nanos(i64::MAX)));
     let stretch = Stretch { from, until, seat: args.seat.clone() };
     let part = args.output.with_extension("cutting");

@@ -34,7 +34,7 @@ pub(in super::super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (contents, summary) = summarize(open(&args.file)?).map_err(|error| unread(error, &args.file))?;
     if args.json {
-        print::json(&Told::new(&contents, &summary))?;
+        print::json(&InfoTold::new(&contents, &summary))?;
     } else {
         print::out(&text(&args.file.display().to_string(), &contents, &summary))?;
     }
@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 #[derive(Debug, Serialize)]
-struct Told<'a> {
+struct InfoTold<'a> {
     metadata: &'a BTreeMap<String, String>,
     end: &'a BTreeMap<String, String>,
     messages: &'a BTreeMap<String, u64>,
@@ -53,18 +53,47 @@ struct Told<'a> {
     summary: &'a Summary,
 }
 
-impl<'a> Told<'a> {
+impl<'a> InfoTold<'a> {
     fn new(contents: &'a Contents, summary: &'a Summary) -> Self {
         let Contents { begin, end, messages, attachments, .. } = contents;
         Self { metadata: begin, end, messages, attachments, flaws: flaws(contents), summary }
     }
 }
 
+fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
+    out.write_fmt(format_args!("{text}\n")).expect("a String takes all text");
+}
+
+/// A line for each seat, below what stands in them.
+fn seats(summary: &Summary) -> String {
+    let mut out = String::new();
+    let mut line = |text: std::fmt::Arguments<'_>| put(&mut out, text);
+    line(format_args!(
+        "  {:<12}{:>10}{:>8}{:>8}{:>10}  {:>7}{:>7}{:>7}",
+        "seat", "sent", "unsent", "clamps", "apart", "speed", "acc", "jerk"
+    ));
+    for seat in &summary.seats {
+        let part = |quantity| {
+            let of_seat = summary.most.iter().filter(|one| one.seat == seat.name && one.quantity == quantity);
+            let most = of_seat.map(Margin::part).fold(0.0, f64::max);
+            format!("{:.0} %", 100.0 * most)
+        };
+        let [speed, acceleration, jerk] = Quantity::ALL.map(part);
+        let apart = format!("{:.2}", seat.apart);
+        line(format_args!(
+            "  {:<12}{:>10}{:>8}{:>8}{apart:>10}  {speed:>7}{acceleration:>7}{jerk:>7}",
+            shown(&seat.name),
+            seat.sent,
+            seat.unsent,
+            seat.clamps
+        ));
+    }
+    out
+}
+
 fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
     let mut out = String::new();
-    let mut line = |text: std::fmt::Arguments<'_>| {
-        out.write_fmt(format_args!("{text}\n")).expect("a String takes all text")
-    };
+    let mut line = |text: std::fmt::Arguments<'_>| put(&mut out, text);
     let entry = |key| shown(contents.entry(key));
     line(format_args!(
         "{name}: {} recording of {}, {} Hz, by {}",
@@ -91,26 +120,8 @@ fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
     if let Some(margin) = summary.nearest() {
         line(format_args!("  nearest   {}", margin.in_words()));
     }
-    line(format_args!(
-        "  {:<12}{:>10}{:>8}{:>8}{:>10}  {:>7}{:>7}{:>7}",
-        "seat", "sent", "unsent", "clamps", "apart", "speed", "acc", "jerk"
-    ));
-    for seat in &summary.seats {
-        let part = |quantity| {
-            let of_seat = summary.most.iter().filter(|one| one.seat == seat.name && one.quantity == quantity);
-            let most = of_seat.map(Margin::part).fold(0.0, f64::max);
-            format!("{:.0} %", 100.0 * most)
-        };
-        let [speed, acceleration, jerk] = Quantity::ALL.map(part);
-        let apart = format!("{:.2}", seat.apart);
-        line(format_args!(
-            "  {:<12}{:>10}{:>8}{:>8}{apart:>10}  {speed:>7}{acceleration:>7}{jerk:>7}",
-            shown(&seat.name),
-            seat.sent,
-            seat.unsent,
-            seat.clamps
-        ));
-    }
+    out += &seats(summary);
+    let mut line = |text: std::fmt::Arguments<'_>| put(&mut out, text);
     for (topic, count) in &contents.messages {
         line(format_args!("  {count:>9} × {}", shown(topic)));
     }

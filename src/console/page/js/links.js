@@ -39,7 +39,7 @@ let parts = [];
 /** Shows them; the panel goes where the hall has none. */
 export function showLinks(status) {
   if (!status) return;
-  const { links, controllers } = status;
+  const { links = [], controllers } = status;
   setProperty(byId('links-panel'), 'hidden', links.length === 0);
   layOut(links.map(({ name, port, dialect, axes }) => ({ name, port, dialect, axes: axes.map(({ controller, axis }) => `${controller} a${axis}`) })));
   for (const [place, link] of links.entries()) showLink(parts[place], link, controllers);

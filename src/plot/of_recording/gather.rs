@@ -1,0 +1,317 @@
+//! What is gathered of a stretch of a recording for its picture, column by column.
+
+use super::Look;
+use crate::plot::{Band, Flag, Shade, TimeAxis};
+use crate::record::{Contents, Margins, SeatSample, TickSample, Told, each_chunk, state_word};
+use crate::time::{MonoTime, Rate, ShowTime};
+
+/// Asked and sent are apart where they differ by more, mm or degrees: more than pulses and rounding make.
+pub(super) const APART: f64 = 0.02;
+/// Upper ends of a histogram's bins, µs; the last has no end.
+pub(super) const BINS_US: [f64; 12] =
+    [10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4, 1e5, f64::INFINITY];
+/// Lateness of a column is kept of so many ticks at the most.
+const KEPT: usize = 20_000;
+
+/// Least and greatest of each column of each axis.
+#[derive(Debug, Default)]
+pub(super) struct Traces(pub(super) Vec<Vec<Option<[f32; 2]>>>);
+
+impl Traces {
+    fn of(axes: usize, columns: usize) -> Self {
+        Self(vec![vec![None; columns]; axes])
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "a picture is no finer")]
+    fn take(&mut self, column: usize, places: impl IntoIterator<Item = f64>) {
+        for (trace, place) in self.0.iter_mut().zip(places) {
+            let place = place as f32;
+            if !place.is_finite() {
+                continue;
+            }
+            let [low, high] = trace[column].unwrap_or([place, place]);
+            trace[column] = Some([low.min(place), high.max(place)]);
+        }
+    }
+
+    pub(super) fn ends(&self) -> Option<(f64, f64)> {
+        let known = self.0.iter().flatten().flatten();
+        let ends = known.fold(None, |ends: Option<(f32, f32)>, [low, high]| {
+            let (least, most) = ends.unwrap_or((*low, *high));
+            Some((least.min(*low), most.max(*high)))
+        })?;
+        Some((ends.0.into(), ends.1.into()))
+    }
+
+    pub(super) fn bands(self, name: impl Fn(usize) -> String, style: usize) -> Vec<Band> {
+        let band = |(axis, columns)| Band { name: name(axis), style: axis + style, columns };
+        self.0.into_iter().enumerate().map(band).collect()
+    }
+}
+
+/// Something that is on at times: its name, columns, and how often.
+pub(super) type CountedLane = (&'static str, Vec<Shade>, u64);
+
+/// What is gathered of a stretch of a recording for its picture.
+#[derive(Debug)]
+pub(crate) struct Gathered {
+    pub(super) look: Look,
+    pub(super) asked: Traces,
+    pub(super) sent: Traces,
+    pub(super) measured: Traces,
+    pub(super) apart: Traces,
+    pub(super) parts: Traces,
+    /// The most of each axis and quantity in the stretch: part, show time.
+    pub(super) most: Vec<[(f64, f64); 3]>,
+    pub(super) margins: Option<Margins>,
+    pub(super) late: Vec<Vec<f32>>,
+    pub(super) acks: Traces,
+    pub(super) lateness: Vec<u64>,
+    pub(super) latency: Vec<u64>,
+    pub(super) counts: SeatCounts,
+    /// What is on.
+    pub(super) lanes: Vec<CountedLane>,
+    pub(super) state: Option<&'static str>,
+    pub(super) states: Vec<(&'static str, Vec<Shade>)>,
+    pub(super) flags: Vec<Flag>,
+    pub(super) column: usize,
+    /// Ticks are taken from whole ones, and not from samples.
+    pub(super) is_whole: bool,
+}
+
+/// What the sentence is made of.
+#[derive(Debug, Default)]
+pub(super) struct SeatCounts {
+    pub(super) sent: u64,
+    pub(super) acked: u64,
+    pub(super) lost: u64,
+    pub(super) refused: u64,
+    pub(super) unsent: u64,
+    pub(super) clamps: u64,
+    pub(super) missed: u64,
+    pub(super) dropped: u64,
+    pub(super) late_us: f64,
+    pub(super) late_s: f64,
+    pub(super) ack_us: f64,
+    /// The greatest distance of asked and sent, and its show time.
+    pub(super) apart: f64,
+    pub(super) apart_s: f64,
+    /// How long they were apart in one piece, about the greatest; and the piece that is not over, with its own greatest.
+    pub(super) held: f64,
+    pub(super) piece: Option<(MonoTime, f64)>,
+}
+
+impl Gathered {
+    /// Nothing yet. `is_whole` where the file has every tick.
+    pub(crate) fn new(contents: &Contents, look: Look, is_whole: bool) -> Self {
+        let (axes, columns) = (contents.seats[look.lane].axes().len(), look.time.columns);
+        let lane = |name| (name, vec![Shade::default(); columns], 0);
+        let margins = is_whole.then(|| Margins::new(&contents.seats, Rate::from_hz(contents.rate_hz())));
+        Self {
+            look,
+            asked: Traces::of(axes, columns),
+            sent: Traces::of(axes, columns),
+            measured: Traces::of(axes, columns),
+            apart: Traces::of(axes, columns),
+            parts: Traces::of(3, columns),
+            most: vec![[(0.0, 0.0); 3]; axes],
+            margins,
+            late: vec![Vec::new(); columns],
+            acks: Traces::of(1, columns),
+            lateness: vec![0; BINS_US.len()],
+            latency: vec![0; BINS_US.len()],
+            counts: SeatCounts::default(),
+            lanes: ["held", "missed", "lost", "refused", "untaken", "gaps"].map(lane).into(),
+            state: None,
+            states: Vec::new(),
+            flags: Vec::new(),
+            column: 0,
+            is_whole,
+        }
+    }
+
+    /// Takes what a file tells.
+    pub(crate) fn take(&mut self, contents: &Contents, at: MonoTime, told: Told<'_>) {
+        match told {
+            Told::Seat(lane, sample) if lane == self.look.lane => self.seat(at, &sample),
+            Told::Tick(sample) => self.tick(&sample),
+            Told::State(state) => self.state = Some(state_word(state)),
+            Told::Chunks(chunks) => self.chunks(contents, &chunks),
+            Told::Other(topic @ ("/mark" | "/event" | "/action"), data) => {
+                let at_s = self.at_s();
+                let name = format!("{}: {}", &topic[1..], String::from_utf8_lossy(data));
+                self.flags.push(Flag { at_s, name });
+            }
+            _ => {}
+        }
+    }
+
+    /// The show time of the column that was taken last.
+    #[expect(clippy::cast_precision_loss, reason = "some thousand columns")]
+    fn at_s(&self) -> f64 {
+        let TimeAxis { from_s, until_s, columns } = self.look.time;
+        from_s + (until_s - from_s) * self.column as f64 / columns as f64
+    }
+
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "0 to the number of columns"
+    )]
+    fn place(&mut self, film_s: f64) -> Option<usize> {
+        let time = &self.look.time;
+        let part = time.part(film_s)?;
+        self.column = ((part * time.columns as f64) as usize).min(time.columns - 1);
+        Some(self.column)
+    }
+
+    fn seat(&mut self, at: MonoTime, sample: &SeatSample) {
+        let Some(column) = self.place(sample.film_s) else { return };
+        self.measured.take(column, sample.measured_mm.iter().copied());
+        let counts = &mut self.counts;
+        counts.acked += u64::from(sample.acked);
+        counts.lost += sample.lost;
+        counts.refused += u64::from(sample.refused);
+        self.on(2, column, sample.lost);
+        self.on(3, column, sample.refused.into());
+        if let Some(ack) = sample.ack_max_us {
+            self.acks.take(column, [ack / 1e3]);
+            self.counts.ack_us = self.counts.ack_us.max(ack);
+        }
+        if let Some(ack) = sample.ack_us {
+            self.latency[bin(ack)] += 1;
+        }
+        if !self.is_whole {
+            self.frame(at, sample.film_s, column, &sample.asked_mm, &sample.sent_mm);
+            self.counts.sent += u64::from(sample.sent);
+            self.counts.unsent += u64::from(sample.unsent);
+            self.counts.clamps += sample.clamps;
+            self.on(0, column, sample.clamps);
+            self.on(4, column, sample.unsent.into());
+        }
+    }
+
+    fn frame(&mut self, at: MonoTime, film_s: f64, column: usize, asked: &[f64], sent: &[f64]) {
+        self.asked.take(column, asked.iter().copied());
+        self.sent.take(column, sent.iter().copied());
+        let apart = || asked.iter().zip(sent).map(|(asked, sent)| asked - sent);
+        self.apart.take(column, apart());
+        self.counts.apart(at, film_s, apart().map(f64::abs).fold(0.0, f64::max));
+    }
+
+    fn tick(&mut self, sample: &TickSample) {
+        let Some(column) = self.place(sample.film_s) else { return };
+        if let Some(word) = self.state {
+            let columns = self.look.time.columns;
+            let known = self.states.iter().position(|(one, _)| *one == word);
+            let index = known.unwrap_or_else(|| {
+                self.states.push((word, vec![Shade::default(); columns]));
+                self.states.len() - 1
+            });
+            self.states[index].1[column] = Shade { height: 1.0, tone: 1.0 };
+        }
+        self.counts.missed += sample.missed;
+        self.counts.dropped += sample.dropped;
+        self.on(1, column, sample.missed);
+        self.on(5, column, sample.dropped);
+        if !self.is_whole {
+            self.late(column, sample.film_s, sample.late_max_us);
+        }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "a picture is no finer")]
+    fn late(&mut self, column: usize, film_s: f64, late_us: f64) {
+        if self.late[column].len() < KEPT {
+            self.late[column].push((late_us / 1e3) as f32);
+        }
+        self.lateness[bin(late_us)] += 1;
+        if late_us > self.counts.late_us {
+            (self.counts.late_us, self.counts.late_s) = (late_us, film_s);
+        }
+    }
+
+    fn chunks(&mut self, contents: &Contents, chunks: &[u8]) {
+        let mut margins = self.margins.take();
+        let (lane, seat) = (self.look.lane, &contents.seats[self.look.lane]);
+        let mut clamps = None;
+        each_chunk(chunks, |chunk| {
+            let film_s = chunk.head.film.as_secs_f64();
+            let at = chunk.head.deadline;
+            if let Some(margins) = &mut margins {
+                margins.take(chunk, &contents.seats, &mut |of, axis, parts| {
+                    if of == lane {
+                        self.parts_of(axis, parts);
+                    }
+                });
+            }
+            let Some(column) = self.place(film_s) else { return };
+            self.late(column, film_s, micros(chunk.head.late_ns));
+            for frame in chunk.frames().filter(|frame| frame.lane == lane) {
+                let is_taken = frame.handed.is_taken();
+                self.counts.sent += u64::from(is_taken);
+                self.counts.unsent += u64::from(!is_taken);
+                self.on(4, column, (!is_taken).into());
+                let (asked, sent) = (seat.asked(&frame.asked), seat.sent(&frame));
+                self.frame(at, film_s, column, &asked, &sent);
+                if !asked.is_empty() {
+                    let more = frame
+                        .asked
+                        .clamps
+                        .saturating_sub(clamps.replace(frame.asked.clamps).unwrap_or(frame.asked.clamps));
+                    self.counts.clamps += more;
+                    self.on(0, column, more);
+                }
+            }
+        });
+        self.margins = margins;
+    }
+
+    fn parts_of(&mut self, axis: usize, parts: [(ShowTime, f64); 3]) {
+        for (order, (at, part)) in parts.into_iter().enumerate() {
+            let at_s = at.as_secs_f64();
+            if let Some(column) = self.place(at_s) {
+                let place = |index| if index == order { 100.0 * part } else { f64::NAN };
+                self.parts.take(column, (0..3).map(place));
+                if part > self.most[axis][order].0 {
+                    self.most[axis][order] = (part, at_s);
+                }
+            }
+        }
+    }
+
+    fn on(&mut self, lane: usize, column: usize, count: u64) {
+        if count > 0 {
+            self.lanes[lane].1[column] = Shade { height: 1.0, tone: 1.0 };
+            self.lanes[lane].2 += count;
+        }
+    }
+}
+
+impl SeatCounts {
+    /// Notes how far asked and sent are apart, and for how long in one piece.
+    fn apart(&mut self, at: MonoTime, film_s: f64, apart: f64) {
+        if apart <= APART {
+            self.piece = None;
+            return;
+        }
+        let (since, most) = self.piece.unwrap_or((at, 0.0));
+        let most = most.max(apart);
+        self.piece = Some((since, most));
+        if apart > self.apart {
+            (self.apart, self.apart_s) = (apart, film_s);
+        }
+        if most >= self.apart {
+            self.held = at.since(since).as_secs_f64();
+        }
+    }
+}
+
+fn bin(us: f64) -> usize {
+    BINS_US.iter().position(|end| us <= *end).unwrap_or(BINS_US.len() - 1)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "less than an hour")]
+fn micros(ns: u64) -> f64 {
+    ns as f64 / 1e3
+}

@@ -1,0 +1,121 @@
+//! A recording of one seat as a picture: asked, sent and measured, how far they are apart, lateness and acks, what was on, and the
+//! sentence that says what happened.
+
+mod gather;
+mod panels;
+mod words;
+
+use std::mem::take;
+
+pub(crate) use self::gather::Gathered;
+use self::gather::{BINS_US, CountedLane};
+use self::panels::panels;
+use self::words::{facts, seats, sentence, title};
+use super::text::number;
+use super::{Histogram, Lane, Picture, Shade, TimeAxis};
+use crate::record::{Contents, Summary};
+
+/// What a recording is looked at for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look {
+    /// The seat, by its place.
+    pub(crate) lane: usize,
+    /// The time axis, in show time.
+    pub(crate) time: TimeAxis,
+    /// Whether asked positions and percentiles are drawn as well: a terminal has no room for them.
+    pub(crate) is_detailed: bool,
+}
+
+/// The picture of what was gathered; with the sent positions of another recording, if one is laid over it.
+pub(crate) fn of_recording(
+    contents: &Contents,
+    summary: &Summary,
+    mut gathered: Gathered,
+    other: Option<Gathered>,
+) -> Picture {
+    let seat = &contents.seats[gathered.look.lane];
+    let (lateness, latency) = (take(&mut gathered.lateness), take(&mut gathered.latency));
+    let histograms = [histogram("Lateness", lateness), histogram("Ack latency", latency)];
+    Picture {
+        title: title(contents, &seat.name),
+        sentence: sentence(&seat.name, &gathered, contents.rate_hz()),
+        facts: facts(contents, summary),
+        time: gathered.look.time,
+        lanes: strips(take(&mut gathered.lanes), take(&mut gathered.states)),
+        flags: take(&mut gathered.flags),
+        table: seats(summary),
+        histograms: histograms
+            .into_iter()
+            .filter(|one| one.bins.iter().any(|(_, count)| *count > 0))
+            .collect(),
+        panels: panels(seat, gathered, other),
+    }
+}
+
+/// What was on, and the states of the hall.
+fn strips(lanes: Vec<CountedLane>, states: Vec<(&'static str, Vec<Shade>)>) -> Vec<Lane> {
+    let strip = |name: &str, note, columns| Lane { name: name.to_owned(), note, columns };
+    let used = lanes.into_iter().filter(|(.., count)| *count > 0);
+    let used = used.map(|(name, columns, count)| strip(name, format!("{count}×"), columns));
+    used.chain(states.into_iter().map(|(word, columns)| strip(word, String::new(), columns))).collect()
+}
+
+fn histogram(name: &'static str, counts: Vec<u64>) -> Histogram {
+    Histogram { name, bins: BINS_US.iter().map(|end| bin_name(*end)).zip(counts).collect() }
+}
+
+fn bin_name(end: f64) -> String {
+    match end {
+        end if end.is_infinite() => "more".to_owned(),
+        end if end >= 1_000.0 => format!("{} ms", number(end / 1_000.0)),
+        end => format!("{} µs", number(end)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::{Theme, braille, page, svg};
+    use super::*;
+    use crate::record::{Mode, Wanted, read, recorded_as, summarize};
+
+    /// What a seat at rest in the middle, that was asked for a tenth of the stroke more in some ticks, looks like.
+    fn drawn(mode: Mode, asked: std::ops::Range<u32>, columns: usize) -> Picture {
+        let ticks = (0..300).map(|tick| (if asked.contains(&tick) { 0.6 } else { 0.5 }, 0.5));
+        let file = recorded_as(mode, ticks);
+        let (contents, summary) = summarize(file.as_slice()).unwrap();
+        let time = TimeAxis { from_s: 0.0, until_s: 2.99, columns };
+        let mut gathered =
+            Gathered::new(&contents, Look { lane: 0, time, is_detailed: true }, mode == Mode::Full);
+        read(file.as_slice(), Wanted::ALL, &mut |contents, at, told| gathered.take(contents, at, told))
+            .unwrap();
+        of_recording(&contents, &summary, gathered, None)
+    }
+
+    #[test]
+    fn the_sentence_says_when_a_seat_was_held_back_and_for_how_long() {
+        let picture = drawn(Mode::Full, 114..122, 300);
+        let expected = "A1 at 00:01.140: held back by the limiter for 80 ms, by up to 15 mm; ";
+        assert!(picture.sentence.starts_with(expected), "{}", picture.sentence);
+        let sampled = drawn(Mode::Sampled, 114..122, 300);
+        let expected = "held back by the limiter for about 120 ms, by up to 15 mm; ";
+        assert!(sampled.sentence.contains(expected), "{}", sampled.sentence);
+        let quiet = drawn(Mode::Full, 0..0, 300);
+        assert!(quiet.sentence.starts_with("A1: sent as it was asked for; "), "{}", quiet.sentence);
+        for drawn in [braille(&picture), svg(&picture, Theme::Auto), page(&picture, Theme::Auto)] {
+            assert!(drawn.contains("held back by the limiter for 80 ms") && drawn.len() < 500_000);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn one_tick_that_was_held_back_shows_however_narrow_the_picture(at in 1_u32..299, columns in 1_usize..200, whole in any::<bool>()) {
+            let mode = if whole { Mode::Full } else { Mode::Sampled };
+            let picture = drawn(mode, at..at + 1, columns);
+            let panel = picture.panels.iter().find(|panel| panel.name == "Asked less sent").expect("they differ");
+            let most = panel.bands[0].columns.iter().flatten().map(|[_, most]| *most).fold(0.0, f32::max);
+            prop_assert!((most - 15.0).abs() < 0.01, "{most}");
+        }
+    }
+}

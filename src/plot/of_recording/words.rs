@@ -1,0 +1,113 @@
+//! What a picture of a recording says in words: the sentence, the facts below it, a row for each seat.
+
+use super::gather::{APART, Gathered};
+use crate::plot::Table;
+use crate::plot::text::number;
+use crate::record::{Contents, Summary};
+use crate::time::ShowTime;
+
+/// A tick is late from here on, µs.
+const LATE_US: f64 = 1_000.0;
+
+/// To two places where that is little.
+pub(super) fn places(value: f64) -> String {
+    if value < 10.0 { format!("{value:.2}") } else { number(value) }
+}
+
+pub(super) fn title(contents: &Contents, seat: &str) -> String {
+    let title = contents.entry("title");
+    format!("{}, {seat}", if title.is_empty() { contents.entry("cue") } else { title })
+}
+
+/// What happened to a seat, for whoever asks why it jerked.
+pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String {
+    let counts = &gathered.counts;
+    if counts.sent + counts.unsent == 0 {
+        return format!("{name}: nothing was sent in what is shown.");
+    }
+    let held = counts.apart > APART || counts.clamps > 0;
+    let mut words = if held {
+        let at = ShowTime::from_secs_f64(counts.apart_s);
+        // From tick to tick it is one period longer than from the first instant to the last.
+        let ms = 1_000.0 * (counts.held + if gathered.is_whole { 1.0 / rate_hz } else { 0.05 });
+        let about = if gathered.is_whole { "" } else { "about " };
+        let how_far = places(counts.apart);
+        format!("{name} at {at}: held back by the limiter for {about}{ms:.0} ms, by up to {how_far} mm")
+    } else {
+        format!("{name}: sent as it was asked for")
+    };
+    let late = if counts.missed > 0 {
+        format!("{} ticks missed", counts.missed)
+    } else if counts.late_us > LATE_US {
+        format!("latest {:.1} ms at {}", counts.late_us / 1e3, ShowTime::from_secs_f64(counts.late_s))
+    } else {
+        "nothing late".to_owned()
+    };
+    let acks = match (counts.lost, counts.refused, counts.acked) {
+        (0, 0, 0) => "no acks recorded".to_owned(),
+        (0, 0, _) => "all acked".to_owned(),
+        (lost, 0, _) => format!("{lost} lost"),
+        (lost, refused, _) => format!("{lost} lost, {refused} refused"),
+    };
+    words += &format!("; {late}, {acks}");
+    if counts.unsent > 0 {
+        words += &format!(", {} not taken by the kernel", counts.unsent);
+    }
+    if counts.dropped > 0 {
+        words += &format!(", {} ticks not recorded", counts.dropped);
+    }
+    words + "."
+}
+
+pub(super) fn facts(contents: &Contents, summary: &Summary) -> Vec<String> {
+    let entry = |key| contents.entry(key);
+    let nearest =
+        summary.nearest().map(|margin| format!("Nearest to its limit in all of it: {}.", margin.in_words()));
+    let mut facts = vec![
+        format!(
+            "{} recording of {}, hall {}, {} Hz",
+            entry("mode"),
+            entry("cue"),
+            entry("hall"),
+            entry("rate_hz")
+        ),
+        format!(
+            "digest {}, recorded by {}, drawn by kinocue {}",
+            entry("cue_sha256"),
+            entry("program"),
+            env!("CARGO_PKG_VERSION")
+        ),
+    ];
+    facts.extend(nearest);
+    if summary.dropped > 0 {
+        facts.push(format!("{} ticks were not recorded.", summary.dropped));
+    }
+    if let Some(trouble) = &contents.trouble {
+        facts.push(format!("The file {trouble}."));
+    }
+    facts
+}
+
+/// A row for each seat.
+pub(super) fn seats(summary: &Summary) -> Table {
+    let row = |seat: &crate::record::SeatTotals| {
+        let of_seat = summary.most.iter().filter(|one| one.seat == seat.name);
+        let nearest = of_seat.max_by(|one, other| one.part().total_cmp(&other.part()));
+        let word = |margin: &crate::record::Margin| {
+            format!("a{} {} {:.0} %", margin.axis, margin.quantity.word(), 100.0 * margin.part())
+        };
+        [
+            seat.name.clone(),
+            seat.sent.to_string(),
+            seat.unsent.to_string(),
+            seat.clamps.to_string(),
+            format!("{} at {}", places(seat.apart), ShowTime::from_secs_f64(seat.apart_film_s)),
+            nearest.map(word).unwrap_or_default(),
+        ]
+    };
+    Table {
+        name: "Seats",
+        head: ["seat", "sent", "not taken", "held back", "farthest apart", "nearest to a limit"],
+        rows: summary.seats.iter().map(row).collect(),
+    }
+}
