@@ -12,6 +12,11 @@ use crate::time::MonoTime;
 /// How long a motor may be off its course at the least.
 const STRAYED: Duration = Duration::from_millis(250);
 
+/// How far a motor may be from where its targets lead, mm.
+pub(super) const OFF_COURSE_MM: f64 = 0.5;
+/// When exactly a unit reads its counter is not known to better than this, seconds: its loop, and when that falls.
+pub(super) const READING: f64 = 0.004;
+
 /// One axis.
 #[derive(Debug)]
 pub(crate) struct Axis {
@@ -64,7 +69,7 @@ impl Axis {
             shaker: Shaker::default(),
             lag,
             maker: TargetMaker::at_rest(lag, scale.reach(0.0), scale.at(0.0)),
-            target: 0,
+            target: of.scale.at(0.0) as i32,
             model: Motor::at_rest(lag, scale.at(0.0)),
             reckoned: now,
             stood_at: None,
@@ -115,6 +120,15 @@ impl Axis {
         let velocity = self.model.velocity();
         let by = f64::from(position) - (self.model.position() - velocity * LOOP.as_secs_f64());
         (self.scale.mm_of(by), self.scale.mm_of(velocity).abs())
+    }
+
+    /// Takes a reading of a motor that is to come to rest; true where it went on since the last other than its targets have it.
+    pub(super) fn strays(&mut self, position: i32, at: MonoTime) -> bool {
+        self.run(at);
+        let (by_mm, mm_s) = self.beside(position);
+        let before = std::mem::replace(&mut self.figures.error_mm, by_mm);
+        let is_first = self.stood_at.replace(position).is_none();
+        !is_first && (by_mm - before).abs() > OFF_COURSE_MM + mm_s * READING
     }
 
     /// How long what one wrong target did to it takes to be gone.

@@ -20,6 +20,10 @@ pub(crate) struct LaneState {
     pub(super) track: Track,
     /// Its units were seen to be home, and have been since.
     pub(super) is_home: bool,
+    /// It is out, and not all of its motors were read at rest since.
+    pub(super) moves_on: bool,
+    /// While it is made ready: its motors are told on where they were led, as one target may have been damaged.
+    pub(super) is_told: bool,
     /// The axis that is asked next.
     pub(super) next_axis: usize,
     /// Its last question was not answered.
@@ -38,6 +42,8 @@ impl LaneState {
             unit,
             track: Track::at_rest(tick, [0.0; MAX_AXES], now),
             is_home: false,
+            moves_on: false,
+            is_told: false,
             next_axis: 0,
             is_failing: false,
             not_before: now,
@@ -50,14 +56,20 @@ impl LaneState {
 impl SixpackLane {
     /// Is looked at again before it follows anything.
     pub(super) fn make_ready(&mut self) {
+        let was_led = matches!(self.stage, Stage::Ready | Stage::Ends);
+        self.own.is_told = was_led && !self.axes.iter().any(Axis::moves);
         self.stage = Stage::Readying;
         self.own.known = None;
-        self.axes.iter_mut().for_each(|axis| (axis.rests, axis.stood_at) = (false, None));
+        self.axes.iter_mut().for_each(|axis| (axis.rests, axis.stood_at, axis.strayed) = (false, None, 0));
     }
 
     /// True if its motors are told where to be.
     pub(super) const fn is_led(&self) -> bool {
-        matches!(self.stage, Stage::Ready | Stage::Runs | Stage::Ends)
+        match self.stage {
+            Stage::Ready | Stage::Runs | Stage::Ends => true,
+            Stage::Readying => self.own.is_told,
+            Stage::Lost | Stage::Out => false,
+        }
     }
 
     /// Takes the next pose.

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::axis::{OFF_COURSE_MM, READING};
 use super::lane::SixpackLane;
 use super::{PROBES, Sixpack2, TARGETS, Track, number};
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
@@ -15,10 +16,8 @@ use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackRepl
 const IDENTITY: Duration = Duration::from_secs(10);
 /// From one look whether a motor still moves to the next.
 const LOOKS: Duration = Duration::from_millis(20);
-/// How far a motor may be from where its targets lead, mm.
-const OFF_COURSE_MM: f64 = 0.5;
-/// When exactly a unit reads its counter is not known to better than this, seconds: its loop, and when that falls.
-const READING: f64 = 0.004;
+/// So many looks in a row at a motor that is led nowhere and moves put its lane out: an answer that is damaged looks like two.
+const STRAYS: u32 = 3;
 /// What is so far outside the stroke is no place of the seat at all, mm.
 const LOST_ZERO_MM: f64 = 10.0;
 
@@ -41,6 +40,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
             match lane.stage {
                 Stage::Lost if is_due => self.probe(index, now)?,
                 Stage::Out if is_due && lane.own.known.is_none() => self.probe(index, now)?,
+                Stage::Out if is_due && lane.own.moves_on => self.stop_for_good(index, now)?,
                 Stage::Readying if is_due => self.look_at(index, now)?,
                 Stage::Ready | Stage::Runs | Stage::Ends => self.ask(index, now)?,
                 _ => {
@@ -91,8 +91,13 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let (unit, motor) = (self.lanes[index].own.unit, self.lanes[index].axes[axis].motor);
         let answer = self.talk.ask(unit, where_is(motor));
         let Some(SixpackReply::PositionTold(told)) = self.heard(index, answer)? else {
-            // By one bit the question is the order to search; nothing else is ended by this.
-            self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
+            // By one bit the question is the order to search; nothing else is ended by this. By another it is a target far away, which
+            // the next of a motor that is led ends.
+            if self.lanes[index].is_led() {
+                self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
+            } else {
+                self.stop_motor(unit, motor)?;
+            }
             return Ok(None);
         };
         let a = axis_number(axis);
@@ -112,12 +117,12 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         axis.run(sent);
         let (by_mm, mm_s) = axis.beside(told.position);
         axis.figures.error_mm = by_mm;
-        let searches = searches(told.action);
+        let is_wrong = !is_ordered(told.action);
         let is_off = by_mm.abs() > OFF_COURSE_MM + mm_s * READING;
         if !is_off {
             axis.figures.off_course_mm = axis.figures.off_course_mm.max(by_mm.abs());
         }
-        if !(is_off || searches) {
+        if !(is_off || is_wrong) {
             axis.strayed = 0;
             self.confirm(index, sent);
             return Ok(());
@@ -130,7 +135,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let axis = &self.lanes[index].axes[a];
         let (low, high) = axis.scale.reach(LOST_ZERO_MM);
         let is_lost = !(low..=high).contains(&f64::from(told.position));
-        let is_for_good = searches || is_lost || sent.since(axis.strays_since) > axis.heals_in();
+        let is_for_good = is_wrong || is_lost || sent.since(axis.strays_since) > axis.heals_in();
         if axis.strayed > 1 && is_for_good {
             if is_lost {
                 return self.is_not_home(index, a);
@@ -162,13 +167,23 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         };
         let Some(told) = self.place_of(index, a)? else { return Ok(()) };
         let lane = &mut self.lanes[index];
+        let is_led = lane.is_led();
         let axis = &mut lane.axes[a];
-        let is_idle = matches!(told.action, action::IDLE | action::PI);
-        if !is_idle || axis.stood_at != Some(told.position) {
-            axis.stood_at = is_idle.then_some(told.position);
+        if !is_ordered(told.action) || axis.stood_at != Some(told.position) {
+            let strays = axis.strays(told.position, self.talk.moment().sent) || !is_ordered(told.action);
             lane.own.not_before = now + LOOKS;
-            // Nobody has it search: a search has no end by itself.
-            return if searches(told.action) { self.stop_motors(index) } else { Ok(()) };
+            // Nobody has it search or turn, and neither has an end by itself; nor has a way that its targets do not lead.
+            if !strays || (is_led && !searches(told.action)) {
+                axis.strayed = 0;
+                return Ok(());
+            }
+            axis.strayed += 1;
+            let (lane, by_mm) = (number(index), axis.figures.error_mm);
+            return if axis.strayed < STRAYS {
+                self.stop_motors(index)
+            } else {
+                self.put_out_and_stop(index, StreamEvent::OffCourse { lane, axis: axis_number(a), by_mm })
+            };
         }
         let (low, high) = axis.scale.reach(OUTSIDE_MM);
         if !(low..=high).contains(&f64::from(told.position)) {
@@ -223,7 +238,40 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
     /// Out until a person has looked, and stopped.
     fn put_out_and_stop(&mut self, index: usize, event: StreamEvent) -> Result<(), LinkFault> {
         self.put_out(index, event);
+        let lane = &mut self.lanes[index];
+        lane.own.moves_on = true;
+        lane.axes.iter_mut().for_each(|axis| (axis.rests, axis.stood_at) = (false, None));
         self.stop_motors(index)
+    }
+
+    /// Reads the motors of a lane that is out by turns, and stops each again that is not at rest: a stop that is damaged on the way is a
+    /// target far away, or a turn without end.
+    fn stop_for_good(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
+        self.own.next_asked = (index + 1) % self.lanes.len();
+        let lane = &mut self.lanes[index];
+        let (a, unit) = (lane.own.next_axis % lane.axes.len(), lane.own.unit);
+        lane.own.next_axis = a + 1;
+        let motor = lane.axes[a].motor;
+        let answer = self.talk.ask(unit, where_is(motor));
+        let lane = &mut self.lanes[index];
+        let axis = &mut lane.axes[a];
+        let SixpackReply::PositionTold(told) = (match answer {
+            Ok(reply) => reply,
+            Err(TalkFault::Link(fault)) => return Err(fault),
+            Err(TalkFault::Silent { .. }) => {
+                // The question may be damaged, and a target far away by that; a unit without power holds nobody up.
+                lane.own.not_before = now + LOOKS;
+                axis.rests = false;
+                return self.stop_motor(unit, motor);
+            }
+        }) else {
+            return Ok(());
+        };
+        let before = axis.stood_at.replace(told.position);
+        axis.rests = is_ordered(told.action) && before == Some(told.position);
+        let moves = !is_ordered(told.action) || before.is_some_and(|before| before != told.position);
+        lane.own.moves_on = lane.axes.iter().any(|axis| !axis.rests);
+        if moves { self.stop_motor(unit, motor) } else { Ok(()) }
     }
 
     /// A unit that was restarted, or never homed: none of its motors knows its place.
@@ -241,13 +289,14 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
     /// Ends what each motor may search, and stops it by its ramp. Nobody answers, so it is said twice.
     pub(super) fn stop_motors(&mut self, index: usize) -> Result<(), LinkFault> {
         let unit = self.lanes[index].own.unit;
-        for motor in self.lanes[index].axes.iter().map(|axis| axis.motor) {
-            for _ in 0..2 {
-                self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
-                self.talk.tell(unit, SixpackOrder::RampedStop { motor })?;
-            }
-        }
-        Ok(())
+        let motors: Vec<u8> = self.lanes[index].axes.iter().map(|axis| axis.motor).collect();
+        [&motors, &motors].into_iter().flatten().try_for_each(|motor| self.stop_motor(unit, *motor))
+    }
+
+    /// The same of one, once.
+    fn stop_motor(&mut self, unit: u8, motor: u8) -> Result<(), LinkFault> {
+        self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
+        self.talk.tell(unit, SixpackOrder::RampedStop { motor })
     }
 
     /// Looks for the unit of a lane that is lost or out.
@@ -282,6 +331,11 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         self.talk.set_baud(baud)?;
         found
     }
+}
+
+/// True where a motor does what a play has it do: it stands, or follows targets.
+const fn is_ordered(does: u8) -> bool {
+    matches!(does, action::IDLE | action::PI)
 }
 
 impl SixpackLane {
