@@ -442,7 +442,8 @@ fn a_link_that_is_to_play_more_often_than_it_can_fails_the_check_with_what_would
         .replace("[link.stalls]", "[link.stalls]\nrate_hz = 50");
     let run = kinocue(&["check", &write(folder.path(), "fast.toml", &text)]);
     assert_eq!(run.code, Some(1), "{}", run.stdout);
-    let wanted = "rate_hz of [link.stalls]: 3 axes play at 29.98 Hz at 57600 baud, not at 50; use baud = 115200\n";
+    let wanted =
+        "rate_hz of [link.stalls]: 3 axes play at 29.98 Hz at 57600 baud, not at 50; use baud = 115200\n";
     assert!(run.stderr.contains(wanted), "{}", run.stderr);
 }
 

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::Folder;
 use super::keyboard::{read_all, terminal};
-use super::process::{Guarded, PATIENCE, Playing};
+use super::process::{Guarded, PATIENCE, Playing, Run};
 use super::programs::is_installed;
 use super::report::assert_sound;
 use super::wav::silent_film;
@@ -207,17 +207,29 @@ fn on_a_terminal_the_console_stays_after_the_ride_to_go_again_until_ctrl_c() {
 /// One at a time: units that hear of nothing for too long are not home, and nobody rides on them.
 static DRIVES: Mutex<()> = Mutex::new(());
 
+/// A ride on drives that is ridden to its end by all seats. Where the machine held up units so often that a seat fell out for good (75), it
+/// is ridden again, three times at the most.
+fn ridden(dialect: &str) -> (Run, Folder) {
+    for tries in 0.. {
+        let folder = Folder::new();
+        let args = ["--json", "--dialect", dialect];
+        let mut demo = Playing::demo(&folder.path(""), &args, Stdio::null(), Stdio::piped());
+        let begun = demo.wait_for("homing: homed by the operator");
+        assert!(begun.contains("the demo plays that person"), "{begun}");
+        demo.wait_for("playing: the seats are on the cue");
+        let run = demo.finish();
+        if tries == 2 || run.code != Some(75) {
+            return (run, folder);
+        }
+    }
+    unreachable!("the last try is given back");
+}
+
 /// A ride on drives, and each line about a unit at its end. True with it if all frames were confirmed: a busy machine may keep a
 /// unit from being asked for so long that its seat is lost for a while.
 fn ride_on_drives(dialect: &str) -> (Vec<String>, bool) {
     let _one = DRIVES.lock().unwrap_or_else(PoisonError::into_inner);
-    let folder = Folder::new();
-    let args = ["--json", "--dialect", dialect];
-    let mut demo = Playing::demo(&folder.path(""), &args, Stdio::null(), Stdio::piped());
-    let begun = demo.wait_for("homing: homed by the operator");
-    assert!(begun.contains("the demo plays that person"), "{begun}");
-    demo.wait_for("playing: the seats are on the cue");
-    let run = demo.finish();
+    let (run, folder) = ridden(dialect);
     let report = run.report_of(0);
     assert_eq!(report["result"], "completed");
     let events = report["events"].as_array().expect("a list");

@@ -69,7 +69,7 @@ impl Axis {
             shaker: Shaker::default(),
             lag,
             maker: TargetMaker::at_rest(lag, scale.reach(0.0), scale.at(0.0)),
-            target: of.scale.at(0.0) as i32,
+            target: scale.whole(of.axis.low),
             model: Motor::at_rest(lag, scale.at(0.0)),
             reckoned: now,
             stood_at: None,
