@@ -23,7 +23,7 @@ pub(crate) enum LinkStream<P: LinkPort> {
 }
 
 impl<P: LinkPort> LinkStream<P> {
-    /// Over a port that is open, with lanes that are out until somebody has them [looked at](Self::look): the seats on that link.
+    /// Over a port that is open, with lanes that are out until somebody has them looked at: the seats on that link.
     ///
     /// # Errors
     /// Why its drives cannot be played to.

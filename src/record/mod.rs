@@ -3,7 +3,7 @@
 //! The tick thread copies what it asked for and what left, octet by octet, into a ring, one chunk a tick, all of it or nothing
 //! ([`Tap`]). A thread behind the ring takes chunks apart ([`Chunk`]), folds them into samples ([`Sampled`]) and writes these as MCAP
 //! ([`Recording`], `mcap.dev/spec`), where it is asked for with every tick as it was (`full`). It is told no time but that of the
-//! ticks. [`read`] reads such files back.
+//! ticks. [`read()`] reads such files back.
 
 mod acks;
 mod chunk;

@@ -105,7 +105,7 @@ pub(crate) enum Note {
 }
 
 impl Note {
-    /// Its topic's place among [`TOPICS`].
+    /// Its topic's place among [`topics`].
     pub(super) const fn topic(&self) -> usize {
         match self {
             Self::Hall(_) => 0,
