@@ -5,8 +5,8 @@ use std::io::{BufWriter, Result};
 use std::path::Path;
 
 use crate::record::{
-    self, About, AckRecord, AckTap, Chunk, Entry, EntryMaker, Flight, Handed, Intake, Mode, Opening,
-    RecordedSeat, Recording, SentFrame, Tap, Taps, Wanted,
+    self, About, AckRecord, AckTap, Chunk, Entry, EntryMaker, Flight, Handed, Intake, Opening, RecordedSeat,
+    Recording, SentFrame, Tap, Taps, Wanted,
 };
 use crate::time::{MonoTime, Rate};
 use crate::tracker::{Fate, Reply};
@@ -25,15 +25,7 @@ impl RecorderRig {
     /// One of these seats, with a file of that size.
     pub fn new(seats: Vec<RecordedSeat>, rate: Rate, path: &Path, room: u64) -> (Tap, AckTap, Self) {
         let clocks = (MonoTime::default(), 0);
-        let about = About {
-            hall: "bench".to_owned(),
-            cue: String::new(),
-            title: String::new(),
-            cue_sha256: String::new(),
-            rate_hz: rate.hz(),
-            mode: Mode::Full,
-            clocks,
-        };
+        let about = About::of_hall("bench", rate, clocks);
         let (opening, maker) = (Opening::new(&about, &seats), EntryMaker::new(seats.len(), clocks));
         let flight = Flight::create(path, &opening.to_octets(), room).expect("there is room");
         let (Taps { ticks, acks }, intake) = Intake::new(seats, rate, 20);

@@ -14,7 +14,7 @@ use super::full::packed;
 use super::notes::topics;
 use super::schemas::{schema_of_seat, schema_of_tick, state_number};
 use super::{Message, RecordedSeat};
-use crate::time::MonoTime;
+use crate::time::{MonoTime, Rate};
 
 /// The version of topics, messages and metadata.
 pub(super) const VERSION: &str = "1";
@@ -64,6 +64,14 @@ pub(crate) struct About {
     pub(crate) mode: Mode,
     /// One instant on both clocks: monotonic, and wall in nanoseconds since 1970.
     pub(crate) clocks: (MonoTime, u64),
+}
+
+impl About {
+    /// Of a hall with no cue, everything kept.
+    pub(crate) fn of_hall(hall: &str, rate: Rate, clocks: (MonoTime, u64)) -> Self {
+        let [cue, title, cue_sha256] = [const { String::new() }; 3];
+        Self { hall: hall.to_owned(), cue, title, cue_sha256, rate_hz: rate.hz(), mode: Mode::Full, clocks }
+    }
 }
 
 /// What a file begins with: whoever has it can write what was folded for it, and needs to know nothing else.

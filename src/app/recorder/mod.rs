@@ -1,6 +1,7 @@
 //! Recordings of the service: shows, and the flight recorder with its incidents. A thread of its own behind the taps, alone at the
 //! disk; whatever becomes of it, the hall goes on.
 
+mod beginning;
 mod disk;
 mod leftovers;
 mod link;
@@ -18,7 +19,7 @@ pub(crate) use link::{RecordAsk, RecordLink, ShowStart};
 use super::recording;
 use super::runtime::Runtime;
 use crate::config::RecordMode;
-use crate::record::{About, EntryMaker, Intake, Mode, Opening, octets_a_second};
+use crate::record::{About, EntryMaker, Intake, Opening, octets_a_second};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
@@ -58,15 +59,7 @@ impl HallRecorder {
         let rate = Rate::from_hz(config.show.rate_hz);
         let seats = recording::seats(&config, runtime.lanes());
         let clocks = (Monotonic.now(), wall_now_ns());
-        let about = About {
-            hall: config.show.name.clone(),
-            cue: String::new(),
-            title: String::new(),
-            cue_sha256: String::new(),
-            rate_hz: rate.hz(),
-            mode: Mode::Full,
-            clocks,
-        };
+        let about = About::of_hall(&config.show.name, rate, clocks);
         let text = fs::read(&places.config).unwrap_or_default();
         let digest: String = Sha256::digest(&text).iter().map(|octet| format!("{octet:02x}")).collect();
         let opening = Opening::new(&about, &seats)

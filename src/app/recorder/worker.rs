@@ -9,6 +9,7 @@ use std::sync::mpsc::Receiver;
 use std::thread::Builder;
 use std::time::Duration;
 
+use super::beginning::{begun, small_file};
 use super::disk::{Disk, PartFile};
 use super::leftovers::{Leftover, clear_up};
 use super::link::{RecordAsk, RecordLink, ShowStart};
@@ -34,8 +35,6 @@ const BEFORE: Duration = Duration::from_secs(10);
 const AFTER: Duration = Duration::from_secs(5);
 /// Asks that are taken in one look; more wait for the next.
 const ASKS: usize = 256;
-/// The largest cue that is attached, octets.
-const MOST_ATTACHED: u64 = 64 << 20;
 
 /// A recording that is being written.
 struct OpenFile {
@@ -173,12 +172,10 @@ impl Worker {
             let Ok((at, ask)) = self.asks.try_recv() else { return };
             match ask {
                 RecordAsk::Keep(note) => {
-                    if matches!(note, Note::Mark(_)) {
-                        self.link.tell(|status| status.marks += 1);
-                    }
                     let is_mark = matches!(note, Note::Mark(_));
                     self.keep(at, note);
                     if is_mark {
+                        self.link.tell(|status| status.marks += 1);
                         self.on_incident(IncidentCause::Mark, at, now);
                     }
                 }
@@ -274,15 +271,10 @@ impl Worker {
             let word = if cue.is_empty() { kind } else { cue.as_str() };
             let (disk, out) = self.disk.create(kind, word, number)?;
             let disk = disk.until_begun();
-            let mut file = Recording::open(out, &opening, self.maker).map_err(in_io)?;
             // The first has what was before the show; those behind it how the hall stands.
-            let first = if number == 1 { self.recent.iter() } else { self.recent.range(..0) };
-            for entry in self.hall.iter().filter(|_| number > 1).chain(first) {
-                file.put(entry).map_err(in_io)?;
-            }
-            if let Some(safe) = &self.safe {
-                file.attach("configuration.toml", "application/toml", safe.as_bytes()).map_err(in_io)?;
-            }
+            let first = self.recent.iter().filter(|_| number == 1);
+            let entries = self.hall.iter().filter(|_| number > 1).chain(first);
+            let mut file = begun(out, &opening, self.maker, self.safe.as_deref(), entries)?;
             if let Some(cue) = attached.as_ref().filter(|_| number == 1)
                 && let Some(octets) = small_file(cue)
             {
@@ -355,15 +347,10 @@ impl Worker {
         let (disk, out) = self.disk.create_incident(cause)?;
         let disk = disk.until_begun();
         let opening = self.opening.clone().with("of", "incident").with("cause", cause.word());
-        let mut file = Recording::open(out, &opening, self.maker).map_err(in_io)?;
         let oldest = self.maker.wall(at).saturating_sub(1_000_000_000 * u64::from(self.record.flight_s));
         let held = flight.read()?;
-        for entry in self.hall.iter().chain(held.iter().filter(|entry| entry.log_time >= oldest)) {
-            file.put(entry).map_err(in_io)?;
-        }
-        if let Some(safe) = &self.safe {
-            file.attach("configuration.toml", "application/toml", safe.as_bytes()).map_err(in_io)?;
-        }
+        let entries = self.hall.iter().chain(held.iter().filter(|entry| entry.log_time >= oldest));
+        let mut file = begun(out, &opening, self.maker, self.safe.as_deref(), entries)?;
         file.flush().map_err(in_io)?;
         self.incident = Some(OpenFile { file, disk: disk.begun(), counts: Counts::default() });
         Ok(())
@@ -462,10 +449,4 @@ impl Worker {
         self.close_incident();
         self.link.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
     }
-}
-
-/// A file of a size that is attached.
-fn small_file(path: &Path) -> Option<Vec<u8>> {
-    let is_small = std::fs::metadata(path).is_ok_and(|about| about.len() <= MOST_ATTACHED);
-    is_small.then(|| std::fs::read(path).ok()).flatten()
 }

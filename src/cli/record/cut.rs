@@ -9,7 +9,7 @@ use anyhow::{Context as _, anyhow};
 
 use super::super::{Exit, Failure, OrExit as _, exit, print};
 use super::open;
-use crate::record::{CutError, CutManner, RecordedSeat, Stretch, cut, each_tick};
+use crate::record::{Chunk, Contents, CutError, CutManner, RecordedSeat, Stretch, cut, each_tick};
 use crate::time::{ShowTime, parse_time};
 
 /// Cuts a stretch out of a recording in full, every tick of it as plain topics that each viewer draws.
@@ -99,12 +99,12 @@ fn each<W: Write>(
     path: &Path,
     stretch: &Stretch,
     mut out: W,
-    mut row: impl FnMut(&mut W, &[RecordedSeat], &crate::record::Chunk<'_>) -> std::io::Result<()>,
+    mut row: impl FnMut(&mut W, &Contents, &Chunk<'_>) -> std::io::Result<()>,
 ) -> Result<W, Failure> {
     let mut result = Ok(());
     each_tick(open(path)?, stretch, &mut |contents, chunk, _| {
         if result.is_ok() {
-            result = row(&mut out, &contents.seats, chunk);
+            result = row(&mut out, contents, chunk);
         }
     })
     .map_err(|error| failure(error, path))?;
@@ -113,18 +113,13 @@ fn each<W: Write>(
 }
 
 fn csv<W: Write>(path: &Path, stretch: &Stretch, mut out: W) -> Result<W, Failure> {
-    let mut is_first = true;
+    let mut columns = None;
     out.write_all(b"film_s,deadline_ns,late_us,seat,handed_us").or_exit(Exit::Io)?;
-    each(path, stretch, out, |out, seats, chunk| {
-        if std::mem::take(&mut is_first) {
-            let most = seats.iter().filter(|seat| stretch.has(seat)).map(|seat| seat.axes().len()).max();
-            for what in ["asked", "sent"] {
-                (1..=most.unwrap_or(0)).try_for_each(|axis| write!(out, ",{what}_{axis}"))?;
-            }
-            writeln!(out, ",level,clamps")?;
-        }
-        let most =
-            seats.iter().filter(|seat| stretch.has(seat)).map(|seat| seat.axes().len()).max().unwrap_or(0);
+    each(path, stretch, out, |out, Contents { seats, .. }, chunk| {
+        let most = match columns {
+            Some(most) => most,
+            None => *columns.insert(columns_of(out, seats, stretch)?),
+        };
         let head = chunk.head;
         for frame in chunk.frames() {
             let Some(seat) = seats.get(frame.lane).filter(|seat| stretch.has(seat)) else { continue };
@@ -152,15 +147,22 @@ fn csv<W: Write>(path: &Path, stretch: &Stretch, mut out: W) -> Result<W, Failur
     })
 }
 
+/// Writes the names of the columns of axes, and what is behind them; gives how many axes the seat with the most has.
+fn columns_of(out: &mut impl Write, seats: &[RecordedSeat], stretch: &Stretch) -> std::io::Result<usize> {
+    let axes = seats.iter().filter(|seat| stretch.has(seat)).map(|seat| seat.axes().len());
+    let most = axes.max().unwrap_or(0);
+    for what in ["asked", "sent"] {
+        (1..=most).try_for_each(|axis| write!(out, ",{what}_{axis}"))?;
+    }
+    writeln!(out, ",level,clamps")?;
+    Ok(most)
+}
+
 /// Datagrams as a capture of raw IPv4 (draft-ietf-opsawg-pcap, link type 101), times to the nanosecond.
 fn pcap<W: Write>(path: &Path, stretch: &Stretch, mut out: W) -> Result<W, Failure> {
     let head = [0xa1b2_3c4d_u32, 0x0004_0002, 0, 0, 65_535, 101];
     head.iter().try_for_each(|word| out.write_all(&word.to_le_bytes())).or_exit(Exit::Io)?;
-    let mut result = Ok(());
-    let wall = &mut |contents: &crate::record::Contents,
-                     chunk: &crate::record::Chunk<'_>,
-                     out: &mut W|
-     -> std::io::Result<()> {
+    each(path, stretch, out, |out, contents, chunk| {
         for frame in chunk.frames() {
             let Some(seat) = contents.seats.get(frame.lane).filter(|seat| stretch.has(seat)) else {
                 continue;
@@ -178,15 +180,7 @@ fn pcap<W: Write>(path: &Path, stretch: &Stretch, mut out: W) -> Result<W, Failu
             out.write_all(&packet)?;
         }
         Ok(())
-    };
-    each_tick(open(path)?, stretch, &mut |contents, chunk, _| {
-        if result.is_ok() {
-            result = wall(contents, chunk, &mut out);
-        }
     })
-    .map_err(|error| failure(error, path))?;
-    result.or_exit(Exit::Io)?;
-    Ok(out)
 }
 
 /// A datagram in IPv4 (RFC 791) and UDP without a checksum (RFC 768), from this machine.
