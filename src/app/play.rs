@@ -16,6 +16,7 @@ use crate::config::{Config, Misfit};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
 use crate::film::chase::ChaseRules;
+use crate::film::follower::PaceLimits;
 use crate::film::point::PublishedPoint;
 use crate::proof::{self, Digest, Proof, Terms};
 use crate::record::{About as Recorded, Mode};
@@ -40,7 +41,7 @@ impl Play {
     /// Everything that [`PlayError`] names but the network.
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
-        keeps_limits(&config, &timeline, show.rate, manner.level)?;
+        keeps_limits(&config, None, &timeline, show.rate, manner.level)?;
         Self::staged(config, timeline, show, manner, None)
     }
 
@@ -57,7 +58,7 @@ impl Play {
     ) -> Result<Self, PlayError> {
         let rules = ChaseRules::until(timeline.duration());
         fit(&config, &timeline)?;
-        keeps_limits(&at_any_pace(&config, rules.pace), &timeline, show.rate, manner.level)?;
+        keeps_limits(&config, Some(rules.pace), &timeline, show.rate, manner.level)?;
         Self::staged(config, timeline, show, manner, Some(LeadingFilm { source, rules: Some(rules) }))
     }
 
@@ -208,14 +209,22 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
     if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
 }
 
-fn keeps_limits(config: &Config, timeline: &Timeline, rate: Rate, level: f64) -> Result<(), PlayError> {
+fn keeps_limits(
+    config: &Config,
+    pace: Option<PaceLimits>,
+    timeline: &Timeline,
+    rate: Rate,
+    level: f64,
+) -> Result<(), PlayError> {
+    let paced = pace.map(|pace| at_any_pace(config, pace));
+    let config = paced.as_ref().unwrap_or(config);
     let terms = Terms::of_hall(config, Digest::of(timeline.cue()), rate, level);
     let proof = proof::prove_in(config, timeline, terms);
     if proof.passed() {
         return Ok(());
     }
     let Proof { violations, more, .. } = proof;
-    Err(PlayError::Limits { cue: timeline.cue().path().to_path_buf(), violations, more })
+    Err(PlayError::Limits { cue: timeline.cue().path().to_path_buf(), violations, more, chases: pace.is_some() })
 }
 
 #[cfg(test)]

@@ -40,15 +40,19 @@ pub fn headroom(config: &Config, timeline: &Timeline, rate: Rate) -> Headroom {
     Headroom::measure(&windows, timeline, rate)
 }
 
+/// The seat with what is left of its limits at those paces.
+pub(crate) fn seat_at_any_pace(seat: &SeatType, pace: PaceLimits) -> SeatType {
+    seat.clone().with_each(|axis| {
+        [axis.max_velocity, axis.max_acceleration, axis.max_jerk] =
+            pace.leave(axis.max_velocity, axis.max_acceleration, axis.max_jerk);
+    })
+}
+
 /// The hall with what is left of its seats' limits at those paces.
-pub(super) fn at_any_pace(config: &Config, pace: PaceLimits) -> Config {
+pub(crate) fn at_any_pace(config: &Config, pace: PaceLimits) -> Config {
     let mut config = config.clone();
     for controller in &mut config.controllers {
-        let seat = SeatType::clone(&controller.seat).with_each(|axis| {
-            [axis.max_velocity, axis.max_acceleration, axis.max_jerk] =
-                pace.leave(axis.max_velocity, axis.max_acceleration, axis.max_jerk);
-        });
-        controller.seat = Arc::new(seat);
+        controller.seat = Arc::new(seat_at_any_pace(&controller.seat, pace));
         if let Connection::Link(drives) = &mut controller.connection {
             // What a fit misses is in proportion to the jerk of what it follows.
             let max_deviation_mm = drives.drive.max_deviation_mm / pace.most().powi(3);

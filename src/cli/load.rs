@@ -7,8 +7,10 @@ use anyhow::anyhow;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use super::{Exit, Failure, OrExit as _};
+use crate::app::staged::{at_any_pace, seat_at_any_pace};
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
+use crate::film::follower::PaceLimits;
 use crate::motion::{SeatAxis, SeatType};
 use crate::proof::{Digest, LinksProof, Proof, Terms, prove, prove_in, prove_links};
 use crate::time::Rate;
@@ -72,6 +74,11 @@ pub(super) struct SeatArgs {
     /// Frames per second [default: the configuration's, else 100].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
+
+    /// The cue follows a film, which may ask for a little more pace than 1: the limits are what that leaves of them. So they are where
+    /// the configuration has [sync].
+    #[arg(long)]
+    chase: bool,
 }
 
 /// What a cue is judged for.
@@ -81,14 +88,28 @@ pub(super) struct Judge {
     /// The seat asked for by name.
     pub(super) seat: Option<Arc<SeatType>>,
     pub(super) rate_hz: f64,
+    /// The paces that a film may ask for, if one leads.
+    pace: Option<PaceLimits>,
 }
 
 impl SeatArgs {
     /// What the arguments mean beside `hall`, the configuration they name.
     pub(super) fn judge(&self, hall: Option<Config>) -> Result<Judge, Failure> {
+        let synced = hall.as_ref().and_then(|hall| hall.sync.as_ref()).map(|sync| sync.pace);
+        let pace = synced.or_else(|| self.chase.then(PaceLimits::default));
         let seat = self.seat.as_deref().map(|name| seat(name, hall.as_ref())).transpose()?;
+        let seat = seat.map(|seat| left_of(pace, seat));
         let rate_hz = self.rate.or_else(|| hall.as_ref().map(|hall| hall.show.rate_hz)).unwrap_or(100.0);
-        Ok(Judge { hall, seat, rate_hz })
+        let hall = match pace {
+            Some(pace) => hall.map(|hall| at_any_pace(&hall, pace)),
+            None => hall,
+        };
+        Ok(Judge { hall, seat, rate_hz, pace })
+    }
+
+    /// What is to be given to `fit` so that a cue passes here.
+    pub(super) const fn remedy(&self) -> &'static str {
+        if self.chase { "kinocue fit CUE -o OUT --chase" } else { "kinocue fit CUE -o OUT" }
     }
 }
 
@@ -108,11 +129,21 @@ fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
     })
 }
 
+/// What those paces leave of the limits of a seat.
+fn left_of(pace: Option<PaceLimits>, seat: Arc<SeatType>) -> Arc<SeatType> {
+    pace.map_or_else(|| Arc::clone(&seat), |pace| Arc::new(seat_at_any_pace(&seat, pace)))
+}
+
 impl Judge {
+    /// The seat of whoever names none.
+    fn bench(&self, axes: usize) -> Arc<SeatType> {
+        left_of(self.pace, Arc::new(SeatType::bench3(axes)))
+    }
+
     /// What each axis of a cue is on: the seat asked for, else that of the first controller that takes the axis,
     /// else the bench seat.
     pub(super) fn seats(&self, axes: usize) -> Vec<SeatAxis> {
-        let bench = Arc::new(SeatType::bench3(axes));
+        let bench = self.bench(axes);
         let seat_of = |axis| {
             let mut controllers = self.hall.iter().flat_map(|hall| &hall.controllers);
             match (&self.seat, controllers.find(|one| one.takes(axis))) {
@@ -136,7 +167,7 @@ impl Judge {
                 Terms { parts: of_seat(seat).parts, ..Terms::of_hall(hall, cue, rate, level) }
             }
             (Some(seat), None) => of_seat(seat),
-            (None, None) => of_seat(&Arc::new(SeatType::bench3(axes))),
+            (None, None) => of_seat(&self.bench(axes)),
         }
     }
 
