@@ -237,7 +237,7 @@ def seek(args, folder, sound="ac3"):
             steps = [(b[0], (b[2] - a[2]) / b[1] / usual) for a, b in zip(frames, frames[1:]) if rests and b[0] > rests[0]]
             moves = next((when for when, pace in steps if pace != 0), None)
             joined = next((when for when, pace in reversed(steps) if abs(pace - 1.0) > 0.15), None)
-            errors = show.errors(frames, at + 0.05, until)
+            errors = show.errors(frames, at + 0.05, until) if clock else []
             near = next((when for when, error in errors if all(abs(e) < 20 for w, e in errors if w >= when)), None)
             if clock and moves and joined and near:
                 took = (clock - at, moves - clock, moves - at, joined - moves, max(near - joined, 0.0))

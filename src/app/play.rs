@@ -224,7 +224,12 @@ fn keeps_limits(
         return Ok(());
     }
     let Proof { violations, more, .. } = proof;
-    Err(PlayError::Limits { cue: timeline.cue().path().to_path_buf(), violations, more, chases: pace.is_some() })
+    Err(PlayError::Limits {
+        cue: timeline.cue().path().to_path_buf(),
+        violations,
+        more,
+        chases: pace.is_some(),
+    })
 }
 
 #[cfg(test)]

@@ -78,8 +78,12 @@ impl ProvedShow {
     ) -> Result<Self, Problem> {
         let refused = |faults: Vec<String>| {
             let detail = format!("the cue {id} does not fit this hall");
-            Problem::new(Code::Check, detail, "correct it, or `kinocue fit` it with --config of this hall, and load it again")
-                .with(faults)
+            Problem::new(
+                Code::Check,
+                detail,
+                "correct it, or `kinocue fit` it with --config of this hall, and load it again",
+            )
+            .with(faults)
         };
         let rate = Rate::from_hz(config.show.rate_hz);
         let misfits = config.misfits(&timeline);
