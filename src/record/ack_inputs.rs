@@ -2,7 +2,11 @@
 
 use super::ack_record::{FALLS, of, place};
 use super::cursor::Cursor;
-use crate::health::{Continuity, HealthInput, Identity, Sighting};
+use crate::health::HealthInput::{
+    self, Alive, Ambiguous, Answered, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew, LostZero,
+    MoreAxes, Moved, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+};
+use crate::health::{Continuity, Identity, Sighting};
 use crate::motion::Pulses;
 use crate::observe::{Look, StopSign};
 
@@ -11,7 +15,6 @@ const SIGNS: [StopSign; 4] = [StopSign::Unsure, StopSign::Asked, StopSign::Held,
 const NONE: u8 = u8::MAX;
 
 pub(super) fn write_input(out: &mut Vec<u8>, input: HealthInput) {
-    use HealthInput::*;
     let mut put = |kind: u8, controller: usize, octets: &[u8]| {
         of(out, kind, controller);
         out.extend_from_slice(octets);
@@ -52,7 +55,6 @@ pub(super) fn write_input(out: &mut Vec<u8>, input: HealthInput) {
 }
 
 pub(super) fn read_input(kind: u8, of: usize, from: &mut Cursor<'_>) -> Option<HealthInput> {
-    use HealthInput::*;
     Some(match kind {
         32 => Part(of, from.u8()? != 0),
         33 => Refused(of),

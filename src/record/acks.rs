@@ -181,7 +181,10 @@ mod tests {
 
     #[test]
     fn what_health_was_told_reads_as_it_was() {
-        use HealthInput::*;
+        use HealthInput::{
+            Alive, Ambiguous, Answered, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew, LostZero,
+            MoreAxes, Moved, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+        };
         let (mut tap, mut ring) = ack_tap(3, Rate::from_hz(100.0));
         let identity = Identity { version: 7, minor_version: 8, work_mode: 2, axes: 3 };
         let sighting = |continuity| Sighting { identity, error: 11, alarm: 12, continuity, homed: true };
