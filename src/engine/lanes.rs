@@ -39,6 +39,7 @@ pub(super) struct Lanes {
 impl Lanes {
     /// Lanes of which nobody has told where they stand, at the levels of their windows.
     pub(super) fn unseen(windows: Vec<Window>, proved_level: f64, rate: Rate) -> Self {
+        // Levels that the cue was proved at are kept, though no room for a change may be left at them.
         let greatest_level = windows.iter().map(Window::level).fold(proved_level, f64::max);
         let events = EngineEvents::of(windows.len());
         let all = windows.into_iter().map(|window| LaneMotion::unseen(window, rate)).collect();
