@@ -59,6 +59,7 @@ fn on_while<T: Copy>(steps: &[TrackStep<T>], end: ShowTime, is_on: impl Fn(T) ->
     let mut runs: Vec<EffectRun> = Vec::new();
     for (index, step) in steps.iter().enumerate().filter(|(_, step)| is_on(step.value)) {
         let until = steps.get(index + 1).map_or(end, |next| next.at);
+        // Steps of other effects lie between: for this one it is one time.
         match runs.last_mut().filter(|last| last.until == step.at) {
             Some(last) => last.until = until,
             None => runs.push(EffectRun { from: step.at, until }),
@@ -84,6 +85,8 @@ fn wrong_length(run: &EffectRun, effect: &LimitedEffect, period: Duration) -> Op
 /// The busiest window, where it is too busy: one that begins where a run begins, or ends where one ends.
 fn too_busy(runs: &[EffectRun], effect: &LimitedEffect) -> Option<(ShowTime, Breach)> {
     let (most, window) = (effect.limit.max_duty?, effect.limit.duty_window);
+    // What a window holds grows or shrinks in straight lines as it is moved; it turns from
+    // growing to shrinking only where its begin meets one of a run, or its end one's end.
     let starts = runs.iter().flat_map(|run| [run.from, run.until - window]);
     let on = |from: ShowTime| -> f64 {
         let until = from + window;

@@ -161,6 +161,7 @@ impl Line<'_> {
             let Breach::Drive(breach) = &violation.breach else { return None };
             part = part.min(breach.part_that_fits()?);
         }
+        // In whole percent, as people set levels.
         let percent = (100.0 * terms.level * part).floor();
         // What is rounded to counts does not shrink with the level.
         let levels = [percent, percent - 1.0, percent - 3.0].into_iter().filter(|level| *level > 0.0);
@@ -182,6 +183,7 @@ impl Line<'_> {
             return None;
         }
         let mut changes = self.load.changes();
+        // At the rate that it has it was refused.
         changes.retain(|(hz, _)| hz * self.period.as_secs_f64() > 1.0);
         // Proofs of a long film take a while: the least is looked for by halves.
         let passes = |(hz, _): &(f64, String)| {
