@@ -61,6 +61,7 @@ impl Engine {
             Phase::Following(Following { course, .. })
                 if !is_wanted_elsewhere && reached >= course.settled() =>
             {
+                // By the highest level: all share one show time, and that lane has the least room.
                 FramePace::Within(headroom.pace(now, lanes.level()))
             }
             _ => FramePace::Within(0.0),

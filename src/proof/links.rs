@@ -107,6 +107,7 @@ impl Line<'_> {
     fn prove(&self, seats: &[&Controller], all: &mut LinksProof) {
         let Some(Drives { drive, .. }) = seats[0].drives() else { return };
         let Some(driven) = self.driven(drive) else { return };
+        // One stands for all: they are of the same type, on the same axes.
         let part = Part { seat: Arc::clone(&seats[0].seat), axes: seats[0].window() };
         let terms = Terms { parts: vec![part], effects: Vec::new(), ..self.terms.clone() };
         let proof = prove_driven(self.timeline, &terms, &driven);
