@@ -84,14 +84,15 @@ impl Headroom {
     }
 }
 
-/// The jerk that the measure sees of an acceleration that turns from 1 to -1 at once: twice the greatest weight that a third
-/// difference gives to one frame, which is 1 over a distance of one period, 7/9 of its share of a longer one.
+/// The jerk that the measure sees of an acceleration that turns from 1 to -1 at once.
 #[expect(clippy::cast_precision_loss, reason = "1 to 20 periods")]
 fn turn(rate: Rate) -> f64 {
     let n = Spacing::at_rate(rate.hz()).n;
     // A pace is constant within a frame, hence the weights of frames and not of a curve (docs/limiter.md, section 2).
     // In whole milliseconds, as Times are: some arrangement of them is up to one shorter than n periods.
     let shortest_s = (n as f64 / rate.hz() * 1e3).floor() * 1e-3;
+    // The greatest weight of one frame in a third difference is 1 over a distance of one period; over longer
+    // ones 7/9 of the frame's share, met at three periods. Twice, as it turns from one side to the other.
     2.0 * if n == 1 { 1.0 } else { 7.0 / 9.0 } / shortest_s
 }
 

@@ -162,12 +162,11 @@ impl LaneMotion {
     }
 
     /// Begins to come to rest from however it moves on its course.
-    ///
-    /// The course knows that best; while the level changes, it is only seen in what was sent.
     pub(super) fn brake(&mut self, on_course: impl FnOnce(&Window) -> [AxisState; MAX_AXES]) {
         if self.mode != LaneMode::Following {
             return;
         }
+        // The course knows best how it moves; while the level changes, it is only seen in what was sent.
         let mut states = if self.fader.is_still() { on_course(&self.window) } else { self.trail.states() };
         // From the pose that was sent: the limiter may hold it elsewhere than the course says.
         for (state, position) in states.iter_mut().zip(self.pose()) {

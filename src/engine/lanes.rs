@@ -125,10 +125,10 @@ impl Lanes {
         moved
     }
 
-    /// Describes the lanes for the planner. The level of those that do not follow the cue is set at once: nothing of their
-    /// present motion hangs on it.
+    /// Describes the lanes for the planner. Those that do not follow the cue take their level at once.
     pub(super) fn describe(&mut self, scene: &mut Scene) {
         for (motion, scene) in self.all.iter_mut().zip(&mut scene.lanes) {
+            // Nothing of how they move now hangs on it: they are out, at rest, or nothing goes to them.
             if motion.out || !motion.is_there() || motion.mode == LaneMode::Still {
                 motion.set_level(motion.wanted.motion.min(self.greatest_level));
             }

@@ -251,12 +251,12 @@ impl Limiter {
     }
 
     /// True if a way to rest goes on from this pose.
-    ///
-    /// Of what was proved, one does: it can be followed to its end within the limits, and from its last pose a way to rest
-    /// within them is part of the proof (`proof::end`); a planned move ends at rest or on the cue. The stroke has room for a
-    /// stop at once as well, since what turns inside it leaves room to turn sooner. That much is asked here all the same, in
-    /// closed form: what was said to be proved and runs out of its stroke is refused while there is room left.
     fn leads_on(&mut self, axis: usize, next: &NextPose, frame: &Frame, by: Provenance) -> bool {
+        // Of what was proved, one does: it can be followed to its end within the limits, and from its last
+        // pose a way to rest within them is part of the proof (`proof::end`); a planned move ends at rest or
+        // on the cue. The stroke has room for a stop at once as well, since what turns inside it leaves room
+        // to turn sooner. That much is asked all the same, in closed form: what was said to be proved and
+        // runs out of its stroke is refused while there is room left.
         (by == Provenance::Proved && self.has_room(axis, next, frame))
             || self.leaves_a_way_out(axis, next, frame)
     }

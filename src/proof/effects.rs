@@ -68,10 +68,11 @@ fn on_while<T: Copy>(steps: &[TrackStep<T>], end: ShowTime, is_on: impl Fn(T) ->
     runs
 }
 
-/// Frames can only switch every period, wherever they fall: a run is on in as many frames as there are whole periods in it,
-/// or in one more.
+/// What is wrong with how long frames have it on, which may be a period more or less than the cue.
 fn wrong_length(run: &EffectRun, effect: &LimitedEffect, period: Duration) -> Option<Breach> {
     let (at, on, limit) = (run.from, run.length(), &effect.limit);
+    // Frames can only switch every period, wherever they fall: a run is on in as many frames as there are
+    // whole periods in it, or in one more.
     let frames = nanos(on) / nanos(period);
     let shortest = Duration::from_nanos(frames * nanos(period));
     let longest = if shortest == on { on } else { shortest + period };
