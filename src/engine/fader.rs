@@ -5,7 +5,7 @@
 pub(super) const RATE: f64 = 0.25;
 /// How quickly the change itself grows and ends, per second squared: 0.25 s to full speed.
 pub(super) const GATHER: f64 = 1.0;
-// With this one it ends within 0.25 / 0.05 = 5 s, whatever the cue leaves.
+// Slowing by its own share alone a change dies away and never stands: from here on it ends in 0.25 s.
 /// The least share with which a change ends.
 const LEAST: f64 = 0.05;
 /// Levels nearer than this are the same.
