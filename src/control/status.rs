@@ -306,9 +306,15 @@ pub struct ControllerStatus {
     pub belts_open: Option<Vec<u8>>,
     /// Outputs, bit 0 = Y01; null if it never told.
     pub outputs: Option<u16>,
-    /// Where its axes are, mm, and degrees of its rotary axis: measured where it measures, else as it was commanded; null if
-    /// nobody knows.
+    /// Where its axes are, mm, and degrees of its rotary axis: as measured, unless it acked a frame more than a second later, then as
+    /// that commanded; null if nobody knows.
     pub positions_mm: Option<Vec<f64>>,
+    /// Where it was told to go by the last frame that it acked, parts of each axis's range, 0 to 1; null before the first.
+    pub commanded: Option<Vec<f64>>,
+    /// Where it measured its axes, parts of each axis's range; null if it never did, or acked a frame more than a second later.
+    pub measured: Option<Vec<f64>>,
+    /// How many axes of a cue come before its own.
+    pub axis_offset: usize,
     /// Its rotary axis, from 1; left out if it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotary_axis: Option<usize>,

@@ -27,6 +27,7 @@ mod readiness;
 mod record;
 mod recorded;
 mod reload;
+mod seat_places;
 mod seat_test;
 mod seat_testing;
 mod service_log;

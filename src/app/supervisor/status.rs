@@ -4,13 +4,13 @@ use jiff::Zoned;
 
 use super::features::Features;
 use super::hall::HallContext;
+use super::seat_places::SeatPlaces;
 use super::{belts, film, links};
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
     ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
-use crate::motion::{AxisGeometry, Pulses};
 use crate::rt::Row;
 use crate::state::Next;
 use crate::time::MonoTime;
@@ -123,6 +123,7 @@ impl StatusParts<'_> {
         let state = row.map(|row| row.state).unwrap_or_default();
         let ack = row.and_then(|row| row.ack_ns);
         let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
+        let SeatPlaces { positions_mm, commanded, measured } = SeatPlaces::of(controller, &state);
         ControllerStatus {
             enabled: hall.settings.is_on(index),
             health: row.map_or(Health::Unknown, |row| row.standing.into()),
@@ -144,11 +145,9 @@ impl StatusParts<'_> {
             inputs: state.inputs.map(|heard| heard.value),
             belts_open: belts::open(controller, &state, now).map(belts::numbers),
             outputs: state.outputs.map(|heard| heard.value),
-            positions_mm: state.measured.or(state.echoed).map(|heard| {
-                let own = controller.seat.own().iter();
-                let place = |(axis, pulses): (&AxisGeometry, &Pulses)| axis.place(axis.fraction(*pulses));
-                own.zip(heard.value.iter()).map(place).collect()
-            }),
+            positions_mm,
+            commanded,
+            measured,
             ..nameplate(controller)
         }
     }
@@ -162,6 +161,7 @@ fn nameplate(controller: &Controller) -> ControllerStatus {
         seat: controller.seat.name.clone(),
         address: controller.address(),
         group: controller.group.clone(),
+        axis_offset: controller.axis_offset,
         rotary_axis: controller.seat.rotary_axis().map(|axis| axis + 1),
         ..ControllerStatus::default()
     }
