@@ -16,7 +16,6 @@ mod hall_settings;
 mod homing;
 mod job;
 mod lasting;
-mod links;
 mod list;
 mod perform;
 mod player;

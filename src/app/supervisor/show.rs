@@ -45,16 +45,10 @@ pub(super) struct ProvedShow {
     /// The film that is shown with it from here.
     pub(super) movie: Option<Movie>,
     /// What the links of the hall execute of it.
-    links: Vec<LinkPlay>,
+    pub(super) links: Vec<LinkPlay>,
 }
 
 impl ProvedShow {
-    /// How far drives on a link are beside it at the most, mm; none where nobody on it plays it.
-    pub(super) fn deviation_on(&self, link: &str) -> Option<f64> {
-        let axes = self.links.iter().filter(|play| play.link == link).flat_map(|play| &play.axes);
-        axes.map(|axis| axis.deviation.value).reduce(f64::max)
-    }
-
     /// Proves a cue for a hall.
     ///
     /// # Errors

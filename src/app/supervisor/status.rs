@@ -5,7 +5,8 @@ use jiff::Zoned;
 use super::features::Features;
 use super::hall::HallContext;
 use super::seat_places::SeatPlaces;
-use super::{belts, film, links};
+use super::{belts, film};
+use crate::app::links;
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
@@ -86,7 +87,7 @@ impl StatusParts<'_> {
                 refusals: hall.granted.refusals.clone(),
             },
             controllers: self.controllers(table),
-            links: links::status(hall),
+            links: links::status(&hall.config, &hall.links, hall.cued.as_ref().map_or(&[], |cued| &cued.links)),
             preflight: preflighted.as_ref().map(|it| it.status(now, |lane| hall.settings.is_on(lane))),
             warnings,
             test: features.seats.test.as_ref().map(|test| test.status.clone()),
