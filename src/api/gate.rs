@@ -121,7 +121,8 @@ fn note(shared: &Shared, request: &Request, problem: &Problem) {
 }
 
 fn takes_query(path: &str) -> bool {
-    path.strip_prefix("/api/v1/cues/").is_some_and(|rest| rest.ends_with("/curve"))
+    let drawn = [("/api/v1/cues/", "/curve"), ("/api/v1/recordings/", "/picture")];
+    drawn.iter().any(|(begin, end)| path.strip_prefix(begin).is_some_and(|rest| rest.ends_with(end)))
 }
 
 /// Does it, or gives the reply to the first request with that key.
