@@ -157,7 +157,7 @@ fn names_and_rows_choose_controllers_of_a_configuration() {
     assert_eq!(chosen(&["--row", "A"]), "A1 A2");
     assert_eq!(chosen(&["--name", "B1"]), "B1");
     let unknown = said(&["register", "read", "PA02", "--config", config, "--row", "C"], vec![]);
-    assert_eq!((unknown.exit, unknown.err.as_str()), (64, "kinocue: no controller stands in row C\n"));
+    assert_eq!((unknown.exit, unknown.err.as_str()), (64, "kinocue: no controller is in row C\n"));
 }
 
 #[test]

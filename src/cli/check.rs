@@ -344,6 +344,6 @@ fn hall_in_words(hall: &Config) -> String {
     if !hall.links.is_empty() {
         words.insert(1, counted(hall.links.len(), "link"));
     }
-    words.extend(hall.absent.iter().map(|one| format!("{} out for good", one.controller.name)));
+    words.extend(hall.absent.iter().map(|one| format!("{} disabled", one.controller.name)));
     words.join(", ")
 }

@@ -76,7 +76,7 @@ impl Features {
             return Err(if is_absent(name, hall) {
                 Problem::new(
                     Code::State,
-                    format!("{name} is out for good: the configuration says enabled = false"),
+                    format!("{name} is disabled in the configuration (enabled = false)"),
                     "take that line out of its [[controller]], and reload",
                 )
             } else {

@@ -167,11 +167,11 @@ fn nameplate(controller: &Controller) -> ControllerStatus {
     }
 }
 
-/// A controller that is out for good: nothing is known of it.
+/// A controller that is disabled in the configuration: nothing is known of it.
 fn absent(controller: &Controller) -> ControllerStatus {
     ControllerStatus {
         health: Health::Out,
-        why: "out for good: enabled = false in the configuration".to_owned(),
+        why: "disabled in the configuration: enabled = false".to_owned(),
         ..nameplate(controller)
     }
 }

@@ -75,7 +75,7 @@ export function showController(status) {
     parts.picture.replaceChildren(mark(health.mark));
   }
   const forGood = controller.health === 'out';
-  setText(parts.word, forGood ? 'out for good' : controller.enabled ? controller.health : `taken out, ${controller.health}`);
+  setText(parts.word, forGood ? 'disabled in the configuration' : controller.enabled ? controller.health : `taken out, ${controller.health}`);
   setText(parts.why, sentence(controller.why));
   for (const [label, figure] of Object.entries(FIGURES)) setText(parts.figures[label], figure(controller));
   setProperty(parts.out, 'hidden', !controller.enabled);

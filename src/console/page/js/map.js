@@ -91,7 +91,7 @@ function lookOf(controller) {
 
 function spoken({ name, row, enabled, health, ack_rate: acks, ack_p99_us: p99 }) {
   const place = row ? `, row ${row}` : '';
-  return `${name}${place}: ${enabled ? health : health === 'out' ? 'out for good' : 'taken out'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
+  return `${name}${place}: ${enabled ? health : health === 'out' ? 'disabled in the configuration' : 'taken out'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
 }
 
 function showLegend() {

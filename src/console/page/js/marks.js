@@ -12,7 +12,7 @@ export const HEALTH = {
   error: { look: 'bad', mark: 'peak', letters: 'ER', means: 'has an error' },
   stopped: { look: 'held', mark: 'block', letters: 'ST', means: 'emergency stop' },
   excluded: { look: 'away', mark: 'dash', letters: 'EX', means: 'taken out' },
-  out: { look: 'away', mark: 'dash', letters: 'XX', means: 'out for good' },
+  out: { look: 'away', mark: 'dash', letters: 'XX', means: 'disabled in the configuration' },
   unknown: { look: 'away', mark: 'what', letters: '??', means: 'never heard' },
 };
 
