@@ -330,7 +330,7 @@ fn unwired(path: &Path, timeline: &Timeline) -> Option<String> {
     let names = timeline.switch_names();
     (!names.is_empty()).then(|| {
         let (path, names) = (path.display(), names.join(", "));
-        format!("{path}: whether a hall has its effects ({names}) was not looked at; --config FILE does")
+        format!("{path}: not checked whether the hall has its effects ({names}); --config FILE checks it")
     })
 }
 

@@ -114,7 +114,7 @@ pub(super) fn target(output: &Path) -> anyhow::Result<ConvertTarget> {
     } else if named("mcap") {
         Ok(ConvertTarget::Mcap)
     } else {
-        Err(anyhow!("{}: the name of what is written ends in .csv or .mcap", output.display()))
+        Err(anyhow!("{}: the name of the output has to end in .csv or .mcap", output.display()))
     }
 }
 
@@ -193,7 +193,7 @@ pub(super) fn write(cue: &Cue, output: &Path, target: ConvertTarget) -> Result<(
     match target {
         ConvertTarget::Csv => {
             if !cue.markers().is_empty() {
-                print::tell(&format!("csv has no place for markers; {} are left out", cue.markers().len()));
+                print::tell(&format!("CSV cannot hold markers; {} are left out", cue.markers().len()));
             }
             cue::write_csv(cue, &mut out).map_err(|error| match error {
                 CsvError::Io(error) => failure(error, Exit::Io, output),

@@ -77,8 +77,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         .map_err(|error| anyhow!("{}: {error}", args.cue.display()))
         .or_exit(Exit::CheckFailed)?;
     if !fitted.after.passed() || !judge.stroke(&fitted.timeline).faults.is_empty() {
-        let error =
-            anyhow!("{}: what was made of it still breaks limits; nothing is written", args.cue.display());
+        let error = anyhow!("{}: the fitted cue still breaks limits; nothing is written", args.cue.display());
         return Err(error).or_exit(Exit::CheckFailed);
     }
     refuse_what_links_miss(args, &judge, &fitted)?;
@@ -100,7 +99,7 @@ fn refuse_what_links_miss(args: &Args, judge: &Judge, fitted: &Fitted) -> Result
     }
     let lines: String = broken.iter().map(|one| format!("{}:{one}\n", args.cue.display())).collect();
     let error = anyhow!(
-        "{lines}what serial links miss of a cue is nothing that fit mends: change the link, the level or the cue; nothing is written"
+        "{lines}fit cannot mend what a serial link cannot carry: change the link, the level or the cue; nothing is written"
     );
     Err(error).or_exit(Exit::CheckFailed)
 }
@@ -171,7 +170,7 @@ impl FitReport {
         let mut lines = Vec::new();
         if let Some(seconds) = self.eased_s {
             lines.push(format!(
-                "brought to rest in its last {seconds:.2} s, as it ended in motion without room for a stop"
+                "brought to rest in its last {seconds:.2} s, because it ended in motion without room for a stop"
             ));
         }
         if let Some(hz) = self.cut_off_hz {
@@ -181,12 +180,12 @@ impl FitReport {
         lines.extend(lowered.map(|(axis, factor)| format!("a{}: amplitude x {factor:.4}", axis + 1)));
         if self.vibration_lowered > 0 {
             lines.push(format!(
-                "vibration lowered {} times, to keep to the stroke and to what the seat stands",
+                "vibration lowered {} times, to keep the stroke and the limits of the seat",
                 self.vibration_lowered
             ));
         }
         if lines.is_empty() {
-            lines.push("kept all limits before; written as it was".to_owned());
+            lines.push("already keeps all limits; written unchanged".to_owned());
         } else {
             let (by, axis, at) = (fitted.change.by, &self.change_axis, fitted.change.at);
             let unit = self.change_deg.map_or(AxisUnit::Millimetre, |_| AxisUnit::Degree).name();

@@ -109,7 +109,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     if let Some(other) = &args.other {
-        let error = anyhow!("{}: only a recording is laid over another", other.display());
+        let error = anyhow!("{}: only two recordings can be drawn over each other", other.display());
         return Err(error).or_exit(Exit::Usage);
     }
     let hall = args.seat.config.as_deref().map(load::config).transpose()?;
@@ -159,7 +159,7 @@ fn format(path: &Path) -> Result<PlotFormat, Failure> {
     match path.extension().and_then(|end| end.to_str()) {
         Some("html") => Ok(PlotFormat::Page),
         Some("svg") => Ok(PlotFormat::Svg),
-        _ => Err(anyhow!("{}: its name has to end in .html or .svg", path.display())).or_exit(Exit::Usage),
+        _ => Err(anyhow!("{}: the name has to end in .html or .svg", path.display())).or_exit(Exit::Usage),
     }
 }
 

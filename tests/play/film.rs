@@ -226,7 +226,7 @@ fn a_relay_ends_with_its_lines() {
     let at = folder.write("none", String::new()).parent().expect("it lies in the folder").to_owned();
     let run = kinocue(&["sync", "relay", "ltc:-", "--folder", at.to_str().expect("text")]);
     assert_eq!(run.code, Some(0), "{run:?}");
-    assert!(run.stderr.contains("each line has ended"), "{run:?}");
+    assert!(run.stderr.contains("every line has ended"), "{run:?}");
 }
 
 #[test]

@@ -116,7 +116,7 @@ fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     let unwanted = Wanted { samples: false, full: false, ..Wanted::ALL };
     let read = record::read(again, unwanted, &mut |_, _, _| ()).map_err(io::Error::other)?;
     if read.trouble.is_some() || read.messages != recovered.messages {
-        return Err(io::Error::other("what was written does not read back; the disk may be failing"));
+        return Err(io::Error::other("the written file does not read back; the disk may be failing"));
     }
     Ok(())
 }

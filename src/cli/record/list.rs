@@ -11,7 +11,7 @@ use super::super::{Exit, Failure, OrExit as _, print};
 use super::{open, shown, wall};
 use crate::record::beginning;
 
-/// Lists the recordings of a folder, the oldest first.
+/// Lists the recordings in a folder, oldest first.
 #[derive(Debug, clap::Args)]
 pub(in super::super) struct Args {
     /// The folder.
