@@ -190,7 +190,7 @@ fn a_cue_is_played_to_drives_that_are_home_with_an_ack_for_each_frame_and_to_no_
         let link = seat_of("A1", &port, dialect, rate_hz);
         let hall = write(folder.path(), &format!("[show]\nbind = \"127.0.0.1:0\"\n{link}"));
         let (code, _, said) = play(&cue, &hall);
-        assert!(said.contains("A1: does not tell that it is home"), "{said}");
+        assert!(said.contains("A1: does not report that it is home"), "{said}");
         assert_eq!(code, Some(75));
         assert_eq!(home(&hall).2, Some(0));
         assert_whole(&play(&cue, &hall), 1);

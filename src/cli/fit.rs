@@ -17,11 +17,11 @@ use crate::timeline::Timeline;
 
 /// Fits a cue into the limits of its seats.
 ///
-/// Scales the motion down about the neutral pose just as far as needed, and never changes its timing. A cue that ends in motion, with no
-/// way to come to rest from there, is brought to rest over its last stretch where that changes less. What scaling cannot cure, such as the
-/// steps of coarse sources and the corners of straight lines, --smooth removes with a low-pass filter that moves nothing in time; of filter
-/// and scaling, it uses the pair that changes the cue least. Vibration that the seat cannot take on top of that is lowered too. It reports,
-/// but does not fix, what the serial links of the hall cannot carry. The result passes `kinocue check` on the same terms.
+/// Scales the motion down about the neutral pose just as far as needed, and never changes its timing. A cue that ends in motion without
+/// room to stop is brought to rest over its last stretch, if that changes it less. --smooth allows a zero-phase low-pass filter against
+/// what scaling cannot cure, such as the steps of coarse sources and the corners of straight lines; of all pairs of filter and scale it
+/// uses the one that changes the cue least. Vibration that the seat cannot take on top of the motion is lowered too. What the serial
+/// links of the hall cannot carry is reported, not fixed. The result passes `kinocue check` with the same options.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue fit ride.csv -o fitted.csv",
@@ -43,19 +43,19 @@ pub(super) struct Args {
     #[command(flatten)]
     seat: SeatArgs,
 
-    /// The level that the cue is to be played at: 60% or -6dB.
+    /// The level at which the cue will be played: 60% or -6dB.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 
-    /// Scale each axis by itself; otherwise all axes are scaled alike, which keeps the shape of the motion.
+    /// Scale each axis by itself; by default all axes are scaled alike, which keeps the shape of the motion.
     #[arg(long)]
     per_axis: bool,
 
-    /// Allow a low-pass filter (zero phase, so nothing moves in time).
+    /// Allow a low-pass filter (zero phase, so without delay).
     #[arg(long)]
     smooth: bool,
 
-    /// Overwrite OUT if it exists; never the cue itself.
+    /// Overwrite OUT if it exists, but never the cue itself.
     #[arg(long)]
     force: bool,
 

@@ -224,7 +224,7 @@ impl Posted {
             Err(_) => Err(Problem::new(
                 Code::Timeout,
                 format!("no answer within {} s", PATIENCE.as_secs()),
-                "look at the status before asking again: it may still be done",
+                "check the status before you repeat the command: it may still take effect",
             )),
         }
     }

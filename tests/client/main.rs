@@ -395,7 +395,7 @@ fn watch_says_when_what_it_shows_is_old() {
     let mut watch = Running(daemon.command(&["watch"]).spawn().expect("it starts"));
     let mut said = BufReader::new(watch.0.stderr.take().expect("piped")).lines();
     let line = said.next().expect("a line").expect("text");
-    assert_eq!(line, "kinocue: the daemon has said nothing for 2 s: what is shown is old");
+    assert_eq!(line, "kinocue: no update from the daemon for 2 s: what is shown is out of date");
 }
 
 #[test]
@@ -440,7 +440,7 @@ fn a_sweep_that_loses_its_daemon_says_to_look_at_the_seats() {
     });
     let run = daemon.run(&["test", "sweep", "--seats-empty", "--json"]);
     assert_eq!(run.code, Some(69));
-    told(&run, "look at the seats");
+    told(&run, "check the seats");
 }
 
 #[test]

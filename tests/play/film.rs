@@ -288,7 +288,7 @@ fn artnet_of_the_named_sender_leads_the_seat_and_whoever_else_sends_is_named_and
     let to = format!("{here}:6454");
     let _other = sent(&["--artnet", &to, "--from", &foreign, "--tc-start", "01:00:01:00"]);
     let mut playing = Playing::start(&rise(&folder, 4), &sim.to(), &args);
-    playing.wait_for(&format!("{foreign} sends as well, and is not heard"));
+    playing.wait_for(&format!("{foreign} sends as well, and is ignored"));
     let _film = sent(&["--artnet", &to, "--from", &named, "--tc-start", "01:00:00:00"]);
     playing.wait_for("playing: ");
     playing.wait_for("parking: the cue is over");

@@ -246,7 +246,7 @@ fn a_player_leads_nobody_with_a_film_that_is_none_of_its_own() {
         row.notes
             .refused
             .as_deref()
-            .is_some_and(|why| why.starts_with("/srv/trailer.mkv is none of its films"))
+            .is_some_and(|why| why.starts_with("/srv/trailer.mkv is not one of its films"))
     );
     assert_eq!((row.used, row.state), (0, FilmState::Absent));
     next.send(()).expect("it lives");

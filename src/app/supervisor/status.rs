@@ -99,8 +99,8 @@ impl StatusParts<'_> {
     fn next(&self) -> String {
         let next = self.hall.mirror.next;
         match self.hall.cued.as_ref().and_then(|cued| cued.left_at) {
-            Some(film) if next == Next::Go => format!("{next}; or go on from {film}, where it was left"),
-            Some(film) if next == Next::Arm => format!("{next}; it can go on from {film}, where it was left"),
+            Some(film) if next == Next::Go => format!("{next}; or go from {film}, where it was left"),
+            Some(film) if next == Next::Arm => format!("{next}; it can go from {film}, where it was left"),
             _ => next.to_string(),
         }
     }
@@ -122,7 +122,7 @@ impl StatusParts<'_> {
         let counts = row.map(|row| row.counts).unwrap_or_default();
         let state = row.map(|row| row.state).unwrap_or_default();
         let ack = row.and_then(|row| row.ack_ns);
-        let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
+        let why = row.map_or_else(|| "not polled yet".to_owned(), |row| row.why.to_string());
         ControllerStatus {
             enabled: hall.settings.is_on(index),
             health: row.map_or(Health::Unknown, |row| row.standing.into()),

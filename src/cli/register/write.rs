@@ -30,12 +30,12 @@ Examples:
   kinocue register write servo 1 508=7 --config hall.toml --name A1
   kinocue register write --file hall-settings.toml --config hall.toml --name A7 --keep
 
-A power cycle undoes what is written, unless --keep is given. Homing: see `kinocue home`.")]
+Without --keep, a power cycle undoes what is written. To home seats, use `kinocue home`.")]
 pub(super) struct Args {
     /// What to write: PA95=6, pa 80..85 = 3000, dpf1=0, servo 1 508=7.
     #[arg(value_name = "REGISTER=VALUE", required_unless_present = "file", conflicts_with = "file")]
     values: Vec<String>,
-    /// Write what a file of `kinocue register save` has of each controller, except addresses and network settings.
+    /// Write the settings in a file of `kinocue register save`, except addresses and network settings.
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
     #[command(flatten)]
@@ -43,13 +43,13 @@ pub(super) struct Args {
     /// The controller of this name; repeatable.
     #[arg(long, value_name = "NAME")]
     name: Vec<String>,
-    /// Have the controllers keep it over a power cycle (PA0f = 2; mbox: object channel 1).
+    /// Have the controllers save them, to keep them over a power cycle (PA0f = 2; mbox: object channel 1).
     #[arg(long)]
     keep: bool,
     /// Write without asking.
     #[arg(long)]
     yes: bool,
-    /// Let network settings (PA10-1b, PA20-29) and the factory reset (PA0f = 1) be written.
+    /// Allow network settings (PA10-1b, PA20-29) and the factory reset (PA0f = 1) to be written.
     #[arg(long)]
     force: bool,
     /// Print one JSON object.
