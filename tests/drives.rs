@@ -300,7 +300,7 @@ fn preflight_passes_a_seat_once_it_is_homed_and_takes_one_that_was_never_for_not
     assert_eq!((fails, exit), (vec!["not-home".to_owned()], Some(1)), "{told}");
     let text = kinocue(&["preflight", "--config", &hall]);
     assert!(
-        text.stdout.contains("link:of_A1") && text.stdout.contains("home it, seats empty"),
+        text.stdout.contains("link:of_A1") && text.stdout.contains("home it, with nobody on the seat"),
         "{}",
         text.stdout
     );
@@ -415,7 +415,7 @@ fn a_sixpack_is_read_by_its_queries_and_its_settings_are_refused_by_name() {
     let Bench { hall, sim, folder } = Bench::of("sixpack2");
     let (_, said, exit) = register(&["read"], &hall);
     assert_eq!(exit, Some(69), "as it woke: {said}");
-    assert!(said.contains("answers as it woke, at 19,200 baud; home it"), "{said}");
+    assert!(said.contains("has its power-on baud rate, 19,200; home it"), "{said}");
     assert_eq!(home(&hall).2, Some(0));
     let (text, said, exit) = register(&["read", "$20", "$43", "$30"], &hall);
     assert_eq!(exit, Some(0), "{said}");

@@ -294,7 +294,7 @@ fn a_stop_goes_by_its_own_socket_while_the_other_is_stuck() {
     assert_eq!(run.code, Some(0), "{run:?}");
     assert_eq!(socket.join().expect("it was asked"), "stop\n");
     assert!(daemon.is_done(), "the control socket was not asked");
-    told(&run, &format!("stopping, by {}", daemon.socket("stop.sock").display()));
+    told(&run, &format!("stopping, via {}", daemon.socket("stop.sock").display()));
     told(&run, "the emergency stop is hard-wired");
 }
 

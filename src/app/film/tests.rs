@@ -177,7 +177,7 @@ fn two_halls_hear_through_a_relay_what_its_devices_carry_and_hear_it_again_once_
     let at = |kind: &str| format!("{kind}:relay:{}", folder.path().join(format!("{kind}.sock")).display());
     let halls = [(); 2].map(|()| listen(&[at("mtc"), at("ltc")]));
     let is_without =
-        |row: &SourceRow| row.notes.trouble.as_deref().is_some_and(|why| why.contains("no line now"));
+        |row: &SourceRow| row.notes.trouble.as_deref().is_some_and(|why| why.contains("no line at present"));
     until(&halls[0], "no device", |table| is_without(&table.sources[0]));
     assert_eq!(fifo(&folder, "midi"), midi, "it is plugged in");
 

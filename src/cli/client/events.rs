@@ -57,7 +57,7 @@ impl Events {
             if let Some(data) = self.lines.event() {
                 return Ok(data);
             }
-            let frame = self.body.frame().await.ok_or("the daemon closed the connection")?;
+            let frame = self.body.frame().await.ok_or("it closed the connection")?;
             if let Ok(piece) = frame.map_err(|_| "the connection broke")?.into_data() {
                 self.lines.take(&piece)?;
             }

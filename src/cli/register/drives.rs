@@ -260,8 +260,9 @@ impl RegisterReader {
                 match sixpack2::look_for(talk, *unit, motors) {
                     Ok(Some(facts)) => found.values = of_pack(&facts, wanted),
                     Ok(None) => {
-                        let why =
-                            format!("unit {unit} answers as it woke, at 19,200 baud; home it, seats empty");
+                        let why = format!(
+                            "unit {unit} has its power-on baud rate, 19,200; home it, with nobody on the seat"
+                        );
                         found.faults.push(why);
                     }
                     Err(fault) => found.faults.push(fault.to_string()),
