@@ -198,7 +198,7 @@ fn lines_of_hex_are_a_message_each_and_bad_ones_are_counted() {
         "\
 line 1  read registers: PA02
 line 3  reply to read registers: received, running normally, PA02 = 6
-line 4  not hex: 'n' after 0 hex digits is no hex digit; give the message as 0-9 and a-f
+line 4  not hex: 'n' after 0 hex digits is not a hex digit; give the message as 0-9 and a-f
 line 5  malformed: byte 18: ends after 18 bytes; this message takes 20: 55aa000012010001ffffffff002000020001
 
 2 messages

@@ -17,7 +17,7 @@ const ALIKE: f64 = 0.75;
 #[non_exhaustive]
 pub(crate) enum SelectError {
     /// No number of a register, or a range of them.
-    #[error("{word:?} is no register number; {space} takes {wanted}")]
+    #[error("{word:?} is not a register number; {space} takes {wanted}")]
     Number {
         /// What was read.
         word: String,
@@ -371,7 +371,7 @@ mod tests {
         assert_eq!(named("cp128..130 CD006..CD007"), "PA80 PA81 PA82 DP06 DP07");
         assert_eq!(selections(&words("cp")).unwrap(), selections(&words("pa")).unwrap());
         assert!(named("cp 256").contains("CP takes 000 to 255"));
-        assert!(named("CP09a").contains("no register number"));
+        assert!(named("CP09a").contains("not a register number"));
         assert!(named("CP153").starts_with("PA99 is in neither manual"));
         let given = assignments(&words("CP082=5")).unwrap();
         assert_eq!(given, [Assignment { address: Address::Pa(0x52), value: 5 }]);
@@ -388,7 +388,7 @@ mod tests {
     fn what_names_no_register_is_told_in_one_line() {
         assert!(named("PA99").starts_with("PA99 is in neither manual"));
         assert!(named("pa 99..9c").starts_with("neither manual has a register among PA 99..9c"));
-        assert!(named("pa 0x100").contains("\"0x100\" is no register number"));
+        assert!(named("pa 0x100").contains("\"0x100\" is not a register number"));
         assert!(named("pa 0b..06").contains("ends before it begins"));
         assert!(named("axis-ofset").contains("did you mean \"axis offset\", PA95?"));
         assert!(named("servo 0 508").starts_with("servo takes"));

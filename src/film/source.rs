@@ -210,7 +210,7 @@ impl NamedSender {
         let (from, bind) = with_option(text, "bind=");
         let refuse = || {
             FilmArgError(format!(
-                "{text} names no sender; write its address, as 10.0.0.20, and after a comma where it is heard, as bind=0.0.0.0:{port}"
+                "{text} has no sender; give its address, such as 10.0.0.20, and optionally, after a comma, bind=0.0.0.0:{port}"
             ))
         };
         let from: Ipv4Addr = from.parse().map_err(|_| refuse())?;
@@ -232,7 +232,7 @@ impl FromStr for ClockStart {
         let (time, most) = with_option(text, "max_error=");
         let at = ClockTime::of(time).ok_or_else(|| {
             FilmArgError(format!(
-                "{time} is no time; write 2026-11-21T19:00:00+01:00, 2026-11-21T19:00 or 19:00"
+                "{time} is not a time; write 2026-11-21T19:00:00+01:00, 2026-11-21T19:00 or 19:00"
             ))
         })?;
         let max_error = match most {

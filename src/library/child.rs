@@ -37,7 +37,7 @@ fn run<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<T,
     let bounds = &hall.bounds;
     let mut child = spawn(hall, cue, more).map_err(|error| {
         let detail = format!("cannot start the check of the cue: {error}");
-        Problem::new(Code::File, detail, "look at the service's limits on processes and memory")
+        Problem::new(Code::File, detail, "check the service's limits on processes and memory")
     })?;
     let deadline = Monotonic.now() + bounds.time;
     let watched = watch(&mut child, deadline);
@@ -84,7 +84,7 @@ fn watch(child: &mut Child, deadline: MonoTime) -> io::Result<Vec<u8>> {
             bytes => output.extend_from_slice(&buf[..bytes]),
         }
         if output.len() as u64 > MAX_OUTPUT {
-            return Err(io::Error::other("it printed more than any verdict is long"));
+            return Err(io::Error::other("its output is longer than any verdict"));
         }
     }
     let ended = pidfd_open(Pid::from_child(child), PidfdFlags::empty())?;
@@ -114,13 +114,13 @@ fn failed(error: &io::Error) -> Problem {
 
 fn too_long(bounds: &Bounds) -> Problem {
     let detail = format!("the check of the cue took more than {} s and was ended", bounds.time.as_secs());
-    Problem::new(Code::Check, detail, "try again when nothing plays; a cue that never passes is no good one")
+    Problem::new(Code::Check, detail, "try again when nothing is playing; a cue that never passes is bad")
 }
 
 /// It ended without a verdict: its limits ended it, or it could not begin.
 fn no_verdict(status: ExitStatus, bounds: &Bounds) -> Problem {
     if status.code() == Some(BAD_CONFIGURATION) {
-        let remedy = "run kinocue check on the configuration and mend it";
+        let remedy = "run kinocue check on the configuration and correct it";
         return Problem::new(Code::Check, "the configuration of the hall has faults", remedy);
     }
     let how = match (status.signal(), status.code()) {

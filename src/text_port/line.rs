@@ -64,8 +64,8 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<TextOrder, TextFa
             return Err(Problem::new(Code::Role, detail, "a person does that on the console").into());
         }
         _ => {
-            let detail = format!("{:?} is no line of kinocue", text.unwrap_or_default());
-            return Err(TextFault::NoOrder(value(detail, &format!("there are {LINES}"))));
+            let detail = format!("{:?} is not a line that kinocue knows", text.unwrap_or_default());
+            return Err(TextFault::NoOrder(value(detail, &format!("the lines are {LINES}"))));
         }
     });
     allowed(order, allow)

@@ -212,7 +212,7 @@ fn a_cue_is_taken_in_from_the_page_or_refused_with_every_fault() {
     browser.press("#upload");
     browser.reads("playlist-reply", "not done");
     browser.reads("upload-faults", "1.4 is outside the stroke");
-    browser.reads("upload-faults", "400 does not come after");
+    browser.reads("upload-faults", "400 is not after");
     browser.shot("50-upload-refused");
 
     browser.choose("#upload-file", &Path::new(env!("CARGO_MANIFEST_DIR")).join("cues/bench-ride.csv"));

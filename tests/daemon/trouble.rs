@@ -67,7 +67,7 @@ fn the_stop_socket_brings_the_seats_to_rest_while_the_api_is_flooded() {
     let hall = Hall::open();
     hall.play("night");
     let flood = [(); 2].map(|()| Flood::of(hall.path("control.sock")));
-    hall.serving().heard(|line| line.contains("no room for more connections").then_some(()));
+    hall.serving().heard(|line| line.contains("too many connections").then_some(()));
     assert_eq!(hall.stop_socket("stop\n"), "stopping\n");
     hall.serving().heard(|line| line.contains("stopped: ").then_some(()));
     drop(flood);

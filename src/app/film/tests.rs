@@ -204,7 +204,7 @@ fn what_has_no_device_is_not_relayed() {
     for source in ["mpv:/s", "artnet:10.0.0.20", "ltc:reel.wav", "ltc:relay:/run/ltc.sock", "clock:19:00"] {
         let args = FilmArgs::of(source.parse().expect("it is a source"));
         let error = FilmReader::relay(&[args], folder.path()).expect_err(source).to_string();
-        assert!(error.contains("is no line that a relay reads; take ltc:alsa:DEVICE"), "{error}");
+        assert!(error.contains("is not a line that a relay reads; take ltc:alsa:DEVICE"), "{error}");
     }
 }
 

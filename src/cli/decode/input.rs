@@ -55,7 +55,7 @@ fn is_file(word: &OsString) -> bool {
 fn messages(words: &[OsString]) -> anyhow::Result<Vec<Vec<u8>>> {
     let mut messages: Vec<String> = Vec::new();
     for word in words {
-        let word = word.to_str().with_context(|| format!("{} is no hex", word.display()))?;
+        let word = word.to_str().with_context(|| format!("{} is not hex", word.display()))?;
         let digits = digits_of(word).to_ascii_lowercase();
         match messages.last_mut() {
             Some(message) if !OPENINGS.iter().any(|opening| digits.starts_with(opening)) => {
@@ -75,7 +75,7 @@ pub(super) fn bytes(text: &str) -> anyhow::Result<Vec<u8>> {
         for c in digits_of(word).chars() {
             let Some(digit) = c.to_digit(16).and_then(|digit| u8::try_from(digit).ok()) else {
                 bail!(
-                    "{c:?} after {} hex digits is no hex digit; give the message as 0-9 and a-f",
+                    "{c:?} after {} hex digits is not a hex digit; give the message as 0-9 and a-f",
                     digits.len()
                 );
             };

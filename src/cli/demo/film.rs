@@ -39,7 +39,8 @@ impl DemoFilm {
         let path = path.canonicalize().with_context(|| path.display().to_string()).or_exit(Exit::NoInput)?;
         let name = path.file_name().and_then(|name| name.to_str()).map(str::to_owned);
         let (Some(folder), Some(name), Some(_)) = (path.parent(), name, path.to_str()) else {
-            return Err(anyhow!("{} is no file with a name of UTF-8", path.display())).or_exit(Exit::NoInput);
+            return Err(anyhow!("{} is not a file with a name of UTF-8", path.display()))
+                .or_exit(Exit::NoInput);
         };
         let length_s = film_length_s(&path).map_err(anyhow::Error::msg).or_exit(Exit::Unavailable)?;
         let shortest_s = f64::from(SWELL_MS + REST_MS) / 1e3;

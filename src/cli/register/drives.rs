@@ -101,8 +101,9 @@ pub(super) fn take(words: &[String]) -> anyhow::Result<(Vec<String>, DriveRegist
 fn registers(word: &str, range: &str) -> anyhow::Result<impl Iterator<Item = u8>> {
     let (first, last) = range.split_once("..").unwrap_or((range, range));
     let last = last.strip_prefix('R').unwrap_or(last);
-    let none =
-        || anyhow!("{word} is no register of a SilverMax; they are R0 to R40 and R200 to R211, in decimal");
+    let none = || {
+        anyhow!("{word} is not a register of a SilverMax; they are R0 to R40 and R200 to R211, in decimal")
+    };
     let number = |text: &str| text.parse::<u8>().map_err(|_| none());
     let (first, last) = (number(first)?, number(last)?);
     if !readable().any(|known| (first..=last).contains(&known)) {
@@ -119,7 +120,7 @@ fn query(text: &str) -> anyhow::Result<u8> {
                 "${number:02X}: a SIXpack 2 has no command that reads its settings back; `kinocue home` writes them whole"
             )
         }
-        _ => bail!("${text} is no query of a SIXpack 2; they are $20, $30 and $43"),
+        _ => bail!("${text} is not a query of a SIXpack 2; they are $20, $30 and $43"),
     }
 }
 
