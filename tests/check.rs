@@ -154,7 +154,7 @@ fn what_serial_drives_execute_of_a_cue_is_judged_where_somebody_asks() {
     let run = check(&["--link-rate", "30"]);
     assert_eq!(run.code, Some(1));
     assert!(
-        run.stderr.contains(" is too quick for drives at 30.0 Hz, which swing at 3.8 Hz"),
+        run.stderr.contains(" is too fast for drives at 30.0 Hz, which follow at most 3.8 Hz"),
         "{}",
         run.stderr
     );
@@ -386,7 +386,7 @@ fn a_hall_with_drives_passes_its_check_which_says_how_often_its_links_play() {
     for text in [
         "passed: 2 controllers, 2 links, 2 seat types",
         "drives.toml: plays at 29.98 Hz on link stalls, 3 axes\n",
-        "drives.toml: link circle runs at 56818 baud, what its drives make of 57600\n",
+        "drives.toml: link circle runs at 56818 baud, the nearest that its drives can make to 57600\n",
         "Hz on link circle, 3 axes, by a USB adapter whose latency timer is 1 ms\n",
     ] {
         assert!(run.stdout.contains(text), "{text}: {}", run.stdout);

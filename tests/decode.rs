@@ -135,14 +135,14 @@ fn a_capture_is_told_a_line_for_each_message_and_counted() {
     0.002000  192.168.15.201:7408 -> 192.168.15.101:8410  reply to motion, relative time: received, running normally, frame 7, in 50 ms, positions 1 0 0, inputs X01
     0.020000  192.168.15.101:8410 -> 192.168.15.201:7408  malformed: byte 18: ends after 18 bytes; this message takes 20: 55aa000012010001ffffffff002000020001
     0.030000  192.168.15.101:8410 -> 192.168.15.201:7408  cut: the capture kept 18 of 38 bytes
-    0.031000  192.168.15.101:8410 -> 192.168.15.201:7408  fragment: from byte 0 of it on; not put together
+    0.031000  192.168.15.101:8410 -> 192.168.15.201:7408  fragment: from byte 0 of it on; not reassembled
 
 2 messages in 0.032 s from 2023-11-14 22:13:20 UTC
        1  0x1401 motion, relative time
        1  0x1402 reply to motion, relative time
        1  malformed
        1  cut short by the capture
-       1  fragments of datagrams, not put together
+       1  fragments of datagrams, not reassembled
        2  other datagrams
        1  other packets
 "
@@ -354,10 +354,10 @@ fn frames_are_told_in_words_and_octets_without_a_frame_are_shown() {
     assert_eq!(ran.code, 65);
     for words in [
         ">   1  motor parameters motor=0 poslimit=400 p5=200 (TestNull, StopNull, FilterSwitch) p6=90 (FastRef, ",
-        ">   ?  01 20 00: a piece of a frame",
+        ">   ?  01 20 00: a part of a frame",
         "<   2  position motor=0 position=8000 action=10 (PI) stop=0",
         ">   1  $CC? parameter=0",
-        ">   1  PI target motor=0 target=8000  (octets that it does not use are not 0)",
+        ">   1  PI target motor=0 target=8000  (bytes that it does not use are not 0)",
         "<   ?  02: it ends in the middle of a frame",
         "5 messages, 2 times octets that are none",
     ] {

@@ -84,7 +84,10 @@ fn a_write_shows_the_change_and_needs_a_yes_and_is_read_back() {
         (Some(0), Some(6), Some(6))
     );
     let again = run(&farm, &["register", "write", "PA95=6"]);
-    assert_eq!((again.exit, again.err.as_str()), (0, "nothing to change: all hold these values already\n"));
+    assert_eq!(
+        (again.exit, again.err.as_str()),
+        (0, "nothing to change: all registers already have these values\n")
+    );
 }
 
 #[test]
@@ -207,7 +210,7 @@ fn a_file_that_is_missing_or_no_settings_ends_in_words() {
     std::fs::write(&file, "[show]\nrate_hz = 100\n").expect("a file");
     let said = run(&farm, &["register", "diff", file.to_str().expect("text")]);
     assert_eq!(said.exit, 78);
-    assert!(said.err.contains("is no settings file"), "{}", said.err);
+    assert!(said.err.contains("is not a settings file"), "{}", said.err);
 }
 
 #[test]

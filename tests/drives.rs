@@ -100,7 +100,7 @@ fn stopped_in_its_search(dialect: &str) -> serde_json::Value {
     let Bench { hall, sim, folder: _folder } = Bench::of(dialect);
     let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
     let mut said = homing.stderr().lines().map(|line| line.expect("text"));
-    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    assert!(said.any(|line| line == "A1: axis 1 searches for its zero"));
     homing.signal(Signal::INT);
     assert!(said.any(|line| line.ends_with("homing was stopped; the seat is not home")));
     assert_eq!(homing.finish().code, Some(130));
@@ -370,7 +370,7 @@ fn preflight_tells_a_port_that_is_missing_and_one_that_another_program_has() {
     let sim = units(&port, "silvermax");
     let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
     let mut said = homing.stderr().lines().map(|line| line.expect("text"));
-    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    assert!(said.any(|line| line == "A1: axis 1 searches for its zero"));
     let (told, fails, exit) = preflight(&hall);
     assert_eq!((fails, exit), (vec!["port-taken".to_owned()], Some(69)), "{told}");
     homing.signal(Signal::INT);
@@ -431,7 +431,7 @@ fn a_sixpack_is_read_by_its_queries_and_its_settings_are_refused_by_name() {
     let file = folder.path().join("kept.toml");
     let (_, said, exit) = register(&["save", file.to_str().expect("text")], &hall);
     assert_eq!((exit, file.exists()), (Some(64), false), "{said}");
-    assert!(said.contains("A1: left out, as no setting of a SIXpack 2 can be read"), "{said}");
+    assert!(said.contains("A1: left out, as the settings of a SIXpack 2 cannot be read"), "{said}");
     sim.signal(Signal::TERM);
     sim.finish();
 }
@@ -441,7 +441,7 @@ fn a_port_that_another_program_has_is_named_with_what_to_do_before_registers_are
     let Bench { hall, sim, folder: _folder } = Bench::of("silvermax");
     let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
     let mut said = homing.stderr().lines().map(|line| line.expect("text"));
-    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    assert!(said.any(|line| line == "A1: axis 1 searches for its zero"));
     let (_, told, exit) = register(&["read", "R1"], &hall);
     assert_eq!(exit, Some(75), "{told}");
     assert!(told.contains("another program has it") && told.contains("systemctl stop kinocue"), "{told}");

@@ -306,7 +306,7 @@ mod tests {
             ("sources = [\"tape\"]", "sources: \"tape\" is not one of ltc, mpv"),
             ("sources = [\"artnet\"]", "there is no [sync.artnet]; it has to say from"),
             ("sources = [\"artnet\"]\n[sync.artnet]\nbind = \"0.0.0.0:6454\"", "[sync.artnet] has no from"),
-            ("sources = [\"artnet:anybody\"]", "names no sender"),
+            ("sources = [\"artnet:anybody\"]", "has no sender"),
             ("sources = [\"mpv:/s\"]\nfilm_fps = \"26\"", "is not a frame rate; take 23.976"),
             ("sources = [\"mpv:/s\"]\nstart = \"1:2\"", "is not a timecode"),
             ("sources = [\"mpv:/s\"]\nrate_band = \"9%\"", "is not a share within 0% to 5%"),

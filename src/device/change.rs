@@ -41,7 +41,7 @@ pub(crate) enum Objection {
     },
     /// A network setting, without being forced.
     #[error(
-        "{address} ({name}) is a network setting, and a wrong one cuts the controller off; --force writes it"
+        "{address} ({name}) is a network setting, and a wrong one makes the controller unreachable; --force writes it"
     )]
     Network {
         /// Which register.
@@ -50,7 +50,7 @@ pub(crate) enum Objection {
         name: &'static str,
     },
     /// The factory reset, without being forced.
-    #[error("{address}=1 takes back every setting of the factory; --force writes it")]
+    #[error("{address}=1 restores all factory settings; --force writes it")]
     Factory {
         /// Which register.
         address: Address,

@@ -21,16 +21,16 @@ pub(crate) type Values = BTreeMap<Address, u16>;
 #[non_exhaustive]
 pub enum SettingsError {
     /// No TOML, or not of this shape.
-    #[error("is no settings file")]
+    #[error("is not a settings file")]
     Shape(#[source] Box<toml::de::Error>),
     /// A later version.
     #[error("is a settings file of version {0}; this kinocue reads version {VERSION}")]
     Version(u32),
     /// Nobody's settings.
-    #[error("has settings of no controller")]
+    #[error("has no settings of any controller")]
     Empty,
     /// A key that is no parameter.
-    #[error("controller {controller}: {key} is no parameter of the manuals, PA00 to PAcf")]
+    #[error("controller {controller}: {key} is not a parameter of the manuals, PA00 to PAcf")]
     Key {
         /// Whose.
         controller: String,

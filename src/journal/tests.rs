@@ -189,7 +189,7 @@ fn a_cut_line_at_the_end_is_named_as_cut() {
     drop(Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T08:00:00Z")));
     let mut file = OpenOptions::new().append(true).open(&files(dir.path())[0]).unwrap();
     file.write_all(b"{\"kind\":\"act").unwrap();
-    assert!(of_day(dir.path(), "2026-11-21").notes[0].ends_with("is cut short, and passed over"));
+    assert!(of_day(dir.path(), "2026-11-21").notes[0].ends_with("is cut short, skipped"));
 }
 
 #[test]

@@ -50,7 +50,7 @@ refused! {
     a_bus_slower_than_the_show_is_refused: [0x59 = 11] => BusPeriod, "every 11 ms at most, but frames come every 10.0 ms";
     positions_of_analogue_inputs_are_refused: [0x60 = 1, 0x61 = 2, 0x62 = 3] => AnaloguePosition, "analogue inputs, times 2/3";
     a_cut_of_long_times_is_refused: [0x0b = 2999] => IntervalLimit, "PA0b = 2999: the frame that brings the seat to its park pose, of 3000 ms, is cut to 2999 ms";
-    a_cut_of_the_shows_frames_is_refused: [0x0b = 5] => IntervalLimit, "made faster";
+    a_cut_of_the_shows_frames_is_refused: [0x0b = 5] => IntervalLimit, "become faster";
     a_reset_by_itself_is_refused: [0x0d = 500] => AutoReset, "PA0d = 500: resets by itself";
     switched_off_replies_are_refused: [0x15 = 0] => RepliesDisabled, "PA15 = 0";
     reports_on_alarm_alone_are_refused: [0x1e = 0] => StatusSlow, "PA1e = 0: reports only when an alarm begins";

@@ -104,7 +104,7 @@ fn film() -> Value {
         "sources": [
             {"source": "artnet:10.0.0.20", "state": "locked", "cause": "the film runs", "timecode": "01:00:05:12",
                 "rate_ppm": 12.0, "sigma_ms": 0.03},
-            {"source": "mtc:/dev/snd/midiC1D0", "state": "absent", "cause": "nothing has been heard of the film yet"},
+            {"source": "mtc:/dev/snd/midiC1D0", "state": "absent", "cause": "nothing has been received from the film yet"},
         ],
     })
 }

@@ -222,7 +222,7 @@ fn the_halls_homing_refuses_a_controller_that_would_not_search_its_zero() {
     let told = |status: &Value| {
         let warnings = status["warnings"].as_array().expect("a list");
         let texts = warnings.iter().filter_map(|warning| warning["text"].as_str());
-        texts.filter(|text| text.contains("without searching it (PA0e = 1)")).count() == 2
+        texts.filter(|text| text.contains("without a search (PA0e = 1)")).count() == 2
     };
     let status = hall.wait(|status| status["state"] == "fault" && told(status));
     assert_eq!(status["cause"], "A1: a seat failed to home");

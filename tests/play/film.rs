@@ -216,7 +216,7 @@ fn a_reel_that_ends_before_it_has_reached_the_cue_ends_the_play_and_moves_nobody
     let args = ["--json", "--chase", &chase, "--film-fps", "25", "--tc-start", "01:00:00:00"];
     let run = Playing::start(&rise(&folder, 4), &sim.to(), &args).finish();
     assert_eq!(run.code, Some(0), "{}", run.stderr);
-    assert!(run.stderr.contains("no source can tell of another"), "{}", run.stderr);
+    assert!(run.stderr.contains("no source can report another"), "{}", run.stderr);
     assert!(sim.end().rows.iter().all(|row| row.commanded[0] == 0));
 }
 
@@ -249,13 +249,13 @@ fn a_source_that_is_none_is_refused_and_so_is_what_a_film_cannot_be_led_with() {
     let (folder, to) = (Folder::new(), ["127.0.0.1:9".to_owned()]);
     let cue = rise(&folder, 2);
     let refused = [
-        (&["--chase", "tape:1"][..], 64, "is no source; take mpv:SOCKET"),
+        (&["--chase", "tape:1"][..], 64, "is not a source; use mpv:SOCKET"),
         (&["--chase", "ltc:nothing.wav"], 71, "nothing.wav cannot be opened"),
         (&["--chase", "ltc:-", "--start", "1"], 64, "cannot be used with"),
         (&["--chase", "ltc:-", "--film-fps", "26"], 64, "is not a frame rate; take"),
         (&["--chase", "ltc:-", "--film-fps", "25", "--tc-start", "01:00:00:25"], 64, "outside 0..=24"),
         (&["--film-fps", "25"], 64, "--chase"),
-        (&["--chase", "artnet:anybody"], 64, "names no sender"),
+        (&["--chase", "artnet:anybody"], 64, "has no sender"),
         (&["--chase", "mtc:/nowhere/midi"], 71, "/nowhere/midi cannot be opened"),
         (&["--at", "soon"], 64, "is not a time; write"),
         (&["--at", "19:00", "--chase", "ltc:-"], 64, "cannot be used with"),

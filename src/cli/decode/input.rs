@@ -35,7 +35,7 @@ impl Input {
     pub(super) fn of(words: &[OsString]) -> Result<Self, Failure> {
         match words {
             [] if io::stdin().is_terminal() => {
-                Err(anyhow!("nothing to decode; give hex, a capture, or - for the standard input"))
+                Err(anyhow!("nothing to decode; give hex, a capture, or - for standard input"))
                     .or_exit(Exit::Usage)
             }
             [] => Ok(Self::Stdin),
@@ -83,10 +83,10 @@ pub(super) fn bytes(text: &str) -> anyhow::Result<Vec<u8>> {
         }
     }
     if digits.is_empty() || digits.len() % 2 != 0 {
-        bail!("{} hex digits are no whole bytes; give two for each byte", digits.len());
+        bail!("{} hex digits are not whole bytes; give two for each byte", digits.len());
     }
     if digits.len() > 2 * MAX_BYTES {
-        bail!("{} bytes are more than a datagram holds; give at most {MAX_BYTES}", digits.len() / 2);
+        bail!("{} bytes do not fit into a datagram; give at most {MAX_BYTES}", digits.len() / 2);
     }
     Ok(digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
 }

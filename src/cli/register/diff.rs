@@ -144,7 +144,7 @@ fn matched_drives<'f>(
     let of = |controller: &Controller| {
         let name = like.unwrap_or(&controller.name);
         let saved = file.iter().find(|one| one.name == name);
-        saved.ok_or_else(|| anyhow!("has no settings of the drives of {name}; --as NAME chooses"))
+        saved.ok_or_else(|| anyhow!("has no settings of the drives of {name}; select others with --as NAME"))
     };
     driven.controllers.iter().map(of).collect()
 }
@@ -212,7 +212,9 @@ fn tell(report: &DiffReport<'_>, all: bool) -> Result<(), Failure> {
         print::tell("nothing differs");
     }
     if !all && !report.controllers.is_empty() {
-        print::tell("PA10-14 and PA16-1b, which are each controller's own, were not compared; --all does");
+        print::tell(
+            "PA10-14 and PA16-1b, which each controller has of its own, were not compared; --all compares them",
+        );
     }
     Ok(())
 }

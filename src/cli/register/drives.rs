@@ -215,12 +215,15 @@ enum PortRefused {
 
 fn open(link: &Link) -> Result<LinkLine, PortRefused> {
     if link.wiring == LinkWiring::Can {
-        return Err(PortRefused::Other(format!("link {} is a CAN bus, which is not opened yet", link.name)));
+        return Err(PortRefused::Other(format!(
+            "link {} is a CAN bus, which is not supported yet",
+            link.name
+        )));
     }
     LinkLine::open(link).map_err(|error| match error {
         SerialError::Taken(_) => PortRefused::Taken(anyhow!(
-            "{error}. If that is the service, stop it first (`systemctl stop kinocue`); `kinocue preflight` without --config asks \
-             through it"
+            "{error}. If that is the service, stop it first (`systemctl stop kinocue`); `kinocue preflight` without --config reads them \
+             through the service"
         )),
         _ => PortRefused::Other(error.to_string()),
     })
@@ -323,7 +326,11 @@ fn of_pack(facts: &sixpack2::UnitFacts, wanted: &DriveRegisters) -> Vec<DriveVal
                 [
                     value(of("position"), "position, microsteps", motor.position.into()),
                     value(of("action"), "action", motor.action.into()),
-                    value(of("stop"), "stopped by its switch since it was asked", motor.was_stopped.into()),
+                    value(
+                        of("stop"),
+                        "stopped by its switch since it was last read",
+                        motor.was_stopped.into(),
+                    ),
                 ]
             })),
             0x30 => {
@@ -335,7 +342,7 @@ fn of_pack(facts: &sixpack2::UnitFacts, wanted: &DriveRegisters) -> Vec<DriveVal
             }
             _ => values.extend([
                 value("$43.firmware".to_owned(), "firmware", facts.firmware.into()),
-                value("$43.reset".to_owned(), "was reset since it was asked", facts.was_reset.into()),
+                value("$43.reset".to_owned(), "was reset since it was last read", facts.was_reset.into()),
                 value("$43.celsius".to_owned(), "°C", facts.celsius.into()),
                 value("$43.serial".to_owned(), "serial number", facts.serial.into()),
             ]),

@@ -33,7 +33,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let none = drives::unreadable(&driven);
     if !none.is_empty() {
         print::tell(&format!(
-            "kinocue: {}: left out, as no setting of a SIXpack 2 can be read; `kinocue home` writes them whole",
+            "kinocue: {}: left out, as the settings of a SIXpack 2 cannot be read; `kinocue home` writes all of them",
             none.join(", ")
         ));
     }

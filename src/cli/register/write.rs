@@ -91,7 +91,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut talk = targets.open()?;
     let mut changes = changes(&mut talk, &targets, &wanted)?;
     if changes.is_empty() {
-        print::tell("nothing to change: all hold these values already");
+        print::tell("nothing to change: all registers already have these values");
         if !args.keep {
             return finish(args, &targets, &changes, false).map(|()| Exit::Done);
         }
@@ -182,7 +182,8 @@ fn changes(
     let mut troubles = Troubles::default();
     let found = read_values(talk, targets, &addresses, &mut troubles);
     if !troubles.none() {
-        return Err(anyhow!("nothing was written, as not all told what they hold")).or_exit(troubles.exit());
+        return Err(anyhow!("nothing was written, as not all registers could be read"))
+            .or_exit(troubles.exit());
     }
     let mut changes = Vec::new();
     for (lane, (assignments, found)) in wanted.iter().zip(found).enumerate() {
@@ -206,7 +207,7 @@ fn changes(
 fn warn_of_moves(changes: &[RegisterChange]) {
     if let Some(change) = changes.iter().find(|change| moves(change.register)) {
         print::tell(&format!(
-            "warning: {} moves the seat, which must be empty; `kinocue home` does this with more care",
+            "warning: {} moves the seat, which must be empty; `kinocue home` is the safer way",
             change.register
         ));
     }

@@ -55,7 +55,9 @@ pub(crate) enum TalkFault {
         unit: u8,
     },
     /// Somebody else answered: which of the two has taken it is not known.
-    #[error("unit {by} answered what unit {unit} was asked; look for a bad line, or two units of one number")]
+    #[error(
+        "unit {by} answered a request to unit {unit}; check for a bad line, or two units with one number"
+    )]
     Foreign {
         /// Who was asked.
         unit: u8,

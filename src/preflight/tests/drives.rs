@@ -143,7 +143,7 @@ fn who_does_not_answer_and_who_answers_for_another_is_told() {
     case.survey.units.insert(17, Err(TalkFault::Silent { unit: 17 }));
     case.assert_found(Check::NoAnswer, "unit 17 does not answer");
     case.survey.units.insert(17, Err(TalkFault::Foreign { unit: 17, by: 18 }));
-    case.assert_found(Check::DuplicateUnit, "unit 18 answered what unit 17 was asked");
+    case.assert_found(Check::DuplicateUnit, "unit 18 answered a request to unit 17");
     let mut case = Case::new();
     case.survey.counts.doubled = 3;
     case.assert_found(Check::DuplicateUnit, "3 more answers than requests");
@@ -186,7 +186,7 @@ fn a_port_that_cannot_be_had_is_told_by_what_is_wrong_with_it() {
         (SerialError::Missing(port()), Check::PortMissing, "there is no such port"),
         (SerialError::Taken(port()), Check::PortTaken, "another program has it"),
         (SerialError::Forbidden(port()), Check::PortForbidden, "not allowed to open it"),
-        (SerialError::NoLine(port()), Check::PortUnfit, "it is no serial line"),
+        (SerialError::NoLine(port()), Check::PortUnfit, "it is not a serial line"),
     ] {
         let mut case = Case::new();
         case.survey = LinkSurvey::silent(error);
