@@ -402,7 +402,7 @@ fn check_and_info_say_how_far_ahead_and_how_far_beside_the_cue_a_link_plays() {
     let (silver, _) = drives.rsplit_once("[[controller]]").expect("two seats");
     let still = silver.replace("[seat.silver3.drive]", "[seat.silver3.drive]\nvibration = \"0%\"") + EFFECTS;
     let hall = write(folder.path(), "hall.toml", &still);
-    let said = "plays at 29.98 Hz on link stalls, 220 ms ahead, at most 0.05 mm beside the cue (a1 of D1 at ";
+    let said = "plays at 29.98 Hz on link stalls, 220 ms ahead, at most 0.05 mm off the cue (a1 of D1 at ";
     for command in ["check", "info"] {
         let run = kinocue(&[command, RIDE, "--config", &hall]);
         assert_eq!(run.code, Some(0), "{command}: {}", run.stderr);

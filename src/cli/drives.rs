@@ -149,7 +149,7 @@ fn part(axis: &DriveAxisProof) -> f64 {
 
 fn beside(axis: &DriveAxisProof) -> String {
     let value = (100.0 * axis.deviation.value).ceil() / 100.0;
-    format!("at most {value:.2} {} beside the cue", axis.on.geometry().unit.name())
+    format!("at most {value:.2} {} off the cue", axis.on.geometry().unit.name())
 }
 
 fn ms(span: Duration) -> f64 {
