@@ -386,7 +386,7 @@ fn a_hall_with_drives_passes_its_check_which_says_how_often_its_links_play() {
     for text in [
         "passed: 2 controllers, 2 links, 2 seat types",
         "drives.toml: plays at 29.98 Hz on link stalls, 3 axes\n",
-        "drives.toml: link circle runs at 56818 baud, the nearest that its drives can make to 57600\n",
+        "drives.toml: link circle runs at 56818 baud, the nearest rate to 57600\n",
         "Hz on link circle, 3 axes, by a USB adapter whose latency timer is 1 ms\n",
     ] {
         assert!(run.stdout.contains(text), "{text}: {}", run.stdout);

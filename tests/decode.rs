@@ -301,7 +301,11 @@ fn a_serial_line_is_told_in_words_and_what_is_no_message_is_shown() {
 fn octets_that_two_forms_explain_are_not_taken_for_one_of_them() {
     // A poll of unit 33 in nine bits; an opening of a refusal as well.
     let ran = serial(b"0.1 > 21 00 df\n0.2 > 20 00 e0\n", &[]);
-    assert!(ran.out.contains("cannot be told") && ran.out.contains(" 32  POL  (nine bits)"), "{}", ran.out);
+    assert!(
+        ran.out.contains("which of them is unknown") && ran.out.contains(" 32  POL  (nine bits)"),
+        "{}",
+        ran.out
+    );
     assert_eq!(decode(&["--dialect", "silvermax", "40", "31 36", "0d"], b"").out, " 16  POL\n");
     assert_eq!(serial(b"", &["--port", "7"]).code, 64);
 }

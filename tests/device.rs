@@ -116,7 +116,7 @@ fn where_one_register_is_refused_none_is_written() {
     let said = run(&farm, &["register", "write", "PA95=1", "servo", "9", "508=7", "--yes"]);
     assert_eq!(said.exit, 76, "{}", said.err);
     assert!(
-        said.err.contains("c2: cannot read servo 9 508") && said.err.contains("nothing was written"),
+        said.err.contains("c2: cannot read servo 9 508") && said.err.contains("nothing written"),
         "{}",
         said.err
     );

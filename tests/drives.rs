@@ -415,7 +415,7 @@ fn a_sixpack_is_read_by_its_queries_and_its_settings_are_refused_by_name() {
     let Bench { hall, sim, folder } = Bench::of("sixpack2");
     let (_, said, exit) = register(&["read"], &hall);
     assert_eq!(exit, Some(69), "as it woke: {said}");
-    assert!(said.contains("has its power-on baud rate, 19,200; home it"), "{said}");
+    assert!(said.contains("is at its power-on baud, 19,200; home it"), "{said}");
     assert_eq!(home(&hall).2, Some(0));
     let (text, said, exit) = register(&["read", "$20", "$43", "$30"], &hall);
     assert_eq!(exit, Some(0), "{said}");

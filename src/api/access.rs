@@ -54,11 +54,7 @@ impl Access {
             return Ok(());
         }
         let detail = format!("pages of {origin:?} may not use this server");
-        Err(Problem::new(
-            Code::Origin,
-            detail,
-            "open the page from this server, or add its origin to origins of [api]",
-        ))
+        Err(Problem::new(Code::Origin, detail, "open the page from this server, or list its origin in [api]"))
     }
 
     /// Who asks from `address`.

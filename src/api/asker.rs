@@ -131,10 +131,7 @@ impl Asker {
 fn age_ms(headers: &HeaderMap, wall_ns: u64) -> Result<Option<i128>, Problem> {
     let Some(text) = one(headers, &SENT)? else { return Ok(None) };
     let sent: i64 = text.parse().map_err(|_| {
-        bad_value(
-            format!("{text:?} is not a time"),
-            format!("{SENT} is a whole number of milliseconds since 1970"),
-        )
+        bad_value(format!("{text:?} is not a time"), format!("{SENT} is in whole milliseconds since 1970"))
     })?;
     Ok(Some(i128::from(wall_ns / 1_000_000) - i128::from(sent)))
 }

@@ -244,10 +244,7 @@ impl Troubles {
 
 /// Tells that a controller has no part in this.
 pub(super) fn tell_absent(controller: &Controller) {
-    print::tell(&format!(
-        "kinocue: {} is disabled in the configuration (enabled = false), and left out",
-        controller.name
-    ));
+    print::tell(&format!("kinocue: {} is disabled (enabled = false), and left out", controller.name));
 }
 
 /// What a controller's state is, where it is not the normal one.

@@ -93,7 +93,7 @@ fn address(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SocketAddr> {
     if address.is_none() {
         entry.fault(
             faults,
-            &format!("{text:?} is not an address and port, such as 127.0.0.1:8480 or [::1]:8480"),
+            &format!("{text:?} is not an address and port; write 127.0.0.1:8480 or [::1]:8480"),
         );
     }
     address
@@ -116,11 +116,7 @@ fn checked(
 
 fn check_host(host: &str) -> Result<(), &'static str> {
     let fits = |c: char| c.is_ascii_alphanumeric() || "-.:[]_".contains(c);
-    if host.chars().all(fits) {
-        Ok(())
-    } else {
-        Err("is not a host, such as hall-1.example or 192.168.1.5:8480")
-    }
+    if host.chars().all(fits) { Ok(()) } else { Err("is not a host; write hall-1.example:8480") }
 }
 
 fn check_origin(origin: &str) -> Result<(), &'static str> {
@@ -137,10 +133,7 @@ fn tokens(section: &mut Section<'_, '_, '_>) -> Vec<ApiToken> {
     for entry in entries {
         let Some(token) = token(entry, section.faults) else { continue };
         if tokens.iter().any(|before| before.name == token.name) {
-            entry.fault(
-                section.faults,
-                &format!("{} already has a token; give each token its own name", token.name),
-            );
+            entry.fault(section.faults, &format!("{} already has a token; use another name", token.name));
         } else if tokens.iter().any(|before| before.sha256 == token.sha256) {
             entry.fault(section.faults, &format!("{} has the same token as another name", token.name));
         }

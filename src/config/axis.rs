@@ -122,9 +122,8 @@ fn shaken(
 ) -> Option<f64> {
     let most = section.above_zero(key)?;
     if let Some(least) = least.filter(|least| most < *least) {
-        let message = format!(
-            "{most} is below {alone}, {least}; give at least that: it is for motion and vibration together"
-        );
+        let message =
+            format!("{most} is below {alone}, {least}; motion and vibration together need at least that");
         section.get(key)?.fault(section.faults, &message);
         return None;
     }
@@ -206,10 +205,7 @@ fn ends(entry: &Entry<'_>, unit: AxisUnit, faults: &mut Faults<'_>) -> Option<(f
     let (low, high) = (low.number(faults)?, high.number(faults)?);
     let unit_name = unit.name();
     if low >= high {
-        entry.fault(
-            faults,
-            &format!("{low} to {high} {unit_name} is the wrong way round; put the lower end first"),
-        );
+        entry.fault(faults, &format!("{low} to {high} {unit_name} is reversed; put the lower end first"));
         return None;
     }
     if !(low..=high).contains(&0.0) {
@@ -293,11 +289,7 @@ mod tests {
     #[test]
     fn what_an_axis_cannot_be_is_named_with_its_line_and_what_to_do() {
         for (more, line, text) in [
-            (
-                "range = [180, -180]\n",
-                19,
-                "range: 180 to -180 deg is the wrong way round; put the lower end first",
-            ),
+            ("range = [180, -180]\n", 19, "range: 180 to -180 deg is reversed; put the lower end first"),
             (
                 "range = [10, 90]\n",
                 19,

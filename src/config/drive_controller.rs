@@ -145,8 +145,7 @@ fn link_of(section: &mut Section<'_, '_, '_>, links: &[LinkEntry<'_>]) -> Option
 fn family(section: &mut Section<'_, '_, '_>) -> Option<DriveFamily> {
     let entry = section.get("dialect")?;
     if matches!(entry.value.as_str(), Some("smc" | "mbox")) {
-        let message =
-            "is for UDP; on a link write \"silvermax\" or \"sixpack2\", otherwise give address = \"IP:PORT\"";
+        let message = "is for UDP; on a link write \"silvermax\" or \"sixpack2\", else address = \"IP:PORT\"";
         entry.fault(section.faults, message);
         return None;
     }

@@ -141,8 +141,8 @@ mod tests {
         let film = hall_with(&format!("[film]\nplayer = \"mpv\"\nfolder = {folder:?}\n")).film.unwrap();
         assert!(film.find("a.mkv").is_ok() && film.find("reel/b.mkv").is_ok());
         for (movie, says) in [
-            ("link.mkv", "lies outside"),
-            ("../outside.mkv", "lies outside"),
+            ("link.mkv", "is outside"),
+            ("../outside.mkv", "is outside"),
             ("reel", "is not a file"),
             ("none.mkv", "copy it there"),
         ] {

@@ -65,10 +65,7 @@ fn source(entry: Entry<'_>, section: &mut Section<'_, '_, '_>) -> Option<Ipv4Add
     let text = entry.text(section.faults)?;
     let address = text.parse::<Ipv4Addr>().ok().filter(|address| !address.is_unspecified());
     if address.is_none() {
-        entry.fault(
-            section.faults,
-            &format!("{text:?} is not an IPv4 address of a machine, such as 10.0.0.5"),
-        );
+        entry.fault(section.faults, &format!("{text:?} is not an IPv4 address, such as 10.0.0.5"));
     }
     address
 }

@@ -126,13 +126,10 @@ fn link<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Option<LinkEntry<'t>> 
 fn refuse_port(entry: Entry<'_>, port: &str, wiring: LinkWiring, faults: &mut Faults<'_>) {
     match (wiring, port.contains('/')) {
         (LinkWiring::Can, true) => {
-            entry.fault(faults, &format!("{port:?} is not an interface, such as \"can0\""))
+            entry.fault(faults, &format!("{port:?} is not an interface like \"can0\""))
         }
         (LinkWiring::Rs232 | LinkWiring::Rs485, false) => {
-            entry.fault(
-                faults,
-                &format!("{port:?} is not a device; write its whole path, such as \"/dev/ttyUSB0\""),
-            );
+            entry.fault(faults, &format!("{port:?} is not a device; write a path such as \"/dev/ttyUSB0\""));
         }
         _ => {}
     }

@@ -232,8 +232,7 @@ fn controllers(
     peers.absent.iter().zip(at).for_each(|(one, at)| refuse_parted(one, at, &peers.present, faults));
     let all_out = peers.placed.iter().all(|one| !one.enabled);
     if peers.present.is_empty() && all_out && peers.absent.len() + peers.placed.len() > 0 {
-        faults
-            .note_missing(entry.at, "enabled: every [[controller]] is disabled; leave at least one enabled");
+        faults.note_missing(entry.at, "enabled: every [[controller]] is disabled; enable at least one");
     }
     peers
 }

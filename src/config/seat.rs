@@ -84,8 +84,7 @@ fn refuse_pulses(at: Option<Entry<'_>>, axis: Option<AxisGeometry>, faults: &mut
 fn refuse_second_rotary(each: &[AxisGeometry], own: &[Option<Entry<'_>>], faults: &mut Faults<'_>) {
     let turns = each.iter().zip(own).filter(|(axis, _)| axis.unit == AxisUnit::Degree);
     for second in turns.skip(1).filter_map(|(_, own)| own.as_ref()) {
-        second
-            .fault(faults, "the seat already has a rotary axis, and its controller can have only one (PA03)");
+        second.fault(faults, "the seat already has a rotary axis; a controller has only one (PA03)");
     }
 }
 

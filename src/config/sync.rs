@@ -304,7 +304,7 @@ mod tests {
         let wrong = [
             ("", "[sync] has no sources, which is needed"),
             ("sources = [\"tape\"]", "sources: \"tape\" is not one of ltc, mpv"),
-            ("sources = [\"artnet\"]", "there is no [sync.artnet]; it has to say from"),
+            ("sources = [\"artnet\"]", "there is no [sync.artnet]; it has to have from"),
             ("sources = [\"artnet\"]\n[sync.artnet]\nbind = \"0.0.0.0:6454\"", "[sync.artnet] has no from"),
             ("sources = [\"artnet:anybody\"]", "has no sender"),
             ("sources = [\"mpv:/s\"]\nfilm_fps = \"26\"", "is not a frame rate; take 23.976"),

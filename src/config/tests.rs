@@ -67,7 +67,7 @@ fn a_controller_that_is_out_for_good_takes_no_part_and_its_axes_still_belong_to_
 #[test]
 fn not_all_are_out_for_good_and_no_seat_loses_a_part_of_its_controllers() {
     let [fault] = &faults_of("enabled = false\n")[..] else { panic!("one fault") };
-    assert!(fault.contains("leave at least one enabled"), "{fault}");
+    assert!(fault.contains("enable at least one"), "{fault}");
     let more = "group = \"g\"\n[[controller]]\nname = \"A2\"\nseat = \"s\"\naddress = \"10.0.0.2:7408\"\ngroup = \"g\"\n\
         enabled = false\n";
     let [fault] = &faults_of(more)[..] else { panic!("one fault") };

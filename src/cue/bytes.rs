@@ -81,7 +81,7 @@ mod tests {
         );
         assert_eq!(
             faults(&[0; 3], 1, 1e-5),
-            "t.u8: 27:46:40.000 lies after 24:00:00.000, the latest time of a cue"
+            "t.u8: 27:46:40.000 is after 24:00:00.000, the latest time of a cue"
         );
     }
 }

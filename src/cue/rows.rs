@@ -66,9 +66,8 @@ impl RowReading {
             if index >= cells.count() {
                 faults.add(place(column_of(line, index)), expected.copied(), Problem::MissingColumn);
             } else if expected != Some(&name) {
-                let problem = Problem::UnknownColumn(
-                    "the header has to be line,time_ms,x,y,z,u,v,w; axes may be missing at the end",
-                );
+                let problem =
+                    Problem::UnknownColumn("the header is line,time_ms,x,y,z,u,v,w, without unused axes");
                 faults.add(place(column_of(line, index)), Some(name), problem);
             }
         }
@@ -193,7 +192,7 @@ mod tests {
         assert_eq!(faults("line,time_ms\n1,2\n"), "1:13: x: the column is missing");
         assert!(
             faults("1,1000,0,0\n")
-                .starts_with("1:1: 1: unknown column; the header has to be line,time_ms,x,y,z,u,v,w")
+                .starts_with("1:1: 1: unknown column; the header is line,time_ms,x,y,z,u,v,w")
         );
     }
 }

@@ -210,7 +210,7 @@ fn on_panel(numbers: &str, panel: &PanelName) -> Result<Selection, SelectError> 
     let bad = || SelectError::Number {
         word: numbers.to_owned(),
         space: panel.name,
-        wanted: "000 to 255, or a range such as 128..133",
+        wanted: "000 to 255, or a range like 128..133",
     };
     let decimal = |text: &str| {
         let digits = text.bytes().all(|byte| byte.is_ascii_digit());
@@ -286,7 +286,7 @@ fn documented(numbers: &str, space: &'static str, of: fn(u8) -> Address) -> Resu
     let bad = || SelectError::Number {
         word: numbers.to_owned(),
         space,
-        wanted: "00 to ff, or a range such as 06..0b",
+        wanted: "00 to ff, or a range like 06..0b",
     };
     let (first, last) = ends(numbers).ok_or_else(bad)?;
     let (low, high) = (hex(first).ok_or_else(bad)?, hex(last).ok_or_else(bad)?);

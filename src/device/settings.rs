@@ -270,8 +270,8 @@ mod tests {
         };
         let head = "kinocue_settings = 1\n[controller.A]\naddress = \"127.0.0.1:7408\"\ndialect = \"smc\"\n";
         assert!(error("kinocue_settings = 2").contains("version 2"));
-        assert!(error("kinocue_settings = 1").contains("no controller"));
-        assert!(error(&format!("{head}parameters = {{ PA99 = 1 }}")).contains("PA99 is no parameter"));
+        assert!(error("kinocue_settings = 1").contains("no settings of any"));
+        assert!(error(&format!("{head}parameters = {{ PA99 = 1 }}")).contains("PA99 is not a parameter"));
         assert!(error(&format!("{head}parameters = {{ PA95 = 70000 }}")).contains("70000"));
         assert!(error(&format!("{head}parameters = {{}}\ncolour = 1")).contains("colour"));
         assert!(!error("\u{0}").is_empty());

@@ -384,7 +384,7 @@ mod tests {
         assert_eq!((read.start.hours, read.start.drops), (1, true));
         for (rate, start) in [(Some("26"), None), (None, Some("1:2"))] {
             let error = args(rate, start).expect_err("it is not").to_string();
-            assert!(error.contains("take") || error.contains("write"), "{error}");
+            assert!(error.contains("use") || error.contains("take") || error.contains("write"), "{error}");
         }
     }
 }

@@ -19,11 +19,7 @@ fn whole(film: &FilmStatus) -> Vec<MetricFamily> {
             values: MetricValues::Gauges(vec![(vec![("state", film.state.clone())], 1.0)]),
         },
         MetricFamily::gauge("sync_follows", "1 if the loaded show follows the film", flag(film.leads)),
-        MetricFamily::gauge(
-            "sync_position_seconds",
-            "Position of the film in the loaded cue",
-            film.position_s,
-        ),
+        MetricFamily::gauge("sync_position_seconds", "Position of the film in the cue", film.position_s),
         MetricFamily::gauge(
             "sync_error_seconds",
             "How far ahead of the film, less the trim, the seats are while they follow it",
@@ -54,13 +50,8 @@ fn sources(film: &FilmStatus) -> Vec<MetricFamily> {
         },
         gauges(all, "sync_leads", "1 for the source that leads", |one| is(&film.source, one)),
         gauges(all, "sync_chosen", "1 for the source that a person selected", |one| is(&film.chosen, one)),
-        gauges(
-            all,
-            "sync_rate_ppm",
-            "How much faster than the clock the film runs, parts per million",
-            |one| one.rate_ppm,
-        ),
-        gauges(all, "sync_sigma_seconds", "Standard deviation of the position of the film", |one| {
+        gauges(all, "sync_rate_ppm", "Rate of the film against the clock, ppm", |one| one.rate_ppm),
+        gauges(all, "sync_sigma_seconds", "Standard deviation of its position", |one| {
             one.sigma_ms.map(|ms| ms / 1e3)
         }),
         gauges(all, "sync_level_dbfs", "Level of the line, dBFS", |one| one.level_dbfs),

@@ -54,8 +54,7 @@ fn timezone(section: &mut Section<'_, '_, '_>) -> Option<TimeZone> {
     let name = entry.text(section.faults)?;
     let zone = TimeZone::get(name).ok();
     if zone.is_none() {
-        let message =
-            format!("{name:?} is not a time zone of this machine, such as Europe/Berlin (package tzdata)");
+        let message = format!("{name:?} is not a time zone here, such as Europe/Berlin (package tzdata)");
         entry.fault(section.faults, &message);
     }
     zone

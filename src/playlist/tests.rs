@@ -85,7 +85,7 @@ fn every_fault_is_named_with_its_line() {
         "day.toml:7:1: [[entry]] has no cue",
         "day.toml:8:11: trim_ms: 900 is outside -500..=500",
         "day.toml:9:8: days: there is no time to start at",
-        "day.toml:9:9: days: \"someday\" is none of mon",
+        "day.toml:9:9: days: \"someday\" is not one of mon",
     ] {
         assert!(faults.iter().any(|fault| fault.starts_with(wanted)), "{wanted}: {faults:#?}");
     }

@@ -176,8 +176,7 @@ fn sixpack(subject: &DriveSubject<'_>, unit: u8, notes: &mut Notes) {
         None => return told(Check::NoAnswer, &format!("unit {unit} was not read; try again"), notes),
         Some(Err(fault)) => return told(Check::NoAnswer, &fault.to_string(), notes),
         Some(Ok(None)) => {
-            let found =
-                format!("unit {unit} has its power-on settings: it was not homed since it was switched on");
+            let found = format!("unit {unit} has its power-on settings: it was not homed since power-on");
             notes.add(Check::NotHome, found, HOME);
             return;
         }

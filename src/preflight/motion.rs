@@ -113,8 +113,7 @@ fn judge_interval(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     let Some(most) = subject.pa(0x0b) else { return };
     if most == 0 {
         if subject.controller.connection.dialect == Dialect::Mbox {
-            let found =
-                "PA0b = 0: no limit in the SMC manual, not explained in the manual of this controller";
+            let found = "PA0b = 0: no limit in the SMC manual, unexplained in that of this controller";
             notes.add(Check::IntervalUnlimited, found, "set PA0b = 3000");
         }
         return;

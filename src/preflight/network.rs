@@ -32,8 +32,7 @@ pub(super) fn judge_replies(subject: &Subject<'_>, terms: &ShowTerms, notes: &mu
     let Some(port) = subject.pa(0x24) else { return };
     match terms.frame_port {
         0 => {
-            let found =
-                format!("PA24 = {port}, but bind has port 0, so the frame port changes at every start");
+            let found = format!("PA24 = {port}, but bind has port 0: another frame port at every start");
             notes.add(Check::FramePortFree, found, format!("set port {port} in bind"));
         }
         own if own != port => {

@@ -9,9 +9,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::{Cause, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why};
 use crate::plain;
 
-/// A play homes no seat, and the command has to be given the same controllers: without, it asks the service.
+/// Without --config or --to the command would ask the service.
 const HOME_BY_COMMAND: &str =
-    "quit, then run `kinocue home` with the same --config or --to, with nobody on the seats";
+    "quit, then `kinocue home` with this --config or --to, with nobody on the seats";
 
 impl State {
     /// The state in one word, as every surface shows it.

@@ -308,7 +308,7 @@ fn a_stop_goes_by_the_control_socket_where_its_own_fails() {
         assert_eq!(daemon.request().path, "/api/v1/show/stop");
         assert!(run.stdout.contains("\"state\":\"stopping\""), "{run:?}");
         told(&run, "did not take the stop");
-        told(&run, &format!("by {}", daemon.socket("control.sock").display()));
+        told(&run, &format!("via {}", daemon.socket("control.sock").display()));
         socket.map(thread::JoinHandle::join);
     }
 }
@@ -395,7 +395,7 @@ fn watch_says_when_what_it_shows_is_old() {
     let mut watch = Running(daemon.command(&["watch"]).spawn().expect("it starts"));
     let mut said = BufReader::new(watch.0.stderr.take().expect("piped")).lines();
     let line = said.next().expect("a line").expect("text");
-    assert_eq!(line, "kinocue: no update from the daemon for 2 s: what is shown is out of date");
+    assert_eq!(line, "kinocue: no update from the daemon for 2 s: what is shown is old");
 }
 
 #[test]

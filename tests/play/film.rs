@@ -307,7 +307,7 @@ fn midi_timecode_of_a_fifo_leads_the_seat_which_rests_once_it_falls_silent() {
     let film = sent(&["--mtc", fifo]);
     playing.wait_for("playing: ");
     drop(film);
-    playing.wait_for("waiting: nothing is heard of the film any more");
+    playing.wait_for("waiting: nothing is received from the film any more");
     playing.signal(Signal::INT);
     let run = playing.finish();
     assert_eq!(run.code, Some(0), "{}", run.stderr);
@@ -372,7 +372,7 @@ fn a_film_is_found_by_its_sound_with_the_index_that_was_made_of_it() {
     };
     assert!(tables.into_iter().any(|table| leads(&table)), "{}", seen.stdout);
     for (foreign, says) in
-        [(film.as_str(), "no index of a film's sound"), ("/nowhere.kidx", "cannot be opened")]
+        [(film.as_str(), "not an index of a film's sound"), ("/nowhere.kidx", "cannot be opened")]
     {
         let refused = kinocue(&["sync", "watch", &format!("sound:-,index={foreign}")]);
         assert!(refused.code != Some(0) && refused.stderr.contains(says), "{refused:?}");

@@ -124,11 +124,7 @@ impl PlayerProcess {
             }
             Monotonic.sleep_until(Monotonic.now() + LOOK);
         }
-        if shared.is_over() {
-            Ok(None)
-        } else {
-            Err("mpv does not answer; find out what blocks it".to_owned())
-        }
+        if shared.is_over() { Ok(None) } else { Err("mpv does not answer; see what blocks it".to_owned()) }
     }
 
     /// How it ended, where it has.
@@ -148,8 +144,7 @@ impl Drop for PlayerProcess {
 fn why_none(status: ExitStatus) -> String {
     match status.code() {
         Some(NONE) => {
-            "mpv is not installed; install it (`apt-get install mpv`), and it is started automatically"
-                .to_owned()
+            "mpv is not installed; install it (`apt-get install mpv`), and it starts by itself".to_owned()
         }
         Some(NOT_HERE) => {
             "mpv may not be started here; the service's sandbox keeps it out (docs/configuration.md, [film])"

@@ -144,10 +144,7 @@ fn home_all(
         seats.into_iter().map(|lane| (lane, stations[lane].connection.dialect)).collect();
     let would_not_search = unsearched(talk, &seats).into_iter().map(|(lane, why)| (lane, why.to_string()));
     let unsearched = others.iter().filter(|lane| is_unsearched(&config.controllers[**lane]));
-    let here = || {
-        "its home is its present position; stop the service, and home it with `kinocue home --config`"
-            .to_owned()
-    };
+    let here = || "its home is where it is; stop the service, and use `kinocue home --config`".to_owned();
     let refused: Vec<_> = would_not_search.chain(unsearched.map(|lane| (*lane, here()))).collect();
     if !refused.is_empty() {
         return refused.into_iter().map(|(lane, why)| (lane, Err(why))).collect();

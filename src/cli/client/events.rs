@@ -30,8 +30,7 @@ impl Events {
     /// Begins to listen.
     pub(super) async fn open(socket: &Path) -> Result<Self, Failure> {
         let asked = request(Method::GET, "/api/v1/events", None, Full::<Bytes>::default())?;
-        let silent =
-            || anyhow!("the daemon at {} accepts the connection but sends nothing", socket.display());
+        let silent = || anyhow!("the daemon at {} connects, but sends nothing", socket.display());
         let response = timeout(BEGINNING, send(socket, asked))
             .await
             .map_err(|_| silent())

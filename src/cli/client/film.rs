@@ -54,8 +54,7 @@ fn meant(name: &str, film: &FilmStatus) -> Result<String, Failure> {
     match of_kind.as_slice() {
         [one] if all().all(|source| source != name) => Ok((*one).to_owned()),
         [_, _, ..] if all().all(|source| source != name) => {
-            Err(anyhow::anyhow!("{name} may be {}; give one in full", of_kind.join(" or ")))
-                .or_exit(Exit::Usage)
+            Err(anyhow::anyhow!("{name} may be {}; write which", of_kind.join(" or "))).or_exit(Exit::Usage)
         }
         _ => Ok(name.to_owned()),
     }

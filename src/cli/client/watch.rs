@@ -81,9 +81,7 @@ async fn listen(events: &mut Events, shown: &mut WatchShown) -> Result<Option<&'
             Ok(None) => {
                 is_old = true;
                 let seconds = QUIET.as_secs();
-                shown.gone(&format!(
-                    "no update from the daemon for {seconds} s: what is shown is out of date"
-                ));
+                shown.gone(&format!("no update from the daemon for {seconds} s: what is shown is old"));
             }
             Err(why) => return Ok(Some(why)),
         }

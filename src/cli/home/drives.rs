@@ -201,9 +201,8 @@ impl LinkTalk {
         let (begun, goes_on) = (Instant::now(), &|| !abort.load(Ordering::Relaxed));
         match self {
             Self::SilverMax(talk) => {
-                let canary = canary().map_err(|error| {
-                    HomingFault::Refused(format!("the system gives no random numbers: {error}"))
-                })?;
+                let canary =
+                    canary().map_err(|error| HomingFault::Refused(format!("no random number: {error}")))?;
                 let seat = units_of(controller).ok_or_else(none)?;
                 silvermax::home(talk, seat, silvermax::Homing { canary, goes_on, told })?;
             }

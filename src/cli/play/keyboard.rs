@@ -241,7 +241,11 @@ mod tests {
         let (mut leader, _commands) = leading(0.62);
         let desk = Arc::clone(&leader.control.desk);
         let levels = || [0, 1].map(|lane| (desk.mix(lane).motion * 1000.0).round());
-        assert!(leader.act(KeyAction::Level(5), at(0)).is_some_and(|said| said.contains("began with")));
+        assert!(
+            leader
+                .act(KeyAction::Level(5), at(0))
+                .is_some_and(|said| said.contains("at the start of the play"))
+        );
         assert_eq!(levels(), [620.0, 310.0]);
         assert_eq!(leader.act(KeyAction::Level(-5), at(0)), None);
         assert_eq!(levels(), [570.0, 285.0]);

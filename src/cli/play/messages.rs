@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn it_names_nothing_that_its_keys_cannot_do() {
         let text = |next| said().news(&entered(State::Recovering, Cause::Cleared, next)).unwrap();
-        assert!(text(Next::Home).contains("quit, then run `kinocue home` with the same --config or --to"));
+        assert!(text(Next::Home).contains("quit, then `kinocue home` with this --config or --to"));
         assert!(text(Next::ParkOrHome).ends_with("next: park"));
         for next in Next::ALL {
             assert!(!text(next).contains("disable"), "{next}");

@@ -71,7 +71,7 @@ pub(super) fn flaws(contents: &Contents) -> Vec<String> {
     let mut flaws = Vec::new();
     if let Some(trouble) = &contents.trouble {
         flaws.push(format!(
-            "the file {trouble}; only what came before that is shown; kinocue record recover saves it"
+            "the file {trouble}; only what precedes is shown; kinocue record recover saves it"
         ));
     }
     flaws.extend(contents.faults.iter().map(|fault| format!("not read: {fault}")));

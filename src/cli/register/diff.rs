@@ -212,9 +212,7 @@ fn tell(report: &DiffReport<'_>, all: bool) -> Result<(), Failure> {
         print::tell("nothing differs");
     }
     if !all && !report.controllers.is_empty() {
-        print::tell(
-            "PA10-14 and PA16-1b, which each controller has of its own, were not compared; --all compares them",
-        );
+        print::tell("PA10-14 and PA16-1b, each controller's own, were not compared; --all does");
     }
     Ok(())
 }

@@ -182,8 +182,7 @@ fn changes(
     let mut troubles = Troubles::default();
     let found = read_values(talk, targets, &addresses, &mut troubles);
     if !troubles.none() {
-        return Err(anyhow!("nothing was written, as not all registers could be read"))
-            .or_exit(troubles.exit());
+        return Err(anyhow!("nothing written: not all registers could be read")).or_exit(troubles.exit());
     }
     let mut changes = Vec::new();
     for (lane, (assignments, found)) in wanted.iter().zip(found).enumerate() {

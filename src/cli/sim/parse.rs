@@ -102,8 +102,7 @@ fn action(text: &str) -> anyhow::Result<Action> {
         ("duplicate", ..) => Action::Duplicate(chance(value)?),
         ("delay", ..) => Action::Delay(parse_duration(value).map_err(|why| anyhow!(why))?),
         (_, Some(input), _) => {
-            let input =
-                input.parse().with_context(|| format!("{name:?} is not an input; they are X1 to X12"))?;
+            let input = input.parse().with_context(|| format!("{name:?} is not X1 to X12"))?;
             Action::Switch { input, closed: switch(value)? }
         }
         (_, _, Some(register)) => Action::Parameter(register_number(register)?, value_number(value)?),

@@ -168,10 +168,8 @@ impl DriveHoming {
         let needed = axes.iter().map(need).fold(0.0, f64::max);
         let (travel, most) = (self.travel_mm, LONGEST_TRAVEL * needed);
         if travel < needed {
-            let message = format!(
-                "{travel} mm do not reach {} mm from the far end; give at least {needed}",
-                self.zero_mm
-            );
+            let message =
+                format!("{travel} mm do not reach {} mm from the far end; {needed} do", self.zero_mm);
             entry.fault(faults, &message);
         } else if travel > most {
             let message = format!(

@@ -230,7 +230,7 @@ fn a_way_home_says_where_it_ends_and_how_far_it_may_go() {
         (
             "travel_mm = 165",
             "travel_mm = 150",
-            "travel_mm: 150 mm do not reach -2 mm from the far end; give at least 152",
+            "travel_mm: 150 mm do not reach -2 mm from the far end; 152 do",
         ),
         ("travel_mm = 165", "travel_mm = 500", "travel_mm: 500 mm are over 228"),
         ("zero_mm = -2", "zero_mm = 2", "zero_mm: 2 mm is above 0 mm, the lower end of the stroke"),
@@ -267,7 +267,7 @@ fn a_seat_says_of_its_motors_what_their_family_needs() {
     assert!(
         six("pulses_per_rev = 3200", "pulses_per_rev = 6400").contains("microsteps a second, over 200000")
     );
-    assert!(six("\"75%\"", "\"70%\"").contains("run: \"70%\" is none of 100%, 75%, 50%"));
+    assert!(six("\"75%\"", "\"70%\"").contains("run: \"70%\" is not one of 100%, 75%, 50%"));
     assert!(six("current = { peak = 9, run = \"75%\" }", "").contains("a SIXpack 2 needs current"));
     assert!(six("[2]", "[4]").contains("reverse: 4 is outside 1..=3"));
     assert!(six("[2]", "[2, 2]").contains("reverse: axis 2 stands there twice"));
@@ -278,9 +278,9 @@ fn a_seat_says_of_its_motors_what_their_family_needs() {
 #[test]
 fn a_link_is_a_line_of_its_own_by_its_whole_path() {
     let port = |port: &str| only(instead("/dev/ttyUSB0", port));
-    assert!(port("ttyUSB0").contains("port: \"ttyUSB0\" is not a device; write its whole path"));
+    assert!(port("ttyUSB0").contains("port: \"ttyUSB0\" is not a device; write a path such as"));
     let can = LINK.replace("[link.stalls]", "[link.bus]").replace("ttyUSB0", "can0") + "wiring = \"can\"\n";
-    assert!(only(silver(&can)).contains("port: \"/dev/can0\" is not an interface, such as \"can0\""));
+    assert!(only(silver(&can)).contains("port: \"/dev/can0\" is not an interface like \"can0\""));
     let twin = LINK.replace("stalls", "circle");
     let fault = only(silver(&twin));
     assert!(fault.starts_with("hall.toml:21:8: port: [link.stalls] uses it already"), "{fault}");

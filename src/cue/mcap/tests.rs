@@ -184,7 +184,7 @@ fn messages_that_are_not_what_they_should_be_are_refused() {
     assert!(faults_behind_rows(&[("/cue/axes", 20, &long)]).ends_with("longer than 65536 bytes, the limit"));
     let end = faults_behind_rows(&[("/cue/axes", u64::MAX, r#"{"a":[0,0]}"#)]);
     assert!(
-        end.ends_with("18446744073709551615 ns lies after 24:00:00.000, the latest time of a cue"),
+        end.ends_with("18446744073709551615 ns is after 24:00:00.000, the latest time of a cue"),
         "{end}"
     );
 }

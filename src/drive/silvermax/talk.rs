@@ -55,9 +55,7 @@ pub(crate) enum TalkFault {
         unit: u8,
     },
     /// Somebody else answered: which of the two has taken it is not known.
-    #[error(
-        "unit {by} answered a request to unit {unit}; check for a bad line, or two units with one number"
-    )]
+    #[error("unit {by} answered a request to unit {unit}; is the line bad, or do two units share a number?")]
     Foreign {
         /// Who was asked.
         unit: u8,
