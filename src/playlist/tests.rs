@@ -159,7 +159,7 @@ fn a_shelf_lists_all_playlists_and_names_the_faults_of_bad_ones() {
     let [bad, day] = &shelf.list()[..] else { panic!("two playlists") };
     assert_eq!((day.id.as_str(), day.title.as_deref()), ("day", Some("Saturday")));
     assert_eq!(day.cues, ["seat-demo", "storm"]);
-    assert!(bad.faults[0].contains("bad.toml:1:9: title: a string is wanted"), "{bad:?}");
+    assert!(bad.faults[0].contains("bad.toml:1:9: title: expected a string"), "{bad:?}");
     assert_eq!(shelf.read(&"link".parse().unwrap()).unwrap_err().code, Code::Unknown);
     assert_eq!(shelf.read(&"bad".parse().unwrap()).unwrap_err().code, Code::Check);
     assert!(Shelf::new(&dir.path().join("none")).list().is_empty());
