@@ -13,6 +13,7 @@ use crate::record::beginning;
 
 /// Lists the recordings in a folder, oldest first.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue record list /var/lib/kinocue/recordings")]
 pub(in super::super) struct Args {
     /// The folder.
     #[arg(default_value = ".")]

@@ -36,6 +36,7 @@ enum Command {
     Recover(recover::Args),
     Layout(layout::Args),
     /// Has the running service write the contents of its flight recorder to an incident file.
+    #[command(after_help = "Example:\n  kinocue record dump")]
     Dump(ServerArgs),
 }
 

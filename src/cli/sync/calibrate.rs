@@ -15,6 +15,9 @@ use crate::time::Clock as _;
 /// Let mpv play a reel of timecode into a cable back to the input: the result is the delay of the input, plus what mpv does not know
 /// of the delay of its own output.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  kinocue sync calibrate ltc:alsa:hw:2,0 --against mpv:/run/user/1000/film.sock"
+)]
 pub(in crate::cli) struct Args {
     /// The source to measure, as for `play --chase`.
     #[arg(value_name = "SOURCE")]

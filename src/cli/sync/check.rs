@@ -8,6 +8,7 @@ use crate::cli::{Exit, Failure, OrExit as _, print};
 
 /// Checks the timecode in a WAV file: its labels, gaps, jumps and level.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue sync check reel.wav")]
 pub(in crate::cli) struct Args {
     /// The file: 16 bits; only its first channel is read.
     file: PathBuf,

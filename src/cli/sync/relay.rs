@@ -13,6 +13,7 @@ use crate::time::Clock as _;
 /// Passes each line on at a socket of its own, ltc.sock or mtc.sock, to up to eight halls on this machine. Their source is
 /// ltc:relay:SOCKET or mtc:relay:SOCKET. It waits for a device that is gone, and ends once every line has ended.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue sync relay ltc:alsa:hw:2,0 --folder /tmp")]
 pub(in crate::cli) struct Args {
     /// One line of LTC, one of MIDI timecode, or both, as for `play --chase`.
     #[arg(required = true, value_name = "SOURCE")]

@@ -13,7 +13,10 @@ use crate::time::Clock as _;
 
 /// Generates timecode: LTC into a file, at once, or Art-Net or MIDI timecode in real time.
 #[derive(Debug, clap::Args)]
-#[command(group = clap::ArgGroup::new("kind").required(true))]
+#[command(
+    group = clap::ArgGroup::new("kind").required(true),
+    after_help = "Examples:\n  kinocue sync send --ltc --film-fps 25 --seconds 60 -o reel.wav\n  kinocue sync send --artnet 10.0.0.255"
+)]
 pub(in crate::cli) struct Args {
     /// Linear timecode, as a WAV file.
     #[arg(long, group = "kind")]

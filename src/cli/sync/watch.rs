@@ -11,6 +11,7 @@ use crate::time::{Clock as _, ShowTime};
 
 /// Shows what the sources report of a film, without a hall, cue or seat: position and quality of each, and which would lead.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue sync watch artnet:10.0.0.20 mtc:/dev/snd/midiC1D0")]
 pub(in crate::cli) struct Args {
     /// The sources, best first, as for `play --chase`.
     #[arg(required = true, value_name = "SOURCE")]
