@@ -18,7 +18,7 @@ use crate::time::Clock as _;
 /// Runs units until a signal comes.
 pub(super) fn run(args: &Args, path: &Path, signals: SignalSocket) -> Result<Exit, Failure> {
     if args.tty.baud.is_some() {
-        let refusal = anyhow!("a SIXpack 2 wakes at 19200 baud, and its host switches it; omit --baud");
+        let refusal = anyhow!("a SIXpack 2 starts at 19200 baud, and its host changes that; omit --baud");
         return Err(refusal).or_exit(Exit::Usage);
     }
     let shafts = [ShaftSetup::default(); MOTORS];
