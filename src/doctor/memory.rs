@@ -15,7 +15,7 @@ pub(crate) struct MemoryFacts {
 }
 
 const UNLIMITED: &str = "LimitMEMLOCK=infinity in the unit, or `@kinocue - memlock unlimited` in \
-                         /etc/security/limits.d/kinocue.conf and log in anew; in a container: --ulimit memlock=-1";
+                         /etc/security/limits.d/kinocue.conf and log in again; in a container: --ulimit memlock=-1";
 
 impl MemoryFacts {
     /// One line for each.

@@ -141,7 +141,7 @@ impl NetworkFacts {
             found,
             format!(
                 "LimitNOFILE={enough} in the unit, or `@kinocue - nofile {enough}` in \
-                 /etc/security/limits.d/kinocue.conf and log in anew"
+                 /etc/security/limits.d/kinocue.conf and log in again"
             ),
         )
     }

@@ -117,7 +117,7 @@ impl Scheduling {
         let fix = || {
             format!(
                 "LimitRTPRIO={PRIORITY} in the unit, or `@kinocue - rtprio {PRIORITY}` in \
-                 /etc/security/limits.d/kinocue.conf and log in anew"
+                 /etc/security/limits.d/kinocue.conf and log in again"
             )
         };
         if self.limit.soft.is_none_or(|most| most >= u64::from(PRIORITY)) {
