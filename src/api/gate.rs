@@ -32,7 +32,8 @@ const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 /// Our wall clock in every reply, unix milliseconds, so that a page can tell how far its own is off.
 const TIME: HeaderName = HeaderName::from_static("x-kinocue-time");
 /// Nothing but what this server itself serves, and in nobody's frame.
-const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+const POLICY: &str =
+    "default-src 'self'; img-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
 /// Passes a request on, or refuses it. What was begun is ended also where the connection goes away meanwhile.
 pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {

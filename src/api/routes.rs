@@ -72,6 +72,7 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(reports::one))
         .routes(routes!(recordings::all))
         .routes(routes!(recordings::one, recordings::remove))
+        .routes(routes!(recordings::picture))
         .routes(routes!(recordings::mark))
         .routes(routes!(recordings::dump));
     let (router, document) = router.split_for_parts();

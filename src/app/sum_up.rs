@@ -87,6 +87,7 @@ pub(super) fn sum_up(about: SumUp, controllers: &[Controller], prepared: &Prepar
         controllers: (0..controllers.len())
             .map(|index| entry(index, &controllers[index], prepared, run))
             .collect(),
+        links: Vec::new(),
         events: events(controllers, run),
     };
     let tracker = run.accounts.books.tracker();
@@ -121,7 +122,7 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
         late: run.tallies[index].late,
         hurried: run.tallies[index].hurried,
         ack_us: Percentiles::of(tracker.latency(index)),
-        state: StateReport::of(&run.accounts.observer.states()[index], run.closed_at),
+        state: StateReport::of(controller, &run.accounts.observer.states()[index], run.closed_at),
     }
 }
 

@@ -17,6 +17,7 @@ mod convert;
 mod decode;
 mod demo;
 mod doctor;
+mod draw_recording;
 mod drives;
 mod exit;
 mod figures;
@@ -99,6 +100,9 @@ enum ProgramCommand {
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
     Prove(prove::Args),
+    /// Draws one recording for the console, as a process of the lowest priority.
+    #[command(hide = true)]
+    DrawRecording(draw_recording::Args),
     #[command(hide = true)]
     FilmPlayer(film_player::Args),
     #[command(hide = true)] // for those who make packages
@@ -177,6 +181,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Client(command) => client::run(&command),
         ProgramCommand::Completions(args) => completions::run(&args),
         ProgramCommand::Prove(args) => prove::run(&args),
+        ProgramCommand::DrawRecording(args) => draw_recording::run(&args),
         ProgramCommand::FilmPlayer(args) => film_player::run(&args),
         ProgramCommand::Man(args) => man::run(&args),
     }

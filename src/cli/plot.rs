@@ -21,7 +21,7 @@ const WIDTH: u16 = 100;
 /// Columns of a file, shared out among the axes: what keeps it under 500 kB.
 const FILE_COLUMNS: usize = 7_200;
 /// The same of a recording, which has more lines.
-const RECORDING_COLUMNS: usize = 900;
+pub(super) const RECORDING_COLUMNS: usize = 900;
 /// The greatest width of a terminal that is used, characters.
 const WIDEST: u16 = 240;
 
@@ -105,7 +105,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             },
             is_detailed: file.is_some() || args.json,
         };
-        tell(&plot_recording::picture(&asked)?, file, args)?;
+        let (picture, ..) = plot_recording::picture(&asked)?;
+        tell(&picture, file, args)?;
         return Ok(Exit::Done);
     }
     if let Some(other) = &args.other {

@@ -111,9 +111,7 @@ pub(super) fn drive_controller<'t>(
     if let (Some(drive), Some(value)) = (&drive, table.get("estop_inputs")) {
         refuse_switch(Entry::new("estop_inputs", value), drive, estop_inputs, faults);
     }
-    let (motors, motors_at) = motors?;
-    let name = name?;
-    let link = link?;
+    let ((motors, motors_at), name, link) = (motors?, name?, link?);
     let drives = Drives { drive: Arc::new(drive?), link: link.clone(), motors: motors.clone() };
     let controller = Controller {
         group: group.unwrap_or_else(|| name.clone()),

@@ -1,9 +1,11 @@
 //! How a level changes while a seat follows the cue: gently, and by what the cue leaves of the limits.
 
+// Both chosen: from all to nothing in some 4 s, and no jolt at either end of it.
 /// The quickest change of a level, per second.
 pub(super) const RATE: f64 = 0.25;
 /// How quickly the change itself grows and ends, per second squared: 0.25 s to full speed.
 pub(super) const GATHER: f64 = 1.0;
+// Slowing by its own share alone a change dies away and never stands: from here on it ends in 0.25 s.
 /// The least share with which a change ends.
 const LEAST: f64 = 0.05;
 /// Levels nearer than this are the same.
@@ -60,6 +62,7 @@ impl Fader {
         let shown = if self.is_still() { share } else { share.max(self.rate.abs() / RATE).max(LEAST) };
         let change = GATHER * shown * dt;
         let gap = target - self.level;
+        // A share of 0 lets nothing begin, while what is under way is still led to an end.
         let wanted = gap.signum() * closing_rate(gap.abs(), GATHER * share.max(LEAST), dt).min(RATE * share);
         self.rate = wanted.clamp(self.rate - change, self.rate + change);
         self.level = (self.level + self.rate * dt).clamp(0.0, 1.0);
@@ -72,6 +75,7 @@ impl Fader {
 /// The greatest rate from which a gap is just closed while slowing down by no more than `gather`, tick by tick.
 fn closing_rate(gap: f64, gather: f64, dt: f64) -> f64 {
     let ticks_left = (dt * dt / 4.0 + 2.0 * gap / gather).sqrt() - dt / 2.0;
+    // Where less is left than a tick can close, the root makes up to twice of it: it would be passed.
     (gather * ticks_left).min(gap / dt)
 }
 

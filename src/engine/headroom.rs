@@ -13,6 +13,7 @@ use crate::timeline::Timeline;
 
 /// Show time of one entry, nanoseconds.
 const SPAN: i64 = 100_000_000;
+// At a fifth of the limits any pace fits and, on seats like the bench seat, any fade (section 7).
 /// What is below this share of a limit is not measured closely: it leaves all that is ever asked.
 const LIGHT: f64 = 0.2;
 /// Entries looked at from the one before the present on: slowing down from the greatest speed takes a tenth of a second, a
@@ -71,23 +72,27 @@ impl Headroom {
     /// The greatest level at which the cue keeps the limits, and can still change its level; 1 at the most.
     #[must_use]
     pub(crate) fn greatest_level(&self) -> f64 {
+        // Two per cent of a limit are for the change: nobody could take back a level that leaves none.
         (0.98 / self.greatest).min(1.0)
     }
 
     fn ahead(&self, at: ShowTime) -> &[Load] {
         let first = usize::try_from(at.as_nanos().max(0) / SPAN).unwrap_or(usize::MAX).min(self.loads.len());
         let last = (first + AHEAD).min(self.loads.len());
+        // From one before on: readings stand under the middle of their poses, half of which are behind.
         &self.loads[first.saturating_sub(1)..last]
     }
 }
 
-/// The jerk that the measure sees of an acceleration that turns from 1 to -1 at once: twice the greatest weight that a third
-/// difference gives to one frame, which is 1 over a distance of one period, 7/9 of its share of a longer one.
+/// The jerk that the measure sees of an acceleration that turns from 1 to -1 at once.
 #[expect(clippy::cast_precision_loss, reason = "1 to 20 periods")]
 fn turn(rate: Rate) -> f64 {
     let n = Spacing::at_rate(rate.hz()).n;
     // A pace is constant within a frame, hence the weights of frames and not of a curve (docs/limiter.md, section 2).
+    // In whole milliseconds, as Times are: some arrangement of them is up to one shorter than n periods.
     let shortest_s = (n as f64 / rate.hz() * 1e3).floor() * 1e-3;
+    // The greatest weight of one frame in a third difference is 1 over a distance of one period; over longer
+    // ones 7/9 of the frame's share, met at three periods. Twice, as it turns from one side to the other.
     2.0 * if n == 1 { 1.0 } else { 7.0 / 9.0 } / shortest_s
 }
 
@@ -102,6 +107,7 @@ fn spans_seen(index: usize, lead: Duration) -> RangeInclusive<usize> {
 
 fn least_limits(slots: &[(Duration, usize, Slot)]) -> Limits {
     let free = Limits { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
+    // What a level adds does not hang on how much of its own limits a slot uses, so the weakest counts.
     slots.iter().fold(free, |least, (_, _, Slot { limits, .. })| Limits {
         velocity: least.velocity.min(limits.velocity),
         acceleration: least.acceleration.min(limits.acceleration),
@@ -157,6 +163,7 @@ impl Load {
         // Derivatives of x(s(t)) with s' the pace (docs/limiter.md, section 6).
         let at_level = |share: f32| level * f64::from(share);
         let added = CHANGE_PER_S * at_level(self.velocity_by_acceleration);
+        // By the greatest pace instead of the one looked for, which would be a cubic to be solved each tick.
         let bends = 3.0 * (1.0 + MAX_SPEED_UP) * at_level(self.acceleration_by_jerk);
         let jerk_added = CHANGE_PER_S * (turn * at_level(self.velocity_by_jerk) + bends);
         let paces = [
@@ -180,6 +187,7 @@ impl Load {
                 + 3.0 * GATHER * f64::from(self.velocity_by_jerk)
                 + GATHER * turn / least.jerk,
         ];
+        // One share for both rates, so that each sum grows in proportion to it, and what is left divides.
         let lefts = [left(self.velocity), left(self.acceleration), left(self.jerk)];
         lefts.into_iter().zip(adds).map(|(left, adds)| left / adds).fold(1.0, f64::min)
     }

@@ -29,6 +29,7 @@ impl Trail {
     pub(super) fn rest(&mut self, pose: Pose) {
         self.poses = [pose; KEPT];
         for (age, time) in (0_u32..).zip(self.times.iter_mut().rev()) {
+            // Apart by anything: slopes over poses of the same time would be 0 by 0.
             *time = -f64::from(age);
         }
         self.newest = KEPT - 1;

@@ -271,6 +271,7 @@ impl SourceTracker {
     fn on_position(&mut self, told: &Observation, media: ShowTime) {
         let at = told.at;
         let is_of_a_film = media.as_nanos().unsigned_abs() <= crate::time::nanos(LONGEST);
+        // In order alone: what was learned since an older one cannot be taken out of the estimate for it.
         if self.winding || !is_of_a_film || self.newest.is_some_and(|newest| at <= newest.at) {
             self.counts.rejected += 1;
             return;
@@ -335,6 +336,7 @@ impl SourceTracker {
         let at = told.at;
         let Some(estimate) = &mut self.estimate else { return };
         estimate.predict(at);
+        // Without the late bias: that moves what is told, and in here would be learned a second time.
         let missed = media.as_secs_f64() - estimate.media_s(at);
         let fits = missed.abs() <= estimate.gate_s(told.bound);
         self.misfits += (if fits { 0.0 } else { 1.0 } - self.misfits) * MISFITS_SHARE;
@@ -364,6 +366,7 @@ impl SourceTracker {
         if let Some(ahead) = self.recent.agreed(window, span, estimate.rate(), estimate.noise_s()) {
             estimate.move_to(at, media.as_secs_f64() + ahead);
             self.fitted_at = at;
+            // What has agreed once is not to move it again with the next sample.
             self.recent.clear();
             self.epoch = self.epoch.wrapping_add(1);
             // A cut of a frame is slewed: the noise is known, so nobody has to hold until the new place is.
@@ -391,6 +394,7 @@ impl SourceTracker {
     /// A film that stands runs again if its positions advance. A single one that still comes from before a told stop does not.
     fn watch_for_play(&mut self, at: MonoTime) {
         let speed = self.recent.speed(self.window(), self.span(), self.traits.sigma_s, self.traits.sigma_s);
+        // At half speed and more: a place that creeps in its noise is a film that stands.
         if speed.is_some_and(|speed| speed.rate > speed.off.max(0.5)) {
             self.begin_anew();
             self.on_sign(SourceSign::Play, at);
@@ -411,6 +415,7 @@ impl SourceTracker {
         // The filter knows the rate best, once it knows it.
         let fine = self.estimate.as_ref().filter(|_| self.fitted > SAMPLES);
         let off = |rate: f64, by: f64| (rate - 1.0).abs() > self.band + by;
+        // Beyond the band by more than it may be off: noise alone must not stop seats.
         let is_off = speeds.iter().flatten().any(|speed| off(speed.rate, speed.off))
             || fine.is_some_and(|estimate| off(estimate.rate(), 3.0 * estimate.rate_sigma()));
         if is_off || is_backward {
@@ -442,6 +447,7 @@ impl SourceTracker {
             return;
         }
         let since = *self.held.sure.get_or_insert(at);
+        // Not where the noise is known from before, nor of coarse kinds, whose samples may take seconds.
         if self.needed == SAMPLES_AGAIN || at.since(since) >= SURE_FOR {
             self.on_sign(SourceSign::Sure, at);
         }

@@ -11,6 +11,7 @@ mod hashed;
 mod id;
 mod index;
 mod info;
+mod sketch;
 mod upload;
 
 pub(crate) use curve::{CurveData, Drawing, MAX_POINTS, draw, needs_hall};
@@ -18,6 +19,7 @@ pub(crate) use hashed::Hashed;
 pub(crate) use id::{CueId, Id, IdError};
 pub(crate) use info::Verdict;
 pub use info::{CueInfo, Proved};
+pub(crate) use sketch::{RecordingPicture, Sketch};
 pub(crate) use upload::Upload;
 
 use std::collections::BTreeSet;
@@ -278,6 +280,19 @@ impl Library {
         let drawn = Drawn { name: cue.name, stamp: cue.stamp, points, curve: Arc::clone(&curve) };
         curves.insert(0, drawn);
         Ok(curve)
+    }
+
+    /// Has a recording drawn as the check of a cue is made: that seat, or the one that was held back farthest. Blocks for as long.
+    ///
+    /// # Errors
+    /// [`Code::Unknown`] where the recording, or the seat in it, is not there; as for a check where drawing it takes too much.
+    pub(crate) fn picture(&self, recording: &Path, seat: Option<&str>) -> Result<RecordingPicture, Problem> {
+        match child::picture(&self.inner.hall, recording, seat)? {
+            Sketch::Picture(picture) => Ok(*picture),
+            Sketch::Fault(fault) => {
+                Err(Problem::new(Code::Unknown, fault, "GET /api/v1/recordings lists what is there"))
+            }
+        }
     }
 
     /// The longest file that is taken in, bytes.

@@ -19,8 +19,10 @@ use crate::wire;
 
 /// In stretches of this length the motion under a vibration is looked at, nanoseconds: about what the measure spans.
 const STRETCH: i64 = 50_000_000;
+// It adds that much to a sum at the most (docs/limiter.md, section 7).
 /// The part of a limit below which motion is not measured closely.
 const LIGHT: f64 = 0.01;
+// Half of the slack, for the decimals of a file.
 /// What is left below a limit that an amplitude was lowered to.
 const ROUNDING: f64 = 0.9995;
 
@@ -116,6 +118,7 @@ impl Subject<'_> {
         let (low, high) = under.pieces.range(from, until);
         let low = At { value: low.value - amplitude, ..low };
         let high = At { value: high.value + amplitude, ..high };
+        // As the frame says it, in whole eighths of a millisecond: acceleration goes by the square of it.
         let hz = executed_hz(hz);
         Some(AxisSwing { low, high, amplitude, hz, moved: self.moved(under, from, until) })
     }
@@ -124,6 +127,7 @@ impl Subject<'_> {
         let Loads { velocity, acceleration, .. } = &under.loads;
         let last = velocity.len() - 1;
         let stretch = |at: i64| usize::try_from(at / STRETCH).unwrap_or(0).min(last);
+        // Whole stretches, of which it may fill a part: the motion under it is never too little.
         let met = stretch(from)..=stretch(until);
         [velocity, acceleration].map(|loads| {
             let most = loads[met.clone()].iter().fold(0.0_f32, |most, load| most.max(*load));

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::full;
 use super::margins::Margin;
-use super::recording::{ACKS, SENT, VERSION};
+use super::recording::{ACKS, REPORT, SENT, VERSION};
 use super::sampled::{SeatSample, TickSample};
 use super::seat::RecordedSeat;
 use crate::container::{self, ChannelRecord, Trouble};
@@ -259,7 +259,7 @@ impl Reading<'_, '_> {
             op::ATTACHMENT => {
                 if let Some((name, data)) = container::attachment(body) {
                     self.contents.attachments.insert(name.to_owned(), data.len());
-                    if name == "report.json" && data.len() <= KEPT {
+                    if name == REPORT && data.len() <= KEPT {
                         self.contents.report = Some(data.to_vec());
                     }
                 }

@@ -402,3 +402,44 @@ fn whoever_may_only_look_sees_all_is_asked_for_a_token_upon_a_press_and_can_stop
     browser.type_text(ESCAPE);
     browser.reads("state", "stopped");
 }
+
+#[test]
+fn a_moment_is_marked_by_a_key_and_its_recording_is_looked_at_seat_by_seat() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    browser.wait("document.getElementById('recordings-none').textContent === 'Nothing was recorded yet.'");
+    arm(&browser);
+    go(&browser);
+    // Bars say how each seat stands, in the map and large where one is looked at; points follow over the curves of the cue.
+    browser.press("[data-controller=A1]");
+    browser.wait("document.querySelectorAll('.pose.small i').length === 12");
+    browser.wait("document.querySelectorAll('#controller .pose.large i').length === 3");
+    browser.wait("parseFloat(document.querySelector('.pose.large i').style.getPropertyValue('--is')) > 5");
+    browser.reads("curves-note", "where A1 was");
+    browser.shot("30-seats-that-move");
+    browser.type_text("m");
+    browser.reads("show-reply", "mark");
+    browser.wait("document.querySelectorAll('#recordings tbody tr').length === 1");
+    assert!(text(&browser, "#recordings tbody tr").contains("incident"));
+    browser.press("#park");
+    browser.reads("state", "parked");
+    browser.wait("document.querySelectorAll('#recordings tbody tr').length === 2");
+    browser.wait("[...document.querySelectorAll('#recordings td')].some((cell) => cell.textContent.startsWith('stopped'))");
+    // The incident is the newer of the two.
+    browser.press("#recordings tbody tr:nth-child(2) button");
+    browser.wait("document.getElementById('picture').naturalWidth > 500");
+    assert!(text(&browser, "#picture-sentence").starts_with('A') || text(&browser, "#picture-sentence").starts_with('B'));
+    browser.shot("31-picture-of-a-recording");
+    browser.eval("const seat = document.getElementById('picture-seat'); seat.value = 'B2'; seat.dispatchEvent(new Event('change'))");
+    browser.wait("document.getElementById('picture-sentence').textContent.startsWith('B2')");
+    browser.press("#picture-close");
+    browser.wait("document.getElementById('picture-panel').hidden");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+/// What an element says.
+fn text(browser: &Browser, selector: &str) -> String {
+    let said = browser.eval(&format!("return document.querySelector({selector:?}).textContent"));
+    said.as_str().expect("it is text").to_owned()
+}

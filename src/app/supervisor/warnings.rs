@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::status::StatusParts;
-use super::{belts, links, player};
+use super::{belts, player};
+use crate::app::links;
 use crate::control::{Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -49,7 +50,7 @@ impl StatusParts<'_> {
         let of_the_film = hall.film.iter().flat_map(|table| table.read().warnings());
         warnings.extend(of_the_film.map(|sentence| in_two("film", &sentence)));
         warnings.extend(player::warnings(hall).iter().map(|trouble| in_two("player", trouble)));
-        warnings.extend(links::troubles(hall).map(|trouble| in_two("link", &trouble)));
+        warnings.extend(links::troubles(&hall.links).map(|trouble| in_two("link", &trouble)));
         warnings.extend(features.lasting.warnings(hall));
         warnings.extend(hall.recorder.status().trouble.map(|trouble: String| in_two("record", &trouble)));
         warnings.extend(settings_file.map(|trouble| in_two("settings", &trouble)));

@@ -27,6 +27,7 @@ impl SourceTracker {
         }
         let patience = self.patience.mul_f64(self.freewheel);
         let patience =
+            // One that tells every few seconds is silent only after several of its own periods.
             patience.max(if self.traits.coarse { WINDOW_PERIODS * period } else { Duration::ZERO });
         if quiet > patience {
             self.on_sign(SourceSign::TimeOut, now);

@@ -5,6 +5,7 @@ import { change } from './api.js';
 import { ask, onPress, onTwoPresses } from './press.js';
 import { hall } from './state.js';
 import { mark, healthOf } from './marks.js';
+import { makePose, showPose } from './pose.js';
 import { ackRate, bits, micros, sentence, whole } from './words.js';
 
 const FIGURES = {
@@ -74,6 +75,7 @@ export function showController(status) {
     parts.shape = health.mark;
     parts.picture.replaceChildren(mark(health.mark));
   }
+  showPose(parts.pose, controller);
   const forGood = controller.health === 'out';
   setText(parts.word, forGood ? 'disabled in the configuration' : controller.enabled ? controller.health : `disabled, ${controller.health}`);
   setText(parts.why, sentence(controller.why));
@@ -112,10 +114,11 @@ function build({ name: which, row, seat, address, group }) {
     action: (button) => ask(button, `enable ${which}`, () => change('POST', `controllers/${encodeURIComponent(which)}/enable`)),
   });
   onPress(close, () => select(null));
+  const pose = makePose('large');
   const title = make('h3', {}, `${which}${row ? `, row ${row}` : ''}`);
   const where = make('p', { className: 'quiet' }, `seat ${seat}, at ${address}${together ? `, one seat${together}` : ''}`);
   const buttons = make('div', { className: 'row' }, out, reason, back, close);
-  return { all: [title, where, health, why, buttons, list], health, picture, word, why, figures, out, reason, in: back, shape: '' };
+  return { all: [title, where, health, why, buttons, pose, list], pose, health, picture, word, why, figures, out, reason, in: back, shape: '' };
 }
 
 function drives(errors) {

@@ -5,6 +5,7 @@ import { BANDS, HEALTH, ackBand, latencyBand, mark, healthOf } from './marks.js'
 import { ackRate, micros } from './words.js';
 import { hall } from './state.js';
 import { selected, select } from './controller.js';
+import { makePose, showPose } from './pose.js';
 
 const NO_ROW = 'no row';
 /** Names of rows up to so long stand beside their seats, longer ones above them; longer names of seats need wider fields. */
@@ -58,13 +59,14 @@ function layOut(controllers) {
 function makeField({ name }) {
   const picture = make('span', { className: 'picture' });
   const letters = make('span', { className: 'letters' });
+  const pose = makePose('small');
   const figure = make('span', { className: 'field-figure' });
   const button = make('button', { type: 'button', className: 'field' },
-    make('span', { className: 'field-head' }, picture, letters),
+    make('span', { className: 'field-head' }, picture, letters, pose),
     make('span', { className: 'field-name' }, name), figure);
   button.dataset.controller = name;
   button.addEventListener('click', () => select(selected() === name ? null : name));
-  fields.set(name, { button, picture, letters, figure, shape: '' });
+  fields.set(name, { button, picture, letters, pose, figure, shape: '' });
   return button;
 }
 
@@ -77,6 +79,7 @@ function showField(field, controller) {
     field.picture.replaceChildren(mark(look.mark));
   }
   setText(field.letters, look.letters);
+  showPose(field.pose, controller);
   setText(field.figure, by === 'latency' ? micros(controller.ack_p99_us, 2) : ackRate(controller.ack_rate));
   setAttribute(field.button, 'aria-label', spoken(controller));
   setProperty(field.button, 'title', controller.why);
