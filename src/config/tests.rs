@@ -294,7 +294,10 @@ fn a_target_that_cannot_be_used_says_why() {
         (&["127.0.0.1:7408,axes=13"], "axes=13 is not one of 1..=12"),
         (&["127.0.0.1:7408,axis=3"], "did you mean axes?"),
         (&["127.0.0.1:7408,axes"], "\"axes\" is not key=value"),
-        (&["127.0.0.1:7408", "127.0.0.1:7408,name=B"], "the address 127.0.0.1:7408 is also that of an earlier"),
+        (
+            &["127.0.0.1:7408", "127.0.0.1:7408,name=B"],
+            "the address 127.0.0.1:7408 is also that of an earlier",
+        ),
         (&["127.0.0.1:7408,name=c2", "127.0.0.1:7409"], "the name c2 is also that of an earlier"),
         (&["255.255.255.255:7408"], "not the address of one controller"),
         (&[], "no controller"),

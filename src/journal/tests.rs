@@ -298,7 +298,9 @@ fn of_a_great_day_the_newest_is_taken_and_the_rest_is_named() {
     let report = report(dir.path(), day, day, ReportBounds { shows: 2, actions: 3 }).unwrap();
     assert_eq!((report.shows.len(), report.actions.len()), (2, 3));
     assert_eq!((report.actions[0].what.as_str(), &report.shows[1].record.start[14..16]), ("trim 2", "04"));
-    assert!(report.notes[0].starts_with("3 earlier shows") && report.notes[1].starts_with("2 earlier commands"));
+    assert!(
+        report.notes[0].starts_with("3 earlier shows") && report.notes[1].starts_with("2 earlier commands")
+    );
 }
 
 #[test]

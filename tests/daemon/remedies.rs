@@ -126,7 +126,10 @@ fn an_error_while_parked_is_put_right_and_cleared_and_preflight_blames_nobody_el
     assert_eq!((wrong["state"].as_str(), wrong["may_clear"].as_bool()), (Some("parked"), Some(false)));
     assert_eq!(health(&wrong, 0), "error");
     let refused = hall.run(&["clear"]);
-    assert!(refused.code == Some(75) && refused.stderr.contains("clear the error at the controller"), "{refused:?}");
+    assert!(
+        refused.code == Some(75) && refused.stderr.contains("clear the error at the controller"),
+        "{refused:?}"
+    );
     let preflight = hall.run(&["preflight"]);
     assert!(!preflight.stdout.contains("other-master"), "{preflight:?}");
     hall.happens("1@err=0");

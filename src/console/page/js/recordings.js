@@ -51,7 +51,7 @@ function showList(list) {
     return make('tr', {}, ...[when, kind, what, size(bytes), name].map((cell) => make('td', {}, cell)));
   });
   setProperty(byId('recordings'), 'hidden', lines.length === 0);
-  setText(byId('recordings-none'), lines.length === 0 ? 'Nothing has been recorded yet.' : '');
+  setText(byId('recordings-none'), lines.length === 0 ? 'Nothing was recorded yet.' : '');
   byId('recordings').tBodies[0].replaceChildren(...lines);
 }
 
