@@ -58,7 +58,7 @@ pub(super) fn picture(hall: &Hall, recording: &Path, seat: Option<&str>) -> Resu
 
 fn check<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<T, Problem> {
     let config = hall.config.to_str().ok_or_else(|| {
-        let detail = format!("the path of the configuration, {}, is no UTF-8", hall.config.display());
+        let detail = format!("the path of the configuration, {}, is not UTF-8", hall.config.display());
         Problem::new(Code::File, detail, "rename it")
     })?;
     let command: Vec<&str> =
