@@ -89,8 +89,8 @@ fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
     let in_the_open = is_public(path);
     if !in_the_open && path != STOP && !takes_query(path) && request.uri().query().is_some() {
         return Err(bad_value(
-            "there is a query, and nothing here takes one",
-            "leave out what is behind the ?",
+            "there is a query, but nothing here takes one",
+            "omit the ? and what follows it",
         ));
     }
     Ok(match peer {
@@ -115,7 +115,7 @@ fn note(shared: &Shared, request: &Request, problem: &Problem) {
     if guessed && matches!(problem.code, Code::Token | Code::Busy) || problem.code == Code::Origin {
         let from = request.extensions().get::<Peer>().map_or_else(String::new, ToString::to_string);
         let line =
-            Line::new(Priority::Warning, "turned-away", format!("turned away {from}: {}", problem.detail));
+            Line::new(Priority::Warning, "turned-away", format!("rejected {from}: {}", problem.detail));
         shared.log.say(line.with("code", problem.code.word()).with("from", from));
     }
 }

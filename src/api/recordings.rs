@@ -98,7 +98,7 @@ pub(super) async fn one(
     State(shared): State<Arc<Shared>>,
     UrlPath(name): UrlPath<String>,
 ) -> Result<Response, Problem> {
-    asker.least_engineer("taking recordings away")?;
+    asker.least_engineer("deleting recordings")?;
     let path = path_of(&shared, &name)?;
     let turn = turn(&shared.reports, "a file").await?;
     let opened = shared.blocking(move || {
@@ -151,7 +151,7 @@ pub(super) async fn picture(
     request: Request,
 ) -> Result<JsonReply<RecordingPicture>, Problem> {
     let query = Query::<PictureQuery>::try_from_uri(request.uri())
-        .map_err(|_| bad_value("the query is not what is wanted here", "?seat= and its name"))?;
+        .map_err(|_| bad_value("the query is not valid here", "send ?seat= and the name of a seat"))?;
     let path = path_of(&shared, &name)?;
     let library = shared.library.clone();
     let turn = turn(&shared.curves, "a picture").await?;

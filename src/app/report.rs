@@ -261,9 +261,9 @@ impl PlayReport {
 
 /// A link, and its axes that did not take all that was made for them.
 fn of_link(link: &LinkStatus) -> String {
-    let beside = link.deviation_mm.map(|most| format!(", at most {most:.2} mm beside the cue by the proof"));
+    let beside = link.deviation_mm.map(|most| format!(", at most {most:.2} mm off the cue by the proof"));
     let mut text = format!(
-        "link {} ({}): {:.1} a second, {:.0} ms ahead{}; {} of {} requests answered, {} late, {} stray",
+        "link {} ({}): {:.1} Hz, {:.0} ms ahead{}; {} of {} requests answered, {} late, {} stray",
         link.name,
         link.dialect,
         link.rate_hz,
@@ -279,7 +279,7 @@ fn of_link(link: &LinkStatus) -> String {
         let taken = if *unconfirmed > 0 { format!("{unconfirmed} sent") } else { format!("{acked} acked") };
         write!(
             text,
-            "\n  {} axis {}: {made} made, {taken}, {refused} refused, {in_doubt} in doubt, {skipped} skipped, dry {dry} times",
+            "\n  {} axis {}: {made} made, {taken}, {refused} refused, {in_doubt} in doubt, {skipped} skipped, ran dry {dry} times",
             axis.controller, axis.axis
         )
         .expect("a String takes what is written to it");

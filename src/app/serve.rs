@@ -86,11 +86,11 @@ pub(crate) enum ServeError {
     },
     /// The supervisor does not end: what it had to write down may be lost.
     #[error(
-        "the supervisor hangs, and the program ends without it: the seats are parked or at rest; what it had to write down may be lost"
+        "the supervisor hangs, and the program ends without it: the seats are parked or at rest; its last journal lines may be lost"
     )]
     Supervisor,
     /// The system gives no signals, or no thread.
-    #[error("the system refused: {0}")]
+    #[error("the system refused a signal handler or a thread: {0}")]
     System(#[source] io::Error),
 }
 

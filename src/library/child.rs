@@ -58,7 +58,7 @@ pub(super) fn picture(hall: &Hall, recording: &Path, seat: Option<&str>) -> Resu
 
 fn check<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<T, Problem> {
     let config = hall.config.to_str().ok_or_else(|| {
-        let detail = format!("the path of the configuration, {}, is no UTF-8", hall.config.display());
+        let detail = format!("the path of the configuration, {}, is not UTF-8", hall.config.display());
         Problem::new(Code::File, detail, "rename it")
     })?;
     let command: Vec<&str> =
@@ -71,7 +71,7 @@ fn run<T: DeserializeOwned>(hall: &Hall, chore: &Chore<'_>) -> Result<T, Problem
     let bounds = &hall.bounds;
     let mut child = spawn(hall, chore).map_err(|error| {
         let detail = format!("cannot start {}: {error}", chore.name);
-        Problem::new(Code::File, detail, "look at the service's limits on processes and memory")
+        Problem::new(Code::File, detail, "check the service's limits on processes and memory")
     })?;
     let deadline = Monotonic.now() + bounds.time;
     let watched = watch(&mut child, deadline);
@@ -115,7 +115,7 @@ fn watch(child: &mut Child, deadline: MonoTime) -> io::Result<Vec<u8>> {
             bytes => output.extend_from_slice(&buf[..bytes]),
         }
         if output.len() as u64 > MAX_OUTPUT {
-            return Err(io::Error::other("it printed more than any verdict is long"));
+            return Err(io::Error::other("its output is longer than any verdict"));
         }
     }
     let ended = pidfd_open(Pid::from_child(child), PidfdFlags::empty())?;
@@ -145,13 +145,13 @@ fn failed(chore: &Chore<'_>, error: &io::Error) -> Problem {
 
 fn too_long(chore: &Chore<'_>, bounds: &Bounds) -> Problem {
     let detail = format!("{} took more than {} s and was ended", chore.name, bounds.time.as_secs());
-    Problem::new(Code::Check, detail, "try again when nothing plays; what never ends in time is too long")
+    Problem::new(Code::Check, detail, "try again when nothing plays; one that never ends in time is too long")
 }
 
 /// It ended without a verdict: its limits ended it, or it could not begin.
 fn no_verdict(chore: &Chore<'_>, status: ExitStatus, bounds: &Bounds) -> Problem {
     if status.code() == Some(BAD_CONFIGURATION) {
-        let remedy = "run kinocue check on the configuration and mend it";
+        let remedy = "run kinocue check on the configuration and correct it";
         return Problem::new(Code::Check, "the configuration of the hall has faults", remedy);
     }
     let how = match (status.signal(), status.code()) {

@@ -34,7 +34,7 @@ pub(crate) enum ReadError {
     #[error("{0}")]
     File(Trouble),
     /// It is MCAP, and no recording.
-    #[error("is no recording of kinocue: it has no metadata record \"kinocue\" of kind \"recording\"")]
+    #[error("is not a recording of kinocue: it has no metadata record \"kinocue\" of kind \"recording\"")]
     Foreign,
     /// It says something of itself that cannot be.
     #[error("its metadata record \"kinocue\": {field}: {why}")]

@@ -212,7 +212,7 @@ fn a_cue_is_taken_in_from_the_page_or_refused_with_every_fault() {
     browser.press("#upload");
     browser.reads("playlist-reply", "not done");
     browser.reads("upload-faults", "1.4 is outside the stroke");
-    browser.reads("upload-faults", "400 does not come after");
+    browser.reads("upload-faults", "400 is not after");
     browser.shot("50-upload-refused");
 
     browser.choose("#upload-file", &Path::new(env!("CARGO_MANIFEST_DIR")).join("cues/bench-ride.csv"));
@@ -248,7 +248,7 @@ fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_pr
     browser.wait("!document.getElementById('follow-panel').hidden");
     browser.reads("follow-word", "absent");
     browser.reads("follow-next", "start the film");
-    browser.reads("timecode-of", "not known");
+    browser.reads("timecode-of", "unknown");
     browser.reads("sources", "/nowhere/midi cannot be opened");
     assert_eq!(
         browser.eval("return document.getElementById('error-curve').hidden"),
@@ -270,7 +270,7 @@ fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_pr
     browser.wait("/^01:00:\\d\\d:\\d\\d$/.test(document.getElementById('timecode').textContent)");
     go(&browser);
     browser.wait("document.querySelector('#error-curve canvas') !== null");
-    browser.reads("error-scale", " ms; above 0");
+    browser.reads("error-scale", " ms; positive");
     browser.wait("/^[+−]?\\d+\\.\\d\\d ms$/.test(document.getElementById('error-now').textContent)");
     for (width, height) in [(1600, 1000), (768, 1024), (390, 844)] {
         browser.resize(width, height);

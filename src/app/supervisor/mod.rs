@@ -402,7 +402,7 @@ impl Supervisor {
         let latched = self.hall.mirror.state.is_latched();
         if latched {
             let (state, cause) = (self.hall.mirror.state, self.hall.cause());
-            self.note(format!("the hall was in {state} before the configuration was read anew: {cause}"));
+            self.note(format!("the hall was in {state} before the configuration was reloaded: {cause}"));
         }
         Carryover {
             settings: Some(self.settings()),

@@ -139,7 +139,7 @@ impl ProvedShow {
         };
         let staged = StagedShow::mixed(config, &self.timeline, self.headroom.clone(), show, &mixes, false);
         let staged = staged.map_err(|error| {
-            Problem::new(Code::Check, error.to_string(), "begin elsewhere in the cue, or lower its level")
+            Problem::new(Code::Check, error.to_string(), "start elsewhere in the cue, or lower its level")
         })?;
         let course = &staged.course;
         self.join_s = course.settled().as_secs_f64() - course.start.as_secs_f64();
@@ -177,7 +177,7 @@ fn film_of(config: &Config, of: &EntryFilm, end: ShowTime) -> Result<Option<Film
     let named = of.begin;
     let Some(sync) = &config.sync else {
         let why =
-            named.map(|label| refused(format!("film = \"{label}\", and the configuration has no [sync]")));
+            named.map(|label| refused(format!("film = \"{label}\", but the configuration has no [sync]")));
         return why.map_or(Ok(None), Err);
     };
     let (pace, join_above, rejoin) = (sync.pace, sync.join_above, sync.rejoin);

@@ -87,7 +87,11 @@ impl StatusParts<'_> {
                 refusals: hall.granted.refusals.clone(),
             },
             controllers: self.controllers(table),
-            links: links::status(&hall.config, &hall.links, hall.cued.as_ref().map_or(&[], |cued| &cued.links)),
+            links: links::status(
+                &hall.config,
+                &hall.links,
+                hall.cued.as_ref().map_or(&[], |cued| &cued.links),
+            ),
             preflight: preflighted.as_ref().map(|it| it.status(now, |lane| hall.settings.is_on(lane))),
             warnings,
             test: features.seats.test.as_ref().map(|test| test.status.clone()),
@@ -100,8 +104,8 @@ impl StatusParts<'_> {
     fn next(&self) -> String {
         let next = self.hall.mirror.next;
         match self.hall.cued.as_ref().and_then(|cued| cued.left_at) {
-            Some(film) if next == Next::Go => format!("{next}; or go on from {film}, where it was left"),
-            Some(film) if next == Next::Arm => format!("{next}; it can go on from {film}, where it was left"),
+            Some(film) if next == Next::Go => format!("{next}; or go from {film}, where it was left"),
+            Some(film) if next == Next::Arm => format!("{next}; it can go from {film}, where it was left"),
             _ => next.to_string(),
         }
     }
@@ -123,7 +127,7 @@ impl StatusParts<'_> {
         let counts = row.map(|row| row.counts).unwrap_or_default();
         let state = row.map(|row| row.state).unwrap_or_default();
         let ack = row.and_then(|row| row.ack_ns);
-        let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
+        let why = row.map_or_else(|| "not polled yet".to_owned(), |row| row.why.to_string());
         let SeatPlaces { positions_mm, commanded, measured } = SeatPlaces::of(controller, &state);
         ControllerStatus {
             enabled: hall.settings.is_on(index),
@@ -168,11 +172,11 @@ fn nameplate(controller: &Controller) -> ControllerStatus {
     }
 }
 
-/// A controller that is out for good: nothing is known of it.
+/// A controller that is disabled in the configuration: nothing is known of it.
 fn absent(controller: &Controller) -> ControllerStatus {
     ControllerStatus {
         health: Health::Out,
-        why: "out for good: enabled = false in the configuration".to_owned(),
+        why: "disabled in the configuration: enabled = false".to_owned(),
         ..nameplate(controller)
     }
 }

@@ -106,7 +106,7 @@ impl StatusParts<'_> {
                 id: "another-master".to_owned(),
                 severity: Severity::Error,
                 controller: Some(controller.name.clone()),
-                text: format!("{answers} answers within a minute to frames that were not sent from here"),
+                text: format!("{answers} acks within a minute of frames that were not sent from here"),
                 remedy: "another machine may drive this seat: find it and stop it, before anybody sits down"
                     .to_owned(),
             })
@@ -119,7 +119,7 @@ impl StatusParts<'_> {
 
     fn of_preflight(&self) -> Option<Warning> {
         let (text, severity) = match &self.features.readiness.preflighted {
-            None => ("preflight was not run since the program started", Severity::Info),
+            None => ("preflight has not been run since the program started", Severity::Info),
             Some(it) if !it.has_passed(|lane| self.hall.settings.is_on(lane)) => {
                 ("preflight failed", Severity::Error)
             }
@@ -157,7 +157,7 @@ fn nobody(table: &[Row], state: State, takes_part: impl FnMut((usize, &Row)) -> 
         id: "no-seat".to_owned(),
         severity: Severity::Error,
         controller: None,
-        text: format!("no seat takes part: \"{state}\" is said of none"),
-        remedy: "take seats in (`kinocue enable`), or see at each what keeps it out".to_owned(),
+        text: format!("no seat takes part: none of them is {state}"),
+        remedy: "enable seats (`kinocue enable`), or see at each why it is out".to_owned(),
     })
 }

@@ -11,7 +11,7 @@ use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::device::Address;
 use crate::device::settings::{Saved, SavedDrives, parameters, text};
 
-/// Keeps the parameters of controllers, and the settings of SilverMax units, as a file, to compare others with or to write back.
+/// Saves the parameters of controllers, and the settings of SilverMax units, to a file, to compare with or write back later.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -19,7 +19,7 @@ Examples:
   kinocue register save hall-settings.toml --config hall.toml
   kinocue register save - --config hall.toml --row A")]
 pub(super) struct Args {
-    /// Where to; `-` for standard output. A file that is there is replaced.
+    /// The file to write, or `-` for stdout. An existing file is replaced.
     file: PathBuf,
     #[command(flatten)]
     targets: TargetArgs,
@@ -33,7 +33,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let none = drives::unreadable(&driven);
     if !none.is_empty() {
         print::tell(&format!(
-            "kinocue: {}: left out, as no setting of a SIXpack 2 can be read; `kinocue home` writes them whole",
+            "kinocue: {}: left out, as the settings of a SIXpack 2 cannot be read; `kinocue home` writes all of them",
             none.join(", ")
         ));
     }

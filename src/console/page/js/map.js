@@ -94,14 +94,14 @@ function lookOf(controller) {
 
 function spoken({ name, row, enabled, health, ack_rate: acks, ack_p99_us: p99 }) {
   const place = row ? `, row ${row}` : '';
-  return `${name}${place}: ${enabled ? health : health === 'out' ? 'out for good' : 'taken out'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
+  return `${name}${place}: ${enabled ? health : health === 'out' ? 'disabled in the configuration' : 'disabled'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
 }
 
 function showLegend() {
   const entry = (look, text) => make('li', { className: `look-${look.look}` }, mark(look.mark), make('b', {}, look.letters), ` ${text}`);
   const bands = {
-    acks: ['99.5 % acked and more', 'from 95 %', 'less', 'nothing asked'],
-    latency: ['99 of 100 within 2 ms', 'within 10 ms', 'longer', 'nothing acked'],
+    acks: ['99.5 % or more acked', '95 % or more', 'less', 'no acks requested'],
+    latency: ['p99 up to 2 ms', 'up to 10 ms', 'longer', 'no acks'],
   }[by];
   const entries = bands
     ? Object.values(BANDS).map((look, index) => entry(look, bands[index]))
