@@ -429,7 +429,10 @@ fn a_moment_is_marked_by_a_key_and_its_recording_is_looked_at_seat_by_seat() {
     // The incident is the newer of the two.
     browser.press("#recordings tbody tr:nth-child(2) button");
     browser.wait("document.getElementById('picture').naturalWidth > 500");
-    assert!(text(&browser, "#picture-sentence").starts_with('A') || text(&browser, "#picture-sentence").starts_with('B'));
+    assert!(
+        text(&browser, "#picture-sentence").starts_with('A')
+            || text(&browser, "#picture-sentence").starts_with('B')
+    );
     browser.shot("31-picture-of-a-recording");
     browser.eval("const seat = document.getElementById('picture-seat'); seat.value = 'B2'; seat.dispatchEvent(new Event('change'))");
     browser.wait("document.getElementById('picture-sentence').textContent.startsWith('B2')");
