@@ -7,7 +7,7 @@ mod links;
 mod play;
 pub(crate) mod player;
 pub(crate) mod recorder;
-mod recording;
+pub(crate) mod recording;
 mod refused;
 mod report;
 mod run;

@@ -9,7 +9,7 @@ use anyhow::{Context as _, anyhow};
 
 use super::super::{Exit, Failure, OrExit as _, exit, print};
 use super::open;
-use crate::record::{Chunk, Contents, CutError, CutManner, RecordedSeat, Stretch, cut, each_tick};
+use crate::record::{Chunk, Contents, CutError, CutManner, Piece, RecordedSeat, Stretch, cut, each_tick};
 use crate::time::{ShowTime, parse_time};
 
 /// Cuts a stretch out of a full recording, with every tick as plain topics that any viewer can draw.
@@ -40,10 +40,10 @@ pub(in super::super) struct Args {
     /// Time messages by the film rather than by the clock.
     #[arg(long)]
     film_time: bool,
-    /// Omit the names of seats, hall and cue, and addresses.
+    /// Omit the names of seats, hall and cue, and addresses, also those in frames and replies.
     #[arg(long)]
     anonymous: bool,
-    /// Also keep the original ticks, so that the cut is itself a full recording.
+    /// Also keep the original ticks and replies, so that the cut is itself a full recording.
     #[arg(long, conflicts_with = "film_time")]
     whole: bool,
     /// Overwrite OUT if it exists.
@@ -102,7 +102,9 @@ fn each<W: Write>(
     mut row: impl FnMut(&mut W, &Contents, &Chunk<'_>) -> std::io::Result<()>,
 ) -> Result<W, Failure> {
     let mut result = Ok(());
-    each_tick(open(path)?, stretch, &mut |contents, chunk, _| {
+    each_tick(open(path)?, stretch, &mut |contents, piece| {
+        let Piece::Tick(chunk, _) = piece else { return };
+        let chunk = &chunk;
         if result.is_ok() {
             result = row(&mut out, contents, chunk);
         }
