@@ -62,7 +62,7 @@ impl Engine {
                 if !is_wanted_elsewhere && reached >= course.settled() =>
             {
                 // By the highest level: all share one show time, and that lane has the least room.
-                FramePace::Within(headroom.pace(now, lanes.level()))
+                FramePace::Within(headroom.pace(now, lanes.level(), lanes.may_shake()))
             }
             _ => FramePace::Within(0.0),
         });

@@ -391,6 +391,11 @@ impl LaneMotion {
         }
     }
 
+    /// Whether what the cue has of vibration may be on it.
+    pub(super) fn may_shake(&self) -> bool {
+        self.vibration.max(self.wanted.vibration) > 0.0
+    }
+
     /// Moves its level on by `dt` seconds, towards `target`.
     pub(super) fn fade(&mut self, dt: f64, target: f64, share: f64) {
         self.fader.advance(dt, target, share);

@@ -116,7 +116,7 @@ impl Lanes {
                 continue;
             }
             if free {
-                motion.fade(dt, target, headroom.fade(at, motion.fader.level()));
+                motion.fade(dt, target, headroom.fade(at, motion.fader.level(), motion.may_shake()));
             } else {
                 motion.settle(dt);
             }
@@ -163,6 +163,11 @@ impl Lanes {
     /// The greatest level there is.
     pub(super) fn level(&self) -> f64 {
         self.all.iter().map(|motion| motion.fader.level()).fold(0.0, f64::max)
+    }
+
+    /// Whether any of them may vibrate.
+    pub(super) fn may_shake(&self) -> bool {
+        self.all.iter().any(LaneMotion::may_shake)
     }
 
     /// Whether one that frames may go to is farther than that from park.

@@ -99,9 +99,10 @@ pub(crate) struct SourceTracker {
     was_misfit: bool,
     /// When the last one did that fitted.
     fitted_at: MonoTime,
-    /// Positions that fitted since the estimate began, or jumped; how many it takes.
+    /// Positions that fitted since the estimate began, or jumped.
     fitted: u32,
-    needed: u32,
+    /// Whether rate and noise are known from before that.
+    is_known: bool,
     held: HeldSince,
     /// For how long after the newest position the estimate may run on.
     patience: Duration,
@@ -154,7 +155,7 @@ impl SourceTracker {
             was_misfit: false,
             fitted_at: now,
             fitted: 0,
-            needed: traits.samples(),
+            is_known: false,
             held: HeldSince::default(),
             patience: traits.silent_for,
             freewheel: 1.0,
@@ -203,6 +204,8 @@ impl SourceTracker {
                 self.recent.clear();
                 self.on_sign(SourceSign::Stop, at);
             }
+            // Said of a film that seats follow it is nothing new, and its place is not to be found again.
+            FilmWord::Play if self.state.may_lead() => {}
             FilmWord::Play => {
                 self.begin_anew();
                 self.on_sign(SourceSign::Play, at);
@@ -326,7 +329,7 @@ impl SourceTracker {
                 }
                 estimate.move_to(at, media.as_secs_f64());
                 self.epoch = self.epoch.wrapping_add(1);
-                self.needed = SAMPLES_AGAIN;
+                self.is_known = true;
             }
         }
     }
@@ -371,7 +374,7 @@ impl SourceTracker {
             self.epoch = self.epoch.wrapping_add(1);
             // A cut of a frame is slewed: the noise is known, so nobody has to hold until the new place is.
             if (missed + ahead).abs() > FILM_FRAME.as_secs_f64() {
-                (self.fitted, self.needed) = (1, SAMPLES_AGAIN);
+                (self.fitted, self.is_known) = (1, true);
                 self.on_sign(SourceSign::Jump, at);
             } else {
                 self.counts.jumps += 1;
@@ -442,13 +445,15 @@ impl SourceTracker {
         let Some(estimate) = &self.estimate else { return };
         let limit = if self.traits.coarse { SURE_COARSE_S } else { SURE_S };
         let is_in_band = (estimate.rate() - 1.0).abs() <= self.band + 2.0 * estimate.rate_sigma();
-        if 3.0 * estimate.sigma_s(at) >= limit || self.fitted < self.needed || !is_in_band {
+        let needed = if self.is_known { SAMPLES_AGAIN } else { self.traits.samples() };
+        if 3.0 * estimate.sigma_s(at) >= limit || self.fitted < needed || !is_in_band {
             self.held.sure = None;
             return;
         }
         let since = *self.held.sure.get_or_insert(at);
-        // Not where the noise is known from before, nor of coarse kinds, whose samples may take seconds.
-        if self.needed == SAMPLES_AGAIN || at.since(since) >= SURE_FOR {
+        // Not where the noise is known from before, nor of what tells less often than that: its samples have taken longer.
+        let is_slow = self.newest.is_some_and(|newest| newest.period >= SURE_FOR);
+        if self.is_known || is_slow || at.since(since) >= SURE_FOR {
             self.on_sign(SourceSign::Sure, at);
         }
     }

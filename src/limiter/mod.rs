@@ -126,7 +126,8 @@ impl Limiter {
         self.history.rest(pose, self.times.usual_ms());
         self.fast_path.rest(pose, f64::from(self.times.usual_ms()) * 1e-3);
         self.axes.iter_mut().for_each(AxisLimiter::rest);
-        self.following = true;
+        // Calm poses pass without being judged: of a seat that nobody has placed none may.
+        self.following = self.is_seeded;
     }
 
     /// Counts since the limiter was made.
@@ -340,4 +341,27 @@ fn exceeded(limits: &AxisLimits, next: &NextPose) -> (Limit, f64) {
 /// Positions held inside the stroke; what is no number rests at its lower end.
 fn held_inside(pose: Pose) -> Pose {
     pose.map(|position| if position.is_nan() { 0.0 } else { position.clamp(0.0, 1.0) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::asked::{read, window};
+    use crate::motion::AxisGeometry;
+
+    #[test]
+    fn before_it_is_told_where_the_lane_stands_it_lets_nothing_pass_whatever_rests() {
+        let window = window(Limits::of(&AxisGeometry::BENCH));
+        let mut limiter = Limiter::new(&window, Rate::from_hz(100.0));
+        for index in 0..3 {
+            for provenance in [Provenance::Proved, Provenance::Anyhow] {
+                let admitted = limiter.admit(&mut [0.0; MAX_AXES], index, provenance);
+                assert_eq!(admitted, Admitted::Fault, "frame {index}");
+            }
+            limiter.rest();
+        }
+        let stands = [0.25; MAX_AXES];
+        limiter.restart(&read(&window, stands));
+        assert_eq!(limiter.admit(&mut { stands }, 3, Provenance::Anyhow), Admitted::Passed);
+    }
 }

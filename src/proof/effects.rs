@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::violation::Breach;
 use super::{Found, LimitedEffect, Terms};
 use crate::cue::{Effects, TrackStep};
-use crate::time::{ShowTime, nanos};
+use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
 /// A time for which an effect is on.
@@ -33,7 +33,7 @@ pub(super) fn prove(timeline: &Timeline, terms: &Terms, found: &mut Vec<Found>) 
             found.push(Found { at, axis: None, column: column.clone(), breach });
         };
         for run in &runs {
-            if let Some(breach) = wrong_length(run, effect, terms.rate.period()) {
+            if let Some(breach) = wrong_length(run, effect, terms.rate) {
                 note(run.from, breach);
             }
         }
@@ -69,13 +69,13 @@ fn on_while<T: Copy>(steps: &[TrackStep<T>], end: ShowTime, is_on: impl Fn(T) ->
 }
 
 /// What is wrong with how long frames have it on, which may be a period more or less than the cue.
-fn wrong_length(run: &EffectRun, effect: &LimitedEffect, period: Duration) -> Option<Breach> {
+fn wrong_length(run: &EffectRun, effect: &LimitedEffect, rate: Rate) -> Option<Breach> {
     let (at, on, limit) = (run.from, run.length(), &effect.limit);
     // Frames can only switch every period, wherever they fall: a run is on in as many frames as there are
     // whole periods in it, or in one more.
-    let frames = nanos(on) / nanos(period);
-    let shortest = Duration::from_nanos(frames * nanos(period));
-    let longest = if shortest == on { on } else { shortest + period };
+    let frames = rate.periods_in(on);
+    let shortest = rate.offset(frames);
+    let longest = if shortest == on { on } else { rate.offset(frames + 1) };
     if shortest < limit.min_on {
         return Some(Breach::OnTooShort { at, on, sent: shortest, least: limit.min_on });
     }

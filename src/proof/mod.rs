@@ -36,6 +36,7 @@ pub use figures::figures;
 pub(crate) use fit::{FitManner, Fitted, fit};
 pub(crate) use links::{LinkPlay, LinksProof, prove_in, prove_links};
 pub(crate) use loads::Loads;
+pub(crate) use shake::shakes;
 pub(crate) use strain::{AxisStrain, strains};
 pub(crate) use terms::LimitedEffect;
 pub use terms::Terms;

@@ -44,7 +44,7 @@ impl SourceTracker {
     /// runs there. What is known of its place and rate rests on what has turned out to be none.
     fn lose_the_place(&mut self, at: MonoTime) {
         self.estimate = None;
-        self.needed = self.traits.samples();
+        self.is_known = false;
         self.begin_anew();
         self.on_sign(SourceSign::Doubt, at);
     }
