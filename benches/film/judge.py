@@ -125,8 +125,8 @@ class Seat:
 class Player:
     """mpv with a film, and the judge's own connection to it, which asks where its sound is."""
 
-    def __init__(self, folder, film, more=()):
-        self.socket = folder / "player.sock"
+    def __init__(self, folder, film, more=(), ask_every=0.02):
+        self.ask_every, self.socket = ask_every, folder / "player.sock"
         self.socket.unlink(missing_ok=True)
         command = ["mpv", "--no-config", "--really-quiet", "--vo=null", "--ao=null", f"--input-ipc-server={self.socket}"]
         self.process = subprocess.Popen([*command, *more, str(film)], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
@@ -147,11 +147,11 @@ class Player:
         self.line.sendall((json.dumps({"command": command, "request_id": number}) + "\n").encode())
 
     def listen(self):
-        self.line.settimeout(0.005)
+        self.line.settimeout(min(self.ask_every / 4, 0.005))
         kept, number, due = b"", 0, time.monotonic()
         while not self.over:
             if time.monotonic() >= due:
-                number, due = number + 1, max(due + 0.02, time.monotonic())
+                number, due = number + 1, max(due + self.ask_every, time.monotonic())
                 self.asked[number] = time.monotonic()
                 with contextlib.suppress(OSError):
                     self.tell("get_property", "audio-pts", number=number)
@@ -301,11 +301,11 @@ def until(true, seconds=30.0):
         time.sleep(0.01)
 
 
-def film(folder, seconds):
+def film(folder, seconds, sound="pcm_s16le"):
     """A film of a small picture and a tone."""
-    path = pathlib.Path(folder) / "film.mkv"
+    path = pathlib.Path(folder) / f"{sound}.mkv"
     made = f"av://lavfi:testsrc=size=64x48:rate=24:duration={seconds}[out0];sine=frequency=440:sample_rate=48000:duration={seconds}[out1]"
-    subprocess.run(["mpv", "--no-config", "--no-terminal", made, f"--o={path}", "--ovc=mpeg4", "--oac=pcm_s16le"], check=True)
+    subprocess.run(["mpv", "--no-config", "--no-terminal", made, f"--o={path}", "--ovc=mpeg4", f"--oac={sound}"], check=True)
     return path
 
 

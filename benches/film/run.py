@@ -34,10 +34,10 @@ def spread(values):
 class Show:
     """One play of one film."""
 
-    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0, until="playing: ", source=None, film=None, more=(), shown=None):
+    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0, until="playing: ", source=None, film=None, more=(), shown=None, ask_every=0.02):
         self.ramp = Ramp(seconds)
         self.seat = Seat(args.program, folder)
-        self.player = shown or Player(folder, film or args.film, player)
+        self.player = shown or Player(folder, film or args.film, player, ask_every)
         self.between = Between(folder, self.player, lost) if lost or between else None
         self.until = until
         source = source or f"mpv:{(self.between or self.player).socket}"
@@ -218,26 +218,32 @@ def pause(args, folder):
     return f"told to first slower frame {spread(slower)}; to rest {spread(still)}"
 
 
-def seek(args, folder):
-    joins, there = [], []
-    with Show(args, folder) as show:
+def seek(args, folder, sound="ac3"):
+    """Of a film whose sound is in small blocks, as films have it. What mpv writes as PCM is silent after a seek until the next block of a third of a second."""
+    film_of = film(folder, max(args.seconds + 60, 220), sound)
+    columns = {"its sound has a clock": [], "from then the join's first frame": [], "landed to that frame": [], "the join": [], "from its end within 20 ms": []}
+    with Show(args, folder, film=film_of, ask_every=0.005) as show:
         time.sleep(5.0)
+        usual = show.ramp.per_s * 300_000
         for turn in range(args.times):
             show.seat.frames()
             target = 20.0 + 50.0 * ((turn + 1) % 2) + turn
             show.player.tell("seek", target, "absolute")
             time.sleep(3.5)
             at = [when for when, event in show.player.events if event["event"] == "playback-restart"][-1]
+            clock = next((when for when, _, _ in show.player.answers if when > at), None)
             frames, until = show.seat.frames(), time.monotonic()
             rests = [b[0] for a, b in zip(frames, frames[1:]) if b[0] > at and a[2] == b[2]]
-            moves = next((b[0] for a, b in zip(frames, frames[1:]) if b[0] > at and rests and b[0] > rests[0] and a[2] != b[2]), None)
+            steps = [(b[0], (b[2] - a[2]) / b[1] / usual) for a, b in zip(frames, frames[1:]) if rests and b[0] > rests[0]]
+            moves = next((when for when, pace in steps if pace != 0), None)
+            joined = next((when for when, pace in reversed(steps) if abs(pace - 1.0) > 0.15), None)
             errors = show.errors(frames, at + 0.05, until)
             near = next((when for when, error in errors if all(abs(e) < 20 for w, e in errors if w >= when)), None)
-            if moves and near:
-                joins.append(1e3 * (moves - at))
-                there.append(1e3 * (near - at))
+            if clock and moves and joined and near:
+                took = (clock - at, moves - clock, moves - at, joined - moves, max(near - joined, 0.0))
+                [column.append(1e3 * one) for column, one in zip(columns.values(), took)]
             time.sleep(9.5)
-    return f"landed to the join's first frame {spread(joins)}; to within 20 ms of the film {spread(there)}"
+    return "; ".join(f"{name} {spread(column)}" for name, column in columns.items())
 
 
 CASES = {
@@ -253,6 +259,7 @@ CASES = {
     "step": step,
     "pause": pause,
     "seek": seek,
+    "seek in PCM": lambda args, folder: seek(args, folder, "pcm_s16le"),
 }
 
 
@@ -269,7 +276,7 @@ def main():
         folder = pathlib.Path(folder)
         args.film = film(folder, max(args.seconds + 60, 220))
         for name in args.only or CASES:
-            print(f"{name:8} {CASES[name](args, folder)}", flush=True)
+            print(f"{name:11} {CASES[name](args, folder)}", flush=True)
 
 
 if __name__ == "__main__":

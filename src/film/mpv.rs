@@ -17,8 +17,8 @@ use crate::time::{MonoTime, ShowTime};
 
 /// From one question to the next: more of them make the estimate no better.
 const ASK_EVERY: Duration = Duration::from_millis(50);
-/// The same while little is known: for so long after it began to run, or was wound.
-const ASK_SOON: Duration = Duration::from_millis(10);
+/// The same while little is known: seats wait for four answers that agree, for so long after it began to run, or was wound.
+const ASK_SOON: Duration = Duration::from_millis(5);
 /// Measured: after a seek the sound has no clock for up to 0.3 s, while the picture runs as much as a frame beside it.
 const SETTLES: Duration = Duration::from_millis(500);
 /// An answer that takes longer says nothing; the next question goes out.
@@ -138,18 +138,13 @@ impl MpvClient {
     }
 
     /// When [`Self::poll`] has something to ask next.
-    #[cfg(test)]
     pub(crate) fn next_at(&self) -> MonoTime {
-        self.due()
-    }
-
-    fn due(&self) -> MonoTime {
         self.question.map_or(self.next_at, |question| question.sent + MUTE_AFTER)
     }
 
     /// The question that is due, as a line to be sent now.
     pub(crate) fn poll(&mut self, now: MonoTime) -> Option<String> {
-        if now < self.due() {
+        if now < self.next_at() {
             return None;
         }
         self.questions += 1;

@@ -7,14 +7,15 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::event::{PollFd, PollFlags, poll};
 use rustix::fs::OFlags;
 
 use super::WordSink;
 
 /// How often it is looked whether anybody still listens.
-const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };
+pub(super) const LOOK: Duration = Duration::from_millis(250);
 
 /// A line, at whose end one is as well where nobody listens any more.
 pub(super) struct LeftRead<R> {
@@ -40,10 +41,8 @@ impl<R: Read + AsFd> Read for LeftRead<R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         while !self.over.load(Ordering::Relaxed) {
             // Before there is a writer a FIFO that is read is at its end, and only a poll waits for one.
-            let mut wanted = [PollFd::new(&self.line, PollFlags::IN)];
-            match poll(&mut wanted, Some(&LOOK)) {
-                Ok(0) | Err(rustix::io::Errno::INTR) => continue,
-                _ => {}
+            if !brings(&self.line, LOOK) {
+                continue;
             }
             match self.line.read(bytes) {
                 Err(error)
@@ -53,4 +52,13 @@ impl<R: Read + AsFd> Read for LeftRead<R> {
         }
         Ok(0)
     }
+}
+
+/// Waits until a line brings something, or ends; false if it did not within that time, which is kept to far below a millisecond.
+pub(super) fn brings(line: &impl AsFd, within: Duration) -> bool {
+    let within = within.try_into().ok();
+    !matches!(
+        poll(&mut [PollFd::new(line, PollFlags::IN)], within.as_ref()),
+        Ok(0) | Err(rustix::io::Errno::INTR)
+    )
 }

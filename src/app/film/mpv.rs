@@ -3,8 +3,8 @@
 use std::io::{self, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
+use super::left::{LOOK, brings};
 use super::told::AGAIN;
 use super::{WordSink, start};
 use crate::film::mpv::MpvClient;
@@ -12,9 +12,6 @@ use crate::film::observation::{FilmWord, Observation};
 use crate::film::source::FilmArgs;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
-
-/// An answer is read for so long before it is looked whether something is to be asked.
-const READ_FOR: Duration = Duration::from_millis(10);
 
 /// Begins to ask the player at that socket; the cue begins where its film is at the begin of those arguments.
 pub(super) fn start_reading(socket: &Path, args: &FilmArgs, told: WordSink) -> io::Result<()> {
@@ -42,14 +39,18 @@ impl MpvPlayer {
     }
 
     fn converse(&self, mut stream: UnixStream, client: &mut MpvClient) -> io::Result<()> {
-        stream.set_read_timeout(Some(READ_FOR))?;
         stream.set_write_timeout(Some(AGAIN))?;
         stream.write_all(MpvClient::greeting().as_bytes())?;
         let mut octets = [0; 4_096];
         // One that talks without a pause is left as well.
         while !self.told.is_over() {
-            if let Some(question) = client.poll(Monotonic.now()) {
+            let now = Monotonic.now();
+            if let Some(question) = client.poll(now) {
                 stream.write_all(question.as_bytes())?;
+            }
+            // The next question is not late: after a seek seats wait for four answers.
+            if !brings(&stream, client.next_at().since(now).min(LOOK)) {
+                continue;
             }
             match stream.read(&mut octets) {
                 Ok(0) => return Ok(()),
@@ -63,7 +64,7 @@ impl MpvPlayer {
                     }
                     self.note(client);
                 }
-                Err(error) if is_nothing_yet(&error) => {}
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(error),
             }
         }
@@ -98,8 +99,4 @@ impl MpvPlayer {
         }
         self.told.tell(what)
     }
-}
-
-fn is_nothing_yet(error: &io::Error) -> bool {
-    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
 }

@@ -89,12 +89,21 @@ fn after_a_seek_the_sound_is_waited_for_while_the_picture_runs_beside_it_and_a_f
 }
 
 #[test]
-fn what_was_asked_before_a_seek_is_no_answer_after_it() {
+fn what_was_asked_before_a_seek_is_no_answer_after_it_and_the_next_answers_come_soon() {
     let mut client = client();
     client.poll(mono(0.9)).expect("it is due");
     told(&mut client, "{\"event\":\"seek\"}\n{\"event\":\"playback-restart\"}\n");
     assert_eq!(told(&mut client, "{\"data\":83.25,\"request_id\":1,\"error\":\"success\"}\n"), []);
     assert_eq!(answered(&mut client, 1.0, Some(60.0)).len(), 1, "and it is asked again at once");
+    let soon = (0..3).map(|_| {
+        let due = client.next_at().since(mono(0.0)).as_secs_f64();
+        answered(&mut client, due, Some(due)).len()
+    });
+    assert_eq!(soon.sum::<usize>(), 3);
+    assert!(
+        client.next_at() <= mono(1.02),
+        "four answers, which seats wait for, take no longer than a tick or two"
+    );
 }
 
 #[test]
