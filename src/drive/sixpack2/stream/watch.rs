@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::axis::{OFF_COURSE_MM, READING};
-use super::lane::{LaneState, SixpackLane};
+use super::lane::SixpackLane;
 use super::{PROBES, Sixpack2, TARGETS, Track, number};
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
 use crate::drive::sixpack2::ask::{WHO, searches, waking_baud, where_is, who_now};
@@ -245,24 +245,43 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         Ok(())
     }
 
-    /// Tells the motors of a lane to stop until its unit says that they do nothing.
+    /// Tells the motors of a lane to stop until its unit says that they do nothing. Where they are led they have to be where that was: by one
+    /// bit a stop has the counter begin anew.
     pub(super) fn settle_lane(&mut self, index: usize) -> Result<(), LinkFault> {
-        let LaneState { unit, was_heard, .. } = self.lanes[index].own;
-        let motors: Vec<u8> = self.lanes[index].axes.iter().map(|axis| axis.motor).collect();
+        let lane = &self.lanes[index];
+        let (unit, tries) = (lane.own.unit, if lane.own.was_heard { SETTLES } else { 0 });
+        let motors: Vec<u8> = lane.axes.iter().map(|axis| axis.motor).collect();
         let stops: Vec<_> =
             motors.iter().map(|motor| SixpackOrder::RampedStop { motor: *motor }.frame(unit)).collect();
-        for _ in 0..if was_heard { SETTLES } else { 0 } {
+        let rests = |actions: [u8; 6]| {
+            motors.iter().all(|motor| actions.get(usize::from(*motor)) == Some(&action::IDLE))
+        };
+        for _ in 0..tries {
             self.talk.send(&stops)?;
-            let rest = |actions: [u8; 6]| {
-                motors.iter().all(|motor| actions.get(usize::from(*motor)) == Some(&action::IDLE))
-            };
             match self.talk.ask(unit, SixpackOrder::AskActions { response: ANSWER }) {
-                Ok(SixpackReply::ActionsTold(ActionsTold { actions })) if rest(actions) => return Ok(()),
-                Ok(_) | Err(TalkFault::Silent { .. }) => {}
+                Ok(SixpackReply::ActionsTold(ActionsTold { actions })) if rests(actions) => {}
+                Ok(_) | Err(TalkFault::Silent { .. }) => continue,
                 Err(TalkFault::Link(fault)) => return Err(fault),
+            }
+            if !self.lanes[index].is_led() || self.is_where_it_was_led(index)? {
+                break;
             }
         }
         Ok(())
+    }
+
+    /// Whether all motors of a lane that is led answer, and are there; one that is not puts it out.
+    fn is_where_it_was_led(&mut self, index: usize) -> Result<bool, LinkFault> {
+        for a in 0..self.lanes[index].axes.len() {
+            let Some(told) = self.place_of(index, a)? else { return Ok(false) };
+            let by_mm = self.lanes[index].axes[a].beside(told.position).0;
+            if by_mm.abs() > OFF_COURSE_MM {
+                let (lane, axis) = (number(index), axis_number(a));
+                self.put_out(index, StreamEvent::OffCourse { lane, axis, by_mm });
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Looks for the unit of a lane that is lost or out.

@@ -205,6 +205,22 @@ fn what_was_damaged_right_before_nobody_is_told_anything_is_found_and_stopped() 
 }
 
 #[test]
+fn a_stop_that_has_a_counter_begin_anew_before_nobody_is_told_anything_leads_no_motor_to_where_it_counts_now()
+{
+    let mut play = Scene { stage: Stage::Ready, holds: true }.set();
+    play.bus_mut().forget();
+    play.stream.talk.port().damage = Some(Box::new(|sent| {
+        let stop = sent.chunks_exact_mut(9).find(|frame| frame[1] == 0x25);
+        stop.map(|frame| frame[1] ^= 0x02).is_some()
+    }));
+    let from = place(&mut play.stream.talk, 0);
+    play.stream.settle().unwrap();
+    play.wait(1.0);
+    assert!(play.has("OffCourse") && !play.stream.is_ready(0), "{:?}", play.rare());
+    assert!((place(&mut play.stream.talk, 0) - from).abs() < 0.01);
+}
+
+#[test]
 fn no_damaged_order_leads_a_motor_farther_than_it_goes_until_the_next_whatever_its_lane_does() {
     let mut farthest = Vec::new();
     for scene in scenes() {
