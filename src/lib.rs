@@ -65,6 +65,7 @@ mod tracker;
 
 mod device;
 mod preflight;
+mod replay;
 
 mod control;
 mod journal;

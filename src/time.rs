@@ -31,6 +31,12 @@ impl MonoTime {
         self.0
     }
 
+    /// The last whole microsecond of the clock that is not after this instant: as recordings have times of frames and of replies.
+    #[must_use]
+    pub(crate) const fn whole_micros(self) -> Self {
+        Self(self.0 - self.0 % 1_000)
+    }
+
     /// How long after `earlier` this is; zero where it is before.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {

@@ -6,7 +6,7 @@ mod helpers;
 mod play;
 pub(crate) mod player;
 pub(crate) mod recorder;
-mod recording;
+pub(crate) mod recording;
 mod refused;
 mod report;
 mod run;

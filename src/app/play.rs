@@ -113,7 +113,8 @@ impl Play {
             clocks: (Monotonic.now(), wall_now_ns()),
         };
         let seats = recording::seats(&config, &staged.lanes);
-        let (taps, recording) = PlayRecording::start(path, &about, seats, staged.show.rate)?;
+        let (taps, recording) =
+            PlayRecording::start(path, &about, &runtime.judging(false), seats, staged.show.rate)?;
         runtime.record(taps);
         Ok(Self { recording: Some(recording), ..self })
     }

@@ -11,7 +11,10 @@ use mcap::{McapError, McapResult};
 use super::PlayReport;
 use crate::config::{Config, Connection, Controller};
 use crate::drive::Lane;
-use crate::record::{About, FrameKind, Intake, Mode, RecordedSeat, Recorder, Recording, SAMPLE_HZ, Taps};
+use crate::record::{
+    About, EntryMaker, FrameKind, Intake, Judging, Mode, Opening, RecordedSeat, Recorder, Recording,
+    SAMPLE_HZ, Taps,
+};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::Rate;
@@ -35,6 +38,7 @@ impl PlayRecording {
     pub(super) fn start(
         path: &Path,
         about: &About,
+        judging: &Judging,
         seats: Vec<RecordedSeat>,
         rate: Rate,
     ) -> io::Result<(Taps, Self)> {
@@ -43,7 +47,9 @@ impl PlayRecording {
         }
         let part = path.with_extension("part.mcap");
         let out = BufWriter::new(File::create_new(&part)?);
-        let file = Recording::begin(out, about, &seats).map_err(in_io)?;
+        let opening = Opening::new(about, &seats).judged(judging);
+        let file =
+            Recording::open(out, &opening, EntryMaker::new(seats.len(), about.clocks)).map_err(in_io)?;
         let (taps, intake) = Intake::new(seats, rate, SAMPLE_HZ);
         let intake = if about.mode == Mode::Full { intake.in_full() } else { intake };
         let recorder = Recorder::new(intake, file);
@@ -83,7 +89,7 @@ pub(super) fn in_io(error: McapError) -> io::Error {
 }
 
 /// The seats of lanes, in their order.
-pub(super) fn seats(config: &Config, lanes: &[Lane]) -> Vec<RecordedSeat> {
+pub(crate) fn seats(config: &Config, lanes: &[Lane]) -> Vec<RecordedSeat> {
     let frames = |connection: &Connection| match connection {
         Connection::Udp(station) => FrameKind::Datagram(station.vibration_port),
         Connection::Link(_) => FrameKind::Pose,

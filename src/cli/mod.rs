@@ -35,6 +35,7 @@ mod print;
 mod prove;
 mod record;
 mod register;
+mod replay;
 mod report;
 mod serve;
 mod sim;
@@ -92,6 +93,7 @@ enum ProgramCommand {
     Latency(latency::Args),
     Report(report::Args),
     Record(record::Args),
+    Replay(replay::Args),
     Token(token::Args),
     #[command(flatten)]
     Client(client::ClientCommand),
@@ -173,6 +175,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Latency(args) => latency::run(&args),
         ProgramCommand::Report(args) => report::run(&args),
         ProgramCommand::Record(args) => record::run(&args),
+        ProgramCommand::Replay(args) => replay::run(&args),
         ProgramCommand::Token(args) => token::run(&args),
         ProgramCommand::Client(command) => client::run(&command),
         ProgramCommand::Completions(args) => completions::run(&args),

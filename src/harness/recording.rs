@@ -1,13 +1,16 @@
 //! A recorder without a hall: both taps, and what is behind them.
 
 use std::fs::File;
-use std::io::{BufWriter, Result};
+use std::io::{BufWriter, Cursor, Result};
 use std::path::Path;
 
+use crate::app::recording::seats;
+use crate::app::runtime::Runtime;
 use crate::record::{
     self, About, AckRecord, AckTap, Chunk, Entry, EntryMaker, Flight, Handed, Intake, Opening, RecordedSeat,
-    Recording, SentFrame, Tap, Taps, Wanted,
+    Recorder, Recording, SentFrame, Tap, Taps, Wanted,
 };
+use crate::replay::replay;
 use crate::time::{MonoTime, Rate};
 use crate::tracker::{Fate, Reply};
 use crate::wire::{FrameNo, ReplyCode};
@@ -66,6 +69,64 @@ impl RecorderRig {
     pub const fn dropped(&self) -> (u64, u64) {
         let counts = self.intake.counts();
         (counts.dropped, counts.dropped_records)
+    }
+}
+
+/// A hall in virtual time that is recorded in full.
+pub struct HallRecording(Recorder<Cursor<Vec<u8>>>);
+
+impl HallRecording {
+    /// Taps a hall that is about to open.
+    pub fn tap(runtime: &mut Runtime) -> Self {
+        let config = runtime.config().clone();
+        let rate = Rate::from_hz(config.show.rate_hz);
+        let seats = seats(&config, runtime.lanes());
+        let clocks = (MonoTime::default(), 0);
+        let opening =
+            Opening::new(&About::of_hall("virtual", rate, clocks), &seats).judged(&runtime.judging(true));
+        let maker = EntryMaker::new(seats.len(), clocks);
+        let file = Recording::open(Cursor::default(), &opening, maker).expect("memory takes it");
+        let (taps, intake) = Intake::new(seats, rate, record::SAMPLE_HZ);
+        runtime.record(taps);
+        Self(Recorder::new(intake.in_full(), file))
+    }
+
+    /// Takes all that is there.
+    pub fn take(&mut self) {
+        self.0.take().expect("memory takes it");
+    }
+
+    /// The file.
+    pub fn finish(mut self) -> Vec<u8> {
+        self.take();
+        self.0.finish(None).expect("memory takes it").into_inner()
+    }
+}
+
+/// What came of judging a recording again.
+#[derive(Debug, Default)]
+pub struct Replayed {
+    /// Frames and replies that were judged.
+    pub frames: u64,
+    pub fates: u64,
+    /// Changes of how seats stood.
+    pub standings: u64,
+    /// True if it begins with its hall and nothing is missing.
+    pub is_whole: bool,
+    /// What differs, in words.
+    pub differences: Vec<String>,
+}
+
+/// Judges a recording again.
+#[must_use]
+pub fn replayed(file: &[u8]) -> Replayed {
+    let (_, verdict) = replay(file).expect("a recording in full");
+    Replayed {
+        frames: verdict.frames,
+        fates: verdict.fates,
+        standings: verdict.standings,
+        is_whole: verdict.from_the_start && verdict.gaps == 0,
+        differences: verdict.differences.iter().map(|one| format!("{one:?}")).collect(),
     }
 }
 

@@ -87,6 +87,13 @@ impl Member {
         }
     }
 
+    /// One of which nothing is known but how it is watched.
+    pub(super) fn anew(&self) -> Self {
+        let replies = Replies::new(self.replies.interval()).led_ahead(self.replies.lead());
+        let Self { controller, must_be_home, out, .. } = *self;
+        Self { replies, must_be_home, out, ..Self::new(controller, self.replies.interval()) }
+    }
+
     /// Acks of what it is sent come so much later.
     pub(super) fn expect_acks_after(&mut self, lead: Duration) {
         self.replies = Replies::new(self.replies.interval()).led_ahead(lead);

@@ -10,6 +10,7 @@ mod counter;
 mod faults;
 mod groups;
 mod health_state;
+mod input;
 mod judge;
 mod late;
 mod member;
@@ -26,6 +27,7 @@ use std::time::Duration;
 pub use groups::Groups;
 pub use health_state::Notice;
 pub(crate) use health_state::{Change, HealthState, Why};
+pub(crate) use input::HealthInput;
 pub(crate) use proof::{Continuity, Identity, Sighting};
 pub(crate) use words::ACKS_OFF;
 

@@ -60,6 +60,10 @@ impl Replies {
         self.interval
     }
 
+    pub(super) const fn lead(&self) -> Duration {
+        self.lead
+    }
+
     pub(super) fn on_asked(&mut self, frame: FrameNo, at: MonoTime) {
         if at.since(self.asked) > APART.max(2 * self.interval) {
             self.rest();

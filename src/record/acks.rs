@@ -1,18 +1,14 @@
 //! One drain of the ack thread as it crosses to the recorder: what was heard and told of frames, in the order in which books, observer
 //! and health took it, and what they made of it. All numbers are little-endian.
 
-use std::net::{Ipv4Addr, SocketAddrV4};
-
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::AckRecord;
 use super::cursor::Cursor;
-use crate::belief::Fall;
 use crate::health::HealthState;
 use crate::motion::{MAX_AXES, Pulses};
-use crate::net::Origin;
-use crate::time::{MonoTime, Rate, nanos};
-use crate::tracker::{Fate, Reply};
-use crate::wire::{FrameNo, PerAxis, ReplyCode};
+use crate::time::{MonoTime, Rate};
+use crate::wire::{FrameNo, PerAxis};
 
 /// Octets of a head: length and records dropped before it u32, the instant u64, whether the drain is over u8.
 const HEAD_LEN: usize = 17;
@@ -22,51 +18,6 @@ const ROOM: usize = 32 << 10;
 const PER_FRAME: usize = 64;
 /// Seconds of drains that the ring holds: a disk may take so long.
 const HELD_S: f64 = 2.0;
-
-const FATES: [Fate; 3] = [Fate::Duplicate, Fate::Stale, Fate::Stray];
-const FALLS: [Fall; 5] = [Fall::Gap, Fall::Astray, Fall::PutBack, Fall::Stale, Fall::Stopped];
-const STANDINGS: [HealthState; 8] = [
-    HealthState::Ok,
-    HealthState::Degraded,
-    HealthState::Lost,
-    HealthState::Rejoining,
-    HealthState::Stopped,
-    HealthState::Error,
-    HealthState::Excluded,
-    HealthState::Unwatched,
-];
-
-/// Something that the ack thread took, or made of it. Controllers are counted from 0 in the order of their lanes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum AckRecord<'a> {
-    /// A reply to a frame, as it was received.
-    Reply(Reply),
-    /// A datagram that is no reply to a frame, bit for bit, and when the kernel received it.
-    Heard(Origin, MonoTime, &'a [u8]),
-    /// The books have the records of so many frames more, in the order in which these were handed over.
-    Posted(u32),
-    /// The kernel did not take that frame of a controller.
-    Failed(usize, FrameNo),
-    /// The lane of a controller is where the others are again.
-    Joined(usize),
-    /// Nothing goes to the lane of a controller any more; and the amplitude with which its seat may vibrate on, strokes.
-    FellOut(usize, Fall, f64),
-    /// Not all axes of a controller that was found tell where they are.
-    Unread(usize),
-    /// A link confirms the frames of a controller from the one to the other.
-    Confirmed(usize, FrameNo, FrameNo),
-    /// What a reply to that frame of a controller turned out to be, and how long after the frame it came, nanoseconds; 0 where that is
-    /// not known.
-    Fate(usize, FrameNo, Fate, u32),
-    /// Frames of a controller that were lost so far.
-    Lost(usize, u64),
-    /// How often the port of a controller was found closed so far.
-    Closed(usize, u64),
-    /// Where the axes of a controller were measured to be, and when.
-    Measured(usize, MonoTime, PerAxis<Pulses>),
-    /// How the group of a controller stands from now on.
-    Standing(usize, HealthState),
-}
 
 /// How a controller stands when a drain is over.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -106,6 +57,18 @@ pub fn ack_tap(controllers: usize, rate: Rate) -> (AckTap, Consumer<u8>) {
 }
 
 impl AckTap {
+    /// The next frame of each controller has that number: so far nothing was taken.
+    pub(crate) fn begin(&mut self, firsts: &[FrameNo]) {
+        for (controller, first) in firsts.iter().enumerate() {
+            self.take(&AckRecord::First(controller, *first));
+        }
+    }
+
+    /// So many records were lost before they came here.
+    pub(crate) const fn lose(&mut self, records: u32) {
+        self.dropped = self.dropped.saturating_add(records);
+    }
+
     /// Takes what comes next.
     pub(crate) fn take(&mut self, record: &AckRecord<'_>) {
         let len = match record {
@@ -114,7 +77,7 @@ impl AckTap {
         };
         if self.octets.len() + len > ROOM {
             // The instant is that of the drain, which is not over.
-            self.post(MonoTime::default(), false);
+            self.post(None);
         }
         if self.octets.len() + len <= ROOM {
             record.write(&mut self.octets);
@@ -144,22 +107,26 @@ impl AckTap {
 
     /// A drain that began at `began` is over: up to that instant all was told.
     pub(crate) fn drained(&mut self, began: MonoTime) {
-        self.post(began, true);
+        self.post(Some(began));
     }
 
-    fn post(&mut self, at: MonoTime, is_over: bool) {
+    fn post(&mut self, drained: Option<MonoTime>) {
         let Self { ring, octets, records, dropped, .. } = self;
-        let len = u32::try_from(octets.len()).unwrap_or_default();
-        octets[..4].copy_from_slice(&len.to_le_bytes());
-        octets[4..8].copy_from_slice(&dropped.to_le_bytes());
-        octets[8..16].copy_from_slice(&at.as_nanos().to_le_bytes());
-        octets[16] = u8::from(is_over);
+        let len = octets.len();
+        write_head(octets, len, *dropped, drained);
         // The instant of a drain counts as a record, so that none is lost unseen.
         let is_posted = ring.push_entire_slice(octets).is_ok();
         *dropped = if is_posted { 0 } else { dropped.saturating_add(*records).saturating_add(1) };
         *records = 0;
         octets.truncate(HEAD_LEN);
     }
+}
+
+fn write_head(octets: &mut [u8], len: usize, dropped: u32, drained: Option<MonoTime>) {
+    octets[..4].copy_from_slice(&u32::try_from(len).unwrap_or_default().to_le_bytes());
+    octets[4..8].copy_from_slice(&dropped.to_le_bytes());
+    octets[8..16].copy_from_slice(&drained.unwrap_or_default().as_nanos().to_le_bytes());
+    octets[16] = u8::from(drained.is_some());
 }
 
 /// Some of what a drain took, or all of it.
@@ -182,6 +149,15 @@ impl<'a> AckChunk<'a> {
         Some((Self { drained: is_over.then_some(at), dropped, body: from.0 }, rest))
     }
 
+    /// The same with other records, which `write` makes of these.
+    pub(super) fn rewritten(&self, out: &mut Vec<u8>, mut write: impl FnMut(&AckRecord<'_>, &mut Vec<u8>)) {
+        let from = out.len();
+        out.resize(from + HEAD_LEN, 0);
+        self.records().for_each(|record| write(&record, out));
+        let len = out.len() - from;
+        write_head(&mut out[from..], len, self.dropped, self.drained);
+    }
+
     /// What it took, in that order; less where it is damaged.
     pub(crate) fn records(&self) -> impl Iterator<Item = AckRecord<'a>> + use<'a> {
         let mut from = Cursor(self.body);
@@ -189,170 +165,61 @@ impl<'a> AckChunk<'a> {
     }
 }
 
-impl<'a> AckRecord<'a> {
-    fn write(&self, out: &mut Vec<u8>) {
-        match *self {
-            Self::Reply(reply) => write_reply(out, reply),
-            Self::Heard(origin, at, octets) => write_heard(out, origin, at, octets),
-            Self::Posted(frames) => {
-                out.push(3);
-                out.extend_from_slice(&frames.to_le_bytes());
-            }
-            Self::Failed(controller, frame) => {
-                of(out, 4, controller);
-                out.extend_from_slice(&frame.0.to_le_bytes());
-            }
-            Self::Joined(controller) => of(out, 5, controller),
-            Self::FellOut(controller, why, shakes) => {
-                of(out, 6, controller);
-                out.push(place(&FALLS, &why));
-                out.extend_from_slice(&shakes.to_le_bytes());
-            }
-            Self::Unread(controller) => of(out, 7, controller),
-            Self::Confirmed(controller, first, last) => {
-                of(out, 8, controller);
-                out.extend_from_slice(&first.0.to_le_bytes());
-                out.extend_from_slice(&last.0.to_le_bytes());
-            }
-            Self::Fate(controller, frame, fate, latency_ns) => {
-                of(out, 9, controller);
-                write_fate(out, frame, fate, latency_ns);
-            }
-            Self::Lost(controller, total) | Self::Closed(controller, total) => {
-                of(out, if matches!(self, Self::Lost(..)) { 10 } else { 11 }, controller);
-                out.extend_from_slice(&total.to_le_bytes());
-            }
-            Self::Measured(controller, at, pulses) => {
-                of(out, 12, controller);
-                out.extend_from_slice(&at.as_nanos().to_le_bytes());
-                out.push(u8::try_from(pulses.len()).unwrap_or_default());
-                pulses.iter().for_each(|at| out.extend_from_slice(&at.0.to_le_bytes()));
-            }
-            Self::Standing(controller, standing) => {
-                of(out, 13, controller);
-                out.push(place(&STANDINGS, &standing));
-            }
-        }
-    }
-
-    fn read(from: &mut Cursor<'a>) -> Option<Self> {
-        let kind = from.u8()?;
-        if kind == 2 {
-            let ip = Ipv4Addr::from_octets(from.take()?);
-            let origin = Origin::Stranger(SocketAddrV4::new(ip, from.u16()?));
-            return heard(origin, from);
-        }
-        if kind == 3 {
-            return from.u32().map(Self::Posted);
-        }
-        let controller = usize::from(from.u16()?);
-        Some(match kind {
-            0 => {
-                let frame = from.frame_no()?;
-                let code = ReplyCode::from_byte(from.u8()?)?;
-                let (error, inputs, at) = (from.u16()?, from.u16()?, from.time()?);
-                Self::Reply(Reply { controller, frame, code, error, inputs, at })
-            }
-            1 => return heard(Origin::Controller(controller), from),
-            4 => Self::Failed(controller, from.frame_no()?),
-            5 => Self::Joined(controller),
-            6 => Self::FellOut(controller, *FALLS.get(usize::from(from.u8()?))?, from.f64()?),
-            7 => Self::Unread(controller),
-            8 => Self::Confirmed(controller, from.frame_no()?, from.frame_no()?),
-            9 => {
-                let (frame, fate) = (from.frame_no()?, from.u8()?);
-                let fate = match fate.checked_sub(16) {
-                    Some(other) => *FATES.get(usize::from(other))?,
-                    None => Fate::Answered(ReplyCode::from_byte(fate)?),
-                };
-                Self::Fate(controller, frame, fate, from.u32()?)
-            }
-            10 => Self::Lost(controller, from.u64()?),
-            11 => Self::Closed(controller, from.u64()?),
-            12 => {
-                let (at, axes) = (from.time()?, usize::from(from.u8()?));
-                let mut pulses = [Pulses(0); MAX_AXES];
-                for pulses in pulses.get_mut(..axes)? {
-                    *pulses = Pulses(i32::from_le_bytes(from.take()?));
-                }
-                Self::Measured(controller, at, PerAxis::new(&pulses[..axes]))
-            }
-            13 => Self::Standing(controller, *STANDINGS.get(usize::from(from.u8()?))?),
-            _ => return None,
-        })
-    }
-}
-
-/// Begins a record that is of a controller.
-fn of(out: &mut Vec<u8>, kind: u8, controller: usize) {
-    out.push(kind);
-    out.extend_from_slice(&u16::try_from(controller).unwrap_or(u16::MAX).to_le_bytes());
-}
-
-fn write_reply(out: &mut Vec<u8>, Reply { controller, frame, code, error, inputs, at }: Reply) {
-    of(out, 0, controller);
-    out.extend_from_slice(&frame.0.to_le_bytes());
-    out.push(code as u8);
-    out.extend_from_slice(&error.to_le_bytes());
-    out.extend_from_slice(&inputs.to_le_bytes());
-    out.extend_from_slice(&at.as_nanos().to_le_bytes());
-}
-
-fn write_heard(out: &mut Vec<u8>, origin: Origin, at: MonoTime, octets: &[u8]) {
-    match origin {
-        Origin::Controller(controller) => of(out, 1, controller),
-        Origin::Stranger(from) => {
-            out.push(2);
-            out.extend_from_slice(&from.ip().octets());
-            out.extend_from_slice(&from.port().to_le_bytes());
-        }
-    }
-    out.extend_from_slice(&at.as_nanos().to_le_bytes());
-    let len = u16::try_from(octets.len()).unwrap_or(u16::MAX);
-    out.extend_from_slice(&len.to_le_bytes());
-    out.extend_from_slice(&octets[..usize::from(len)]);
-}
-
-fn write_fate(out: &mut Vec<u8>, frame: FrameNo, fate: Fate, latency_ns: u32) {
-    out.extend_from_slice(&frame.0.to_le_bytes());
-    out.push(match fate {
-        Fate::Answered(code) => code as u8,
-        other => 16 + place(&FATES, &other),
-    });
-    out.extend_from_slice(&latency_ns.to_le_bytes());
-}
-
-fn heard<'a>(origin: Origin, from: &mut Cursor<'a>) -> Option<AckRecord<'a>> {
-    let (at, len) = (from.time()?, from.u16()?);
-    Some(AckRecord::Heard(origin, at, from.slice(usize::from(len))?))
-}
-
-fn place<T: PartialEq>(all: &[T], one: &T) -> u8 {
-    all.iter().position(|other| other == one).and_then(|at| u8::try_from(at).ok()).unwrap_or(u8::MAX)
-}
-
-/// How a group stands, as viewers have it: a number that the schema names.
-pub(super) fn standing_number(standing: HealthState) -> u8 {
-    place(&STANDINGS, &standing)
-}
-
-/// The words of these numbers, from 0.
-pub(super) fn standing_words() -> impl Iterator<Item = String> {
-    STANDINGS.iter().map(ToString::to_string)
-}
-
-/// How long after a frame was handed over its reply came, nanoseconds, as [`AckRecord::Fate`] has it.
-pub(crate) fn latency_ns(sent: Option<MonoTime>, received: MonoTime) -> u32 {
-    sent.map_or(0, |sent| u32::try_from(nanos(received.since(sent))).unwrap_or(u32::MAX))
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::belief::Fall;
+    use crate::health::{Continuity, HealthInput, Identity, Sighting};
+    use crate::net::Origin;
+    use crate::observe::{Look, StopSign};
+    use crate::tracker::{Fate, Reply};
+    use crate::wire::ReplyCode;
 
     const AT: MonoTime = MonoTime::from_nanos(7_000_000_001);
+
+    #[test]
+    fn what_health_was_told_reads_as_it_was() {
+        use HealthInput::{
+            Alive, Ambiguous, Answered, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew, LostZero,
+            MoreAxes, Moved, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+        };
+        let (mut tap, mut ring) = ack_tap(3, Rate::from_hz(100.0));
+        let identity = Identity { version: 7, minor_version: 8, work_mode: 2, axes: 3 };
+        let sighting = |continuity| Sighting { identity, error: 11, alarm: 12, continuity, homed: true };
+        let inputs = [
+            Part(1, true),
+            Refused(2),
+            Alive(0, AT),
+            Answered(1, AT),
+            ReadSent(1, 3),
+            OtherSent(1, 70_000),
+            BeatSent(2, AT),
+            Zero(1, false),
+            Drive(1, 3, 513),
+            LostZero(2),
+            Wide(0),
+            Seen(1, sighting(Continuity::Packets(65_535)), AT),
+            Seen(1, sighting(Continuity::Answers), AT),
+            Seen(1, sighting(Continuity::Mark), AT),
+            MoreAxes(1, 6),
+            Count(1, 40_000),
+            Moved(1),
+            FellOut(1, Fall::Stale),
+            Outside(1, Some((5, Pulses(-3)))),
+            Outside(1, None),
+            Ambiguous(1, true),
+            Homed(1),
+            Joined(1),
+            LookAnew(2),
+        ];
+        let records = inputs.map(AckRecord::Health);
+        records.iter().for_each(|record| tap.take(record));
+        tap.drained(AT);
+        let held = take(&mut ring);
+        assert_eq!(read(&held)[0].2, records);
+    }
 
     fn read(octets: &[u8]) -> Vec<(Option<MonoTime>, u32, Vec<AckRecord<'_>>)> {
         let (mut rest, mut chunks) = (octets, Vec::new());
@@ -387,7 +254,13 @@ mod tests {
             AckRecord::Reply(reply),
             AckRecord::Heard(Origin::Controller(1), AT, &octets),
             AckRecord::Heard(stranger, AT, &[]),
-            AckRecord::Posted(64),
+            AckRecord::Posted(64, 2, FrameNo(7)),
+            AckRecord::First(1, FrameNo(1)),
+            AckRecord::Watched,
+            AckRecord::Events,
+            AckRecord::Judged,
+            AckRecord::Code(1, ReplyCode::EmergencyStop, AT),
+            AckRecord::Look(1, Look { stop: StopSign::Held, inputs: Some(513) }, AT),
             AckRecord::Failed(1, FrameNo(3)),
             AckRecord::Joined(1),
             AckRecord::FellOut(0, Fall::Stopped, 0.125),

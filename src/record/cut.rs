@@ -1,12 +1,14 @@
 //! A stretch of a whole recording as plain topics: a sample for every tick, which every viewer draws.
 
+use std::collections::VecDeque;
 use std::io::{Read, Seek, Write};
 
 use mcap::McapError;
 
+use super::anonymous::Anonymous;
 use super::full::Block;
 use super::read::{Contents, ReadError, Told, Wanted, read};
-use super::{About, Chunk, Message, Mode, RecordedSeat, Recording, Sampled};
+use super::{About, AckChunk, Chunk, EntryMaker, Message, Mode, Opening, RecordedSeat, Recording, Sampled};
 use crate::time::{MonoTime, ShowTime};
 
 /// What is taken.
@@ -64,27 +66,63 @@ pub(crate) enum CutError {
     Write(#[from] McapError),
 }
 
-/// Hands over each tick of a stretch, with all its frames.
+/// What is in a stretch.
+#[derive(Debug)]
+pub(crate) enum Piece<'a> {
+    /// A tick with all its frames, and its octets.
+    Tick(Chunk<'a>, &'a [u8]),
+    /// Some of what the ack thread took after a tick and before the next, and its octets.
+    Drain(AckChunk<'a>, &'a [u8]),
+}
+
+/// Which of the ticks that are not over are in a stretch.
+struct HeldTicks {
+    ticks: VecDeque<(MonoTime, bool)>,
+    /// Whether the last that is over is, or the beginning of the file.
+    is_in: bool,
+}
+
+impl HeldTicks {
+    /// Whether the last tick before an instant is in it; instants are asked for in their order.
+    fn holds(&mut self, at: MonoTime) -> bool {
+        while let Some((_, is_in)) = self.ticks.pop_front_if(|(deadline, _)| *deadline <= at) {
+            self.is_in = is_in;
+        }
+        self.is_in
+    }
+}
+
+/// Hands over each tick of a stretch with all its frames, and what the ack thread took meanwhile.
 ///
 /// # Errors
 /// Where the file is no whole recording, or has no such seat or stretch.
 pub(crate) fn each_tick(
     input: impl Read,
     stretch: &Stretch,
-    take: &mut dyn FnMut(&Contents, &Chunk<'_>, &[u8]),
+    take: &mut dyn FnMut(&Contents, Piece<'_>),
 ) -> Result<Contents, CutError> {
     let (mut ticks, mut is_whole) = (0_u64, false);
+    let mut held =
+        HeldTicks { ticks: VecDeque::new(), is_in: stretch.from == ShowTime::from_nanos(i64::MIN) };
     let wanted = Wanted { samples: false, ..Wanted::ALL };
     let contents = read(input, wanted, &mut |contents, _, told| {
-        let Told::Chunks(chunks) = told else { return };
+        let chunks = match told {
+            Told::Chunks(chunks) => chunks,
+            Told::Drains(drains) => {
+                return each_drain(&drains, &mut held, &mut |piece| take(contents, piece));
+            }
+            _ => return,
+        };
         is_whole = true;
         let mut rest = chunks.as_slice();
         while let Some((chunk, behind)) = Chunk::parse(rest) {
             let octets = &rest[..rest.len() - behind.len()];
             rest = behind;
-            if stretch.holds(chunk.head.film) {
+            let is_in = stretch.holds(chunk.head.film);
+            held.ticks.push_back((chunk.head.deadline, is_in));
+            if is_in {
                 ticks += 1;
-                take(contents, &chunk, octets);
+                take(contents, Piece::Tick(chunk, octets));
             }
         }
     })?;
@@ -96,6 +134,24 @@ pub(crate) fn each_tick(
         (false, _) => Err(CutError::Sampled),
         (true, 0) => Err(CutError::Nothing(stretch.from, stretch.until)),
         _ => Ok(contents),
+    }
+}
+
+/// Hands over those drains that began in the stretch.
+fn each_drain(drains: &[u8], held: &mut HeldTicks, take: &mut dyn FnMut(Piece<'_>)) {
+    let (mut rest, mut open) = (drains, drains);
+    while let Some((chunk, behind)) = AckChunk::parse(rest) {
+        rest = behind;
+        let Some(began) = chunk.drained else { continue };
+        let is_in = held.holds(began);
+        // All chunks of the drain that is over with this one.
+        while open.len() > rest.len() {
+            let Some((chunk, behind)) = AckChunk::parse(open) else { return };
+            if is_in {
+                take(Piece::Drain(chunk, &open[..open.len() - behind.len()]));
+            }
+            open = behind;
+        }
     }
 }
 
@@ -112,7 +168,7 @@ pub(crate) fn cut<W: Write + Seek>(
     let mut out = Some(out);
     let mut file: Option<Cutting<W>> = None;
     let mut result = Ok(());
-    each_tick(input, stretch, &mut |contents, chunk, octets| {
+    each_tick(input, stretch, &mut |contents, piece| {
         if result.is_err() {
             return;
         }
@@ -123,7 +179,7 @@ pub(crate) fn cut<W: Write + Seek>(
             }
         }
         if let (Some(cutting), Ok(())) = (&mut file, &result) {
-            result = cutting.take(chunk, octets);
+            result = cutting.take(&piece);
         }
     })?;
     result?;
@@ -139,18 +195,17 @@ struct Cutting<W: Write + Seek> {
     /// Which seats are taken.
     taken: Vec<bool>,
     block: Option<Block>,
+    /// Drains of the block that is not over.
+    drains: Vec<u8>,
+    anonymous: Option<Anonymous>,
     film_time: bool,
     ticks: u64,
 }
 
 impl<W: Write + Seek> Cutting<W> {
     fn begin(contents: &Contents, stretch: &Stretch, manner: CutManner, out: W) -> Result<Self, McapError> {
-        let anonymous = |(index, seat): (usize, &RecordedSeat)| seat.without_names(index);
-        let seats: Vec<RecordedSeat> = if manner.anonymous {
-            contents.seats.iter().enumerate().map(anonymous).collect()
-        } else {
-            contents.seats.clone()
-        };
+        let anonymous = manner.anonymous.then(|| Anonymous::of(contents));
+        let seats = anonymous.as_ref().map_or(contents.seats.as_slice(), Anonymous::seats).to_vec();
         let entry = |key: &str| if manner.anonymous { String::new() } else { contents.entry(key).to_owned() };
         let origin = contents.wall(MonoTime::default());
         let about = About {
@@ -163,21 +218,48 @@ impl<W: Write + Seek> Cutting<W> {
             clocks: (MonoTime::default(), if manner.film_time { 0 } else { origin }),
         };
         let taken = contents.seats.iter().map(|seat| stretch.has(seat)).collect();
-        let file = Recording::begin(out, &about, &seats)?;
+        let own = contents.judging();
+        let judging = anonymous.as_ref().map_or(own.as_ref(), Anonymous::judging);
+        let opening = Opening::new(&about, &seats);
+        let opening = judging.into_iter().fold(opening, Opening::judged);
+        let file = Recording::open(out, &opening, EntryMaker::new(seats.len(), about.clocks))?;
         // A window for each tick, whatever the rate.
         let fold = Sampled::new(seats.clone(), 1_000_000);
         let block = manner.whole.then(Block::default);
-        Ok(Self { file, fold, seats, taken, block, film_time: manner.film_time, ticks: 0 })
+        let (film_time, drains, ticks) = (manner.film_time, Vec::new(), 0);
+        Ok(Self { file, fold, seats, taken, block, drains, anonymous, film_time, ticks })
     }
 
-    fn take(&mut self, chunk: &Chunk<'_>, octets: &[u8]) -> Result<(), McapError> {
-        let Self { file, fold, seats, taken, block, film_time, ticks } = self;
+    fn take(&mut self, piece: &Piece<'_>) -> Result<(), McapError> {
+        match (piece, &self.anonymous) {
+            (Piece::Tick(chunk, octets), None) => self.tick(chunk, octets),
+            (Piece::Tick(chunk, _), Some(anonymous)) => {
+                let octets = anonymous.tick(chunk).unwrap_or_default();
+                Chunk::parse(&octets).map_or(Ok(()), |(chunk, _)| self.tick(&chunk, &octets))
+            }
+            (Piece::Drain(..), _) if self.block.is_none() => Ok(()),
+            (Piece::Drain(_, octets), None) => {
+                self.drains.extend_from_slice(octets);
+                Ok(())
+            }
+            (Piece::Drain(chunk, _), Some(anonymous)) => {
+                self.drains.extend(anonymous.drain(chunk));
+                Ok(())
+            }
+        }
+    }
+
+    fn tick(&mut self, chunk: &Chunk<'_>, octets: &[u8]) -> Result<(), McapError> {
+        let Self { file, fold, seats, taken, block, drains, film_time, ticks, .. } = self;
         *ticks += 1;
         let mut result = Ok(());
         fold.take(chunk, &mut writer(file, taken, *film_time, &mut result));
         result?;
         match block.as_mut().and_then(|block| block.add(chunk, octets, seats)) {
-            Some((at, block)) => file.write(at, &Message::Ticks(block)),
+            Some((at, block)) => {
+                file.write(at, &Message::Ticks(block))?;
+                file.write(at, &Message::Drains(std::mem::take(drains)))
+            }
             None => Ok(()),
         }
     }
@@ -188,6 +270,7 @@ impl<W: Write + Seek> Cutting<W> {
         result?;
         if let Some((at, block)) = self.block.as_mut().and_then(|block| block.close(&self.seats)) {
             self.file.write(at, &Message::Ticks(block))?;
+            self.file.write(at, &Message::Drains(std::mem::take(&mut self.drains)))?;
         }
         self.file.finish(&[("ticks", self.ticks.to_string())], None)
     }

@@ -99,6 +99,11 @@ pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
     Acks { drains: drains.to_vec() }.encode_to_vec()
 }
 
+/// The drains of such a message; `None` where it is none.
+pub(super) fn drains(message: &[u8]) -> Option<Vec<u8>> {
+    Acks::decode(message).ok().map(|acks| acks.drains)
+}
+
 /// Ticks that become a block.
 #[derive(Debug, Default)]
 pub(crate) struct Block {
@@ -188,7 +193,7 @@ fn row(
     raw: &mut Vec<u8>,
 ) -> LaneRow {
     let asked = frame.asked;
-    let after = frame.at.as_nanos().wrapping_sub(deadline.as_nanos()).cast_signed().div_euclid(1_000);
+    let after = (frame.at.as_nanos() / 1_000).wrapping_sub(deadline.as_nanos() / 1_000).cast_signed();
     #[expect(clippy::cast_possible_truncation, reason = "a chunk has it in so many bits")]
     let (level, handed) = (i64::from((asked.level as f32).to_bits()), frame.handed as i64);
     let mut row = LaneRow {
@@ -365,7 +370,7 @@ impl<'a> LaneReader<'a> {
     fn frame(&mut self, fields: &[i64; OF_FRAME], head: &TickHead) -> Option<OwnedFrame> {
         let datagram = self.datagram(fields)?;
         let [_, after, handed, slots, level, clamps, ..] = *fields;
-        let at = head.deadline.as_nanos().saturating_add_signed(after.saturating_mul(1_000));
+        let at = (head.deadline.as_nanos() / 1_000).saturating_add_signed(after).saturating_mul(1_000);
         let mut frame = OwnedFrame {
             lane: self.lane,
             at: MonoTime::from_nanos(at),

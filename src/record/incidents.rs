@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::acks::{AckChunk, AckRecord};
 use super::chunk::{Chunk, Handed};
+use super::{AckChunk, AckRecord};
 use crate::health::HealthState;
 use crate::state::State;
 use crate::time::MonoTime;

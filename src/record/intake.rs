@@ -88,6 +88,8 @@ pub(crate) struct Intake {
 struct Whole {
     ticks: Block,
     drains: Vec<u8>,
+    /// When the last tick was due.
+    last: MonoTime,
 }
 
 impl Intake {
@@ -163,10 +165,10 @@ impl Intake {
             watchman.look(&chunk, &mut |cause, at| found.push((cause, at)));
             margins.take(&chunk, seats, &mut |_, _, _| ());
             fold.take(&chunk, tell);
-            if let Some(whole) = whole
-                && let Some((at, block)) = whole.ticks.add(&chunk, octets, seats)
-            {
-                whole.tell(at, block, tell);
+            if let Some(whole) = whole {
+                let block = whole.ticks.add(&chunk, octets, seats);
+                whole.last = chunk.head.deadline;
+                block.into_iter().for_each(|(at, block)| whole.tell(at, block, tell));
             }
         }
         self.take_acks(&mut drains, None);
@@ -194,15 +196,16 @@ impl Intake {
         }
     }
 
-    /// Tells of what is not over.
+    /// Tells of what is not over, so that a file that ends here has all that was counted.
     pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
         self.fold.close(tell);
         let Self { whole, seats, .. } = self;
-        if let Some(whole) = whole
-            && let Some((at, block)) = whole.ticks.close(seats)
-        {
+        let Some(whole) = whole else { return };
+        if let Some((at, block)) = whole.ticks.close(seats) {
             whole.tell(at, block, tell);
         }
+        // Replies come after the last tick as well.
+        whole.tell_drains(whole.last, tell);
     }
 }
 
@@ -210,6 +213,10 @@ impl Whole {
     /// Tells of a block that began then, and of the drains so far.
     fn tell(&mut self, at: MonoTime, block: Vec<u8>, tell: &mut impl FnMut(MonoTime, Message)) {
         tell(at, Message::Ticks(block));
+        self.tell_drains(at, tell);
+    }
+
+    fn tell_drains(&mut self, at: MonoTime, tell: &mut impl FnMut(MonoTime, Message)) {
         if !self.drains.is_empty() {
             tell(at, Message::Drains(std::mem::take(&mut self.drains)));
         }

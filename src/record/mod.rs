@@ -5,7 +5,10 @@
 //! ([`Recording`], `mcap.dev/spec`), where it is asked for with every tick as it was (`full`). It is told no time but that of the
 //! ticks. [`read()`] reads such files back.
 
+mod ack_inputs;
+mod ack_record;
 mod acks;
+mod anonymous;
 mod chunk;
 mod columns;
 mod compare;
@@ -16,6 +19,7 @@ mod flight;
 mod full;
 mod incidents;
 mod intake;
+mod judging;
 mod margins;
 mod notes;
 mod read;
@@ -32,22 +36,24 @@ mod tap;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use acks::{AckChunk, AckRecord, AckStanding, latency_ns};
+pub(crate) use ack_record::{AckRecord, latency_ns, standing_of};
+pub(crate) use acks::{AckChunk, AckStanding};
 pub use acks::{AckTap, ack_tap};
 pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
 #[cfg(feature = "harness")]
 pub(crate) use chunk::{Handed, SentFrame};
 pub(crate) use compare::{Comparison, Places, compare, tracks};
-pub(crate) use cut::{CutError, CutManner, Stretch, cut, each_tick};
+pub(crate) use cut::{CutError, CutManner, Piece, Stretch, cut, each_tick};
 pub(crate) use flight::{Entry, Flight, read as read_flight};
 pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
 pub(crate) use intake::{Counts, Intake, Taps};
+pub(crate) use judging::{JudgedController, Judging};
 pub(crate) use margins::{Margin, Margins, Quantity};
 pub(crate) use notes::{ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote};
 pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;
-pub(crate) use recording::{About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ};
+pub(crate) use recording::{ACKS, About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ};
 pub(crate) use recover::{RecoverError, Recovered, recover};
 pub(crate) use sampled::{Message, Sampled, SeatSample, TickSample};
 pub(crate) use schemas::state_number;

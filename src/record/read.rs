@@ -9,6 +9,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::full;
+use super::judging::Judging;
 use super::margins::Margin;
 use super::recording::{ACKS, SENT, VERSION};
 use super::sampled::{SeatSample, TickSample};
@@ -63,6 +64,8 @@ pub(crate) enum Told<'a> {
     State(u64),
     /// Whole ticks: chunks, one behind the other.
     Chunks(Vec<u8>),
+    /// Drains of the ack thread: chunks, one behind the other.
+    Drains(Vec<u8>),
     /// Anything else, as it stands there: topic and octets.
     Other(&'a str, &'a [u8]),
 }
@@ -105,6 +108,12 @@ impl Contents {
     /// The most that each axis was sent to do, as the recorder measured it.
     pub(crate) fn most(&self) -> Vec<Margin> {
         self.end.get("most").and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
+    }
+
+    /// What has to be known to judge its acks again; `None` where it does not say, or nothing that can be.
+    pub(crate) fn judging(&self) -> Option<Judging> {
+        let judging: Judging = serde_json::from_str(self.entry("judging")).ok()?;
+        judging.fault(self.seats.len()).is_none().then_some(judging)
     }
 
     /// The place of a seat.
@@ -304,13 +313,12 @@ impl Reading<'_, '_> {
             RecordedTopic::Hall => json::<Value>(data).and_then(|hall| {
                 hall["state"].as_u64().map(Told::State).ok_or_else(|| "no state".to_owned())
             }),
-            // For programs that judge acks again; there is none yet.
-            RecordedTopic::Acks => return,
-            RecordedTopic::Sent if !wanted.full => return,
+            RecordedTopic::Sent | RecordedTopic::Acks if !wanted.full => return,
             RecordedTopic::Sent => {
                 let chunks = full::unpack(data, &contents.seats);
                 chunks.map(Told::Chunks).ok_or_else(|| "not a block of ticks".to_owned())
             }
+            RecordedTopic::Acks => full::drains(data).map(Told::Drains).ok_or_else(|| "no drains".to_owned()),
             RecordedTopic::Other(name) => Ok(Told::Other(name, data)),
         };
         match told {

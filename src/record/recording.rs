@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use super::descriptors::descriptors;
 use super::flight::Entry;
 use super::full::packed;
+use super::judging::Judging;
 use super::notes::topics;
 use super::schemas::{schema_of_seat, schema_of_tick, state_number};
 use super::{Message, RecordedSeat};
@@ -21,7 +22,7 @@ pub(super) const VERSION: &str = "1";
 /// The topic of whole ticks.
 pub(super) const SENT: &str = "/full/sent";
 /// That of what the ack thread took.
-pub(super) const ACKS: &str = "/full/acks";
+pub(crate) const ACKS: &str = "/full/acks";
 /// Samples a second of each seat.
 pub(crate) const SAMPLE_HZ: u32 = 20;
 /// Topics of notes.
@@ -129,6 +130,12 @@ impl Opening {
         serde_json::from_slice(octets).ok()
     }
 
+    /// The same of a hall whose acks are judged so.
+    pub(crate) fn judged(self, judging: &Judging) -> Self {
+        let judging = serde_json::to_string(judging).unwrap_or_default();
+        self.with("judging", judging)
+    }
+
     /// The same of a part, or of something else.
     pub(crate) fn with(mut self, key: &str, value: impl Into<String>) -> Self {
         self.metadata.insert(key.to_owned(), value.into());
@@ -194,11 +201,15 @@ impl<W: Write + Seek> Recording<W> {
     ///
     /// # Errors
     /// Where writing fails, as all of these.
+    #[cfg(test)]
     pub(crate) fn begin(out: W, about: &About, seats: &[RecordedSeat]) -> McapResult<Self> {
         Self::open(out, &Opening::new(about, seats), EntryMaker::new(seats.len(), about.clocks))
     }
 
     /// The same with an opening that was made before.
+    ///
+    /// # Errors
+    /// Where writing fails, as all of these.
     pub(crate) fn open(out: W, opening: &Opening, maker: EntryMaker) -> McapResult<Self> {
         // By time alone, so that of a file that is cut short no more than half a second is lost.
         let mut writer = options().chunk_size(None).create(out)?;

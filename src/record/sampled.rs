@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::acks::{AckChunk, AckRecord, standing_number};
+use super::ack_record::{AckRecord, standing_number};
+use super::acks::AckChunk;
 use super::chunk::{Chunk, Handed, SentFrame};
 use super::notes::Note;
 use super::{RecordedSeat, TickHead};
@@ -115,13 +116,23 @@ pub(crate) struct Sampled {
     hz: u32,
     /// The last tick, of the window that is not over.
     last: Option<TickHead>,
+    /// When the last tick of a window that is over was due.
+    closed_at: MonoTime,
 }
 
 impl Sampled {
     /// A fold into so many samples a second.
     pub(crate) fn new(seats: Vec<RecordedSeat>, hz: u32) -> Self {
         let windows = vec![SeatWindow::default(); seats.len()];
-        Self { seats, windows, tick: TickSample::default(), state: None, hz, last: None }
+        Self {
+            seats,
+            windows,
+            tick: TickSample::default(),
+            state: None,
+            hz,
+            last: None,
+            closed_at: MonoTime::default(),
+        }
     }
 
     /// Takes a tick, and tells what is over by it.
@@ -147,15 +158,18 @@ impl Sampled {
         }
     }
 
-    /// Tells of the window that is not over.
+    /// Tells of the window that is not over, and of acks that came since there was one.
     pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
-        let Some(last) = self.last.take() else { return };
-        tell(last.deadline, Message::Tick(std::mem::take(&mut self.tick)));
+        if let Some(last) = self.last.take() {
+            self.closed_at = last.deadline;
+            tell(last.deadline, Message::Tick(std::mem::take(&mut self.tick)));
+        }
+        let closed_at = self.closed_at;
         for (lane, window) in self.windows.iter_mut().enumerate() {
             let mut sample = std::mem::take(&mut window.sample);
             let worst = window.worst.take();
             let is_heard = sample.acked > 0 || sample.refused > 0 || sample.lost > 0;
-            if let Some(at) = worst.map(|(at, _)| at).or_else(|| is_heard.then_some(last.deadline)) {
+            if let Some(at) = worst.map(|(at, _)| at).or_else(|| is_heard.then_some(closed_at)) {
                 (sample.standing, sample.measured_mm) = (window.standing, window.measured_mm.clone());
                 tell(at, Message::Seat(lane, sample));
             }

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::acks::standing_words;
+use super::ack_record::standing_words;
 use crate::state::State;
 
 /// Viewers take one type a property, never null, arrays of scalars, and `oneOf` only to name numbers.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::chunk::{Asked, SentFrame, longest_frame};
 use crate::drive::link::{LinkPose, RECORD_LEN};
 use crate::motion::{AxisUnit, MAX_AXES, Pulses, Window};
-use crate::wire::{MotionRequest, Timing, VibrationPort, motion_len};
+use crate::wire::{FrameNo, MotionRequest, Timing, VibrationPort, motion_len};
 
 /// What the frames of a lane are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -165,6 +165,16 @@ impl RecordedSeat {
     pub(super) fn measured(&self, pulses: &[Pulses]) -> Vec<f64> {
         let place = |axis: &RecordedAxis| pulses.get(axis.slot).map(|at| f64::from(at.0) * axis.pulse);
         self.axes.iter().map_while(place).collect()
+    }
+
+    /// The number of a frame; `None` where that is no frame of its kind.
+    pub(crate) fn frame_no(&self, datagram: &[u8]) -> Option<FrameNo> {
+        match self.frames {
+            FrameKind::Datagram(port) => {
+                MotionRequest::parse_as(port, datagram).ok().map(|request| request.frame)
+            }
+            FrameKind::Pose => datagram.try_into().ok().map(|record| LinkPose::parse(record).frame),
+        }
     }
 
     /// Where its axes were sent, millimetres or degrees; none where that is no frame of its kind.

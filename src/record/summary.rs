@@ -133,6 +133,7 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
                 let margins = margins.get_or_insert_with(|| Margins::new(&contents.seats, rate));
                 each_chunk(&chunks, |chunk| margins.take(chunk, &contents.seats, &mut |_, _, _| ()));
             }
+            Told::Drains(_) => {}
             Told::Other(topic, data) => {
                 summary.happened(contents, at, topic, &String::from_utf8_lossy(data), film_s);
             }

@@ -135,6 +135,42 @@ fn a_file_says_what_it_is_of_first_and_what_it_came_to_last() {
 }
 
 #[test]
+fn acks_that_come_after_the_last_tick_are_in_samples_and_drains_as_they_are_in_the_counts() {
+    let (Taps { ticks: mut tap, mut acks }, intake) =
+        Intake::new(vec![seat()], Rate::from_hz(100.0), SAMPLE_HZ);
+    let mut intake = intake.in_full();
+    let (mut acked, mut fates) = (0, 0);
+    let mut tell = |_, message| match message {
+        Message::Seat(0, sample) => acked += sample.acked,
+        Message::Drains(drains) => {
+            let mut rest = drains.as_slice();
+            while let Some((chunk, behind)) = AckChunk::parse(rest) {
+                fates += chunk.records().filter(|one| matches!(one, AckRecord::Fate(..))).count();
+                rest = behind;
+            }
+        }
+        _ => {}
+    };
+    let mut ack = |frame, ms| {
+        acks.take(&AckRecord::Fate(0, FrameNo(frame), Fate::Answered(ReplyCode::Running), 2_000_000));
+        acks.drained(MonoTime::from_nanos(ms * MS));
+    };
+    let mut buf = [0; MAX_LEN];
+    tap.asked(asked(0.5));
+    tap.frame(0, frame(0.5, &mut buf), MonoTime::from_nanos(0), Delivery::Sent);
+    tap.tick(&head(0));
+    ack(1, 5);
+    intake.take(&mut tell);
+    // One file ends here, and the next has no tick any more.
+    intake.close(&mut tell);
+    ack(2, 200);
+    intake.take(&mut tell);
+    intake.close(&mut tell);
+    intake.close(&mut tell);
+    assert_eq!((acked, fates, intake.counts().acked), (2, 2, 2));
+}
+
+#[test]
 fn of_a_tick_that_finds_no_room_nothing_is_kept_and_the_next_says_so() {
     let (mut tap, mut ring) = tap(&[seat()], Rate::from_hz(1.0));
     let mut buf = [0; MAX_LEN];

@@ -135,6 +135,9 @@ impl AckLoop {
     /// Has whatever is taken copied to `tap`.
     pub fn record(&mut self, tap: AckTap) {
         self.tap = Some(tap);
+        if let Some(watch) = &mut self.watch {
+            watch.keep_records();
+        }
     }
 
     /// Its thread has no real-time service: a busy machine holds it up, as it does the tick thread.
@@ -143,7 +146,10 @@ impl AckLoop {
     }
 
     /// Has `watch` judge how the controllers stand.
-    pub(crate) fn watched_by(&mut self, watch: Watch) {
+    pub(crate) fn watched_by(&mut self, mut watch: Watch) {
+        if self.tap.is_some() {
+            watch.keep_records();
+        }
         self.watch = Some(watch);
     }
 
@@ -222,7 +228,8 @@ impl AckLoop {
             if let FromController::Reply(reply) = message {
                 observer.on_reply(controller, &reply, at);
                 let MotionReply { frame, code, error, inputs, .. } = reply;
-                let reply = Reply { controller, frame, code, error, inputs, at };
+                // As frames have it: what is recorded is what was judged by.
+                let reply = Reply { controller, frame, code, error, inputs, at: at.whole_micros() };
                 copy(tap, &AckRecord::Reply(reply));
                 return books.on_reply(reply, &mut Records { sent, last_sent, watch, observer, live, tap });
             }
@@ -235,6 +242,7 @@ impl AckLoop {
                     watch.hear(observer, controller, Incoming { message, at, others_ask })
                 })
                 || other(controller, Incoming { message, at, others_ask: false });
+            copy_judged(tap, watch);
             if !is_known {
                 books.tracker_mut().on_stray(controller);
             }
@@ -254,6 +262,7 @@ impl AckLoop {
         if let Some(watch) = watch {
             watch.look(observer, began);
         }
+        copy_judged(tap, watch);
         if let Some(tap) = tap {
             tell_standings(tap, receiver, accounts, watch.as_ref());
             tap.drained(began);
@@ -305,9 +314,9 @@ struct Records<'a> {
 }
 
 impl Records<'_> {
-    fn note_posted(&mut self, posted: &mut u32) {
-        if let frames @ 1.. = std::mem::take(posted) {
-            copy(self.tap, &AckRecord::Posted(frames));
+    fn note_posted(&mut self, posted: &mut Option<(u32, usize, FrameNo)>) {
+        if let Some((frames, lane, last)) = posted.take() {
+            copy(self.tap, &AckRecord::Posted(frames, lane, last));
         }
     }
 
@@ -334,23 +343,26 @@ impl Records<'_> {
         } else if let Some(watch) = self.watch {
             watch.hear_link(self.observer, controller, event, now);
         }
+        copy_judged(self.tap, self.watch);
     }
 }
 
 impl Ledger for Records<'_> {
     fn bring_up_to_date(&mut self, tracker: &mut Tracker) {
-        let mut posted = 0;
+        let mut posted: Option<(u32, usize, FrameNo)> = None;
         while let Ok(sent) = self.sent.pop() {
             record(sent, tracker, self.last_sent);
             if let Some(watch) = self.watch {
                 watch.on_sent(sent);
             }
             match copy_of(sent) {
-                Some(record) => {
+                AckRecord::Posted(one, lane, frame) => {
+                    posted = Some((one + posted.map_or(0, |(before, ..)| before), lane, frame));
+                }
+                record => {
                     self.note_posted(&mut posted);
                     copy(self.tap, &record);
                 }
-                None => posted += 1,
             }
         }
         self.note_posted(&mut posted);
@@ -371,6 +383,7 @@ impl Ledger for Records<'_> {
         if let Some(watch) = self.watch {
             watch.on_fate(reply, fate);
         }
+        copy_judged(self.tap, self.watch);
     }
 }
 
@@ -380,15 +393,23 @@ fn copy(tap: &mut Option<AckTap>, record: &AckRecord<'_>) {
     }
 }
 
-/// A record of a lane as it is copied; of frames only how many there were.
-fn copy_of(sent: Sent) -> Option<AckRecord<'static>> {
-    Some(match sent {
-        Sent::Posted { .. } => return None,
+/// Copies to `tap` what `watch` made of what it heard since.
+fn copy_judged(tap: &mut Option<AckTap>, watch: &mut Option<Watch>) {
+    if let (Some(tap), Some(watch)) = (tap, watch) {
+        let lost = watch.take_records(&mut |record| tap.take(record));
+        tap.lose(lost);
+    }
+}
+
+/// A record of a lane as it is copied.
+fn copy_of(sent: Sent) -> AckRecord<'static> {
+    match sent {
+        Sent::Posted { lane, frame, .. } => AckRecord::Posted(1, usize::from(lane), frame),
         Sent::Failed { lane, frame } => AckRecord::Failed(usize::from(lane), frame),
         Sent::Joined { lane } => AckRecord::Joined(usize::from(lane)),
         Sent::FellOut { lane, why, shakes } => AckRecord::FellOut(usize::from(lane), why, shakes),
         Sent::Unread { lane } => AckRecord::Unread(usize::from(lane)),
-    })
+    }
 }
 
 fn record(sent: Sent, tracker: &mut Tracker, last_sent: &mut MonoTime) {

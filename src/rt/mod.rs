@@ -317,7 +317,8 @@ impl Outgoing<'_> {
     fn hand_over(&self, datagram: &[u8], places: &mut Places, mail: &mut Mail, sink: &mut impl FrameSink) {
         let Self { index, stamped: Stamped { frame, asked, shakes }, pose, lasts_ms, at_most_ms, at } = *self;
         // Posted before it is sent: a reply can overtake what is posted after.
-        mail.post(Sent::Posted { lane: places::number(index), frame, asked, at });
+        // To the microsecond, as it is recorded: whoever judges a recording again judges by the same instants.
+        mail.post(Sent::Posted { lane: places::number(index), frame, asked, at: at.whole_micros() });
         let delivery = sink.send(index, datagram, at);
         places.sent(index, &Taken { frame, asked, pose, lasts_ms, at_most_ms, shakes, at }, delivery);
         if let Delivery::Failed(_) = delivery {

@@ -80,16 +80,14 @@ impl Standby {
         self.line.is_hushed()
     }
 
-    /// Takes orders, and counts what the line sent; `on_homed` hears of every controller that is home.
-    pub(super) fn serve(&mut self, health: &mut HealthTable, mut on_homed: impl FnMut(usize)) {
-        while let Ok(Order::Homed(controller)) = self.orders.pop() {
-            on_homed(usize::from(controller));
-            health.on_homed(usize::from(controller));
-            health.look_anew(health.groups().group_of(usize::from(controller)));
-        }
-        for controller in 0..self.seen.len() {
-            health.on_other_sent(controller, self.line.take_sent(controller));
-        }
+    /// The next controller that somebody said is home.
+    pub(super) fn take_homed(&mut self) -> Option<usize> {
+        self.orders.pop().ok().map(|Order::Homed(controller)| usize::from(controller))
+    }
+
+    /// How many datagrams the line sent to a controller since this was asked last.
+    pub(super) fn take_sent(&mut self, controller: usize) -> u32 {
+        u32::try_from(self.line.take_sent(controller)).unwrap_or(u32::MAX)
     }
 
     /// What the start has found, once every controller that is to take part has told; said once.

@@ -3,6 +3,7 @@
 
 mod asking;
 mod hearing;
+mod notes;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -18,13 +19,15 @@ use crate::belief::Reading;
 use crate::config::Controller;
 use crate::drive::link::LaneWants;
 use crate::drive::{EvidenceList, Lane, MOST_EVIDENCE, Need, Peer, Rounds, Whereabouts};
-use crate::health::{Change, HealthState, HealthTable, Notice};
+use crate::health::{Change, HealthInput, HealthState, HealthTable, Notice};
 use crate::net::Sender;
 use crate::observe::Observer;
+use crate::record::AckRecord;
 use crate::state::{Event, State};
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
 use crate::wire::ReplyCode;
+use notes::Notes;
 
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
@@ -77,6 +80,8 @@ pub(crate) struct Watch {
     /// What a hall has beside a play.
     standby: Option<Standby>,
     turns: Turns,
+    /// What is told to `health`, where somebody records.
+    records: Option<Notes>,
 }
 
 impl Watch {
@@ -120,6 +125,7 @@ impl Watch {
             untold: false,
             standby: None,
             turns: Turns::default(),
+            records: None,
         }
     }
 
@@ -129,6 +135,27 @@ impl Watch {
         (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
         self.standby = Some(standby);
         self
+    }
+
+    /// Keeps what it makes of all that it hears, for whoever records.
+    pub(super) fn keep_records(&mut self) {
+        self.records = Some(Notes::of(self.peers.len()));
+    }
+
+    /// Gives what it made of all that it heard since; says how much found no room.
+    pub(super) fn take_records(&mut self, give: &mut dyn FnMut(&AckRecord<'static>)) -> u32 {
+        self.records.as_mut().map_or(0, |records| records.take(give))
+    }
+
+    /// Tells the table something, unless it is known there.
+    fn judge(&mut self, input: HealthInput) {
+        if self.health.knows(input) {
+            return;
+        }
+        self.health.take(input);
+        if let Some(records) = &mut self.records {
+            records.health(input);
+        }
     }
 
     /// How the groups stood otherwise than before, the first 1,000 times; and the controllers that were given up in the end.
@@ -196,7 +223,7 @@ impl Watch {
         let is_refusal = self.peers[reply.controller].on_reply_code(reply.code);
         match fate {
             Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
-            Fate::Answered(_) if is_refusal => self.health.on_refused(reply.controller),
+            Fate::Answered(_) if is_refusal => self.judge(HealthInput::Refused(reply.controller)),
             _ => {}
         }
     }
@@ -231,7 +258,7 @@ impl Watch {
             place.is_off_park
         };
         if is_off && stands != HealthState::Rejoining {
-            self.health.on_moved(controller);
+            self.judge(HealthInput::Moved(controller));
         }
     }
 
@@ -267,6 +294,9 @@ impl Watch {
         self.looked = now;
         let health = &mut self.health;
         self.heard = observer.events_since(self.heard, |event| health.on_event(event));
+        if let Some(records) = &mut self.records {
+            records.on_events();
+        }
         for (controller, state) in observer.states().iter().enumerate() {
             let Some(at) = state.reported_at else { continue };
             self.health.on_status(controller, at);
@@ -284,6 +314,9 @@ impl Watch {
         self.read_all();
         let notices = &mut self.notices;
         self.health.tick(now, &mut |notice| notices.push(notice));
+        if let Some(records) = &mut self.records {
+            records.on_judged();
+        }
         for index in 0..self.notices.len() {
             self.tell(self.notices[index]);
         }
@@ -291,6 +324,9 @@ impl Watch {
         self.tell_of_zeros();
         self.end_look_anew(now);
         self.send_alarms();
+        if let Some(records) = &mut self.records {
+            records.end_look();
+        }
     }
 
     fn tell(&mut self, notice: Notice) {
@@ -306,7 +342,7 @@ impl Watch {
             Notice::Read(controller) => {
                 self.darken(controller);
                 let datagrams = self.ask(controller, Need::Identity, self.looked);
-                self.health.on_read_sent(controller, datagrams);
+                self.judge(HealthInput::ReadSent(controller, datagrams));
             }
             Notice::Group(change) => {
                 self.keep(change);
@@ -358,7 +394,7 @@ impl Watch {
         self.lit[controller] -= u8::from(self.peers[controller].has_answered());
         // It is sent three times: what the kernel does not take is like what is lost.
         self.ask(controller, Need::Dark, self.looked);
-        self.health.on_other_sent(controller, 1);
+        self.judge(HealthInput::OtherSent(controller, 1));
     }
 
     /// What finds no room waits for the next look: the tick thread hears all of it, in this order.

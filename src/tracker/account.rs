@@ -42,6 +42,10 @@ impl Account {
         }
     }
 
+    pub(super) fn begin_at(&mut self, first: FrameNo) {
+        *self = Self::new(first, self.ack_every);
+    }
+
     pub(super) fn recorded(&self, frame: FrameNo) -> bool {
         self.ring.ahead(frame) == 0
     }

@@ -53,6 +53,11 @@ impl Tracker {
         }
     }
 
+    /// What was before a frame of a controller is not known, and its accounts begin with it.
+    pub(crate) fn begin_at(&mut self, controller: usize, first: FrameNo) {
+        self.accounts[controller].begin_at(first);
+    }
+
     /// A frame is about to be handed to the kernel at `at`; `asked` says whether it requests a reply.
     ///
     /// Records come in the order of sending. Numbers left out are frames whose records were dropped: they count as sent,

@@ -18,6 +18,17 @@ use super::seat::MS;
 /// Where the histories begin that are always the same.
 const FIXED: u64 = 12_000_000;
 
+/// What is kept of a history beside what seats did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Keeps {
+    /// Nothing.
+    Nothing,
+    /// What happened, in words.
+    Diary,
+    /// A recording of each hall.
+    Recordings,
+}
+
 /// What came of a history.
 #[derive(Debug)]
 pub(crate) struct Past {
@@ -25,10 +36,12 @@ pub(crate) struct Past {
     pub(crate) breaches: Vec<Breach>,
     frames: u64,
     diary: Vec<String>,
+    pub(crate) recordings: Vec<Vec<u8>>,
 }
 
 /// Lives through the history of a seed, with no more than so many deeds.
-fn live_through(seed: u64, bent: Option<Bent>, deeds: u64, told: bool) -> Past {
+pub(crate) fn live_through(seed: u64, bent: Option<Bent>, deeds: u64, keeps: Keeps) -> Past {
+    let told = keeps == Keeps::Diary;
     let mut dice = Dice::new(seed ^ 0xadde);
     let kinds = bent.map_or(&KINDS[..], |bent| bent.kinds(&mut dice));
     let mut kind = dice.pick(kinds);
@@ -40,6 +53,7 @@ fn live_through(seed: u64, bent: Option<Bent>, deeds: u64, told: bool) -> Past {
     person.furnish(&ether);
     let (mut numbers, mut crashed) = (BTreeMap::new(), dice.one_in(3));
     let mut diary = Vec::new();
+    ether.world().recordings = (keeps == Keeps::Recordings).then(Vec::new);
     ether.world().frames = setting("KINOCUE_FRAMES").filter(|_| told).map(|_| Vec::new());
     if told {
         diary.push(format!("seed {seed}: {kind:?}"));
@@ -69,7 +83,8 @@ fn live_through(seed: u64, bent: Option<Bent>, deeds: u64, told: bool) -> Past {
     ether.pass_to(ether.ns() + 1_000 * MS);
     diary.extend(ether.world().frames.take().into_iter().flatten());
     let frames = ether.world().lines.iter().map(|line| line.frames).sum();
-    Past { seed, breaches: breaches(&ether), frames, diary }
+    let recordings = ether.world().recordings.take().unwrap_or_default();
+    Past { seed, breaches: breaches(&ether), frames, diary, recordings }
 }
 
 pub(crate) fn setting(name: &str) -> Option<u64> {
@@ -88,7 +103,7 @@ fn histories(first: u64, count: u64, bent: Option<Bent>) -> Vec<Past> {
             if index >= count {
                 return bad;
             }
-            let past = live_through(first + index, bent, u64::MAX, false);
+            let past = live_through(first + index, bent, u64::MAX, Keeps::Nothing);
             frames.fetch_add(past.frames, Ordering::Relaxed);
             if !past.breaches.is_empty() {
                 bad.push(past);
@@ -116,7 +131,7 @@ fn histories(first: u64, count: u64, bent: Option<Bent>) -> Vec<Past> {
 
 /// One history in full.
 pub(crate) fn tell(seed: u64, bent: Option<Bent>) {
-    let past = live_through(seed, bent, setting("KINOCUE_DEEDS").unwrap_or(u64::MAX), true);
+    let past = live_through(seed, bent, setting("KINOCUE_DEEDS").unwrap_or(u64::MAX), Keeps::Diary);
     past.diary.iter().for_each(|line| println!("{line}"));
     past.breaches.iter().for_each(|breach| println!("{breach}"));
     println!("{} frames", past.frames);

@@ -99,6 +99,8 @@ pub(crate) struct World {
     pub(crate) asked_until: u64,
     /// Frames of motion in words, where somebody wants to read them.
     pub(crate) frames: Option<Vec<String>>,
+    /// Recordings of the halls that were, where somebody wants them.
+    pub(crate) recordings: Option<Vec<Vec<u8>>>,
 }
 
 /// The network, with its clock.
@@ -121,8 +123,9 @@ impl Ether {
             master: None,
         };
         let lines = seats.iter().enumerate().map(line).collect();
+        let dice = Dice::new(!seed);
         let world =
-            World { lines, dice: Dice::new(!seed), asked: false, asked_at: 0, asked_until: 0, frames: None };
+            World { lines, dice, asked: false, asked_at: 0, asked_until: 0, frames: None, recordings: None };
         Self { now: Arc::new(AtomicU64::new(BEGIN)), world: Arc::new(Mutex::new(world)) }
     }
 

@@ -4,6 +4,7 @@ use kinocue::harness::app::StagedShow;
 use kinocue::harness::app::runtime::{Loops, Numbers, Purpose, Runtime, RuntimeHandle};
 use kinocue::harness::engine::{Mix, Show};
 use kinocue::harness::net::{DrainGrid, over};
+use kinocue::harness::recording::HallRecording;
 use kinocue::harness::rt::{Command, Line, News, Order, Ticked};
 use kinocue::harness::state::{Event, Readiness, State, Transition, Trouble};
 use kinocue::harness::time::{MonoTime, Rate, ShowTime};
@@ -78,6 +79,7 @@ pub(crate) struct Hall<'h, 'l> {
     show_over: bool,
     pub(crate) closed: bool,
     pub(crate) diary: Option<Vec<String>>,
+    recording: Option<HallRecording>,
 }
 
 /// A hall of virtual seats that opens, and is `led`; where it reopens, from which frame numbers on.
@@ -91,12 +93,13 @@ pub(crate) fn open<T>(
     let book = kind.book();
     ether.world().lines.iter_mut().for_each(|line| line.seat.settings.period_ms = kind.period_ms());
     let halves = over(Arc::new(ether.clone()));
-    let runtime =
+    let mut runtime =
         Runtime::over(Arc::clone(&book.config), Purpose::Hall { crashed }, numbers, &Arc::default(), halves)
             .expect("the hall opens");
+    let recording = ether.world().recordings.is_some().then(|| HallRecording::tap(&mut runtime));
     let origin = MonoTime::from_nanos(ether.ns() + 20 * MS);
     let period = Rate::from_hz(kind.hz).period();
-    runtime.stepped(ether, origin, |runtime, line, loops| {
+    let (outcome, numbers) = runtime.stepped(ether, origin, |runtime, line, loops| {
         let mut hall = Hall {
             ether: ether.clone(),
             kind,
@@ -125,9 +128,17 @@ pub(crate) fn open<T>(
             show_over: false,
             closed: false,
             diary: None,
+            recording,
         };
-        lead(&mut hall)
-    })
+        let outcome = lead(&mut hall);
+        (outcome, hall.recording)
+    });
+    let (outcome, recording) = outcome;
+    // Its taps are gone.
+    if let (Some(recording), Some(all)) = (recording, &mut ether.world().recordings) {
+        all.push(recording.finish());
+    }
+    (outcome, numbers)
 }
 
 /// Seats as a kind of hall has them, set as they leave the factory, but for the cap on speed.
@@ -222,6 +233,9 @@ impl Hall<'_, '_> {
 
     /// What the supervisor does.
     fn look(&mut self) {
+        if let Some(recording) = &mut self.recording {
+            recording.take();
+        }
         while let Ok(news) = self.runtime.news.pop() {
             match news {
                 News::Refused(refusal) => {

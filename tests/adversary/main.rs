@@ -25,6 +25,7 @@ mod process;
 #[path = "../common/serving.rs"]
 mod serving;
 
+mod again;
 mod anew;
 mod bent;
 mod chance;

@@ -171,6 +171,38 @@ fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
 }
 
 #[test]
+fn a_play_that_was_recorded_is_judged_again_as_its_report_says_and_so_is_a_cut_of_it_that_names_nobody() {
+    let (folder, sim) = (Folder::new(), Sim::one(&["--loss", "0.05", "--seed", "7"]));
+    let (path, report) = recorded_in_full(&folder, &sim.addresses[0], &[]);
+    let judged = |path: &Path| {
+        let run = kinocue(&["replay", text(path), "--json"]);
+        let told: Value = serde_json::from_str(&run.stdout).expect("JSON");
+        assert_eq!((run.code, &told["equal"]), (Some(0), &true.into()), "{told}");
+        told
+    };
+    let whole = judged(&path);
+    let (seat, reported) = (&whole["seats"][0], &report["controllers"][0]);
+    for key in ["sent", "asked", "acked", "refused", "lost"] {
+        assert_eq!(seat[key], reported[key], "{key}");
+    }
+    assert!(seat["lost"].as_u64() > Some(0), "some were lost: {seat}");
+    assert_eq!((&whole["from_the_start"], &whole["gaps"]), (&true.into(), &0.into()));
+    let cut = folder.path("case.mcap");
+    let film = ["--film", "0.2..1.5", "--anonymous", "--whole"];
+    let run = kinocue(&[&["record", "cut", text(&path), "-o", text(&cut)], &film[..]].concat());
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let part = judged(&cut);
+    assert!(part["fates"].as_u64() > Some(20) && part["from_the_start"] == false, "{part}");
+    assert!(kinocue(&["replay", text(&path)]).stdout.contains("no difference"));
+    let sampled = folder.path("sampled.mcap");
+    let run = kinocue(&["record", "cut", text(&path), "-o", text(&sampled)]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let run = kinocue(&["replay", text(&sampled)]);
+    assert!(run.code == Some(64) && run.stderr.contains("no replies to judge again"), "{run:?}");
+    drop(sim.end());
+}
+
+#[test]
 fn the_official_python_reader_reads_a_recording_with_the_counts_that_we_tell() {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers/bin/python");
     if !programs::is_there("python-mcap", python.is_file(), "tests/readers.sh installs it") {

@@ -63,6 +63,7 @@ impl HallRecorder {
         let text = fs::read(&places.config).unwrap_or_default();
         let digest: String = Sha256::digest(&text).iter().map(|octet| format!("{octet:02x}")).collect();
         let opening = Opening::new(&about, &seats)
+            .judged(&runtime.judging(true))
             .with("config_sha256", digest)
             .with("sample_hz", config.record.sample_hz.to_string());
         let maker = EntryMaker::new(seats.len(), clocks);

@@ -371,6 +371,7 @@ impl Worker {
             .as_ref()
             .is_some_and(|open| open.disk.len() >> 20 >= u64::from(self.record.part_mib))
         {
+            self.cut();
             // The next is open before the last is closed.
             let before = self.show.as_mut().and_then(|show| show.file.take());
             self.open_part(now);
@@ -380,7 +381,19 @@ impl Worker {
         }
     }
 
+    /// Gives what is not over to the files, of which one ends: it has all that was counted for it.
+    fn cut(&mut self) {
+        let mut rest = Vec::new();
+        self.intake.close(&mut |at, message| rest.push((at, message)));
+        for (at, message) in &rest {
+            self.write(*at, message);
+        }
+    }
+
     fn close_show(&mut self, now: MonoTime) {
+        if self.show.is_some() {
+            self.cut();
+        }
         let Some(OpenRecording { file, report, .. }) = self.show.take() else { return };
         self.link.tell(|status| status.recording = None);
         if let Some(Err(error)) = file.map(|open| self.close_file(open, report.as_deref())) {
@@ -389,6 +402,7 @@ impl Worker {
     }
 
     fn close_incident(&mut self) {
+        self.cut();
         if let Some(Err(error)) = self.incident.take().map(|open| self.close_file(open, None)) {
             self.fail_incident(&error);
         }
@@ -440,11 +454,6 @@ impl Worker {
     }
 
     fn end(mut self, now: MonoTime) {
-        let mut rest = Vec::new();
-        self.intake.close(&mut |at, message| rest.push((at, message)));
-        for (at, message) in &rest {
-            self.write(*at, message);
-        }
         self.close_show(now);
         self.close_incident();
         self.link.tell(|status| (status.recording, status.flight_s) = (None, 0.0));

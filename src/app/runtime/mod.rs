@@ -28,7 +28,7 @@ use crate::health::{Groups, HealthTable};
 use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
-use crate::record::Taps;
+use crate::record::{Judging, Taps};
 use crate::rt::{
     AckLoop, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds, NewsIn,
     Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line, mailboxes,
@@ -245,13 +245,22 @@ impl Runtime {
     }
 
     /// Has whatever leaves, and whatever is heard, copied.
-    pub(super) fn record(&mut self, taps: Taps) {
-        self.ticks.sink.record(taps.ticks);
-        self.acks.record(taps.acks);
+    pub(crate) fn record(&mut self, taps: Taps) {
+        let Taps { ticks, mut acks } = taps;
+        acks.begin(&self.ticks.lanes.iter().map(|lane| lane.last_frame().next()).collect::<Vec<_>>());
+        self.ticks.sink.record(ticks);
+        self.acks.record(acks);
+    }
+
+    /// What whoever judges its acks again has to know of it.
+    pub(crate) fn judging(&self, is_hall: bool) -> Judging {
+        let config = self.config();
+        let ack_every = if self.silent { 0 } else { config.show.ack_every };
+        Judging::of(config, self.lanes(), ack_every, is_hall)
     }
 
     /// How its seats are sent to at first.
-    pub(super) fn lanes(&self) -> &[Lane] {
+    pub(crate) fn lanes(&self) -> &[Lane] {
         &self.ticks.lanes
     }
 

@@ -9,7 +9,7 @@ use anyhow::{Context as _, anyhow};
 
 use super::super::{Exit, Failure, OrExit as _, exit, print};
 use super::open;
-use crate::record::{Chunk, Contents, CutError, CutManner, RecordedSeat, Stretch, cut, each_tick};
+use crate::record::{Chunk, Contents, CutError, CutManner, Piece, RecordedSeat, Stretch, cut, each_tick};
 use crate::time::{ShowTime, parse_time};
 
 /// Cuts a stretch out of a recording in full, every tick of it as plain topics that each viewer draws.
@@ -40,10 +40,10 @@ pub(in super::super) struct Args {
     /// Give messages the film's time in place of the clock's.
     #[arg(long)]
     film_time: bool,
-    /// Leave out names of seats, hall and cue, and addresses.
+    /// Leave out names of seats, hall and cue, and addresses, also in frames and answers.
     #[arg(long)]
     anonymous: bool,
-    /// Keep the ticks as they were as well, so that the cut is a whole recording too.
+    /// Keep ticks and replies as they were as well, so that the cut is a whole recording too.
     #[arg(long, conflicts_with = "film_time")]
     whole: bool,
     /// Overwrite OUT if it exists.
@@ -102,7 +102,9 @@ fn each<W: Write>(
     mut row: impl FnMut(&mut W, &Contents, &Chunk<'_>) -> std::io::Result<()>,
 ) -> Result<W, Failure> {
     let mut result = Ok(());
-    each_tick(open(path)?, stretch, &mut |contents, chunk, _| {
+    each_tick(open(path)?, stretch, &mut |contents, piece| {
+        let Piece::Tick(chunk, _) = piece else { return };
+        let chunk = &chunk;
         if result.is_ok() {
             result = row(&mut out, contents, chunk);
         }

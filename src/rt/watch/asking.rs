@@ -2,9 +2,10 @@
 //! hall was cleared.
 
 use super::super::mail::Alarm;
+use super::super::standby::Standby;
 use super::{SILENT_AFTER, Watch};
 use crate::drive::Need;
-use crate::health::HealthState;
+use crate::health::{HealthInput, HealthState};
 use crate::net::Delivery;
 use crate::state::{Event, State};
 use crate::time::MonoTime;
@@ -25,7 +26,7 @@ impl Watch {
             return;
         }
         self.anew = Some(now);
-        (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
+        (0..self.health.groups().len()).for_each(|group| self.judge(HealthInput::LookAnew(group)));
     }
 
     /// A motion that begins waits for readings of where the seats are by now, as does whoever leads a play before that.
@@ -37,7 +38,7 @@ impl Watch {
         for controller in 0..self.peers.len() {
             if self.stands(controller).may_move() {
                 let sent = self.ask(controller, Need::Position, self.looked);
-                self.health.on_other_sent(controller, u64::from(sent));
+                self.judge(HealthInput::OtherSent(controller, sent));
             }
         }
     }
@@ -69,31 +70,41 @@ impl Watch {
 
     fn ask_beat(&mut self, controller: usize, is_led: bool, now: MonoTime) {
         if self.stands(controller).may_move() && self.ask(controller, Need::KeepAlive { is_led }, now) > 0 {
-            self.health.on_beat_sent(controller, now);
+            self.judge(HealthInput::BeatSent(controller, now));
         }
     }
 
     pub(super) fn stand_by(&mut self) {
-        let Self { standby, health, peers, live, untold, .. } = self;
-        let Some(standby) = standby else { return };
-        for controller in 0..health.groups().controllers() {
-            health.on_part(controller, standby.takes_part(controller));
+        let Some(mut standby) = self.standby.take() else { return };
+        for controller in 0..self.peers.len() {
+            self.judge(HealthInput::Part(controller, standby.takes_part(controller)));
         }
-        standby.serve(health, |homed| peers[homed].on_homed());
-        if live.is_moving() {
-            return;
+        while let Some(homed) = standby.take_homed() {
+            self.peers[homed].on_homed();
+            self.judge(HealthInput::Homed(homed));
+            self.judge(HealthInput::LookAnew(self.health.groups().group_of(homed)));
         }
-        // A group that was found at park is where the others are.
-        for group in 0..health.groups().len() {
-            if health.standing(group) == HealthState::Rejoining
-                && standby.is_at_park(health.groups().members(group))
-            {
-                health.on_joined(group);
-                *untold = true;
+        for controller in 0..self.peers.len() {
+            self.judge(HealthInput::OtherSent(controller, standby.take_sent(controller)));
+        }
+        if !self.live.is_moving() {
+            self.join_at_park(&standby);
+            if let Some(finding) = standby.take_finding(&self.health) {
+                self.alarm(Alarm::Event(Event::Identified(finding)));
             }
         }
-        if let Some(finding) = standby.take_finding(health) {
-            self.alarm(Alarm::Event(Event::Identified(finding)));
+        self.standby = Some(standby);
+    }
+
+    /// A group that was found at park is where the others are.
+    fn join_at_park(&mut self, standby: &Standby) {
+        for group in 0..self.health.groups().len() {
+            if self.health.standing(group) == HealthState::Rejoining
+                && standby.is_at_park(self.health.groups().members(group))
+            {
+                self.judge(HealthInput::Joined(group));
+                self.untold = true;
+            }
         }
     }
 

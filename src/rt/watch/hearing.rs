@@ -3,6 +3,7 @@
 use super::Watch;
 use crate::drive::link::StreamEvent;
 use crate::drive::{Evidence, Incoming, Seen, Whereabouts};
+use crate::health::HealthInput;
 use crate::observe::Observer;
 use crate::time::MonoTime;
 
@@ -48,8 +49,8 @@ impl Watch {
 
     fn take(&mut self, observer: &mut Observer, controller: usize, evidence: Evidence, at: MonoTime) {
         match evidence {
-            Evidence::Answered => self.health.on_answer(controller, at),
-            Evidence::Alive => self.health.on_status(controller, at),
+            Evidence::Answered => self.judge(HealthInput::Answered(controller, at)),
+            Evidence::Alive => self.judge(HealthInput::Alive(controller, at)),
             Evidence::Position(place) => {
                 self.publish(controller, &place);
                 self.mind_rest(controller, &place);
@@ -59,20 +60,30 @@ impl Watch {
             }
             // One that homes because it was asked to does not know its zero meanwhile.
             Evidence::Homed(homed) if self.live.is_moving() => {
-                self.health.on_zero(controller, homed);
-                self.health.on_status(controller, at);
+                self.judge(HealthInput::Zero(controller, homed));
+                self.judge(HealthInput::Alive(controller, at));
             }
             Evidence::Homed(_) => {}
-            Evidence::Count(packets) => self.health.on_count(controller, packets),
-            Evidence::Unreadable => self.health.on_wide_registers(controller),
+            Evidence::Count(packets) => self.judge(HealthInput::Count(controller, packets)),
+            Evidence::Unreadable => self.judge(HealthInput::Wide(controller)),
             Evidence::Seen(seen) => self.on_seen(controller, seen, at),
-            Evidence::Code(code) => observer.on_code(controller, code, at),
-            Evidence::Stop(look) => observer.on_look(controller, look, at),
-            Evidence::Drive { axis, error } => self.health.on_drive(controller, axis, error),
-            Evidence::LostZero => self.health.on_lost_zero(controller),
+            Evidence::Code(code) => {
+                observer.on_code(controller, code, at);
+                if let Some(records) = &mut self.records {
+                    records.code(controller, code, at);
+                }
+            }
+            Evidence::Stop(look) => {
+                observer.on_look(controller, look, at);
+                if let Some(records) = &mut self.records {
+                    records.look(controller, look, at);
+                }
+            }
+            Evidence::Drive { axis, error } => self.judge(HealthInput::Drive(controller, axis, error)),
+            Evidence::LostZero => self.judge(HealthInput::LostZero(controller)),
             // One that is out already is looked at anyway.
             Evidence::Fell(why) if self.stands(controller).may_move() => {
-                self.health.on_fell_out(controller, why)
+                self.judge(HealthInput::FellOut(controller, why));
             }
             Evidence::Fell(_) => {}
         }
@@ -83,8 +94,8 @@ impl Watch {
     pub(super) fn publish(&mut self, controller: usize, place: &Whereabouts) {
         // While frames lead a seat from a place that is known, each answer is held against where they led it.
         let is_led = self.live.is_moving() && self.stands(controller).may_move();
-        self.health.on_outside(controller, place.outside);
-        self.health.on_ambiguous(controller, !is_led && place.is_ambiguous);
+        self.judge(HealthInput::Outside(controller, place.outside));
+        self.judge(HealthInput::Ambiguous(controller, !is_led && place.is_ambiguous));
         let reading = place.reading.or(place.passing.filter(|_| self.live.is_moving()));
         if let (Some(reading), Some(evidence)) = (reading, self.live.evidence(controller)) {
             evidence.on_reading(&reading);
@@ -94,11 +105,11 @@ impl Watch {
     fn on_seen(&mut self, controller: usize, seen: Seen, at: MonoTime) {
         let Seen { sighting, rests, sways, leads_more_axes, .. } = seen;
         if leads_more_axes {
-            self.health.on_more_axes(controller, sighting.identity.axes);
+            self.judge(HealthInput::MoreAxes(controller, sighting.identity.axes));
         }
         // A vibration ends with the next frame, and none goes to a seat while the hall sends none.
         if rests || (sways && self.live.is_moving()) || !self.stands(controller).is_looked_at() {
-            self.health.on_sighting(controller, &sighting, at);
+            self.judge(HealthInput::Seen(controller, sighting, at));
             if let Some(standby) = &mut self.standby {
                 standby.on_seen(controller, seen);
             }

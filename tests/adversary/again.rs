@@ -1,0 +1,46 @@
+//! Histories by chance, recorded and judged again: books, observer and health of each say what they said the first time.
+
+use kinocue::harness::recording::{Replayed, replayed};
+
+use super::bent::Bent;
+use super::chance::{Keeps, live_through, setting};
+
+/// Where the histories begin that are always the same.
+const FIXED: u64 = 16_000_000;
+
+/// Lives through so many histories, and gives what judging them again came to, with what differs in each.
+fn judged_again(first: u64, count: u64) -> (Replayed, Vec<String>) {
+    let bents =
+        [None, Some(Bent::Master), Some(Bent::Mbox), Some(Bent::Reload), Some(Bent::Lie), Some(Bent::Deaf)];
+    let (mut all, mut differs) = (Replayed::default(), Vec::new());
+    for seed in first..first + count {
+        let bent = bents[(seed % bents.len() as u64) as usize];
+        for (hall, file) in
+            live_through(seed, bent, u64::MAX, Keeps::Recordings).recordings.iter().enumerate()
+        {
+            let Replayed { frames, fates, standings, is_whole, differences } = replayed(file);
+            all.frames += frames;
+            all.fates += fates;
+            all.standings += standings;
+            let trouble =
+                differences.first().cloned().or_else(|| (!is_whole).then(|| "not whole".to_owned()));
+            differs.extend(trouble.map(|one| format!("seed {seed}, {bent:?}, hall {hall}: {one}")));
+        }
+    }
+    (all, differs)
+}
+
+#[test]
+fn a_history_that_was_recorded_is_judged_again_as_it_was() {
+    let (first, count) = (setting("KINOCUE_SEED"), setting("KINOCUE_HISTORIES"));
+    let count = count.unwrap_or(30);
+    let (all, differs) = judged_again(first.unwrap_or(FIXED), count);
+    println!("{count} histories: {} frames, {} replies, {} standings", all.frames, all.fates, all.standings);
+    assert!(all.frames > 50 * count && all.fates > 20 * count && all.standings > 3 * count, "{all:?}");
+    assert!(
+        differs.is_empty(),
+        "{} of {count} differ:\n{}",
+        differs.len(),
+        differs[..differs.len().min(10)].join("\n")
+    );
+}
