@@ -62,7 +62,6 @@ fn where_only_its_answers_are_lost_a_seat_comes_to_rest_all_the_same() {
         // What its acceleration makes in a slice that waited for an answer in vain, and the whole units of speed.
         let motors = play.bus().units()[0].motors[..3].iter();
         let jump = motors.map(|motor| motor.shaft.executed().jump / MM).fold(0.0, f64::max);
-        println!("{phase}: {jump}");
         assert!(jump <= 3_000.0 * (PERIOD.as_secs_f64() + 0.009) + 3.5, "{phase}: {jump} mm/s at once");
     }
 }
