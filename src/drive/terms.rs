@@ -8,6 +8,7 @@ use super::silvermax::SilverMax;
 use super::sixpack2::{OrderGap, Reach, Sixpack2};
 use crate::config::drive::DriveFamily;
 use crate::config::drive::sixpack2::Sixpack2Drive;
+use crate::config::link::LinkWiring;
 use crate::config::{Config, Controller, Link};
 use crate::motion::{AxisGeometry, MAX_LEAD, SeatType};
 use crate::time::Rate;
@@ -79,8 +80,12 @@ fn other_baud(Link { name, baud, asked_baud, .. }: &Link) -> Option<String> {
     (baud != asked_baud).then(|| format!("link {name} runs at {baud} baud, the nearest rate to {asked_baud}"))
 }
 
-/// How far an order that is damaged on its way leads a motor of a SIXpack 2, where its answers are as slow as they may be.
+/// How far an order that is damaged on its way leads a motor of a SIXpack 2, where its answers are as slow as they may be. Frames on a bus have a
+/// checksum.
 fn damaged(link: &Link, config: &Config, load: &LinkLoad, period: Duration) -> Option<String> {
+    if load.wiring == LinkWiring::Can {
+        return None;
+    }
     let octet = |baud: u32| Duration::from_secs(1) * load.octet_bits / baud.max(1);
     let gap = |asked: u32| {
         let (octets, delay) = ([load.baud, asked].map(octet), OrderGap::LONGEST_DELAY);
