@@ -27,11 +27,13 @@ impl Engine {
                 self.playhead.run(gap);
             }
             (Phase::Braking(why), _) if self.is_too_long(gap) => self.halt(*why),
+            // The last frame has run out, so seats stand: to go on at speed would be a jump for them.
             (Phase::Following(_) | Phase::Parking(_), _) if self.is_too_long(gap) => {
                 self.playhead.catch_up();
                 self.playhead.run(gap);
                 self.halt(Rest::Late);
             }
+            // Others than those that follow have no film to fall behind: what they do is only later.
             (Phase::Following(_), _) => self.playhead.miss(gap),
             _ => {}
         }
@@ -39,6 +41,7 @@ impl Engine {
 
     /// Whether a gap or a lag is more than can be slewed away.
     fn is_too_long(&self, span: Duration) -> bool {
+        // Below 20 Hz one tick alone is longer than that, and is slewed as any other.
         span > LAG_HOLD && span > self.show.rate.period()
     }
 
@@ -48,7 +51,9 @@ impl Engine {
         let is_wanted_elsewhere = self.is_wanted_elsewhere();
         let Self { phase, playhead, headroom, lanes, .. } = self;
         playhead.pass(time, || match phase {
+            // The planner was told that pace: its course begins with what that makes of the motion.
             Phase::Following(Following { next: Some(next), .. }) if next.pace != 1.0 => FramePace::Kept,
+            // That course was planned from the clock's pace, which has to be back before it begins.
             Phase::Following(Following { next: Some(next), .. }) if next.is_near(now + SLOWING) => {
                 FramePace::Within(0.0)
             }
@@ -56,7 +61,8 @@ impl Engine {
             Phase::Following(Following { course, .. })
                 if !is_wanted_elsewhere && reached >= course.settled() =>
             {
-                FramePace::Within(headroom.pace(now, lanes.level()))
+                // By the highest level: all share one show time, and that lane has the least room.
+                FramePace::Within(headroom.pace(now, lanes.level(), lanes.may_shake()))
             }
             _ => FramePace::Within(0.0),
         });
@@ -133,6 +139,8 @@ impl Engine {
         {
             return None;
         }
+        // In this order: who parks leaves all else, a person's seek goes before the machine's
+        // lag, and both before single lanes, whose course would have to be made anew.
         let need = if self.is_to_park() {
             (Goal::Park, soonest, soonest)
         } else if let Some(target) = self.planner.sought {
@@ -152,6 +160,7 @@ impl Engine {
                 _ => (Goal::Again, end, self.playhead.cue_time(ShowTime::ZERO)),
             }
         };
+        // A way onto the cue is asked for once: asked anew each tick it would never be planned to its end.
         (asked != Some(need.0) || need.0 != Goal::Cue).then_some(need)
     }
 
@@ -227,6 +236,7 @@ impl Engine {
         let now = self.playhead.at();
         let Some(replan) = self.phase.take_due(now) else { return };
         let (goal, nearer) = (replan.goal, replan.skips());
+        // The frame that passes the change is as far into the new course as it is past it.
         let over = replan.at.map_or(time, |at| Duration::from_nanos(now.as_nanos().abs_diff(at.as_nanos())));
         let to = replan.start + over;
         let Planned::Ready(course, scene) = replan.planned else { return };
@@ -235,6 +245,7 @@ impl Engine {
         self.planner.late_answers = 0;
         match goal {
             Goal::Lanes => self.playhead.set(to),
+            // Elsewhere in the film no lag of before is left to be taken back.
             Goal::Cue if self.planner.sought.take().is_some() => self.playhead.restart(to),
             Goal::Cue => self.playhead.skip(to, nearer),
             Goal::Again => {

@@ -96,6 +96,7 @@ impl BlindAxis {
     }
 
     fn slow(&mut self, harder: f64) {
+        // Down to 0 and not through it: the last step is only as large as the speed that is left.
         let speed = (self.speed.abs() - harder * self.step).max(0.0);
         self.speed = speed.copysign(self.speed);
     }
@@ -103,6 +104,7 @@ impl BlindAxis {
     /// How long a line at its speed has to be.
     fn needs_s(&self) -> f64 {
         let spare = self.velocity - self.speed.abs();
+        // At all of its speed no Time lets a seat that heard nothing keep up with the line.
         if spare > 0.0 { self.farthest / spare } else { f64::INFINITY }
     }
 
@@ -159,6 +161,7 @@ fn fits(axes: &[BlindAxis], mut grid: Grid, harder: f64) -> bool {
     let mut kept = [BlindAxis::PADDING; MAX_AXES];
     kept[..axes.len()].copy_from_slice(axes);
     let axes = &mut kept[..axes.len()];
+    // It ends: each line takes 13 ms and more of what is left of a second.
     loop {
         slow(axes, harder);
         if rest(axes) {
@@ -192,6 +195,7 @@ fn line(axes: &mut [BlindAxis], grid: Grid, least_s: f64) -> Option<BlindLeg> {
         axis.go(f64::from(lasts_ms) * 1e-3);
         *to = axis.place;
     }
+    // One that stands cannot leave the stroke, though its place may be off by a last bit.
     let inside = axes.iter().all(|axis| axis.speed == 0.0 || (0.0..=1.0).contains(&axis.place));
     inside.then_some(BlindLeg { to, lasts_ms, ticks })
 }

@@ -25,6 +25,7 @@ impl CueAhead {
         let mut leads: Vec<Duration> = windows.iter().map(Window::lead).collect();
         leads.sort_unstable();
         leads.dedup();
+        // A hint of its own for each: of one for all the place would have to be looked for at every turn.
         leads.into_iter().map(Self::new).collect()
     }
 

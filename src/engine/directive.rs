@@ -86,6 +86,7 @@ impl Engine {
         if turn != PhaseTurn::Stay && matches!(directive, Directive::Stop | Directive::Park) {
             self.ending = Ending::Stopped;
         }
+        // A stop has the last word: no seek that was asked for before may set anything in motion after it.
         if turn != PhaseTurn::Stay && directive == Directive::Stop {
             self.planner.sought = None;
         }
@@ -167,6 +168,7 @@ impl Engine {
         if self.directive != Directive::Play {
             return;
         }
+        // The target is where this frame ends; show time here is where it begins.
         let before = ShowTime::from_nanos(target.as_nanos() - (ShowTime::ZERO + time).as_nanos());
         match &self.phase {
             // At the first frame, and out of a rest, the lanes join the film wherever it is.

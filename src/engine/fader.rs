@@ -1,9 +1,11 @@
 //! How a level changes while a seat follows the cue: gently, and by what the cue leaves of the limits.
 
+// Both chosen: from all to nothing in some 4 s, and no jolt at either end of it.
 /// The quickest change of a level, per second.
 pub(super) const RATE: f64 = 0.25;
 /// How quickly the change itself grows and ends, per second squared: 0.25 s to full speed.
 pub(super) const GATHER: f64 = 1.0;
+// By a share of next to nothing a change that nears its goal would take for ever to slow down there.
 /// The least share with which a change ends.
 const LEAST: f64 = 0.05;
 /// Levels nearer than this are the same.
@@ -55,12 +57,19 @@ impl Fader {
     /// Moves on for `dt` seconds towards `target`, no quicker than that share of the rates, 0 to 1. One that goes the
     /// other way, or too quickly, slows down first.
     pub(super) fn advance(&mut self, dt: f64, target: f64, share: f64) {
-        self.ends_by = None;
-        // A share that shrinks must neither stop it abruptly nor leave it running.
-        let shown = if self.is_still() { share } else { share.max(self.rate.abs() / RATE).max(LEAST) };
-        let change = GATHER * shown * dt;
+        let (most, gentle) = (RATE * share, GATHER * share.max(LEAST));
+        // A share that shrinks must neither stop it abruptly nor leave it running: it slows as evenly as if it came to stand, and is
+        // as slow as it has to be a quarter of a second later, when the cue leaves no more (`headroom`).
+        let gather = if self.rate.abs() > most {
+            *self.ends_by.get_or_insert(GATHER * self.rate.abs() / RATE)
+        } else {
+            self.ends_by = None;
+            gentle
+        };
+        let change = gather * dt;
         let gap = target - self.level;
-        let wanted = gap.signum() * closing_rate(gap.abs(), GATHER * share.max(LEAST), dt).min(RATE * share);
+        // A share of 0 lets nothing begin, while what is under way is still led to an end.
+        let wanted = gap.signum() * closing_rate(gap.abs(), gentle, dt).min(most);
         self.rate = wanted.clamp(self.rate - change, self.rate + change);
         self.level = (self.level + self.rate * dt).clamp(0.0, 1.0);
         if (target - self.level).abs() < SAME && self.rate.abs() < SAME {
@@ -72,6 +81,7 @@ impl Fader {
 /// The greatest rate from which a gap is just closed while slowing down by no more than `gather`, tick by tick.
 fn closing_rate(gap: f64, gather: f64, dt: f64) -> f64 {
     let ticks_left = (dt * dt / 4.0 + 2.0 * gap / gather).sqrt() - dt / 2.0;
+    // Where less is left than a tick can close, the root makes up to twice of it: it would be passed.
     (gather * ticks_left).min(gap / dt)
 }
 
@@ -103,6 +113,20 @@ mod tests {
         let mut fader = Fader::at(1.0);
         (0..1000).for_each(|_| fader.advance(0.01, 0.2, 0.0));
         assert_eq!(fader, Fader::at(1.0));
+    }
+
+    #[test]
+    fn where_a_cue_leaves_no_more_a_change_stands_a_quarter_of_a_second_later_and_ends_evenly() {
+        for (share, left) in [(1.0, 0.0), (1.0, 0.2), (0.3, 0.0), (0.1, 0.0)] {
+            let mut fader = Fader::at(1.0);
+            (0..50).for_each(|_| fader.advance(0.01, 0.0, share));
+            for _ in 0..26 {
+                let before = fader.rate;
+                fader.advance(0.01, 0.0, left);
+                assert!((fader.rate - before).abs() <= 0.01 * GATHER * share + 1e-9, "{share}: {fader:?}");
+            }
+            assert!(fader.rate.abs() <= RATE * left, "{share} to {left}: {fader:?}");
+        }
     }
 
     #[test]

@@ -26,6 +26,7 @@ impl Engine {
         }
         (0..self.lanes.all.len()).for_each(|lane| self.brake(lane));
         if matches!(self.phase, Phase::Following(_) | Phase::Settling(_)) {
+            // What leads on from rest is a join, and that meets the film where it is.
             self.playhead.catch_up();
         }
         self.seek_at_rest();
@@ -42,6 +43,7 @@ impl Engine {
         let (reached, pace) = (playhead.reached(), playhead.pace());
         lanes.all[lane].brake(|window| {
             let states = curve.ahead(window.lead(), |cue| course.states_by_slot(lane, reached, window, cue));
+            // A course moves by show time, a seat by the clock.
             states.map(|state| state.at_pace(pace))
         });
     }
@@ -63,6 +65,7 @@ impl Engine {
     /// Hold frames that end a motion of all lanes: by the last of them a seat that is led ahead is where its poses lead.
     pub(super) fn hold_frames(&self) -> u16 {
         let lead = self.lanes.all.iter().map(|lane| lane.window.lead()).max().unwrap_or_default();
+        // A seat that is led ahead executes its last pose so much later; by then it has to be told still.
         let ahead = lead.as_nanos().div_ceil(self.show.rate.period().as_nanos().max(1));
         u16::from(hold_frames(self.show.rate)).saturating_add(u16::try_from(ahead).unwrap_or(u16::MAX))
     }

@@ -16,6 +16,7 @@ use crate::time::{Rate, ShowTime};
 /// One that falls out is read at rest after a second or two, if it answers at all.
 const AWAITED_FOR: Duration = Duration::from_secs(3);
 
+// Chosen: gone within a quarter of a second of whoever turns it off, and not at one blow.
 /// How quickly the level of vibration changes, per second.
 const VIBRATION_RATE: f64 = 4.0;
 
@@ -161,13 +162,13 @@ impl LaneMotion {
     }
 
     /// Begins to come to rest from however it moves on its course.
-    ///
-    /// The course knows that best; while the level changes, it is only seen in what was sent.
     pub(super) fn brake(&mut self, on_course: impl FnOnce(&Window) -> [AxisState; MAX_AXES]) {
         if self.mode != LaneMode::Following {
             return;
         }
+        // The course knows best how it moves; while the level changes, it is only seen in what was sent.
         let mut states = if self.fader.is_still() { on_course(&self.window) } else { self.trail.states() };
+        // From the pose that was sent: the limiter may hold it elsewhere than the course says.
         for (state, position) in states.iter_mut().zip(self.pose()) {
             state.position = *position;
         }
@@ -228,6 +229,7 @@ impl LaneMotion {
     /// It is there (again), at rest in that pose.
     pub(super) fn come_back(&mut self, known: &KnownPose) {
         self.trail.rest(*known.pose());
+        // Of a seat that was away nothing that was sent before says how it moves, nor where from.
         self.limiter.restart(known);
         (self.mode, self.leaving, self.ahead, self.awaited) = (LaneMode::Still, None, 0, 0);
         (self.refused, self.returning) = (false, true);
@@ -244,6 +246,7 @@ impl LaneMotion {
     /// Frames stopped: none leads elsewhere than to the last pose, and the way goes on from there. One of which nobody knew which
     /// frames reach it falls out: says whether it does.
     pub(super) fn halt(&mut self) -> bool {
+        // The last frame has led there and has ended, or none has left yet.
         self.trail.rest(*self.pose());
         self.limiter.rest();
         let falls_out = self.is_blind();
@@ -298,6 +301,7 @@ impl LaneMotion {
                 self.count_holds();
                 *self.pose()
             }
+            // One that follows no course is asked to stay, and where it still moves the limiter brakes it.
             (LaneMode::Following | LaneMode::Blind(_) | LaneMode::Unseen | LaneMode::Away, _) => *self.pose(),
         };
         self.send(index, time, pose, on_cue)
@@ -345,6 +349,7 @@ impl LaneMotion {
         let LaneMode::Blind(since_ms) = self.mode else { return None };
         let (pose, speed) = (*self.pose(), self.trail.speed(blind::sight_s(rate)));
         let mut axes = [BlindAxis::PADDING; MAX_AXES];
+        // Slots that are no axis of the seat move nothing, and must not make its frames longer.
         for (slot, own) in self.window.slots().iter().enumerate().filter(|(_, own)| own.is_own) {
             axes[slot] = BlindAxis::new(pose[slot], speed[slot], farthest[slot], &own.limits, rate);
         }
@@ -360,10 +365,9 @@ impl LaneMotion {
     }
 
     /// Has `pose` sent in frame `index`, counted from 0, to be reached in `time`, as far as the limiter lets it pass.
-    ///
-    /// Following its course at a level that stands its way out is part of the proof: course and cue are within the limits to
-    /// their ends, and from there to rest.
     fn send(&mut self, index: u64, time: Duration, mut pose: Pose, on_cue: bool) -> bool {
+        // On its course, at a level that stands, its way out is part of the proof: course and cue are
+        // within the limits to their ends, and from there to rest. No proof is about a level that changes.
         let proved = self.mode == LaneMode::Following && self.fader.is_still();
         let provenance = if proved { Provenance::Proved } else { Provenance::Anyhow };
         self.asked = pose;
@@ -385,6 +389,11 @@ impl LaneMotion {
         } else {
             Mix::STILL
         }
+    }
+
+    /// Whether what the cue has of vibration may be on it.
+    pub(super) fn may_shake(&self) -> bool {
+        self.vibration.max(self.wanted.vibration) > 0.0
     }
 
     /// Moves its level on by `dt` seconds, towards `target`.

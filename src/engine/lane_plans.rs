@@ -59,6 +59,7 @@ impl LaneMotion {
 
     /// Takes up the course that was asked for with `scene`.
     pub(super) fn take_up(&mut self, scene: &LaneScene) {
+        // One that stands elsewhere by now, or moves, is not where this course begins: it would jump there.
         let as_planned = match (self.mode, scene.place) {
             (LaneMode::Following, Place::OnCourse) => true,
             (LaneMode::Still, Place::Still(pose)) => self.leaving.is_none() && pose == *self.pose(),

@@ -39,6 +39,7 @@ pub(super) struct Lanes {
 impl Lanes {
     /// Lanes of which nobody has told where they stand, at the levels of their windows.
     pub(super) fn unseen(windows: Vec<Window>, proved_level: f64, rate: Rate) -> Self {
+        // Levels that the cue was proved at are kept, though no room for a change may be left at them.
         let greatest_level = windows.iter().map(Window::level).fold(proved_level, f64::max);
         let events = EngineEvents::of(windows.len());
         let all = windows.into_iter().map(|window| LaneMotion::unseen(window, rate)).collect();
@@ -115,7 +116,7 @@ impl Lanes {
                 continue;
             }
             if free {
-                motion.fade(dt, target, headroom.fade(at, motion.fader.level()));
+                motion.fade(dt, target, headroom.fade(at, motion.fader.level(), motion.may_shake()));
             } else {
                 motion.settle(dt);
             }
@@ -124,10 +125,10 @@ impl Lanes {
         moved
     }
 
-    /// Describes the lanes for the planner. The level of those that do not follow the cue is set at once: nothing of their
-    /// present motion hangs on it.
+    /// Describes the lanes for the planner. Those that do not follow the cue take their level at once.
     pub(super) fn describe(&mut self, scene: &mut Scene) {
         for (motion, scene) in self.all.iter_mut().zip(&mut scene.lanes) {
+            // Nothing of how they move now hangs on it: they are out, at rest, or nothing goes to them.
             if motion.out || !motion.is_there() || motion.mode == LaneMode::Still {
                 motion.set_level(motion.wanted.motion.min(self.greatest_level));
             }
@@ -162,6 +163,11 @@ impl Lanes {
     /// The greatest level there is.
     pub(super) fn level(&self) -> f64 {
         self.all.iter().map(|motion| motion.fader.level()).fold(0.0, f64::max)
+    }
+
+    /// Whether any of them may vibrate.
+    pub(super) fn may_shake(&self) -> bool {
+        self.all.iter().any(LaneMotion::may_shake)
     }
 
     /// Whether one that frames may go to is farther than that from park.

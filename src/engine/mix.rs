@@ -45,6 +45,7 @@ impl Mix {
     pub(crate) const fn effects(&self, cue: EffectSet) -> EffectSet {
         match cue {
             EffectSet::Named(on) => EffectSet::Named(on & self.effects),
+            // A raw word has no names to tell its bits apart by: with one effect off, all of it is off.
             EffectSet::Word(word) if self.effects == u32::MAX => EffectSet::Word(word),
             EffectSet::Word(_) => EffectSet::Word(0),
         }

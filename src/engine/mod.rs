@@ -194,6 +194,7 @@ impl Engine {
             Phase::Waiting(_) => return Step::Quiet,
             _ => {}
         }
+        // Counted even where nothing is sent: by their number whole milliseconds keep to the grid.
         let time_ms = self.playhead.next_frame();
         let time = millis(time_ms);
         target.into_iter().for_each(|target| self.chase(target, time));
@@ -231,6 +232,7 @@ impl Engine {
             }
             Phase::Closing(..) => return self.close(),
             Phase::Waiting(_) | Phase::Done => return,
+            // The film runs on: these lanes join it where it is by then.
             Phase::Holding(Holding { why: Rest::Late | Rest::Film, .. }) => self.playhead.run(time),
             // The film waits from the very request on.
             Phase::Braking(_) | Phase::Holding(_) => {}
@@ -241,8 +243,10 @@ impl Engine {
         }
         // Before the poses: one past the change of course is the new course's.
         self.take_due(time);
+        // After what is due: lanes that have just been led on are not at the end any more.
         self.end_the_cue();
         self.set_poses(time);
+        // After the poses: the last one of a brake is sent before frames that hold it are counted.
         self.come_to_rest();
         self.close();
     }

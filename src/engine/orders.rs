@@ -100,6 +100,7 @@ impl Engine {
         let is_fresh = is_ready && self.playhead.frames() == 0 && self.phase.rest().is_none();
         let rests = self.is_at_rest() && self.phase.next().is_none_or(|next| next.is_none());
         let motion = &mut self.lanes.all[lane];
+        // As far as readings are noise: exactly at park no encoder ever says that it is.
         let at_park = is_at(&motion.window, known.pose(), &motion.window.park(), near);
         match motion.mode {
             // One that is out is left where it stands.

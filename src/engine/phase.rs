@@ -105,6 +105,7 @@ pub(super) struct Holding {
 impl Phase {
     /// What the first frame does.
     pub(super) fn first(show: &Show, course: Box<Course>) -> Self {
+        // A longer first Time would be cut to that, and its way be done faster than the limits allow.
         let settles = show.timing == Timing::Absolute && show.rate.period() > millis(FIRST_ABSOLUTE_MS);
         if settles { Self::Settling(course) } else { Self::Following(Following::on(course)) }
     }

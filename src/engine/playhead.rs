@@ -94,6 +94,7 @@ impl Playhead {
     pub(super) fn trim(&mut self, ms: i32) -> bool {
         let film = self.film();
         let before = std::mem::replace(&mut self.trim_ms, ms.clamp(-TRIM_MS, TRIM_MS));
+        // The film is where it was; what is owed to it is another.
         self.due = self.cue_time(film);
         before != self.trim_ms
     }
@@ -112,6 +113,7 @@ impl Playhead {
     /// Ticks were missed: the film ran on, and the lanes fall behind it.
     pub(super) fn miss(&mut self, gap: Duration) {
         self.due += gap;
+        // Counted apart from a trim, which is never a reason to hold, however much of it is still to come.
         self.missed_s += gap.as_secs_f64();
     }
 
@@ -123,6 +125,7 @@ impl Playhead {
 
     /// The lanes, and the film of their own with them, go on from elsewhere in the cue.
     pub(super) const fn set(&mut self, at: ShowTime) {
+        // Its film goes with it, so that a seek neither makes a debt nor settles one.
         self.due = ShowTime::from_nanos(self.due.as_nanos() + at.as_nanos() - self.at.as_nanos());
         self.at = at;
     }
@@ -138,11 +141,13 @@ impl Playhead {
         self.set(to);
         self.due = ShowTime::from_nanos(self.due.as_nanos() - nearer.as_nanos());
         self.close_in(nearer.as_secs_f64());
+        // The course was planned from that pace, and begins at the clock's.
         self.slew.end();
     }
 
     /// Moves on by a frame, at a pace that is asked for where it may be another than the clock's.
     pub(super) fn pass(&mut self, time: Duration, pace: impl FnOnce() -> FramePace) {
+        // In whole nanoseconds: an undisturbed show has no rounding that hours could add up.
         if self.at == self.due && self.slew.is_calm() {
             return self.run(time);
         }
@@ -157,6 +162,7 @@ impl Playhead {
 
     /// So much of what was owed is made good.
     fn close_in(&mut self, seconds: f64) {
+        // A trim in the other direction can cancel what was missed: no more lag is left than is owed.
         self.missed_s = (self.missed_s - seconds).clamp(0.0, self.owed_s().max(0.0));
     }
 

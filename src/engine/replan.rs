@@ -79,6 +79,7 @@ impl Replan {
 
     /// Whether its course is there, and is to be taken up.
     pub(super) fn is_due(&self, now: ShowTime) -> bool {
+        // Past it, not at it: the old course leads up to there, and the new one begins where that ends.
         matches!(self.planned, Planned::Ready(..)) && self.at.is_none_or(|at| now > at)
     }
 
@@ -125,6 +126,7 @@ impl Replanner {
 
     /// The time a planner is given: at least two ticks and 20 ms, twice as long after each answer that came too late.
     pub(super) fn lead(&self, rate: Rate) -> Duration {
+        // Up to 64 times as long, 1.3 s where ticks are quick: waiting longer will not help either.
         LEAD.max(2 * rate.period()) * (1 << self.late_answers.min(6))
     }
 

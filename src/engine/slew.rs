@@ -40,6 +40,7 @@ impl Slew {
 
     /// Show time runs no faster than the clock from here on.
     pub(super) const fn end(&mut self) {
+        // Not calm at once: the seam between both paces stays in what the measure sees.
         self.speed_up = 0.0;
     }
 
@@ -65,6 +66,7 @@ impl Slew {
         let change = CHANGE_PER_S * dt;
         let wanted = closing_speed(owed_s.abs(), dt).min(ceiling).min(MAX_SPEED_UP) * owed_s.signum();
         self.speed_up = wanted.clamp(self.speed_up - change, self.speed_up + change);
+        // A pace that stands, and is another, is not calm: the change back from it is yet to come.
         self.calm_s = if self.speed_up == 0.0 { self.calm_s + dt } else { 0.0 };
         Duration::from_secs_f64(dt * (1.0 + self.speed_up))
     }
@@ -74,6 +76,7 @@ impl Slew {
 fn closing_speed(owed: f64, dt: f64) -> f64 {
     // Slowing by c dt a frame from k c dt covers c dt^2 k (k + 1) / 2; solved for k c dt (docs/limiter.md, section 6).
     let from_rest = (dt * dt / 4.0 + 2.0 * owed / CHANGE_PER_S).sqrt() - dt / 2.0;
+    // Where less is owed than a frame can close, that is up to twice of it: seats would pass the film.
     (CHANGE_PER_S * from_rest).min(owed / dt)
 }
 

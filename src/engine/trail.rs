@@ -29,6 +29,7 @@ impl Trail {
     pub(super) fn rest(&mut self, pose: Pose) {
         self.poses = [pose; KEPT];
         for (age, time) in (0_u32..).zip(self.times.iter_mut().rev()) {
+            // Apart by anything: slopes over poses of the same time would be 0 by 0.
             *time = -f64::from(age);
         }
         self.newest = KEPT - 1;
@@ -89,7 +90,7 @@ impl Trail {
     fn apart(&self) -> usize {
         let before = (self.newest + KEPT - 1) % KEPT;
         let frame = self.times[self.newest] - self.times[before];
-        (1..KEPT / 3).rev().find(|apart| apart_s(*apart, frame) <= APART_S * 1.01).unwrap_or(1)
+        (1..=KEPT / 3).rev().find(|apart| apart_s(*apart, frame) <= APART_S * 1.01).unwrap_or(1)
     }
 }
 
@@ -138,6 +139,15 @@ mod tests {
         assert!((trail.speed(0.020)[0] - 2.5).abs() < 1e-9, "{}", trail.speed(0.020)[0]);
         trail.push(Duration::from_millis(100), [0.16; MAX_AXES]);
         assert!((trail.speed(0.020)[0] - 1.0).abs() < 1e-9, "{}", trail.speed(0.020)[0]);
+    }
+
+    #[test]
+    fn its_poses_are_5_ms_apart_as_far_as_its_frames_let_them_be() {
+        for (time_ms, apart) in [(1, 5), (2, 2), (3, 1), (5, 1), (10, 1)] {
+            let mut trail = Trail::at_rest([0.0; MAX_AXES]);
+            (0..KEPT).for_each(|_| trail.push(Duration::from_millis(time_ms), [0.5; MAX_AXES]));
+            assert_eq!(trail.apart(), apart, "{time_ms} ms");
+        }
     }
 
     #[test]

@@ -162,6 +162,7 @@ impl ChaseState {
             (ChaseSign::Unready(_), Following | Holding) => Holding,
             (ChaseSign::Unready(_) | ChaseSign::Brief | ChaseSign::Ready, Leaving) => Leaving,
             (ChaseSign::Brief, Waiting) => Waiting,
+            // Once let go they need no half second: what flickers is stopped by the count of joins.
             (ChaseSign::Brief, Following | Holding) => Following,
             (ChaseSign::Ready, Waiting | Following | Holding) => Following,
         }
@@ -222,6 +223,7 @@ impl Chase {
     /// What the seats are to do.
     pub fn tick(&mut self, input: &ChaseInput<'_>) -> ChaseVerdict {
         let now = input.tick.deadline;
+        // Seats reach the pose of a frame when it ends: then is when they and the film have to agree.
         let end = now + input.frame;
         let sign = self.sign(input, now, end);
         let from = self.state;
@@ -252,6 +254,7 @@ impl Chase {
         self.let_join = false;
         let at = self.follower.playhead();
         if at <= JOINS_WITHIN && at.as_nanos() <= self.rules.cue_end.as_nanos() / 2 {
+            // Nobody has missed what was before so early a join: those parts count as led.
             self.led |= self.part().saturating_sub(1);
         }
     }
@@ -277,10 +280,12 @@ impl Chase {
 
     fn sign(&mut self, input: &ChaseInput<'_>, now: MonoTime, end: MonoTime) -> ChaseSign {
         if !input.may_lead {
+            // What could be followed while the hall did not let it lead has to be so anew.
             (self.ready_since, self.outside_since) = (None, None);
             return ChaseSign::Barred;
         }
         let state = input.point.map_or(FilmState::Absent, |point| point.state);
+        // A film that stands or runs back has no pace that a playhead may take, whatever its state says.
         let Some(point) = input.point.filter(|point| point.state.may_lead() && point.rate > 0.0) else {
             self.ready_since = None;
             return self.sign_of_nobody(state, now);
@@ -289,6 +294,7 @@ impl Chase {
         if self.has_left(point.media_at(end), now) {
             return ChaseSign::Over(ParkCause::CueLeft);
         }
+        // Only of seats that follow: those that hold come back by a join, from however far.
         let is_apart = self.state == ChaseState::Following
             && self.follower.error_s(&point, end, input.frame).abs() > self.rules.join_above.as_secs_f64();
         if is_apart {

@@ -78,6 +78,7 @@ impl Chooser {
     ) -> ChosenFilm {
         let views = &views[..views.len().min(MOST_SOURCES)];
         for (since, view) in self.leads_since.iter_mut().zip(views) {
+            // From the start at each break: ten seconds in all are no ten seconds on end.
             *since = if view.leads() { since.or(Some(now)) } else { None };
         }
         let disagrees = if let Some(by_hand) = by_hand.filter(|place| *place < views.len()) {
@@ -118,6 +119,7 @@ impl Chooser {
         let present = self.present?;
         // Only those that rank higher: between lower ones nobody has to choose.
         let higher = (0..present).find(|place| self.has_led(*place, now))?;
+        // One that is stopped says no place to agree with, and is obeyed: a higher one is not taken past it.
         if !views[present].leads() || !views[present].agrees(&views[higher]) {
             return Some((higher, views[present].behind(&views[higher])));
         }
@@ -148,6 +150,7 @@ impl Chooser {
             return;
         }
         let before = self.present.and_then(|present| views.get(present));
+        // Two that agree are one film: the change is slewed, and nobody is told of a jump.
         let jumps = before.is_none_or(|before| !before.agrees(&views[to]));
         self.epoch = self.epoch.wrapping_add(u32::from(jumps && self.present.is_some()));
         self.switches += u64::from(self.present.is_some());

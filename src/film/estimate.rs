@@ -67,6 +67,7 @@ impl Estimate {
         (self.at, self.media_s) = (at, media_s);
         // How far off the rate is says nothing any more of how far off the place is.
         (self.place_2, self.mixed, self.lean) = (self.noise_2, 0.0, 0.0);
+        // Another place may be another reel: its pull-down has to be found again.
         self.rate_2 = self.rate_2.max(RATE_SIGMA * RATE_SIGMA);
     }
 
@@ -112,6 +113,7 @@ impl Estimate {
         // A rate that wanders at random: its variance grows by dt, and integrated that of the place by dt³/3, of both by dt²/2.
         let wander = RATE_WANDERS * RATE_WANDERS * dt.abs();
         self.place_2 += 2.0 * dt * self.mixed + dt * dt * self.rate_2 + wander * dt * dt / 3.0;
+        // After the place, and before the rate: each goes by what the next one was before.
         self.mixed += dt * self.rate_2 + wander * dt / 2.0;
         self.rate_2 += wander;
         self.at = at;
@@ -154,6 +156,7 @@ impl Estimate {
     }
 
     fn learn(&mut self, noise_2: f64) {
+        // A fixed share would keep the guess of its kind for the first two seconds of timecode.
         let share = (1.0 / self.samples).max(1.0 / NOISE_SAMPLES);
         self.noise_2 = (self.noise_2 + share * (noise_2 - self.noise_2)).max(self.least_noise_2);
     }

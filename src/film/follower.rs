@@ -106,6 +106,7 @@ impl Follower {
 
     /// The film's rate as far as it is followed.
     fn rate_of(&self, point: &FilmPoint) -> f64 {
+        // Beyond the band the tracker says so and seats hold; until it does, they follow no further.
         let rate = if point.rate.is_finite() { point.rate } else { 1.0 };
         rate.clamp(1.0 - self.limits.band, 1.0 + self.limits.band)
     }
@@ -113,6 +114,7 @@ impl Follower {
     /// How far the film, less the trim, is ahead of where the playhead would be at the end of a frame, seconds.
     #[must_use]
     pub(crate) fn error_s(&self, point: &FilmPoint, end: MonoTime, frame: Duration) -> f64 {
+        // At the frame's end, less what the playhead moves by itself: the rest has to be slewed.
         let ahead = point.media_at(end).since(self.playhead).as_nanos();
         ShowTime::from_nanos(ahead).as_secs_f64() - self.trim_s - frame.as_secs_f64() * self.rate_of(point)
     }
@@ -122,6 +124,7 @@ impl Follower {
         self.trim_s = f64::from(trim_ms) * 1e-3;
         let trim = ShowTime::from_secs_f64(self.trim_s).as_nanos();
         self.playhead = ShowTime::from_nanos(point.media_at(end).as_nanos().saturating_sub(trim));
+        // It goes on as the film does: what was off is the matter of the join, and not of a slew.
         (self.pace, self.change) = (self.rate_of(point), 0.0);
     }
 
@@ -134,6 +137,7 @@ impl Follower {
         self.slew_trim(point, (end, frame), trim_ms);
         let (error, rate) = (self.error_s(point, end, frame), self.rate_of(point));
         if error.abs() < NOTHING_S && (self.pace - rate).abs() < NO_PACE {
+            // Exactly: else rounding would keep the pace, and what hangs on it, in motion for ever.
             (self.pace, self.change) = (rate, 0.0);
         } else {
             let most = self.limits.change_per_s();

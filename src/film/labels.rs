@@ -130,6 +130,7 @@ impl LabelClock {
             self.refused = (said != rate.labels()).then_some(TimecodeError::Says { said, rate });
             return;
         }
+        // A label that this rate cannot have says nothing of how its seconds end; it is refused for itself.
         if rate.dropping(label.drops).is_none() {
             self.newest = None;
         }
@@ -180,8 +181,11 @@ impl LabelClock {
                 }
             }
         }
+        // Two instants are compared, each off by its own noise: together by root two of it.
         let by_chance = SIGMAS * std::f64::consts::SQRT_2 * self.sigma_s;
         match best {
+            // Only if no other rate explains the labels as well. A wrong one is
+            // 3.6 s off an hour into the film: seats would follow another scene.
             Some((rate, off)) if off < by_chance && second > off + 2.0 * by_chance => {
                 (self.found, self.is_sure) = (Some(rate), true);
             }

@@ -42,6 +42,7 @@ impl LateBias {
         // A selection, not a sort: it is most of the work of a tracker.
         let mut sorted = self.residuals;
         let kept = &mut sorted[..self.count.min(KEPT)];
+        // Late is behind: whose residual is high was quick, and said where the film really is.
         let index = ((kept.len() - 1) as f64 * ENVELOPE) as usize;
         let (_, envelope, _) = kept.select_nth_unstable_by(index, f32::total_cmp);
         // Below zero it would say that a sample came before it was sent.

@@ -86,6 +86,7 @@ impl PositionReader {
     #[expect(clippy::float_cmp, reason = "a rate that was told before says nothing new")]
     pub(crate) fn hear(&mut self, told: &FilmPosition, at: MonoTime, out: &mut impl FnMut(Observation)) {
         let age_s = told.age_ms / 1e3;
+        // What another clock says is worth nothing: the instant at which it came is off by the network alone.
         let age_s = if (0.0..=OLDEST_S).contains(&age_s) { age_s } else { 0.0 };
         let at = at.before(Duration::from_secs_f64(age_s));
         // Before the position: from here on the estimate runs at that rate, and need not find it out.

@@ -213,6 +213,7 @@ impl MpvClient {
         self.sound = match (message.error.as_deref(), position, self.sound) {
             (Some("success"), Some(_), _) => MpvSound::Heard,
             (.., MpvSound::Absent) => MpvSound::Absent,
+            // Too early to say that there is none: the picture would lead, a frame beside the sound.
             _ if self.paused || self.winding || self.settles(at) => MpvSound::Away,
             _ => MpvSound::Absent,
         };
@@ -248,11 +249,13 @@ impl MpvClient {
             Some("time-pos") => {
                 let is_clock = match self.sound {
                     MpvSound::Heard => false,
+                    // Paused, the picture stands where sound will begin. Running, it may be a frame off.
                     MpvSound::Away => self.paused,
                     MpvSound::Absent => true,
                 };
                 let shown = number.filter(|_| is_clock);
                 let word =
+                    // It names the frame that was queued; people see the one before.
                     shown.map(|queued| FilmWord::Position(ShowTime::from_secs_f64(queued - self.frame_s)));
                 word.into_iter().for_each(|word| out(Observation::new(at, word)));
                 return;

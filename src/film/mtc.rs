@@ -131,6 +131,7 @@ impl MtcReader {
     /// Takes a byte that came at an instant.
     pub(crate) fn hear(&mut self, byte: u8, at: MonoTime, out: &mut impl FnMut(Observation)) {
         match byte {
+            // Clocks of other machines come at any time, within a message too, and end none.
             REALTIME.. => {}
             EXCLUSIVE_ENDS => {
                 if self.status == EXCLUSIVE {
@@ -180,6 +181,8 @@ impl MtcReader {
         if is_whole {
             let (label, bits) = self.set.label();
             let step = if backwards { -FRAMES_OF_A_SET } else { FRAMES_OF_A_SET };
+            // A set that was filled while its label changed may be a minute off with
+            // all of its pieces in order; two sets that follow each other are not.
             let agrees = self
                 .whole
                 .is_some_and(|(before, its, _)| its == bits && stepped(before, bits, step) == Some(label));
@@ -195,6 +198,7 @@ impl MtcReader {
             (8, [0x7f, _, 0x01, 0x01, hours, minutes, seconds, frames, ..]) => {
                 let (labels, drops) = rate_bits(hours >> 5);
                 let label = Label { hours: hours & 0x1f, minutes, seconds, frames, drops };
+                // It was wound: sets from before say nothing of the next.
                 self.whole = None;
                 out(Observation::new(at, FilmWord::Stop));
                 let Some(media) = self.labels.media(at, label, 0, Some(labels)) else { return };

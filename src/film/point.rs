@@ -170,6 +170,7 @@ impl ChasedFilm {
         // While a point is being written the one before does: it is a few milliseconds old.
         self.last = self.source.read().or(self.last);
         let mut point = self.last?;
+        // By its own instant: a thread that hangs cannot say that it does.
         if tick.deadline.since(point.at) > STALE {
             point.state = FilmState::Lost;
         }

@@ -92,6 +92,7 @@ impl SampleClock {
         });
         let is_long = sound().count() >= SLOPED;
         let drift = if is_long { (above / below).clamp(-DRIFT, DRIFT) } else { 0.0 };
+        // On the quickest of all: a read is never before its samples, so none may lie below the line.
         let least = self.kept().iter().map(|one| one.late_s - drift * one.at_s).fold(f64::INFINITY, f64::min);
         (self.drift, self.late_s) = (drift, least);
     }

@@ -82,6 +82,7 @@ impl FrameRate {
         let (frames, seconds) = self.ratio();
         let (parts, per) =
             (i128::from(quarters) * i128::from(seconds) * 1_000_000_000, i128::from(4 * frames));
+        // In whole numbers: after two hours a period that was rounded to a nanosecond would be 0.06 ms off.
         let nanos = (parts + per / 2).div_euclid(per);
         // Only a count of more than 292 years saturates.
         ShowTime::from_nanos(i64::try_from(nanos).unwrap_or(if nanos < 0 { i64::MIN } else { i64::MAX }))
@@ -222,6 +223,7 @@ impl Timecode {
         if seconds == 0 && u32::from(frames) < DROPPED && !minute.is_multiple_of(10) {
             return Err(TimecodeError::LeftOut(label));
         }
+        // Two labels less for each minute so far, but for every tenth.
         Ok(Self { rate, index: counted - DROPPED * (minute - minute / 10) })
     }
 
@@ -237,6 +239,7 @@ impl Timecode {
     /// Frames since the label of midnight, less whole days.
     pub(crate) fn at_index(rate: FrameRate, index: i64) -> Self {
         let day = rate.labels_of_a_day();
+        // Never below zero: the frame before midnight is the last of the day before.
         let index = u32::try_from(index.rem_euclid(i64::from(day))).unwrap_or(0);
         Self { rate, index }
     }
@@ -258,6 +261,7 @@ impl Timecode {
     pub(crate) fn since(self, earlier: Self) -> i64 {
         let day = i64::from(self.rate.labels_of_a_day());
         let ahead = (i64::from(self.index) - i64::from(earlier.index)).rem_euclid(day);
+        // A film that starts before midnight goes on after it.
         if ahead >= day / 2 { ahead - day } else { ahead }
     }
 

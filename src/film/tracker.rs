@@ -99,9 +99,10 @@ pub(crate) struct SourceTracker {
     was_misfit: bool,
     /// When the last one did that fitted.
     fitted_at: MonoTime,
-    /// Positions that fitted since the estimate began, or jumped; how many it takes.
+    /// Positions that fitted since the estimate began, or jumped.
     fitted: u32,
-    needed: u32,
+    /// Whether rate and noise are known from before that.
+    is_known: bool,
     held: HeldSince,
     /// For how long after the newest position the estimate may run on.
     patience: Duration,
@@ -154,7 +155,7 @@ impl SourceTracker {
             was_misfit: false,
             fitted_at: now,
             fitted: 0,
-            needed: traits.samples(),
+            is_known: false,
             held: HeldSince::default(),
             patience: traits.silent_for,
             freewheel: 1.0,
@@ -203,6 +204,8 @@ impl SourceTracker {
                 self.recent.clear();
                 self.on_sign(SourceSign::Stop, at);
             }
+            // Said of a film that seats follow it is nothing new, and its place is not to be found again.
+            FilmWord::Play if self.state.may_lead() => {}
             FilmWord::Play => {
                 self.begin_anew();
                 self.on_sign(SourceSign::Play, at);
@@ -271,6 +274,7 @@ impl SourceTracker {
     fn on_position(&mut self, told: &Observation, media: ShowTime) {
         let at = told.at;
         let is_of_a_film = media.as_nanos().unsigned_abs() <= crate::time::nanos(LONGEST);
+        // In order alone: what was learned since an older one cannot be taken out of the estimate for it.
         if self.winding || !is_of_a_film || self.newest.is_some_and(|newest| at <= newest.at) {
             self.counts.rejected += 1;
             return;
@@ -325,7 +329,7 @@ impl SourceTracker {
                 }
                 estimate.move_to(at, media.as_secs_f64());
                 self.epoch = self.epoch.wrapping_add(1);
-                self.needed = SAMPLES_AGAIN;
+                self.is_known = true;
             }
         }
     }
@@ -335,6 +339,7 @@ impl SourceTracker {
         let at = told.at;
         let Some(estimate) = &mut self.estimate else { return };
         estimate.predict(at);
+        // Without the late bias: that moves what is told, and in here would be learned a second time.
         let missed = media.as_secs_f64() - estimate.media_s(at);
         let fits = missed.abs() <= estimate.gate_s(told.bound);
         self.misfits += (if fits { 0.0 } else { 1.0 } - self.misfits) * MISFITS_SHARE;
@@ -364,11 +369,12 @@ impl SourceTracker {
         if let Some(ahead) = self.recent.agreed(window, span, estimate.rate(), estimate.noise_s()) {
             estimate.move_to(at, media.as_secs_f64() + ahead);
             self.fitted_at = at;
+            // What has agreed once is not to move it again with the next sample.
             self.recent.clear();
             self.epoch = self.epoch.wrapping_add(1);
             // A cut of a frame is slewed: the noise is known, so nobody has to hold until the new place is.
             if (missed + ahead).abs() > FILM_FRAME.as_secs_f64() {
-                (self.fitted, self.needed) = (1, SAMPLES_AGAIN);
+                (self.fitted, self.is_known) = (1, true);
                 self.on_sign(SourceSign::Jump, at);
             } else {
                 self.counts.jumps += 1;
@@ -391,6 +397,7 @@ impl SourceTracker {
     /// A film that stands runs again if its positions advance. A single one that still comes from before a told stop does not.
     fn watch_for_play(&mut self, at: MonoTime) {
         let speed = self.recent.speed(self.window(), self.span(), self.traits.sigma_s, self.traits.sigma_s);
+        // At half speed and more: a place that creeps in its noise is a film that stands.
         if speed.is_some_and(|speed| speed.rate > speed.off.max(0.5)) {
             self.begin_anew();
             self.on_sign(SourceSign::Play, at);
@@ -411,6 +418,7 @@ impl SourceTracker {
         // The filter knows the rate best, once it knows it.
         let fine = self.estimate.as_ref().filter(|_| self.fitted > SAMPLES);
         let off = |rate: f64, by: f64| (rate - 1.0).abs() > self.band + by;
+        // Beyond the band by more than it may be off: noise alone must not stop seats.
         let is_off = speeds.iter().flatten().any(|speed| off(speed.rate, speed.off))
             || fine.is_some_and(|estimate| off(estimate.rate(), 3.0 * estimate.rate_sigma()));
         if is_off || is_backward {
@@ -437,12 +445,15 @@ impl SourceTracker {
         let Some(estimate) = &self.estimate else { return };
         let limit = if self.traits.coarse { SURE_COARSE_S } else { SURE_S };
         let is_in_band = (estimate.rate() - 1.0).abs() <= self.band + 2.0 * estimate.rate_sigma();
-        if 3.0 * estimate.sigma_s(at) >= limit || self.fitted < self.needed || !is_in_band {
+        let needed = if self.is_known { SAMPLES_AGAIN } else { self.traits.samples() };
+        if 3.0 * estimate.sigma_s(at) >= limit || self.fitted < needed || !is_in_band {
             self.held.sure = None;
             return;
         }
         let since = *self.held.sure.get_or_insert(at);
-        if self.needed == SAMPLES_AGAIN || at.since(since) >= SURE_FOR {
+        // Not where the noise is known from before, nor of what tells less often than that: its samples have taken longer.
+        let is_slow = self.newest.is_some_and(|newest| newest.period >= SURE_FOR);
+        if self.is_known || is_slow || at.since(since) >= SURE_FOR {
             self.on_sign(SourceSign::Sure, at);
         }
     }

@@ -52,6 +52,7 @@ impl WallFilm {
         // By the clock as it is now: one that was wrong until now, and past the begin, has begun a film that nobody saw begin.
         let runs = since_ns(self.stepped_ns.saturating_add(step)) >= 0;
         let error_ns = STEP_NS.saturating_add(signed(crate::time::nanos(reading.bound)));
+        // Seats that follow must not jump because somebody mends the hour.
         if runs && step.saturating_abs() > error_ns {
             self.stepped_ns = self.stepped_ns.saturating_add(step);
             self.steps += 1;

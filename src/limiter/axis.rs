@@ -6,8 +6,10 @@ use crate::time::ShowTime;
 
 /// What the way back takes at the least, as a join does.
 const SHORTEST_RETURN: f64 = 1.5;
+// The other half is for what it fades onto (docs/limiter.md, section 7).
 /// Share of the limits that fading over a whole stroke takes by itself.
 const FADE_SHARE: f64 = 0.5;
+// What the product rule adds shrinks with the length; what refuses even this leaves room for none.
 /// How many times as long a way back may become after several that did not lead there.
 const LONGEST: f64 = 8.0;
 
@@ -43,6 +45,8 @@ pub(super) struct AxisLimiter {
 impl AxisLimiter {
     pub(super) fn new(limits: AxisLimits, spacing: Spacing) -> Self {
         // The greatest derivatives of u^3 (10 - 15 u + 6 u^2) are 15/8, 10/sqrt 3 and 60 (docs/limiter.md, section 7).
+        // They go by 1/S, 1/S² and 1/S³ of its length S: the longest of
+        // the three keeps all. On the bench seat velocity rules, 2.3 s.
         let share = |limit: f64| FADE_SHARE * limit;
         let fade = (1.875 / share(limits.velocity))
             .max((5.7735 / share(limits.acceleration)).sqrt())
@@ -72,6 +76,7 @@ impl AxisLimiter {
         match self.mode {
             // What the fade adds to what it fades onto shrinks with its length, so a longer one may be let pass.
             AxisMode::Returning { .. } => self.stretch = (2.0 * self.stretch).min(LONGEST),
+            // What was asked so far was measured as what was sent: of it alone nothing is known yet.
             AxisMode::Following => self.asked.forget(),
             AxisMode::Braking { .. } => {}
         }
@@ -90,6 +95,7 @@ impl AxisLimiter {
     pub(super) fn wish(&self, asked: f64, seconds: f64) -> (AxisMode, f64) {
         match self.mode {
             AxisMode::Following => (AxisMode::Following, asked),
+            // From rest alone: a fade begins without speed, and would stop a braking seat at once.
             AxisMode::Braking { brake, after } if after > brake.seconds() && self.asked.is_sound() => {
                 let back = AxisMode::Returning {
                     from: brake.position(after),
@@ -108,6 +114,7 @@ impl AxisLimiter {
 
     /// Takes up the mode that a wish came with.
     pub(super) fn take_up(&mut self, mode: AxisMode) {
+        // This way back has led there; the next may be short again.
         if mode == AxisMode::Following {
             self.stretch = 1.0;
         }
@@ -123,6 +130,7 @@ fn fade_on(mode: AxisMode, asked: f64, passed: f64) -> (AxisMode, f64) {
         return (AxisMode::Following, asked);
     }
     let u = after / seconds;
+    // Speed and acceleration of the weight are 0 at both ends, so that neither seam has a step.
     let weight = u * u * u * (10.0 + u * (6.0 * u - 15.0));
     (AxisMode::Returning { from, after, seconds }, from + weight * (asked - from))
 }
@@ -147,6 +155,7 @@ impl AskedPose {
     }
 
     fn look(&mut self, asked: f64, time_ms: u32, limits: &AxisLimits) -> bool {
+        // In the measure it would hide: nothing compares as larger, so differences over it would read 0.
         if !asked.is_finite() {
             self.forget();
             return true;
@@ -164,6 +173,7 @@ impl AskedPose {
 
     /// True if all that the measure looks back on has kept the limits.
     const fn is_sound(&self) -> bool {
+        // The longest difference spans 3 m + 1 poses; the first ones were judged by less than that.
         self.sound > 3 * self.spacing.m + 1
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::plain;
 
+// Chosen: one is an accident, three in a second have a cause that will make more of them.
 /// Clamps within a second that make a fault.
 const FAULT: usize = 3;
 /// The second they have to fall into, ms; also how long a single clamp may last before it is one.
@@ -78,8 +79,10 @@ pub(super) struct Counter {
 impl Counter {
     /// Hears of a tick's end: whether a pose was refused on it, and whether something else was sent than asked.
     pub(super) fn tick(&mut self, time_ms: u32, refused: bool, held: bool) {
+        // By the Times of frames: while none goes out no seat is held back from anything.
         self.at_ms += u64::from(time_ms);
         self.counts.held_ticks += u64::from(held);
+        // By beginnings: the same clamp has ten times the frames at ten times the rate.
         if refused && !self.clamping {
             self.counts.clamps += 1;
             self.began.rotate_right(1);
@@ -87,6 +90,7 @@ impl Counter {
             let earliest = self.began[FAULT - 1];
             self.counts.fault |= earliest.is_some_and(|began| self.at_ms - began <= FAULT_MS);
         } else if refused {
+            // One that lasts is no better than three: the seat is not where the show is.
             self.counts.fault |= self.began[0].is_some_and(|began| self.at_ms - began >= FAULT_MS);
         }
         self.clamping = refused;

@@ -122,6 +122,7 @@ impl FastPath {
     }
 
     fn look_at_times(&mut self, frame: f64) {
+        // All divisions are made here, where a Time differs from those before: a pose only multiplies.
         let two = frame + self.times[0];
         self.spans = FrameSpans {
             times: [frame, self.times[0], self.times[1]],
@@ -159,6 +160,7 @@ impl FastPath {
 
     /// Takes what is sent, calm or not.
     pub(super) fn take(&mut self, pose: &Pose) {
+        // What the long test let pass counts as well: the measure sees it for just as long.
         let (seen, _) = self.see(pose);
         self.keep(pose, &seen);
     }
@@ -270,6 +272,7 @@ impl AxisGroup {
             *sum += beyond;
         }
         if ends {
+            // Begun anew, not subtracted from: over hours of that the sums would gather rounding.
             self.sums = [[[0.0; WIDTH]; 2], self.sums[0]];
         }
     }
@@ -282,6 +285,7 @@ impl AxisGroup {
         let change = velocity - self.velocity[axis];
         let acceleration = change * spans.double_per_two;
         let jerk = (acceleration - self.acceleration[axis]) * spans.triple_per_three;
+        // Here `max` makes 0 of what is no number; such a pose fails the comparisons below.
         let beyond = [
             (acceleration.abs() - rows.acceleration[axis]).max(0.0),
             (jerk.abs() - rows.jerk[axis]).max(0.0),
@@ -292,6 +296,8 @@ impl AxisGroup {
         let (rising, falling) = (pull.max(0.0), (-pull).max(0.0));
         let up = speed.max(0.0) + rising * rising * rows.half_per_jerk[axis];
         let down = (-speed).max(0.0) + falling * falling * rows.half_per_jerk[axis];
+        // Limits without their slack: what is that close is for the long test. The
+        // ways may end 1e-9 outside, a matter of last bits, as a brake is held inside.
         // A brake from here is seen together with old poses by one more acceleration, and by fewer than three more jerks
         // (docs/limiter.md, section 3).
         let calm = (self.sums[0][0][axis] + self.sums[1][0][axis] + 2.0 * beyond[0] <= rows.rest[0][axis])

@@ -68,6 +68,7 @@ impl Reciprocals {
     #[inline]
     pub(super) fn newest(&self, shown: Shown) -> (f64, f64) {
         let [one, two] = self.spans;
+        // Newton's form of the cubic, differentiated at the newest of its nodes.
         let velocity = shown.slope + one * (shown.acceleration / 2.0 + two * shown.jerk / 6.0);
         (velocity, shown.acceleration + (one + two) * shown.jerk / 3.0)
     }
@@ -88,6 +89,7 @@ impl PoseHistory {
         self.newest = ROWS - 1;
         self.even = 0;
         self.differences = None;
+        // As if frames had held it there all along: what comes first is measured against rest.
         for (at, back) in self.at_ms.iter_mut().rev().zip(0..) {
             *at = -back * i64::from(period_ms);
         }
@@ -109,11 +111,13 @@ impl PoseHistory {
 
     #[inline]
     const fn row(&self, back: usize) -> usize {
+        // It may wrap below 0: ROWS divides 2^64, so that the row is right all the same.
         (self.newest + 1).wrapping_sub(back) % ROWS
     }
 
     /// The two differences that a pose reached `time_ms` after the newest makes.
     pub(super) fn differences(&mut self, time_ms: u32) -> [Reciprocals; 2] {
+        // All 3 m Times of the longest difference are this one then: nothing has to be divided anew.
         let even = self.even > 3 * self.spacing.m && self.last_time() == i64::from(time_ms);
         if let (true, Some(differences)) = (even, self.differences) {
             return differences;

@@ -28,6 +28,7 @@ impl AxisLimits {
     /// True if the next pose keeps the limits: inside the stroke, frame velocity, its step, both distances. Not-a-number does not.
     #[inline]
     pub(super) fn hold(&self, next: &NextPose) -> bool {
+        // As `value <= limit`: what is no number fails that, and would pass `!(value > limit)`.
         let [n, m] = next.shown;
         (next.position >= 0.0)
             & (next.position <= 1.0)

@@ -121,11 +121,13 @@ impl Limiter {
     }
 
     fn rest_in(&mut self, pose: Pose) {
+        // A pose outside is never sent: an axis that is said to stand there could not be told to stay.
         let pose = held_inside(pose);
         self.history.rest(pose, self.times.usual_ms());
         self.fast_path.rest(pose, f64::from(self.times.usual_ms()) * 1e-3);
         self.axes.iter_mut().for_each(AxisLimiter::rest);
-        self.following = true;
+        // Calm poses pass without being judged: of a seat that nobody has placed none may.
+        self.following = self.is_seeded;
     }
 
     /// Counts since the limiter was made.
@@ -153,6 +155,8 @@ impl Limiter {
     pub fn admit(&mut self, pose: &mut Pose, index: u64, asked: Provenance) -> Admitted {
         let time_ms = self.times.of(index);
         self.fast_path.begin(f64::from(time_ms) * 1e-3);
+        // The sums know what was sent. While an axis goes its own way
+        // that is not what is asked, so none of the lane passes by them.
         if self.following && self.fast_path.admit_calm(pose) {
             self.history.push(*pose, time_ms);
             self.counter.tick(time_ms, false, false);
@@ -194,11 +198,13 @@ impl Limiter {
     #[cold]
     #[inline(never)]
     fn judge(&mut self, pose: &mut Pose, index: u64, time_ms: u32, asked: Provenance) -> Admitted {
+        // Any pose may be a jump for a seat that nobody has placed, so the show has to end.
         if !self.is_seeded {
             *pose = *self.history.last();
             return Admitted::Fault;
         }
         let frame = &self.frame(index, time_ms);
+        // Not up to the first refusal: each axis brakes from its own motion, and the others go on.
         let (mut refused, mut held) = (false, false);
         for (axis, position) in pose.iter_mut().enumerate().take(self.axes.len()) {
             let (sent, was_refused) = self.judge_axis(axis, *position, frame, asked);
@@ -207,6 +213,7 @@ impl Limiter {
             held |= self.axes[axis].mode != AxisMode::Following;
         }
         self.following = !held;
+        // What is sent counts, not what was asked: differences of the next frames reach back to it.
         self.fast_path.take(pose);
         self.history.push(*pose, time_ms);
         self.counter.tick(time_ms, refused, held);
@@ -220,10 +227,13 @@ impl Limiter {
     /// What one axis is sent, and whether what was asked broke a limit.
     fn judge_axis(&mut self, axis: usize, asked: f64, frame: &Frame, by: Provenance) -> (f64, bool) {
         let state = &mut self.axes[axis];
+        // As long as it follows, what is asked is what is sent, and that is measured below.
+        // Apart from it it is looked at by itself, to know when it may be followed again.
         let broken = state.mode != AxisMode::Following && state.look(asked, frame.time_ms);
         let (mode, wish) = state.wish(asked, frame.seconds);
         let next = self.next(axis, wish, frame);
         let held = self.axes[axis].limits.hold(&next);
+        // A way to rest needs no other way out: what is left of it is one.
         if let AxisMode::Braking { .. } = mode {
             if held {
                 self.axes[axis].take_up(mode);
@@ -242,12 +252,12 @@ impl Limiter {
     }
 
     /// True if a way to rest goes on from this pose.
-    ///
-    /// Of what was proved, one does: it can be followed to its end within the limits, and from its last pose a way to rest
-    /// within them is part of the proof (`proof::end`); a planned move ends at rest or on the cue. The stroke has room for a
-    /// stop at once as well, since what turns inside it leaves room to turn sooner. That much is asked here all the same, in
-    /// closed form: what was said to be proved and runs out of its stroke is refused while there is room left.
     fn leads_on(&mut self, axis: usize, next: &NextPose, frame: &Frame, by: Provenance) -> bool {
+        // Of what was proved, one does: it can be followed to its end within the limits, and from its last
+        // pose a way to rest within them is part of the proof (`proof::end`); a planned move ends at rest or
+        // on the cue. The stroke has room for a stop at once as well, since what turns inside it leaves room
+        // to turn sooner. That much is asked all the same, in closed form: what was said to be proved and
+        // runs out of its stroke is refused while there is room left.
         (by == Provenance::Proved && self.has_room(axis, next, frame))
             || self.leaves_a_way_out(axis, next, frame)
     }
@@ -258,6 +268,7 @@ impl Limiter {
         let limits = Limits { velocity, acceleration, jerk };
         frame.differences.iter().zip(next.shown).any(|(difference, shown)| {
             let (velocity, acceleration) = difference.newest(shown);
+            // At its end a cubic through four poses may bend by more than what was proved does anywhere.
             let acceleration = acceleration.clamp(-limits.acceleration, limits.acceleration);
             let state = AxisState { position: next.position, velocity, acceleration };
             // No way peaks lower than braking with everything (docs/limiter.md, section 4).
@@ -268,6 +279,8 @@ impl Limiter {
     /// True if the axis can come to rest after this pose; the way is kept for the next tick.
     fn leaves_a_way_out(&mut self, axis: usize, next: &NextPose, frame: &Frame) -> bool {
         let state = &mut self.axes[axis];
+        // The brake that a calm pose leaves is found again from the same
+        // poses (docs/limiter.md, section 3): nothing has to be kept of it.
         if self.fast_path.is_calm(axis, next.position) {
             return true;
         }
@@ -276,6 +289,7 @@ impl Limiter {
         let mut outlook = StopPath::new(&self.history, axis, &state.limits, self.times, frame.time_ms, sent);
         let way = outlook.way(state.habit);
         if let Some((brake, habit)) = way {
+            // With its frame: a tick later it begins where the axis no longer is.
             state.way_out = Some((frame.index, brake));
             state.habit = habit;
         }
@@ -295,6 +309,8 @@ impl Limiter {
         }
         let state = &self.axes[axis];
         let mut outlook = StopPath::new(&self.history, axis, &state.limits, self.times, frame.time_ms, None);
+        // Where no way keeps the limits a person still has to be brought
+        // to rest: by the one that is least beyond, and that is counted.
         let brake = outlook.way(state.habit).map_or_else(|| outlook.least(), |way| way.0);
         let next = self.next(axis, brake.position(frame.seconds), frame);
         if !self.axes[axis].limits.hold(&next) {
@@ -316,6 +332,7 @@ fn exceeded(limits: &AxisLimits, next: &NextPose) -> (Limit, f64) {
         (Limit::Acceleration, n.acceleration.abs().max(m.acceleration.abs()) / limits.acceleration),
         (Limit::Jerk, n.jerk.abs().max(m.jerk.abs()) / limits.jerk),
     ];
+    // What is within the slack was let pass: what is refused with no more than that lacked a way to rest.
     let worst =
         shares.into_iter().fold((Limit::WayOut, SLACK), |most, of| if of.1 > most.1 { of } else { most });
     if worst.0 == Limit::WayOut { (Limit::WayOut, 1.0) } else { worst }
@@ -324,4 +341,27 @@ fn exceeded(limits: &AxisLimits, next: &NextPose) -> (Limit, f64) {
 /// Positions held inside the stroke; what is no number rests at its lower end.
 fn held_inside(pose: Pose) -> Pose {
     pose.map(|position| if position.is_nan() { 0.0 } else { position.clamp(0.0, 1.0) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::asked::{read, window};
+    use crate::motion::AxisGeometry;
+
+    #[test]
+    fn before_it_is_told_where_the_lane_stands_it_lets_nothing_pass_whatever_rests() {
+        let window = window(Limits::of(&AxisGeometry::BENCH));
+        let mut limiter = Limiter::new(&window, Rate::from_hz(100.0));
+        for index in 0..3 {
+            for provenance in [Provenance::Proved, Provenance::Anyhow] {
+                let admitted = limiter.admit(&mut [0.0; MAX_AXES], index, provenance);
+                assert_eq!(admitted, Admitted::Fault, "frame {index}");
+            }
+            limiter.rest();
+        }
+        let stands = [0.25; MAX_AXES];
+        limiter.restart(&read(&window, stands));
+        assert_eq!(limiter.admit(&mut { stands }, 3, Provenance::Anyhow), Admitted::Passed);
+    }
 }

@@ -49,6 +49,7 @@ impl<'a> StopPath<'a> {
         sent: Option<f64>,
     ) -> Self {
         let (mut at, mut positions) = ([0.0; PAST + AHEAD], [0.0; PAST + AHEAD]);
+        // Without a pose that is sent the way begins at the last that was, one frame ago.
         let skip = usize::from(sent.is_none());
         let now = history.seconds_since(skip, time_ms);
         for back in 0..PAST {
@@ -68,11 +69,14 @@ impl<'a> StopPath<'a> {
     /// When the frames ahead are reached, `first` being the Time of the first if it is known already.
     fn look_ahead(&mut self, mut times: FrameTimes, first: Option<u32>) {
         let mut first = first;
+        // By the Times that these very frames will have: a way judged
+        // with even ones could fail with those that alternate.
         let mut sum = 0.0;
         for at in &mut self.at[PAST..] {
             sum += f64::from(first.take().unwrap_or_else(|| times.next())) * 1e-3;
             *at = sum;
         }
+        // One set of reciprocals for all places is right only if no difference reaches back to another Time.
         let reach = 3 * self.spacing.m;
         let past = &self.at[PAST - 1 - reach.min(PAST - 1)..=PAST];
         if times.are_even() && past.windows(2).all(|pair| (pair[1] - pair[0] - self.period).abs() < 1e-9) {
@@ -104,6 +108,7 @@ impl<'a> StopPath<'a> {
 
     /// The way to rest that exceeds the limits least.
     pub(super) fn least(&mut self) -> Halt {
+        // One that turns out worse than the best so far is left there, so most cost a few frames.
         let mut least: Option<(Halt, f64)> = None;
         for way in 0..WAYS {
             let Some(brake) = self.brake(way) else { continue };
@@ -120,6 +125,7 @@ impl<'a> StopPath<'a> {
         let share = SHARES[way % SHARES.len()];
         let (kind, rest) = (way / OF_A_KIND, way % OF_A_KIND / SHARES.len());
         let (part, cubic) = (PARTS[rest % PARTS.len()], rest < PARTS.len());
+        // 0 divides nothing: frame to frame, as the fast path looks, so that its brake is among the ways.
         let apart = self.spacing.n.checked_div(part).unwrap_or(1).max(1);
         let difference = self.difference(PAST - 1, apart);
         let mut shown = difference.show(self.nodes(PAST - 1, apart));
@@ -128,8 +134,10 @@ impl<'a> StopPath<'a> {
         }
         let (velocity, acceleration) = difference.newest(shown);
         let limits = self.limits;
+        // Taken on to the newest pose, both may come out beyond limits that the motion itself keeps.
         let velocity = velocity.clamp(-limits.velocity, limits.velocity);
         let most = PLANNED * limits.acceleration;
+        // What is cut off was let go of before that pose, so the speed has changed by as much already.
         let excess = acceleration.clamp(-most, most) - acceleration;
         let from = AxisState { position: self.positions[PAST - 1], velocity, acceleration }.nudged_by(
             excess,
@@ -152,6 +160,8 @@ impl<'a> StopPath<'a> {
     /// The greatest share of a limit that the brake takes; at least `enough` where it stops looking.
     fn worst(&mut self, brake: &Halt, enough: f64) -> f64 {
         let frames_ahead = self.frames_ahead(brake);
+        // No test of the stroke: a way that would leave it is held at
+        // its end, and so sudden a stop shows as acceleration and jerk.
         let mut worst = 0.0_f64;
         for place in PAST..PAST + frames_ahead {
             self.positions[place] = brake.position(self.at[place]);
@@ -176,6 +186,7 @@ impl<'a> StopPath<'a> {
         let velocity = (now.1 - before.1) / (now.0 - before.0);
         let step = velocity - (before.1 - earlier.1) / (before.0 - earlier.0);
         let limits = self.limits;
+        // The step as well: a way that trembles from frame to frame could pass both distances.
         let mut worst = (velocity.abs() / limits.velocity).max(step.abs() / limits.step);
         for (count, apart) in [self.spacing.n, self.spacing.m].into_iter().enumerate() {
             let difference = self.even.map_or_else(|| self.difference(place, apart), |even| even[count]);

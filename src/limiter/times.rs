@@ -46,6 +46,7 @@ impl FrameTimes {
     #[inline]
     pub(super) fn next(&mut self) -> u32 {
         self.frame += 1;
+        // The remainder wraps at each frame that is a millisecond longer; no sum grows with the frames.
         self.over += self.period.1;
         if self.over < self.millihertz {
             return self.period.0;
@@ -66,6 +67,7 @@ impl FrameTimes {
 
     /// The Time that most frames have, ms.
     pub(super) fn usual_ms(&self) -> u32 {
+        // The first Time is the period rounded to the nearest, which at least half of the frames have.
         self.rate.time_ms(0)
     }
 }

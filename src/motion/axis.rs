@@ -149,6 +149,12 @@ impl AxisGeometry {
         self.max_shaken_acceleration.unwrap_or(usual)
     }
 
+    /// The greatest velocity and acceleration of motion and vibration together.
+    #[must_use]
+    pub(crate) fn most_shaken(&self) -> [f64; 2] {
+        [self.shaken_velocity(), self.shaken_acceleration()]
+    }
+
     /// Where the motor stands at `fraction` of the range: rounded to nearest, ties away from zero, saturating.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a saturating cast is what is wanted")]

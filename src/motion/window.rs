@@ -55,6 +55,8 @@ pub struct Slot {
     pub(crate) unit: AxisUnit,
     /// What the axis may do.
     pub(crate) limits: Limits,
+    /// The greatest velocity and acceleration of motion and vibration together, strokes per second and second squared.
+    pub(crate) most_shaken: [f64; 2],
     /// Between which fractions of the stroke it may be sent, the lower first: the whole stroke, unless it is held.
     reach: (f64, f64),
 }
@@ -77,6 +79,7 @@ impl Slot {
             stroke: geometry.stroke(),
             unit: geometry.unit,
             limits: Limits::of(geometry),
+            most_shaken: geometry.most_shaken().map(|most| most / geometry.stroke()),
             reach: (0.0, 1.0),
         }
     }

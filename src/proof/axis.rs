@@ -82,6 +82,7 @@ impl Subject<'_> {
         let pieces = AxisPieces::new(self.timeline, self.axis, &self.slot);
         let Allowed { limits, step, .. } = self.allowed(terms);
         let mut judge = |quantity, stencils: &[_], order, limit: f64| {
+            // With the limiter's own slack: what passes here must not be held there.
             let swept = sweep(&pieces, stencils, order, limit * SLACK);
             self.note(quantity, &swept, limit, found);
             self.worst(&swept, limit)

@@ -21,6 +21,7 @@ impl Digest {
     #[must_use]
     pub fn of(cue: &Cue) -> Self {
         let mut sink = Sink { hash: Sha256::new(), buffer: Vec::with_capacity(CHUNK + 8) };
+        // Each text and list with its length first: without it two cues could run together to the same bytes.
         sink.text(&cue.unit_words());
         sink.text(cue.interpolation().name());
         sink.count(cue.axes());

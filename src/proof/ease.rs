@@ -12,6 +12,7 @@ const FINE: i64 = 5_000_000;
 
 /// The cue with each of these endings, and the seconds that it takes; `None` if it jumps from row to row.
 pub(super) fn eased(timeline: &Timeline) -> impl Iterator<Item = (f64, Cue)> {
+    // Steps run through more slowly are as high as before.
     let jumps = timeline.cue().interpolation() == Interpolation::Hold;
     let half = timeline.duration().as_secs_f64() / 2.0;
     let lengths = LENGTHS.into_iter().filter(move |length| !jumps && *length <= half);

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::violation::Breach;
 use super::{Found, LimitedEffect, Terms};
 use crate::cue::{Effects, TrackStep};
-use crate::time::{ShowTime, nanos};
+use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
 /// A time for which an effect is on.
@@ -33,7 +33,7 @@ pub(super) fn prove(timeline: &Timeline, terms: &Terms, found: &mut Vec<Found>) 
             found.push(Found { at, axis: None, column: column.clone(), breach });
         };
         for run in &runs {
-            if let Some(breach) = wrong_length(run, effect, terms.rate.period()) {
+            if let Some(breach) = wrong_length(run, effect, terms.rate) {
                 note(run.from, breach);
             }
         }
@@ -59,6 +59,7 @@ fn on_while<T: Copy>(steps: &[TrackStep<T>], end: ShowTime, is_on: impl Fn(T) ->
     let mut runs: Vec<EffectRun> = Vec::new();
     for (index, step) in steps.iter().enumerate().filter(|(_, step)| is_on(step.value)) {
         let until = steps.get(index + 1).map_or(end, |next| next.at);
+        // Steps of other effects lie between: for this one it is one time.
         match runs.last_mut().filter(|last| last.until == step.at) {
             Some(last) => last.until = until,
             None => runs.push(EffectRun { from: step.at, until }),
@@ -67,13 +68,14 @@ fn on_while<T: Copy>(steps: &[TrackStep<T>], end: ShowTime, is_on: impl Fn(T) ->
     runs
 }
 
-/// Frames can only switch every period, wherever they fall: a run is on in as many frames as there are whole periods in it,
-/// or in one more.
-fn wrong_length(run: &EffectRun, effect: &LimitedEffect, period: Duration) -> Option<Breach> {
+/// What is wrong with how long frames have it on, which may be a period more or less than the cue.
+fn wrong_length(run: &EffectRun, effect: &LimitedEffect, rate: Rate) -> Option<Breach> {
     let (at, on, limit) = (run.from, run.length(), &effect.limit);
-    let frames = nanos(on) / nanos(period);
-    let shortest = Duration::from_nanos(frames * nanos(period));
-    let longest = if shortest == on { on } else { shortest + period };
+    // Frames can only switch every period, wherever they fall: a run is on in as many frames as there are
+    // whole periods in it, or in one more.
+    let frames = rate.periods_in(on);
+    let shortest = rate.offset(frames);
+    let longest = if shortest == on { on } else { rate.offset(frames + 1) };
     if shortest < limit.min_on {
         return Some(Breach::OnTooShort { at, on, sent: shortest, least: limit.min_on });
     }
@@ -84,6 +86,8 @@ fn wrong_length(run: &EffectRun, effect: &LimitedEffect, period: Duration) -> Op
 /// The busiest window, where it is too busy: one that begins where a run begins, or ends where one ends.
 fn too_busy(runs: &[EffectRun], effect: &LimitedEffect) -> Option<(ShowTime, Breach)> {
     let (most, window) = (effect.limit.max_duty?, effect.limit.duty_window);
+    // What a window holds grows or shrinks in straight lines as it is moved; it turns from
+    // growing to shrinking only where its begin meets one of a run, or its end one's end.
     let starts = runs.iter().flat_map(|run| [run.from, run.until - window]);
     let on = |from: ShowTime| -> f64 {
         let until = from + window;

@@ -6,7 +6,7 @@
 //! stroke, up to where it turns by itself or ends. So where the cue turns, the stroke has room for a stop at any instant
 //! before; and where it ends without turning, if there is room from its last pose. Room for every stop is thus a matter of
 //! the last pose alone, as far as the curve itself keeps the limits; where only the measure does, because a corner is too
-//! short for it, the gate finds the stop that the measure takes no more of than of the corner.
+//! short for it, the limiter finds the stop that the measure takes no more of than of the corner.
 
 use super::pieces::AxisPieces;
 use super::stencil::{Stencil, Stencils};
@@ -60,6 +60,7 @@ pub(super) fn no_rest(pieces: &AxisPieces, allowed: &Allowed, stencils: &Stencil
     let limits = allowed.limits;
     // The stroke has to suffice at any pace; for roughness the clock's counts, which pace is back at before the end.
     let hurried = from.at_pace(HURRY);
+    // A curve that only the measure keeps may bend beyond the limit; a brake begins at the limit.
     let acceleration = hurried.acceleration.clamp(-limits.acceleration, limits.acceleration);
     let missing = Halt::least_past(AxisState { acceleration, ..hurried }, limits, ROOM_SHARE);
     if missing > allowed.pulse {
@@ -73,8 +74,10 @@ fn too_rough(pieces: &AxisPieces, from: AxisState, allowed: &Allowed, stencils: 
     let limits = allowed.limits;
     let reach = stencils.reach();
     let ending = pieces.ending(reach, 1.0, 0.0);
+    // From gentle to hard, the first that keeps the measure; if none does, the least is told.
     let mut least: Option<(Quantity, f64, f64)> = None;
     for share in SHARES {
+        // Room was asked for above: here a way that leaves the stroke counts by its roughness alone.
         let way = Halt::inside(from, limits, &[share]).unwrap_or_else(|| Halt::full(from, limits));
         let then = ending.then(&way, reach);
         let swept = |quantity, stencils: &[Stencil], order, limit: f64| {

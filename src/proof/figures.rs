@@ -51,6 +51,7 @@ pub(super) fn of_pieces(
     let slot = timeline.unit(axis).slot(&on.seat, on.index, Some(axis));
     let stroke = on.geometry().stroke();
     let most = |stencils: &[Stencil], order| {
+        // Without a limit: what people judge a cue by is how much it asks, whoever may take it.
         let swept = sweep(pieces, stencils, order, f64::INFINITY);
         let at = ShowTime::from_nanos(swept.at);
         let line = timeline.cue().line(timeline.row_before(at));

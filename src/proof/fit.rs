@@ -96,6 +96,7 @@ pub(crate) fn fit(timeline: Timeline, terms: &Terms, manner: FitManner) -> Resul
     let before = prove(&timeline, terms.clone());
     refuse_others(&before)?;
     let mut best = best_of(&timeline, timeline.cue().clone(), terms, manner);
+    // Easing the end may move less than lowering the amplitude of all until it can rest, so both are tried.
     if !all_rest(&timeline, terms) {
         let rests = eased(&timeline).find(|(_, cue)| all_rest(&Timeline::new(cue.clone()), terms));
         let other = rests.and_then(|(seconds, cue)| {
@@ -203,6 +204,7 @@ fn amplitude(original: &Timeline, cue: Cue, terms: &Terms, per_axis: bool) -> Op
         for (factor, needed) in factors.iter_mut().zip(&needed) {
             *factor *= if per_axis { *needed } else { least };
         }
+        // With a thousandth of its motion a cue is none: it is refused, with what may help.
         if factors.iter().any(|factor| *factor < 1e-3) {
             return None;
         }
@@ -236,6 +238,7 @@ fn within_stroke(subject: &Subject<'_>) -> f64 {
     let reach = |value: f64| {
         let place = value * to_stroke + cue_zero;
         let room = if place < neutral { neutral } else { 1.0 - neutral };
+        // What is no further outside is held at the end instead of being refused.
         let is_inside = (-HELD_BACK..=1.0 + HELD_BACK).contains(&place);
         if is_inside { 1.0 } else { ROUNDING * room / (place - neutral).abs() }
     };
@@ -252,6 +255,7 @@ fn able_to_rest(subject: &Subject<'_>, terms: &Terms, stencils: &Stencils) -> f6
     if rests(1.0) {
         return 1.0;
     }
+    // Without amplitude it stands in its neutral pose, and rests.
     let (mut fits, mut fails) = (0.0, 1.0);
     for _ in 0..HALVINGS {
         let middle = f64::midpoint(fits, fails);
@@ -263,6 +267,7 @@ fn able_to_rest(subject: &Subject<'_>, terms: &Terms, stencils: &Stencils) -> f6
 /// The neutral pose of the first seat that takes each axis, in the cue's unit.
 fn neutral(cue: &Cue, terms: &Terms) -> [f64; MAX_AXES] {
     let mut pose = [0.0; MAX_AXES];
+    // Backwards: where several seats take an axis the first has the last word.
     for part in terms.parts.iter().rev() {
         for axis in part.axes.clone().filter(|axis| *axis < MAX_AXES) {
             let geometry = &part.seat.each[axis - part.axes.start];

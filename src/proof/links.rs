@@ -107,6 +107,7 @@ impl Line<'_> {
     fn prove(&self, seats: &[&Controller], all: &mut LinksProof) {
         let Some(Drives { drive, .. }) = seats[0].drives() else { return };
         let Some(driven) = self.driven(drive) else { return };
+        // One stands for all: they are of the same type, on the same axes.
         let part = Part { seat: Arc::clone(&seats[0].seat), axes: seats[0].window() };
         let terms = Terms { parts: vec![part], effects: Vec::new(), ..self.terms.clone() };
         let proof = prove_driven(self.timeline, &terms, &driven);
@@ -161,6 +162,7 @@ impl Line<'_> {
             let Breach::Drive(breach) = &violation.breach else { return None };
             part = part.min(breach.part_that_fits()?);
         }
+        // In whole percent, as people set levels.
         let percent = (100.0 * terms.level * part).floor();
         // What is rounded to counts does not shrink with the level.
         let levels = [percent, percent - 1.0, percent - 3.0].into_iter().filter(|level| *level > 0.0);
@@ -182,6 +184,7 @@ impl Line<'_> {
             return None;
         }
         let mut changes = self.load.changes();
+        // At the rate that it has it was refused.
         changes.retain(|(hz, _)| hz * self.period.as_secs_f64() > 1.0);
         // Proofs of a long film take a while: the least is looked for by halves.
         let passes = |(hz, _): &(f64, String)| {

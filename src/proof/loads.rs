@@ -50,6 +50,7 @@ impl Loads {
         let step = super::stencil::step_limit(acceleration, rate);
         let fill =
             |stencils: &[Stencil], order, limit: f64| fill(pieces, stencils, order, light * limit, span);
+        // As a part of a limit of its own, so that one row says of both how near they come.
         let steps = fill(&stencils.step, 2, step);
         let mut accelerations = fill(&stencils.acceleration, 2, acceleration);
         for (most, step_met) in accelerations.iter_mut().zip(steps) {
@@ -117,6 +118,7 @@ impl SumSink for Peaks {
 
     fn take(&mut self, from: i64, until: i64, cubic: Cubic) {
         let whole = seconds(until - from);
+        // A cell may lie over several stretches; each is told the most of its own part alone.
         for stretch in self.touched(from, until) {
             let begins = self.span * i64::try_from(stretch).expect("under a day");
             let (begin, end) = (begins.max(from), (begins + self.span).min(until));

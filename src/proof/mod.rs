@@ -36,6 +36,7 @@ pub use figures::figures;
 pub(crate) use fit::{FitManner, Fitted, fit};
 pub(crate) use links::{LinkPlay, LinksProof, prove_in, prove_links};
 pub(crate) use loads::Loads;
+pub(crate) use shake::shakes;
 pub(crate) use strain::{AxisStrain, strains};
 pub(crate) use terms::LimitedEffect;
 pub use terms::Terms;
@@ -126,6 +127,7 @@ pub fn prove(timeline: &Timeline, terms: Terms) -> Proof {
     let subjects = subjects(timeline, &terms);
     let axes = on_threads(&subjects, &mut found, |subject, found| subject.prove(&terms, &stencils, found));
     effects::prove(timeline, &terms, &mut found);
+    // By time before any is left out: people mend a cue from its beginning.
     found.sort_by_key(|one| one.at);
     let more = found.len().saturating_sub(FAULTS_TOLD) as u64;
     found.truncate(FAULTS_TOLD);
@@ -148,6 +150,7 @@ fn on_threads<P: Send>(
     };
     let mut all = Vec::with_capacity(subjects.len());
     thread::scope(|scope| {
+        // This thread takes the first share: with one processor no other is started.
         let (own, others) = subjects.split_at(share.min(subjects.len()));
         let prove_some = &prove_some;
         let workers: Vec<_> =
@@ -211,6 +214,7 @@ fn too_fast(seat: &SeatType, axis: &AxisGeometry) -> Option<Breach> {
 /// Frames whose Time the controller cuts (PA0b, IMAX manual 2.3.1).
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 1,000")]
 fn too_far_apart(seat: &SeatType, rate: Rate) -> Option<Breach> {
+    // Of Times that take turns the longer one is cut first.
     let frame = (1000.0 / rate.hz()).ceil() as u32;
     let most = seat.max_interval_ms;
     (frame > most).then(|| Breach::Interval { seat: seat.name.clone(), most, frame })

@@ -87,6 +87,7 @@ impl AxisPieces {
         let (ends, (scale, shift)) = (ends(timeline.unit(axis), slot), slot.scale());
         let (cue, times) = (timeline.cue(), timeline.cue().times());
         let extremes = &timeline.extremes()[axis];
+        // One look at the whole axis: most stay inside, and need not be cut where they are held.
         let leaves = place(slot, extremes.min.value) < ends.0 || place(slot, extremes.max.value) > ends.1;
         let mut pieces = Self::with_capacity(cue.rows());
         let (mut usual, mut per_second) = (0, 0.0);
@@ -135,6 +136,7 @@ impl AxisPieces {
         if low >= ends.0 && high <= ends.1 {
             return self.push(start, end, cubic.scaled(per_second));
         }
+        // Between two cuts it lies on one side of each end, so that its middle speaks for all of it.
         for pair in cuts(cubic, ends).windows(2) {
             let (begin, until) = (between(start, end, pair[0]), between(start, end, pair[1]));
             if begin >= until {
@@ -183,6 +185,7 @@ impl AxisPieces {
         let mut then = self.copied(0..self.list.len() - 1, |cubic| cubic);
         let (mut start, mut since) = (self.end(), 0.0);
         for (from, jerk, lasts) in way.stretches() {
+            // From the sum: were each span rounded, those behind would be moved by all of it.
             since += lasts;
             let end = self.end() + nanos(since);
             let AxisState { position, velocity, acceleration } = from;
@@ -191,6 +194,7 @@ impl AxisPieces {
         }
         let stays = Cubic([way.rest(), 0.0, 0.0, 0.0]);
         then.push(start, start + rest, stays);
+        // As every axis ends: with a piece that begins at the end and has no length.
         then.push(start + rest, start + rest, stays);
         then
     }
@@ -227,6 +231,7 @@ impl AxisPieces {
             let begin = piece.start.max(from);
             let end = self.list.get(index + 1).map_or(until, |next| next.start.min(until));
             let part = piece.cubic.from(seconds(begin - piece.start)).scaled(seconds(end - begin));
+            // Bezier points enclose it: only where these pass what was met are its extremes looked for.
             let (least, most) = part.bounds();
             if least < low.value || most > high.value {
                 for u in [0.0, 1.0].into_iter().chain(part.still()) {
@@ -281,6 +286,7 @@ fn crossing(cubic: Cubic, mut from: f64, mut to: f64, level: f64) -> Option<f64>
     if is_past(from) || !is_past(to) {
         return None;
     }
+    // More halvings than an argument from 0 to 1 has bits.
     for _ in 0..60 {
         let middle = f64::midpoint(from, to);
         if is_past(middle) { to = middle } else { from = middle }

@@ -14,13 +14,17 @@ use super::stencil::Stencils;
 use super::violation::{Breach, Quantity};
 use super::{Found, SLACK, Terms};
 use crate::cue::Vibration;
-use crate::time::ShowTime;
+use crate::motion::Slot;
+use crate::time::{Rate, ShowTime};
+use crate::timeline::Timeline;
 use crate::wire;
 
 /// In stretches of this length the motion under a vibration is looked at, nanoseconds: about what the measure spans.
 const STRETCH: i64 = 50_000_000;
+// It adds that much to a sum at the most (docs/limiter.md, section 7).
 /// The part of a limit below which motion is not measured closely.
 const LIGHT: f64 = 0.01;
+// Half of the slack, for the decimals of a file.
 /// What is left below a limit that an amplitude was lowered to.
 const ROUNDING: f64 = 0.9995;
 
@@ -31,23 +35,70 @@ pub(super) struct Under<'a> {
 }
 
 /// One vibration, as it is executed.
-struct AxisSwing {
-    low: At,
-    high: At,
+#[derive(Clone, Copy)]
+struct Swing {
+    /// Between which show times it is, nanoseconds.
+    from: i64,
+    until: i64,
     /// In strokes.
     amplitude: f64,
     hz: f64,
-    /// The greatest velocity and acceleration of motion meanwhile.
-    moved: [f64; 2],
 }
 
-impl AxisSwing {
+impl Swing {
+    /// One of an axis's vibrations on a slot, at the slot's level; `None` if it stands for none.
+    fn of(timeline: &Timeline, axis: usize, slot: &Slot, rate: Rate, index: usize) -> Option<Self> {
+        let steps = timeline.cue().tracks().vibration(axis).as_slice();
+        let (step, next) = (steps.get(index)?, steps.get(index + 1));
+        let Vibration { hz, amplitude } = step.value.into();
+        let amplitude = amplitude * slot.scale().0;
+        if hz <= 0.0 || amplitude <= 0.0 {
+            return None;
+        }
+        // What a frame switches acts while the axis moves to the frame's pose, a period later.
+        let until = next.map_or(timeline.duration(), |next| next.at + rate.period());
+        // As the frame says it, in whole eighths of a millisecond: acceleration goes by the square of it.
+        let hz = executed_hz(hz);
+        Some(Self { from: step.at.as_nanos(), until: until.as_nanos(), amplitude, hz })
+    }
+
     /// Velocity and acceleration of an amplitude of 1.
     fn per_amplitude(&self) -> [f64; 2] {
         // Derivatives of A sin (2 pi f t).
         let turns = TAU * self.hz;
         [turns, turns * turns]
     }
+}
+
+/// One vibration, and the motion that it is put on.
+struct AxisSwing {
+    swing: Swing,
+    low: At,
+    high: At,
+    /// The greatest velocity and acceleration of motion meanwhile.
+    moved: [f64; 2],
+}
+
+/// The greatest velocity and acceleration of the vibration of an axis, in each stretch of `span` nanoseconds; strokes and seconds. On a
+/// slot that carries it, at the slot's level.
+pub(crate) fn shakes(
+    timeline: &Timeline,
+    axis: usize,
+    slot: &Slot,
+    rate: Rate,
+    span: i64,
+) -> Box<[[f64; 2]]> {
+    let stretch = |at: i64| usize::try_from(at / span).unwrap_or(0);
+    let mut most = vec![[0.0_f64; 2]; stretch(timeline.duration().as_nanos()) + 1];
+    let last = most.len() - 1;
+    let steps = timeline.cue().tracks().vibration(axis).as_slice().len();
+    for swing in (0..steps).filter_map(|index| Swing::of(timeline, axis, slot, rate, index)) {
+        let shaken = swing.per_amplitude().map(|one| swing.amplitude * one);
+        for most in &mut most[stretch(swing.from).min(last)..=stretch(swing.until).min(last)] {
+            *most = [most[0].max(shaken[0]), most[1].max(shaken[1])];
+        }
+    }
+    most.into()
 }
 
 impl Subject<'_> {
@@ -62,11 +113,6 @@ impl Subject<'_> {
             let loads = Loads::over(pieces, self.slot.limits, stencils, terms.rate, STRETCH, LIGHT);
             Under { pieces, loads }
         })
-    }
-
-    /// The velocity and the acceleration that motion and vibration together may reach.
-    fn most_shaken(&self) -> [f64; 2] {
-        [self.geometry().shaken_velocity(), self.geometry().shaken_acceleration()]
     }
 
     /// The ends that the axis reaches while it vibrates; what is broken goes to `found`.
@@ -103,27 +149,19 @@ impl Subject<'_> {
 
     /// One of the axis's vibrations; `None` if it stands for none.
     fn swing(&self, under: &Under<'_>, terms: &Terms, index: usize) -> Option<AxisSwing> {
-        let steps = self.timeline.cue().tracks().vibration(self.axis).as_slice();
-        let (step, next) = (steps.get(index)?, steps.get(index + 1));
-        let Vibration { hz, amplitude } = step.value.into();
-        let amplitude = amplitude * self.slot.scale().0;
-        if hz <= 0.0 || amplitude <= 0.0 {
-            return None;
-        }
-        // What a frame switches acts while the axis moves to the frame's pose, a period later.
-        let until = next.map_or(self.timeline.duration(), |next| next.at + terms.rate.period());
-        let (from, until) = (step.at.as_nanos(), until.as_nanos());
+        let swing = Swing::of(self.timeline, self.axis, &self.slot, terms.rate, index)?;
+        let Swing { from, until, amplitude, .. } = swing;
         let (low, high) = under.pieces.range(from, until);
         let low = At { value: low.value - amplitude, ..low };
         let high = At { value: high.value + amplitude, ..high };
-        let hz = executed_hz(hz);
-        Some(AxisSwing { low, high, amplitude, hz, moved: self.moved(under, from, until) })
+        Some(AxisSwing { swing, low, high, moved: self.moved(under, from, until) })
     }
 
     fn moved(&self, under: &Under<'_>, from: i64, until: i64) -> [f64; 2] {
         let Loads { velocity, acceleration, .. } = &under.loads;
         let last = velocity.len() - 1;
         let stretch = |at: i64| usize::try_from(at / STRETCH).unwrap_or(0).min(last);
+        // Whole stretches, of which it may fill a part: the motion under it is never too little.
         let met = stretch(from)..=stretch(until);
         [velocity, acceleration].map(|loads| {
             let most = loads[met.clone()].iter().fold(0.0_f32, |most, load| most.max(*load));
@@ -132,7 +170,7 @@ impl Subject<'_> {
     }
 
     fn past_stroke(&self, swing: &AxisSwing) -> Option<Found> {
-        let AxisSwing { low, high, amplitude, .. } = *swing;
+        let AxisSwing { low, high, swing: Swing { amplitude, .. }, .. } = *swing;
         // A pulse for the rounding of the position and that of the amplitude.
         let slack = self.slot.stroke_pulses.recip();
         if low.value >= -slack && high.value <= 1.0 + slack {
@@ -156,11 +194,10 @@ impl Subject<'_> {
 
     /// The sum that is over its limit by the greater part, if one is.
     fn too_much(&self, swing: &AxisSwing, at: ShowTime) -> Option<Found> {
+        let &AxisSwing { swing, moved, .. } = swing;
         let amplitude = swing.amplitude * self.geometry().stroke();
-        let of = |place: usize| {
-            let (shaken, moved) = (swing.per_amplitude()[place] * amplitude, swing.moved[place]);
-            (place, shaken, moved, self.most_shaken()[place])
-        };
+        let (shaken, most) = (swing.per_amplitude(), self.geometry().most_shaken());
+        let of = |place: usize| (place, shaken[place] * amplitude, moved[place], most[place]);
         let part = |&(_, shaken, moved, limit): &(usize, f64, f64, f64)| (shaken + moved) / limit;
         let worst = [of(0), of(1)].into_iter().max_by(|a, b| part(a).total_cmp(&part(b)))?;
         let (place, shaken, moved, limit) = worst;
@@ -177,10 +214,9 @@ impl Subject<'_> {
     /// The largest amplitude that stroke, velocity and acceleration have room for while a vibration lasts, in the cue's unit;
     /// none where nothing vibrates.
     pub(super) fn most_amplitude(&self, under: &Under<'_>, terms: &Terms, index: usize) -> Option<f64> {
-        let swing = self.swing(under, terms, index)?;
-        let AxisSwing { low, high, amplitude, moved, .. } = swing;
-        let room = (low.value + amplitude).min(1.0 - (high.value - amplitude));
-        let limits = self.most_shaken();
+        let AxisSwing { swing, low, high, moved } = self.swing(under, terms, index)?;
+        let room = (low.value + swing.amplitude).min(1.0 - (high.value - swing.amplitude));
+        let limits = self.geometry().most_shaken();
         let left = |place: usize| {
             ROUNDING * (limits[place] - moved[place])
                 / swing.per_amplitude()[place]

@@ -107,6 +107,7 @@ impl Resampled {
         let u = rest as f64 / self.step as f64;
         let sample = |offset: usize| samples[(index + offset).saturating_sub(1).min(samples.len() - 1)];
         let (before, here, next, after) = (sample(0), sample(1), sample(2), sample(3));
+        // Lagrange's: a straight line between samples would have corners, and corners are jerk.
         let weights = [
             -u * (u - 1.0) * (u - 2.0) / 6.0,
             (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
@@ -119,6 +120,7 @@ impl Resampled {
 
 /// How far the three means reach to either side, in samples.
 fn halves(strength: usize) -> [usize; 3] {
+    // As equal as they can be: three equal means are close to a bell, of which the cut-off is known.
     [strength, strength + 1, strength + 2].map(|part| part / 3)
 }
 
@@ -135,6 +137,7 @@ fn running_mean(samples: &[f64], half: usize) -> Vec<f64> {
     let after = (1..=half).map(|i| 2.0 * samples[last] - samples[last - i]);
     let extended: Vec<f64> = before.chain(samples.iter().copied()).chain(after).collect();
     let width = 2 * half + 1;
+    // Its rounding grows by some 1e-16 of it a sample, 1e-10 over a film: far below a pulse.
     let mut sum: f64 = extended[..width].iter().sum();
     let mut means = Vec::with_capacity(samples.len());
     means.push(sum / width as f64);

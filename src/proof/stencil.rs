@@ -44,6 +44,7 @@ impl Stencils {
             all.extend(stencils(rate, m, order));
             all
         };
+        // A change of slope is the acceleration times half of what both frames span.
         let step = |stencil: Stencil| Stencil { scale: stencil.span() / 2.0, ..stencil };
         Self {
             velocity: stencils(rate, 1, 1),
@@ -72,6 +73,7 @@ impl Stencil {
         let order = offsets.len() - 1;
         let factorial: f64 = [1.0, 1.0, 2.0, 6.0][order];
         let weight = |at: &i64| {
+            // A divided difference weighs each pose by 1 over the product of its distances to all others.
             let others = offsets.iter().filter(|other| *other != at);
             factorial / others.map(|other| seconds(at - other)).product::<f64>()
         };
@@ -102,6 +104,7 @@ impl Stencil {
             3 => slope / gap + position / (gap * gap),
             _ => bend / gap + slope / (gap * gap) + 2.0 * position / (gap * gap * gap),
         };
+        // A little more: the sums that it bounds are rounded, and must not come out above it.
         (derivative + of_jumps) * self.scale * (1.0 + 1e-9)
     }
 }

@@ -44,6 +44,7 @@ pub(super) fn sweep(pieces: &AxisPieces, stencils: &[Stencil], order: usize, thr
         passed_over = passed_over.max(one.run(order));
     }
     let mut swept = over.swept;
+    // Nobody has looked there, so its bound is told: too much by the tolerance at most, never too little.
     swept.worst = swept.worst.max(passed_over);
     swept.over.sort_by_key(|stretch| stretch.from);
     swept.over = merged(&swept.over);
@@ -99,10 +100,12 @@ struct Over {
 
 impl SumSink for Over {
     fn ignores(&self, _: i64, _: i64) -> f64 {
+        // What is below both changes neither the greatest size nor what is over.
         self.swept.worst.min(self.threshold)
     }
 
     fn take(&mut self, from: i64, until: i64, cubic: Cubic) {
+        // Inside, a cubic is greatest where it stands still; else at an end.
         let met = [0.0, 1.0].into_iter().chain(cubic.still()).map(|u| (cubic.at(u).abs(), u));
         let (worst, u) = met.fold((0.0, 0.0), |most, one| if one.0 > most.0 { one } else { most });
         self.note(Stretch { from, until, worst, at: between(from, until, u) });
@@ -177,6 +180,7 @@ impl<T: SumSink> StencilSweep<'_, T> {
             if from >= until {
                 break;
             }
+            // A difference that begins in this block reaches into others, whose jumps count in full for it.
             let reached = until + self.stencil.reach();
             let reached = blocks[index + 1..].iter().take_while(|next| next.times.0 <= reached);
             let all = reached.fold(*block, Block::and);
@@ -210,6 +214,7 @@ impl<T: SumSink> StencilSweep<'_, T> {
     }
 
     fn is_aligned(&self, run: &PhaseRun) -> bool {
+        // All poses of a difference pass their rows at the same instants then, and no cell is cut short.
         run.span > 0 && self.stencil.offsets.iter().all(|offset| offset % run.span == 0)
     }
 
@@ -259,6 +264,7 @@ impl<T: SumSink> StencilSweep<'_, T> {
         }
         let mut at = from;
         while at < until {
+            // Up to where the first of the poses comes to its next row: so long each is on one cubic.
             let mut next = until;
             for (cursor, offset) in cursors[..nodes].iter().zip(&self.stencil.offsets) {
                 next = next.min(list.get(cursor + 1).map_or(until, |piece| piece.start - offset));

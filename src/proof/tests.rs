@@ -408,6 +408,17 @@ fn with_effects(limit: EffectLimit, text: &str) -> Vec<String> {
 }
 
 #[test]
+fn an_effect_that_is_on_for_whole_periods_is_on_for_as_long_in_frames() {
+    for hz in [24.0, 30.0, 60.0, 72.0, 100.0, 144.0] {
+        let second = Duration::from_secs(1);
+        let config = hall(EffectLimit { min_on: second, max_on: Some(second), ..air() });
+        let timeline = timeline("time_ms,a1,fx_air\n0,0.5,0\n1000,0.5,1\n2000,0.5,0\n3000,0.5,0\n");
+        let terms = Terms::of_hall(&config, Digest::of(timeline.cue()), Rate::from_hz(hz), 1.0);
+        assert_eq!(messages(&prove(&timeline, terms)), [""; 0], "{hz} Hz");
+    }
+}
+
+#[test]
 fn an_effect_is_on_long_enough_and_not_too_long_in_frames_too() {
     let text = "time_ms,a1,fx_air\n0,0.5,0\n1000,0.5,1\n1055,0.5,0\n2000,0.5,0\n";
     let at_least = |ms| EffectLimit { min_on: Duration::from_millis(ms), ..air() };

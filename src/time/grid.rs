@@ -42,8 +42,8 @@ impl Rate {
         Duration::from_nanos(u64::try_from(ns).unwrap_or(u64::MAX))
     }
 
-    /// The newest tick due `elapsed` after the origin.
-    fn due(self, elapsed: Duration) -> u64 {
+    /// How many whole periods there are in a span, each to the nanosecond: the newest tick that is due so long after the origin.
+    pub(crate) fn periods_in(self, elapsed: Duration) -> u64 {
         // Offsets are rounded down, so a tick is due within the nanosecond before its exact instant.
         let parts = (elapsed.as_nanos() + 1) * u128::from(self.millihertz);
         u64::try_from((parts - 1) / 1_000_000_000_000).unwrap_or(u64::MAX)
@@ -115,7 +115,7 @@ impl TickGrid {
     /// The newest tick due at `now`, which is not before [`Self::next_deadline`]; those slept through are counted, never
     /// served.
     pub(crate) fn take(&mut self, now: MonoTime) -> Tick {
-        let index = self.rate.due(now.since(self.origin)).max(self.next);
+        let index = self.rate.periods_in(now.since(self.origin)).max(self.next);
         let deadline = self.origin + self.rate.offset(index);
         let tick = Tick { index, deadline, late: now.since(deadline), missed: index - self.next };
         self.next = index + 1;

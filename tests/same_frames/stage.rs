@@ -45,7 +45,7 @@ fn effects(cue: &str) -> String {
         let more = match row {
             0 => ",v1_hz,v1_amp,fx_air,fx_light".to_owned(),
             _ => {
-                format!(",{},{},{},{}", 5 + row % 3, 0.1 * f64::from(row % 2 == 1), row / 5 % 2, row / 7 % 2)
+                format!(",{},{},{},{}", 5 + row % 3, 0.01 * f64::from(row % 2 == 1), row / 5 % 2, row / 7 % 2)
             }
         };
         text.extend([line, &more, "\n"]);

@@ -87,6 +87,7 @@ impl LtcCells {
     fn on_odd(&mut self) -> LtcCell {
         self.is_half = false;
         self.odd += 1;
+        // One odd interval is a click; several in a row are another speed.
         if self.length == 0.0 || self.odd >= LOST {
             self.learn();
         }

@@ -11,6 +11,7 @@ use crate::film::timecode::FrameRate;
 const AGREEING: u32 = 3;
 /// So many frames after a label that was sure the next may still be told from it, by the time that has passed.
 const TOLD_BY_TIME: f64 = 60.0;
+// Over 60 frames that is a length of a bit which is off by a third of a per cent.
 /// How far from a whole number of frames that time may be, frames.
 const OFF_GRID: f64 = 0.2;
 

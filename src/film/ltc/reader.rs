@@ -71,6 +71,7 @@ impl LtcReader {
         self.frame_end = frame.end;
         self.said = None;
         let Some(read) = self.samples.time_of(frame.end) else { return };
+        // Seats go by when it sounded, not by when it was heard.
         let at = read.before(self.latency);
         if frame.stands {
             return out(Observation::new(at, FilmWord::Stop));

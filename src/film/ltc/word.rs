@@ -54,6 +54,7 @@ impl LtcWord {
             hours: pair(6)?,
             drops: self.0 >> DROPS_AT & 1 == 1,
         };
+        // Digits that cannot be are bits that were turned: nothing of such a frame is believed.
         let is_one = label.frames < 30 && label.seconds < 60 && label.minutes < 60 && label.hours < 24;
         is_one.then_some(label)
     }
@@ -83,6 +84,7 @@ pub(super) fn follows(label: Label, before: Label) -> bool {
     if label == (Label { frames: before.frames + 1, ..before }) {
         return true;
     }
+    // A second ends after 24, 25 or 30 frames, and how many there are is not known yet: any end will do.
     let rates: &[FrameRate] = match (before.frames, before.drops) {
         (23, false) => &[FrameRate::F24],
         (24, false) => &[FrameRate::F25],

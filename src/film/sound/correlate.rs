@@ -9,6 +9,7 @@ use super::trace::TRACE_RATE;
 
 /// Samples that are held against each other: 0.64 s.
 pub(crate) const PIECE: usize = 1_024;
+// Padded with as much of nothing, so that no lag up to a piece wraps round onto the other end.
 const SIZE: usize = 2 * PIECE;
 /// The greatest lag that is looked at, samples: 50 ms; and that from which it is known what chance does.
 pub(crate) const LAGS: usize = 80;
@@ -92,6 +93,7 @@ impl Correlator {
         for (n, (one, other)) in live.iter_mut().zip(expected.iter()).enumerate() {
             let product = *one * other.conj();
             let length = product.norm();
+            // Not by all of its length: lines of which there is next to nothing would count as much as sound.
             *one = if band.contains(&n) && length > 1e-20 {
                 product / length.powf(0.8)
             } else {
@@ -133,6 +135,7 @@ pub(crate) fn best(fit: &Fit) -> Option<BestLag> {
     }
     let [before, after] = [peak - 1, peak + 1].map(|n| f64::from(fit[n]));
     let height = f64::from(height);
+    // The top of the parabola through three heights: the peak lies between samples, 0.6 ms apart.
     let bend = before - 2.0 * height + after;
     let between = if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };
     Some(BestLag { lag: peak as f64 - NOISE_LAGS as f64 + between, z: height / noise })

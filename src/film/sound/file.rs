@@ -85,6 +85,7 @@ impl SoundIndex {
         let name = rest.take(length).ok_or_else(|| cut(head + length))?;
         let [blocks, marks] = [(); 2].map(|()| rest.u32().map(|count| count as usize));
         let (Some(blocks), Some(marks)) = (blocks, marks) else { return Err(cut(head + length)) };
+        // A file may say any number: none may wrap to a length that fits.
         let (trace, landmarks) = (blocks.saturating_mul(BLOCK_OCTETS), marks.saturating_mul(MARK));
         let said = (head + length).saturating_add(trace).saturating_add(landmarks).saturating_add(SUM);
         if octets.len() != said {

@@ -15,6 +15,7 @@ const LEAST_PIECES: usize = 4;
 const GLANCE_Z: f64 = 5.5;
 /// How much faster or slower a copy may run that is thought to run at a speed.
 const SLOPE: f64 = 2.5e-4;
+// Six to either side: 0.15 %, a pull-down and half of one.
 const SLOPES: usize = 13;
 /// A piece holds from there on.
 const HOLD_Z: f64 = 7.0;
@@ -197,6 +198,7 @@ impl Holder {
         let at = middle as f64;
         let fit = compare.fit(line, &films[self.place.film], &self.place, middle)?;
         let passed = at - self.place.at;
+        // Whether it fits or not: a place that is held goes on through what cannot be heard.
         (self.place.media, self.place.at) = (self.place.media_at(at), at);
         for (sum, one) in self.fits.iter_mut().zip(&fit) {
             *sum = REMEMBERED * *sum + one;

@@ -6,6 +6,7 @@ use super::kernel::Resampler;
 use super::landmarks::{Density, Landmark, LandmarkStream, SOUND_RATE};
 use super::trace::{PackedTrace, TRACE_RATE, TraceStream};
 
+// What would fold onto the lines that are looked at, from 4,500 Hz on, comes through 45 dB softer.
 /// What passes into the sound that all is made of, Hz.
 const PASSES: f64 = 3_600.0;
 

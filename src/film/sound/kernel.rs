@@ -20,6 +20,7 @@ impl SincKernel {
         let half = (ZEROS / cutoff).ceil();
         let taps = 2 * half as usize + 1;
         let mut weights = Vec::with_capacity((PHASES + 1) * taps);
+        // One more than there are between: a place may be rounded up to the next sample.
         for phase in 0..=PHASES {
             let between = phase as f64 / PHASES as f64;
             let row = (0..taps).map(|tap| {

@@ -113,6 +113,7 @@ impl LandmarkStream {
         let mut levels =
             if self.levels.len() == most { self.levels.pop_front().unwrap_or_default() } else { Vec::new() };
         levels.clear();
+        // A sine of full scale has a line of SIZE / 4 through this window.
         let full = (SIZE * SIZE) as f32 / 16.0;
         levels.extend(self.spectrum.iter().map(|line| 10.0 * (line.norm_sqr() / full).max(1e-12).log10()));
         self.levels.push_back(levels);

@@ -75,6 +75,7 @@ impl PackedTrace {
         for block in samples[..whole].chunks_exact(BLOCK) {
             let peak = block.iter().fold(0.0_f32, |peak, sample| peak.max(sample.abs()));
             // By the peak of each block: what is soft has as many steps as what is loud.
+            // Rounded up, so that the peak itself is within seven steps and is not cut.
             let scale = ((peak.max(1e-9).log2() * SCALE_STEPS).ceil() + 240.0).clamp(0.0, 255.0);
             self.octets.push(scale as u8);
             let step = step(scale as u8);

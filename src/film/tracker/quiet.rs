@@ -27,6 +27,7 @@ impl SourceTracker {
         }
         let patience = self.patience.mul_f64(self.freewheel);
         let patience =
+            // One that tells every few seconds is silent only after several of its own periods.
             patience.max(if self.traits.coarse { WINDOW_PERIODS * period } else { Duration::ZERO });
         if quiet > patience {
             self.on_sign(SourceSign::TimeOut, now);
@@ -43,7 +44,7 @@ impl SourceTracker {
     /// runs there. What is known of its place and rate rests on what has turned out to be none.
     fn lose_the_place(&mut self, at: MonoTime) {
         self.estimate = None;
-        self.needed = self.traits.samples();
+        self.is_known = false;
         self.begin_anew();
         self.on_sign(SourceSign::Doubt, at);
     }

@@ -72,6 +72,7 @@ impl Recent {
     /// Where the newest samples agree that the film is, as seconds ahead of the newest: those of the window that are on one line of
     /// that rate are the majority since the oldest of them, and span so long.
     pub(super) fn agreed(&self, window: Duration, span: Duration, rate: f64, sigma_s: f64) -> Option<f64> {
+        // At the known rate: what agrees at another one alone is a film that is wound, and was not cut.
         let near = AGREE_WITHIN_S.max(3.0 * sigma_s);
         let (mut agreeing, mut ahead, mut oldest, mut seen_by_then, mut seen) = (0, 0.0, 0.0, 0, 0);
         for (when, place) in self.since_newest(window) {
@@ -104,6 +105,7 @@ impl Recent {
             (tt, tm, mm) = (tt + when * when, tm + when * place, mm + place * place);
             oldest = -when;
         }
+        // Through two any line goes, and what three leave beside it says next to nothing of their noise.
         if n < 4.0 || oldest < span.as_secs_f64() {
             return None;
         }

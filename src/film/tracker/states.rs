@@ -77,6 +77,7 @@ pub(super) const fn next(state: FilmState, sign: SourceSign) -> FilmState {
         (SourceSign::Sure, Acquiring | Jumped | Unusable) => Locked,
         (SourceSign::Sure, FreeRunning | Absent | Locked | Freewheeling | Stopped | Ended | Reverse | Shuttle | Lost) => state,
 
+        // Only what seats follow: what is being found is uncertain by nature, and has its own time to settle.
         (SourceSign::Doubt, Locked | Freewheeling) => Unusable,
         (SourceSign::Doubt, FreeRunning | Absent | Acquiring | Stopped | Ended | Jumped | Reverse | Shuttle | Unusable | Lost) => state,
 
@@ -87,6 +88,7 @@ pub(super) const fn next(state: FilmState, sign: SourceSign) -> FilmState {
         (SourceSign::Miss, FreeRunning | Absent | Acquiring | Freewheeling | Stopped | Ended | Jumped | Reverse | Shuttle | Unusable | Lost) => state,
 
         (SourceSign::TimeOut | SourceSign::Gone, Acquiring | Locked | Freewheeling | Jumped | Reverse | Shuttle | Unusable) => Lost,
+        // A film may stand for hours and say nothing. Without whoever told, nobody would say that it goes on.
         (SourceSign::Gone, Stopped) => Lost,
         (SourceSign::TimeOut, Stopped) => state,
         (SourceSign::TimeOut | SourceSign::Gone, FreeRunning | Absent | Ended | Lost) => state,
@@ -98,6 +100,7 @@ pub(super) const fn next(state: FilmState, sign: SourceSign) -> FilmState {
         (SourceSign::Play, FreeRunning | Acquiring | Locked | Freewheeling | Jumped | Reverse | Shuttle | Unusable) => state,
 
         (SourceSign::Seek, FreeRunning) => state,
+        // Wound while it stands it stands elsewhere: that it runs nobody has said.
         (SourceSign::Seek, Stopped | Ended) => Stopped,
         (SourceSign::Seek, Absent | Acquiring | Locked | Freewheeling | Jumped | Reverse | Shuttle | Unusable | Lost) => Jumped,
 

@@ -297,6 +297,35 @@ fn an_estimate_runs_on_for_as_long_as_is_configured_and_a_told_stop_is_obeyed_at
 }
 
 #[test]
+fn a_film_that_runs_and_is_told_to_play_is_followed_as_before() {
+    let film = TrueFilm::new(10.0, 1.0);
+    for (name, told) in SOURCES {
+        let all = told.of(&film, (0.1, 20.0), &[], &mut Luck::new(4));
+        let mut told_again = all.clone();
+        let at = all.iter().position(|told| told.at > mono(15.0)).expect("there is more");
+        told_again.insert(at, Observation::new(mono(15.0), FilmWord::Play));
+        let [before, run] = [all, told_again].map(|all| Run::of(told.kind, &film, &all, 20.0));
+        assert!(before.errors.iter().any(|error| error.0 < 15.0), "{name} was locked: {:?}", before.states);
+        assert_eq!((run.errors, run.tracker.epoch), (before.errors, 0), "{name}");
+    }
+}
+
+#[test]
+fn however_often_a_coarse_source_tells_it_locks_no_sooner_than_chance_lasts() {
+    let film = TrueFilm::new(10.0, 1.0);
+    for (a_second, from_s, until_s) in [(50.0, 0.25, 0.5), (10.0, 0.25, 0.8), (1.0, 2.9, 3.2)] {
+        let tell = |n: u32| {
+            let t = f64::from(n) / a_second;
+            Observation::new(mono(t), FilmWord::Position(ShowTime::from_secs_f64(film.media_s(t))))
+        };
+        let all: Vec<Observation> = (1..=(10.0 * a_second) as u32).map(tell).collect();
+        let run = Run::of(SourceKind::Message, &film, &all, 10.0);
+        let lock_s = run.lock_s.expect("it locks");
+        assert!((from_s..=until_s).contains(&lock_s), "{a_second} a second: {lock_s} s");
+    }
+}
+
+#[test]
 fn a_told_speed_is_believed_at_once() {
     // The player's clock is 300 ppm fast all the while.
     let film = TrueFilm::new(10.0, 1.0003)

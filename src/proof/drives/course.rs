@@ -97,7 +97,8 @@ struct Ends {
 impl Ends {
     fn of(subject: &Subject<'_>, slice: Duration) -> Self {
         let (mut first, last, end) = edges(subject);
-        // A way from rest is one to rest that is run backwards.
+        // A way from rest is one to rest that is run backwards: speed turns round then, and acceleration, the
+        // second derivative, stays what it is.
         first.velocity = -first.velocity;
         let halt = |from: AxisState, slot: &Slot| {
             let moves = from.velocity.abs() > standing(slot.limits, slice);

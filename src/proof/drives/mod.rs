@@ -148,6 +148,7 @@ pub(crate) fn rate_that_fits(
     }
     let mut hz = link.period.as_secs_f64().recip();
     loop {
+        // By tenths of itself: a few proofs up to any rate.
         hz = (11.0 * hz).ceil() / 10.0;
         if hz > most {
             return None;
@@ -399,6 +400,7 @@ impl MostExecuted {
     /// The axis is at `place` at a show time, and was to be at `wanted`, a fraction of the stroke, if that is of the cue.
     fn be_at(&mut self, driven: &Driven<'_>, at: i64, place: f64, wanted: Option<f64>) {
         driven.larger(&mut self.highest, place, at);
+        // Turned round, so that the first of several equal ones is kept there as well.
         let mut lowest = Worst { value: -self.lowest.value, ..self.lowest };
         driven.larger(&mut lowest, -place, at);
         self.lowest = Worst { value: -lowest.value, ..lowest };
