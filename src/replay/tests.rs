@@ -96,7 +96,12 @@ fn a_recording_of_a_play_is_judged_as_it_was_from_its_start() {
     let verdict = judged(&recorded(well));
     assert_eq!(verdict.differences, []);
     assert_eq!((verdict.frames, verdict.fates, verdict.gaps, verdict.from_the_start), (300, 300, 0, true));
-    assert_eq!((verdict.seats[0].frames.acked, verdict.seats[0].ack_us.max_us), (300, Some(2_000.0)));
+    let seat = &verdict.seats[0];
+    // Histograms have three digits.
+    assert!(
+        seat.frames.acked == 300 && seat.ack_us.max_us.is_some_and(|us| (us - 2_000.0).abs() < 2.0),
+        "{seat:?}"
+    );
 }
 
 #[test]
@@ -223,10 +228,10 @@ proptest! {
     }
 }
 
-/// A recording of a virtual hall in which seats were lost and came back, without names: `kinocue record cut --anonymous --whole`.
+/// A recording of a virtual hall of two seats, some frames of which were lost, without names: `kinocue record cut --anonymous --whole`.
 #[test]
 fn a_recording_that_is_kept_is_judged_as_it_was_when_it_was_recorded() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/recordings/lost-and-found.mcap");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/recordings/lost-frames.mcap");
     let (contents, verdict) = replay(std::fs::File::open(path).expect("it is there")).expect("a recording");
     assert_eq!((&verdict.differences[..], verdict.gaps, verdict.from_the_start), (&[][..], 0, true));
     assert!(contents.trouble.is_none() && contents.faults.is_empty(), "{:?}", contents.faults);
