@@ -1,5 +1,5 @@
 //! The table of channels: values beside positions that a cue carries from its file into frames. Each holds until it changes,
-//! and is 0 at rest. Files, digest, timeline, levels and `info` go through the table; the lane's codec (`drive::mbox`) alone knows
+//! and is 0 at rest. Files, digest, timeline, levels and `info` go through the table; codecs (`drive::mbox`, `drive::link`) alone know
 //! what a channel means in a frame.
 
 use std::fmt;

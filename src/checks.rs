@@ -119,68 +119,68 @@ macro_rules! checks {
 
 checks! {
     NoAnswer "no-answer" Answers Fail
-        "A controller that does not answer cannot be checked, and a seat that nobody watches must not be played to. \
-         PA15 = 0 silences a controller that is alive.";
+        "A controller that does not answer can be neither checked nor monitored, so its seat must not take part. \
+         PA15 = 0 silences a controller that works.";
     RegisterUnread "register-unread" Answers Fail
         "A setting that could not be read cannot be known to be safe.";
     RepliesDisabled "replies-disabled" Answers Fail
         "With PA15 other than 1 no frame is acknowledged, and the loss of a controller goes unnoticed.";
     RepliesLost "replies-lost" Answers Fail
-        "More than 2 of 20 reads without an answer within 100 ms: so many lost frames make a show degrade.";
+        "More than 2 of 20 reads had no answer within 100 ms: a show that loses as many frames degrades.";
     RepliesMissed "replies-missed" Answers Warn
-        "One or two of 20 reads without an answer within 100 ms: the network loses datagrams.";
+        "One or two of 20 reads had no answer within 100 ms: the network loses datagrams.";
     SlowReplies "slow-replies" Answers Warn
-        "An answer that took over 20 ms: a show notices a silent controller after 250 ms, and late replies hide it. On a serial link: \
-         answers so late that it cannot carry what it plays and be watched as well.";
+        "An answer took over 20 ms: a show notices a silent controller after 250 ms, and late replies hide one. On a serial link: \
+         answers are so late that the link cannot carry both motion and monitoring.";
     BrokenReplies "broken-replies" Answers Warn
-        "Datagrams came from the controller's address that are no messages: a broken cable or switch, or another device.";
+        "Datagrams from the controller's address are not messages of the protocol: a broken cable or switch, or another device.";
     DrivesUnasked "drives-unasked" Answers Fail
-        "Drives on a CAN bus are not asked yet, and of a seat that nobody asked nothing is known.";
+        "Drives on a CAN bus cannot be read yet, so nothing is known about their seat.";
 
     Address "address" Identity Fail
-        "The controller takes itself for another address or port than the one it was reached at (PA10 to PA14): its \
-         station code and its reports are then another seat's.";
+        "The controller has another address or port in its settings (PA10 to PA14) than it was reached at: its station \
+         code and its reports then belong to another seat.";
     DuplicateAddress "duplicate-address" Identity Fail
-        "Two controllers of the configuration have one address, or one hardware address (PA16 to PA1b): what is meant \
-         for one seat moves another.";
+        "Two controllers of the configuration share an address, or a hardware address (PA16 to PA1b): frames for one seat \
+         move another.";
     DuplicateUnit "duplicate-unit" Identity Fail
-        "Two drives on a link have one number: both obey what one is told, and their answers garble each other.";
+        "Two drives on a link share a unit number: both obey commands for one, and their answers garble each other.";
     TwoAnswer "two-answer" Identity Warn
-        "A request was answered more than once: two controllers may have one address, or the network repeats datagrams.";
+        "A request was answered more than once: two controllers may share an address, or the network repeats datagrams.";
     Contradiction "contradiction" Identity Fail
-        "The same register read twice gave two values though nobody wrote it: two controllers answer for one, or \
-         somebody else is changing its settings.";
+        "A register read twice gave two values although this program did not write it: two controllers share an address, \
+         or somebody else is changing the settings.";
     ForeignReplies "foreign-replies" Identity Warn
-        "Answers came that nobody had asked for: another program speaks to this controller from this machine's \
-         address, or two controllers have one address.";
+        "Answers came without a request: another program talks to this controller from this machine's address, or two \
+         controllers share an address.";
     OtherMaster "other-master" Identity Fail
-        "The controller counts more packets (DP34) than it was sent from here: another machine sends to it, and a \
-         controller obeys everybody.";
+        "The controller counts more packets (DP34) than were sent from here: another machine sends to it, and a \
+         controller obeys every sender.";
     AxisCount "axis-count" Identity Fail
-        "PA02 differs from the axes of the seat type: axes stand still, or motors that are not there raise errors.";
+        "PA02 differs from the axes of the seat type: some axes do not move, or missing motors raise errors.";
     AxisCountOpen "axis-count-open" Identity Info
         "Neither a configuration, nor axes= in --to, nor a cue says how many axes the seat has.";
     WorkMode "work-mode" Identity Fail
-        "PA00 must be the work mode: 10, or 0 on RS-485 controllers of the IMAX manual. The others are for tests and \
-         effects, and frames do not move the seat as meant.";
+        "PA00 must be the work mode: 10, or 0 on RS-485 controllers of the IMAX manual. Other modes are for tests and \
+         effects; frames do not move the seat as intended.";
     WorkModeOpen "work-mode-open" Identity Warn
-        "PA00 = 0 is the work mode of RS-485 units (SMC manual 5.2) and none of CAN units, whose work mode is 10; no \
-         register tells which of them this is.";
+        "PA00 = 0 is the work mode of RS-485 units (SMC manual 5.2) but not of CAN units, whose work mode is 10; no \
+         register tells which kind this is.";
     RotaryAxis "rotary-axis" Identity Fail
-        "PA03 names the axis that takes for zero wherever it stands; the others search their zero at an end. Where that is not \
-         the axis with unit = \"deg\" of the seat type, positions mean other places, or a turntable runs to search an end.";
+        "PA03 names the axis whose zero is its position at a reset or start; the others search for zero at an end. If that is \
+         not the axis with unit = \"deg\" of the seat type, positions are wrong, or a turntable runs in search of an end.";
     RotaryZero "rotary-zero" Identity Warn
-        "A rotary axis has no search for its zero: wherever it stands when its controller starts or is homed becomes 0, and its range \
-         lies about that. Homed a quarter turn off, it may be led a quarter turn past its end.";
+        "A rotary axis has no search for its zero: its position when its controller starts or is homed becomes 0, the middle of \
+         its range. Homed a quarter turn off, it may be moved a quarter turn past its end.";
     AxisOffset "axis-offset" Identity Fail
-        "PA95 must be 0 where kinocue sends each controller its own axes (fan_out = slice), and axis_offset where each \
-         takes its window of one frame (shared). Else the seat plays axes that are not its own.";
+        "PA95 must be 0 if kinocue sends each controller its own axes (fan_out = slice), and equal axis_offset if each takes \
+         its own part of a shared frame (shared). Otherwise the seat plays axes that are not its own.";
     Version "version" Identity Info
         "The version of the controller's software, DPFF and DPFE.";
     VersionDiffers "version-differs" Identity Warn
         "Controllers of one dialect with different software may behave differently, for instance in an emergency stop.";
     NotAsked "not-asked" Identity Info
-        "MBOX controllers lack some registers; what these would tell is not known.";
+        "MBOX controllers lack some registers, so the settings in them remain unknown.";
 
     Route "route" Network Fail
         "The system has no way to the controller's address.";
@@ -191,86 +191,85 @@ checks! {
     ReplyPort "reply-port" Network Fail
         "PA24 must be the frame port: SMC controllers take frames from that port alone, and answer to it.";
     PortMissing "port-missing" Network Fail
-        "The serial port of the link is not there, so none of its drives can be reached.";
+        "The serial port of the link does not exist, so none of its drives can be reached.";
     PortTaken "port-taken" Network Fail
         "Another program has the serial port: two masters on one line garble each other.";
     PortForbidden "port-forbidden" Network Fail
         "The system does not let this user open the serial port; the service needs its drop-in for drives.";
     PortUnfit "port-unfit" Network Fail
-        "The port is no serial line, or cannot be set as the link needs it.";
+        "The port is not a serial line, or cannot be set as the link needs it.";
     AdapterSlow "adapter-slow" Network Warn
-        "The adapter holds answers back, 16 ms unless it is told otherwise, and a link that waits for each plays slowly.";
+        "The adapter delays answers, by 16 ms unless set otherwise, and a link that waits for each answer plays slowly.";
     EchoDiffers "echo-differs" Network Fail
-        "Some two-wire adapters return what is sent; taken for an answer, or an answer for it, no exchange can be trusted.";
+        "Some two-wire adapters echo what is sent. If echoes and answers are confused, no exchange can be trusted.";
     FramePortFree "frame-port-free" Network Info
-        "With port 0 in bind the frame port is another each time, so PA24 cannot be compared with it.";
+        "With port 0 in bind the frame port changes at every start, so PA24 cannot be compared with it.";
 
     IntervalLimit "interval-limit" Motion Fail
-        "A Time longer than PA0b is cut to it, so the move is made in less time: faster than anyone proved.";
+        "A Time longer than PA0b is cut to it, so the move takes less time: it is faster than what was proved.";
     IntervalUnlimited "interval-unlimited" Motion Warn
-        "PA0b = 0 means no limit by the SMC manual alone; the IMAX manual does not say what it does.";
+        "PA0b = 0 means no limit in the SMC manual; the IMAX manual does not say what it means.";
     SignedFilter "signed-filter" Motion Fail
-        "An IMAX controller filters positions (PA51); its manual wants that off where positions go below 0 (section 5.7).";
+        "An IMAX controller filters positions (PA51); its manual wants the filter off if positions go below 0 (section 5.7).";
     TimeIgnored "time-ignored" Motion Fail
-        "With PA0a = 1 an IMAX controller goes by the time between packets and not by the Time in them: a frame that comes \
-         late or early is made slower or faster than anyone proved.";
+        "With PA0a = 1 an IMAX controller uses the time between packets instead of the Time in them: a frame that comes \
+         late or early is executed slower or faster than was proved.";
     HomesUnsearched "homes-unsearched" Motion Fail
-        "With PA0e = 1 a reset goes to where the controller believes zero to be, without a search. One that was switched \
-         off in between has no zero, and every position after that is wrong by as much; the hall's homing refuses it.";
+        "With PA0e = 1 a reset moves to where the controller believes zero to be, without a search. After a power cycle it \
+         has no zero, and every later position is off by the error; homing refuses this setting.";
     Encoder "encoder" Motion Fail
-        "PA54 is how many lines the encoders have, 5,000 or 2,500, of which each makes two or four counts. Where \
-         pulses_per_rev is neither of these, the seat goes farther or less far than it is sent.";
+        "PA54 sets the lines of the encoders, 5,000 or 2,500, each of which makes two or four counts. If \
+         pulses_per_rev matches neither, the seat moves too far or not far enough.";
     EncoderUnsure "encoder-unsure" Motion Warn
         "pulses_per_rev fits the encoder of PA54 with four counts for each line. Most seats have two, and no manual says \
          which; with the wrong one every move is twice as far and twice as fast.";
     EncoderDiffers "encoder-differs" Motion Fail
-        "Seats of one type whose controllers have other encoders set (PA54) go to other places by the same pulses.";
+        "Controllers of one seat type have different encoder settings (PA54), so the same pulses mean different positions.";
     Lead "lead" Motion Fail
-        "PA41 is the lead of the screw, and the seat type's lead_mm should be the same: one of them is wrong, and with the \
-         seat type's every limit in millimetres; with the controller's the rise after homing (PA40).";
+        "PA41, the lead of the screw, differs from the seat type's lead_mm, so one of them is wrong. If it is lead_mm, every \
+         limit in millimetres is wrong too; if it is PA41, the rise after homing (PA40).";
     Stroke "stroke" Motion Fail
-        "PA42 is the stroke that the controller knows; the seat type has a longer one, so positions near its end are cut \
-         off or run into the stop.";
+        "PA42 is the stroke set in the controller; that of the seat type is longer, so positions near its end are cut off \
+         or run into the end stop.";
     WordOrder "word-order" Motion Fail
-        "By the word order of its dialect the controller's position registers tell of places outside the stroke, or other \
-         than its reports tell, and by the other order they do not: whoever believes them takes the seat for somewhere \
-         else, and moves it from there.";
+        "In the word order of its dialect the controller's position registers read outside the stroke, or differ from its \
+         reports; in the other order they do not. With the wrong order a motion would start from a position at which the \
+         seat is not.";
     WordOrderOpen "word-order-open" Motion Warn
-        "Both word orders make a place inside the stroke of its position registers, and not the same one; the dialect's is \
-         taken.";
+        "Both word orders make its position registers a position inside the stroke, but a different one; that of the dialect \
+         is used.";
     Position "position" Motion Fail
-        "An axis that says it is outside its stroke by more than rounding, or elsewhere than a report of the same rest \
-         says, is in no known place: its zero was lost, or pulses, lead or stroke of the seat type are not its own.";
+        "An axis reads outside its stroke by more than rounding, or differs from a report at the same rest, so its position \
+         is unknown: it lost its zero, or pulses, lead or stroke of the seat type are wrong.";
     BusPeriod "bus-period" Motion Fail
-        "PA59 is the shortest time between commands to the drives; where it is longer than the show's frames these pile up \
-         in the controller, which then hurries (PA06) or stops with Err21.";
+        "PA59 is the shortest time between commands to the drives. If it is longer than the frame period, frames pile up in \
+         the controller, which then shortens their Time (PA06) or stops with Err21.";
     MotionLate "motion-late" Motion Warn
         "Filters and delays in the controller (PA50 and PA51 of IMAX, PA4c and PA4d of SMC) make motion later than the \
-         film, and smooth what was proved; trim can make up for the delay.";
+         film, and smooth it; trim can compensate for the delay.";
     AnaloguePosition "analogue-position" Motion Fail
-        "With PA60 = 1 positions come from the analogue inputs too (times PA61 over PA62): the seat does not go where it \
-         is sent.";
+        "With PA60 = 1 the analogue inputs also set positions (times PA61 over PA62): the seat does not go where it is sent.";
     LinkTooSlow "link-too-slow" Motion Fail
-        "The link cannot carry segments as often as its drives are to be told something new.";
+        "The link cannot carry segments at the rate set for it.";
     SoftLimits "soft-limits" Motion Fail
-        "Registers 38 and 39 of a drive are not those of the seat, which homing wrote: past the stroke nothing but them holds it.";
+        "Registers 38 and 39 of a drive are not what homing wrote: past the stroke only these limits stop it.";
     ErrorLimits "error-limits" Motion Fail
-        "Register 208 of a drive is not what homing wrote: it lets go too soon, or not where something blocks it.";
+        "Register 208 of a drive is not what homing wrote: it releases its motor too soon, or not when something blocks it.";
     DriveTorque "drive-torque" Motion Fail
-        "Registers 206 and 207 of a drive are not what homing wrote: it is too weak to hold the seat, or stronger than it may be.";
+        "Registers 206 and 207 of a drive are not what homing wrote: it is too weak to hold the seat, or too strong.";
     BrakeRate "brake-rate" Motion Fail
-        "Register 19 of a drive is not what homing wrote: where its link dies it brakes too hard, or past the stroke.";
+        "Register 19 of a drive is not what homing wrote: if its link dies it brakes too hard, or past the stroke.";
     AutoReset "auto-reset" Motion Fail
         "With PA0d above 0 the controller resets by itself some time after the last frame: the seat moves without a \
          command, perhaps in a pause with people on it.";
     FastForward "fast-forward" Motion Warn
-        "With PA06 = 1 the controller hurries as soon as more than two frames wait, so a burst of late frames is a \
-         violent move. With 0 it lags behind instead.";
+        "With PA06 = 1 the controller shortens Time as soon as more than two frames are queued, so a burst of late frames \
+         becomes a violent move. With 0 it lags behind instead.";
     FastForwardUnknown "fast-forward-unknown" Motion Fail
-        "PA06 is neither 0 nor 1: what the controller does with a backlog is not known.";
+        "PA06 is neither 0 nor 1: no manual says what the controller does with a backlog.";
     Amplitude "amplitude" Motion Fail
-        "PA55 other than 0 scales every position in the controller: the seat does not go where it is sent, and what it \
-         acknowledges is not where it stands.";
+        "PA55 other than 0 scales every position in the controller: the seat does not go where it is sent, and is not where \
+         its acks say.";
     OutputsIgnored "outputs-ignored" Motion Warn
         "With PA9d = 1 the controller ignores the outputs in frames: no effect of a cue comes on, and none goes off.";
 
@@ -278,22 +277,21 @@ checks! {
         "With PA05 = 1 an output is on when a frame says off: every effect runs between shows, and pauses when it is \
          called for.";
     PowerOnOutputs "power-on-outputs" Motion Warn
-        "PA9f switches outputs on as soon as the controller has power, with nobody leading it; they stay on until the \
-         first frame.";
+        "PA9f switches outputs on as soon as the controller has power; they stay on until the first frame.";
 
     SpeedUnlimited "speed-unlimited" Speed Fail
         "PA07 is the last limit on speed that the controller itself keeps; 0 is none that can be relied on.";
     AxisSpeedUnlimited "axis-speed-unlimited" Speed Fail
         "PA80 to PA85 limit the speed of each axis; 0 is no limit, so that only PA07 is left.";
     SpeedTooLow "speed-too-low" Speed Fail
-        "The controller's limit is below the seat type's max_velocity_mm_s: it falls behind fast passages, its queue \
-         fills, and it then hurries (PA06) or stops with Err21.";
+        "The controller's limit is below the seat type's max_velocity_mm_s: it falls behind in fast passages, its queue \
+         fills, and it then shortens Time (PA06) or stops with Err21.";
     SpeedTooHigh "speed-too-high" Speed Warn
         "The controller's limit is more than a tenth above the seat type's max_velocity_mm_s: it would not hold back \
          a move that is too fast for people.";
 
     EstopDisabled "estop-disabled" EmergencyStop Fail
-        "With bit 0 of PA90 clear, as it leaves the factory, the controller ignores every emergency stop input.";
+        "With bit 0 of PA90 clear, the factory setting, the controller ignores every emergency stop input.";
     EstopNoInput "estop-no-input" EmergencyStop Fail
         "PA92 = 0 names no input: the emergency stop is enabled, but nothing can trigger it.";
     EstopAnd "estop-and" EmergencyStop Fail
@@ -303,26 +301,25 @@ checks! {
         "With PA91 = 0 the seat holds while the button is pressed and moves on by itself once it is let go; no \
          emergency stop may end without a reset.";
     EstopReturns "estop-returns" EmergencyStop Fail
-        "With PA91 = 1 the seat moves to zero when the button is pressed, when it should stand still, and moves on by \
-         itself once it is let go.";
+        "With PA91 = 1 the seat moves to zero when the button is pressed, instead of stopping, and moves on by itself once \
+         it is let go.";
     EstopAction "estop-action" EmergencyStop Fail
-        "PA91 has a value that no manual explains: what the seat does in an emergency stop is not known.";
+        "No manual explains this value of PA91, so it is unknown what the seat does in an emergency stop.";
     EstopIsBelts "estop-is-belts" EmergencyStop Fail
         "PA92 names the inputs of the belts (belt_inputs), as in the second example of the manual's section 5.6. The \
-         controller has one such function: so no input of it is an emergency stop, and opening the last belt does to \
-         the seat what PA91 says, in mid-show too.";
+         controller has only one such function, so none of its inputs is an emergency stop, and opening the last belt \
+         does to the seat what PA91 says, even in mid-show.";
     BeltsOpen "belts-open" EmergencyStop Warn
         "All belts that PA92 names are open, so the controller takes no motion; it does once one of them is closed.";
     EstopFilter "estop-filter" EmergencyStop Fail
-        "PA93 is how long the input must be active before anything happens; over 50 ms the seat moves on too long.";
+        "PA93 is the time for which the input must be active before the seat stops; over 50 ms it moves on too long.";
     EstopRelease "estop-release" EmergencyStop Fail
-        "PA94 limits the speed at which the seat leaves an emergency stop; what 0 means is not documented, and may be \
-         no limit.";
+        "PA94 limits the speed at which the seat leaves an emergency stop; 0 is not documented, and may mean no limit.";
     EstopReleaseFast "estop-release-fast" EmergencyStop Warn
         "PA94 is not below PA07, so the seat leaves an emergency stop at the full speed of a show.";
     EstopWire "estop-wire" EmergencyStop Warn
-        "With PA04 = 1 an input is active when low, and an open one is high: a broken wire looks like a button that \
-         nobody presses. PA04 = 0 with a normally closed button stops when the wire breaks.";
+        "With PA04 = 1 an input is active when low, and an open one is high: a broken wire looks like a button that is not \
+         pressed. With PA04 = 0 and a normally closed button, a broken wire stops the seat.";
     EstopResetInput "estop-reset-input" EmergencyStop Warn
         "With bit 3 of PA90 set and inputs in PA98, a press at an input resets the controller, and the seat moves; so \
          an emergency stop can be ended from there.";
@@ -331,35 +328,35 @@ checks! {
     EstopJog "estop-jog" EmergencyStop Warn
         "Bit 1 or 2 of PA90 is set: inputs can move the seat by hand, also during a show.";
     EstopUnwatched "estop-unwatched" EmergencyStop Warn
-        "estop_inputs of the configuration and PA92 name different inputs: what the controller takes for an emergency \
-         stop and what kinocue does are not the same.";
+        "estop_inputs of the configuration and PA92 name different inputs: controller and kinocue do not agree on what is \
+         an emergency stop.";
 
     EmergencyStopActive "emergency-stop-active" Status Fail
         "An emergency stop is in effect now.";
     ActiveError "active-error" Status Fail
         "The controller or one of its drives reports an error now (chapter 6 of both manuals).";
     NotHome "not-home" Status Fail
-        "A drive counts from where it was switched on until it is homed, and no place of it is known.";
+        "Until it is homed, a drive counts from where it was switched on, so its position is unknown.";
     Restarted "restarted" Status Fail
-        "Drives of one seat were not homed together: one of them was off since, and counts from elsewhere.";
+        "The drives of a seat were not homed together: one of them has been off since, and counts from elsewhere.";
     Killed "killed" Status Fail
-        "A drive let go of its motor, by an error or by heat, and waits for a person.";
+        "A drive released its motor, because of an error or heat, and waits for a person.";
     DriveError "drive-error" Status Fail
-        "A drive is farther from its course than it may be: something blocks it, or it is too weak.";
+        "A drive has a larger position error than allowed: something blocks it, or it is too weak.";
     DriveHot "drive-hot" Status Fail
-        "A drive is too hot, and lets go of its motor where it gets hotter.";
+        "A drive is too hot, and releases its motor if it gets hotter.";
     Supply "supply" Status Fail
-        "The supply of a drive left its bounds: over them it lets go of its motor, and braking raises it.";
+        "The supply voltage of a drive left its range. Above it the drive releases its motor, and braking raises it.";
     StatusOff "status-off" Status Fail
         "With PA1f = 0 the controller never reports its state, so a drive's alarm between frames goes unnoticed.";
     StatusElsewhere "status-elsewhere" Status Fail
-        "With PA1f = 2 reports go to PA25 to PA29; where that is not this machine, nobody here hears them.";
+        "With PA1f = 2 reports go to PA25 to PA29; if that is not this machine, they are not received here.";
     StatusUnheard "status-unheard" Status Warn
-        "The settings promise status reports to this machine, but none came while it listened: a firewall may be in the \
-         way, or the firmware has no such reports.";
+        "By its settings the controller sends status reports to this machine, but none came: a firewall may be in the way, \
+         or the firmware has no such reports.";
     StatusSlow "status-slow" Status Fail
-        "PA1e is the interval of status reports: 0 sends one only when an alarm begins, and over 100 ms is no beat by \
-         which a loss is noticed in time.";
+        "PA1e is the interval of status reports: 0 sends one only when an alarm begins, and over 100 ms is too slow to \
+         notice a loss in time.";
 }
 
 impl Check {

@@ -89,10 +89,10 @@ fn a_sound_cue_and_a_sound_hall_pass() {
     assert!(run.stdout.contains("cues/coaster.csv: passed: 6 axes"), "{}", run.stdout);
     assert!(run.stdout.contains("hall.toml: passed: 4 controllers"), "{}", run.stdout);
     let unlooked =
-        "coaster.csv: whether a hall has its effects (air, water, wind, leg, smoke, light) was not looked at";
+        "coaster.csv: not checked whether the hall has its effects (air, water, wind, leg, smoke, light)";
     assert!(run.stdout.contains(unlooked), "{}", run.stdout);
     let run = kinocue(&["check", CUE, "--config", HALL]);
-    assert!(!run.stdout.contains("was not looked at"), "{}", run.stdout);
+    assert!(!run.stdout.contains("not checked whether"), "{}", run.stdout);
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn what_serial_drives_execute_of_a_cue_is_judged_where_somebody_asks() {
     let run = check(&["--link-rate", "30"]);
     assert_eq!(run.code, Some(1));
     assert!(
-        run.stderr.contains(" is too quick for drives at 30.0 Hz, which swing at 3.8 Hz"),
+        run.stderr.contains(" is too fast for drives at 30.0 Hz, which follow at most 3.8 Hz"),
         "{}",
         run.stderr
     );
@@ -386,7 +386,7 @@ fn a_hall_with_drives_passes_its_check_which_says_how_often_its_links_play() {
     for text in [
         "passed: 2 controllers, 2 links, 2 seat types",
         "drives.toml: plays at 29.98 Hz on link stalls, 3 axes\n",
-        "drives.toml: link circle runs at 56818 baud, what its drives make of 57600\n",
+        "drives.toml: link circle runs at 56818 baud, the nearest rate to 57600\n",
         "Hz on link circle, 3 axes, by a USB adapter whose latency timer is 1 ms\n",
     ] {
         assert!(run.stdout.contains(text), "{text}: {}", run.stdout);
@@ -402,7 +402,7 @@ fn check_and_info_say_how_far_ahead_and_how_far_beside_the_cue_a_link_plays() {
     let (silver, _) = drives.rsplit_once("[[controller]]").expect("two seats");
     let still = silver.replace("[seat.silver3.drive]", "[seat.silver3.drive]\nvibration = \"0%\"") + EFFECTS;
     let hall = write(folder.path(), "hall.toml", &still);
-    let said = "plays at 29.98 Hz on link stalls, 220 ms ahead, at most 0.05 mm beside the cue (a1 of D1 at ";
+    let said = "plays at 29.98 Hz on link stalls, 220 ms ahead, at most 0.05 mm off the cue (a1 of D1 at ";
     for command in ["check", "info"] {
         let run = kinocue(&[command, RIDE, "--config", &hall]);
         assert_eq!(run.code, Some(0), "{command}: {}", run.stderr);

@@ -72,7 +72,7 @@ fn nothing_is_guessed_and_nothing_overwritten() {
             &["a.csv", "c.csv", "--from", "rows", "--units", "cm"],
             "units are fraction, percent, u8, mm, deg or pulse",
         ),
-        (&["a.csv", "c.xml"], "ends in .csv or .mcap"),
+        (&["a.csv", "c.xml"], "has to end in .csv or .mcap"),
         (&["a.csv", "b.csv"], "b.csv exists; --force replaces it"),
     ] {
         let (code, said) = convert(folder.path(), args);

@@ -135,14 +135,14 @@ fn a_capture_is_told_a_line_for_each_message_and_counted() {
     0.002000  192.168.15.201:7408 -> 192.168.15.101:8410  reply to motion, relative time: received, running normally, frame 7, in 50 ms, positions 1 0 0, inputs X01
     0.020000  192.168.15.101:8410 -> 192.168.15.201:7408  malformed: byte 18: ends after 18 bytes; this message takes 20: 55aa000012010001ffffffff002000020001
     0.030000  192.168.15.101:8410 -> 192.168.15.201:7408  cut: the capture kept 18 of 38 bytes
-    0.031000  192.168.15.101:8410 -> 192.168.15.201:7408  fragment: from byte 0 of it on; not put together
+    0.031000  192.168.15.101:8410 -> 192.168.15.201:7408  fragment: from byte 0 of it on; not reassembled
 
 2 messages in 0.032 s from 2023-11-14 22:13:20 UTC
        1  0x1401 motion, relative time
        1  0x1402 reply to motion, relative time
        1  malformed
        1  cut short by the capture
-       1  fragments of datagrams, not put together
+       1  fragments of datagrams, not reassembled
        2  other datagrams
        1  other packets
 "
@@ -198,7 +198,7 @@ fn lines_of_hex_are_a_message_each_and_bad_ones_are_counted() {
         "\
 line 1  read registers: PA02
 line 3  reply to read registers: received, running normally, PA02 = 6
-line 4  not hex: 'n' after 0 hex digits is no hex digit; give the message as 0-9 and a-f
+line 4  not hex: 'n' after 0 hex digits is not a hex digit; give the message as 0-9 and a-f
 line 5  malformed: byte 18: ends after 18 bytes; this message takes 20: 55aa000012010001ffffffff002000020001
 
 2 messages
@@ -301,7 +301,11 @@ fn a_serial_line_is_told_in_words_and_what_is_no_message_is_shown() {
 fn octets_that_two_forms_explain_are_not_taken_for_one_of_them() {
     // A poll of unit 33 in nine bits; an opening of a refusal as well.
     let ran = serial(b"0.1 > 21 00 df\n0.2 > 20 00 e0\n", &[]);
-    assert!(ran.out.contains("cannot be told") && ran.out.contains(" 32  POL  (nine bits)"), "{}", ran.out);
+    assert!(
+        ran.out.contains("which of them is unknown") && ran.out.contains(" 32  POL  (nine bits)"),
+        "{}",
+        ran.out
+    );
     assert_eq!(decode(&["--dialect", "silvermax", "40", "31 36", "0d"], b"").out, " 16  POL\n");
     assert_eq!(serial(b"", &["--port", "7"]).code, 64);
 }
@@ -354,10 +358,10 @@ fn frames_are_told_in_words_and_octets_without_a_frame_are_shown() {
     assert_eq!(ran.code, 65);
     for words in [
         ">   1  motor parameters motor=0 poslimit=400 p5=200 (TestNull, StopNull, FilterSwitch) p6=90 (FastRef, ",
-        ">   ?  01 20 00: a piece of a frame",
+        ">   ?  01 20 00: a part of a frame",
         "<   2  position motor=0 position=8000 action=10 (PI) stop=0",
         ">   1  $CC? parameter=0",
-        ">   1  PI target motor=0 target=8000  (octets that it does not use are not 0)",
+        ">   1  PI target motor=0 target=8000  (bytes that it does not use are not 0)",
         "<   ?  02: it ends in the middle of a frame",
         "5 messages, 2 times octets that are none",
     ] {

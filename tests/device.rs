@@ -84,7 +84,10 @@ fn a_write_shows_the_change_and_needs_a_yes_and_is_read_back() {
         (Some(0), Some(6), Some(6))
     );
     let again = run(&farm, &["register", "write", "PA95=6"]);
-    assert_eq!((again.exit, again.err.as_str()), (0, "nothing to change: all hold these values already\n"));
+    assert_eq!(
+        (again.exit, again.err.as_str()),
+        (0, "nothing to change: all registers already have these values\n")
+    );
 }
 
 #[test]
@@ -113,7 +116,7 @@ fn where_one_register_is_refused_none_is_written() {
     let said = run(&farm, &["register", "write", "PA95=1", "servo", "9", "508=7", "--yes"]);
     assert_eq!(said.exit, 76, "{}", said.err);
     assert!(
-        said.err.contains("c2: cannot read servo 9 508") && said.err.contains("nothing was written"),
+        said.err.contains("c2: cannot read servo 9 508") && said.err.contains("nothing written"),
         "{}",
         said.err
     );
@@ -157,7 +160,7 @@ fn names_and_rows_choose_controllers_of_a_configuration() {
     assert_eq!(chosen(&["--row", "A"]), "A1 A2");
     assert_eq!(chosen(&["--name", "B1"]), "B1");
     let unknown = said(&["register", "read", "PA02", "--config", config, "--row", "C"], vec![]);
-    assert_eq!((unknown.exit, unknown.err.as_str()), (64, "kinocue: no controller stands in row C\n"));
+    assert_eq!((unknown.exit, unknown.err.as_str()), (64, "kinocue: no controller is in row C\n"));
 }
 
 #[test]
@@ -207,7 +210,7 @@ fn a_file_that_is_missing_or_no_settings_ends_in_words() {
     std::fs::write(&file, "[show]\nrate_hz = 100\n").expect("a file");
     let said = run(&farm, &["register", "diff", file.to_str().expect("text")]);
     assert_eq!(said.exit, 78);
-    assert!(said.err.contains("is no settings file"), "{}", said.err);
+    assert!(said.err.contains("is not a settings file"), "{}", said.err);
 }
 
 #[test]

@@ -100,7 +100,7 @@ fn stopped_in_its_search(dialect: &str) -> serde_json::Value {
     let Bench { hall, sim, folder: _folder } = Bench::of(dialect);
     let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
     let mut said = homing.stderr().lines().map(|line| line.expect("text"));
-    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    assert!(said.any(|line| line == "A1: axis 1 searches for its zero"));
     homing.signal(Signal::INT);
     assert!(said.any(|line| line.ends_with("homing was stopped; the seat is not home")));
     assert_eq!(homing.finish().code, Some(130));
@@ -190,7 +190,7 @@ fn a_cue_is_played_to_drives_that_are_home_with_an_ack_for_each_frame_and_to_no_
         let link = seat_of("A1", &port, dialect, rate_hz);
         let hall = write(folder.path(), &format!("[show]\nbind = \"127.0.0.1:0\"\n{link}"));
         let (code, _, said) = play(&cue, &hall);
-        assert!(said.contains("A1: does not tell that it is home"), "{said}");
+        assert!(said.contains("A1: does not report that it is home"), "{said}");
         assert_eq!(code, Some(75));
         assert_eq!(home(&hall).2, Some(0));
         assert_whole(&play(&cue, &hall), 1);
@@ -300,7 +300,7 @@ fn preflight_passes_a_seat_once_it_is_homed_and_takes_one_that_was_never_for_not
     assert_eq!((fails, exit), (vec!["not-home".to_owned()], Some(1)), "{told}");
     let text = kinocue(&["preflight", "--config", &hall]);
     assert!(
-        text.stdout.contains("link:of_A1") && text.stdout.contains("home it, seats empty"),
+        text.stdout.contains("link:of_A1") && text.stdout.contains("home it, with nobody on the seat"),
         "{}",
         text.stdout
     );
@@ -370,7 +370,7 @@ fn preflight_tells_a_port_that_is_missing_and_one_that_another_program_has() {
     let sim = units(&port, "silvermax");
     let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
     let mut said = homing.stderr().lines().map(|line| line.expect("text"));
-    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    assert!(said.any(|line| line == "A1: axis 1 searches for its zero"));
     let (told, fails, exit) = preflight(&hall);
     assert_eq!((fails, exit), (vec!["port-taken".to_owned()], Some(69)), "{told}");
     homing.signal(Signal::INT);
@@ -415,7 +415,7 @@ fn a_sixpack_is_read_by_its_queries_and_its_settings_are_refused_by_name() {
     let Bench { hall, sim, folder } = Bench::of("sixpack2");
     let (_, said, exit) = register(&["read"], &hall);
     assert_eq!(exit, Some(69), "as it woke: {said}");
-    assert!(said.contains("answers as it woke, at 19,200 baud; home it"), "{said}");
+    assert!(said.contains("is at its power-on baud, 19,200; home it"), "{said}");
     assert_eq!(home(&hall).2, Some(0));
     let (text, said, exit) = register(&["read", "$20", "$43", "$30"], &hall);
     assert_eq!(exit, Some(0), "{said}");
@@ -431,7 +431,7 @@ fn a_sixpack_is_read_by_its_queries_and_its_settings_are_refused_by_name() {
     let file = folder.path().join("kept.toml");
     let (_, said, exit) = register(&["save", file.to_str().expect("text")], &hall);
     assert_eq!((exit, file.exists()), (Some(64), false), "{said}");
-    assert!(said.contains("A1: left out, as no setting of a SIXpack 2 can be read"), "{said}");
+    assert!(said.contains("A1: left out, as the settings of a SIXpack 2 cannot be read"), "{said}");
     sim.signal(Signal::TERM);
     sim.finish();
 }
@@ -441,7 +441,7 @@ fn a_port_that_another_program_has_is_named_with_what_to_do_before_registers_are
     let Bench { hall, sim, folder: _folder } = Bench::of("silvermax");
     let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
     let mut said = homing.stderr().lines().map(|line| line.expect("text"));
-    assert!(said.any(|line| line == "A1: axis 1 looks for its zero"));
+    assert!(said.any(|line| line == "A1: axis 1 searches for its zero"));
     let (_, told, exit) = register(&["read", "R1"], &hall);
     assert_eq!(exit, Some(75), "{told}");
     assert!(told.contains("another program has it") && told.contains("systemctl stop kinocue"), "{told}");

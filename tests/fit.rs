@@ -85,7 +85,7 @@ fn a_cue_that_keeps_its_limits_is_written_as_it_was() {
     let report = fit(&["cues/coaster.csv", "-o", &out, "--smooth"]);
     assert_eq!((&report["change_mm"], &report["cut_off_hz"]), (&0.0.into(), &Value::Null));
     let run = kinocue(&["fit", "cues/coaster.csv", "-o", &out, "--force"]);
-    assert!(run.stderr.contains("kept all limits before"), "{}", run.stderr);
+    assert!(run.stderr.contains("already keeps all limits"), "{}", run.stderr);
 }
 
 #[test]

@@ -164,7 +164,7 @@ fn json_has_every_figure_and_notes_what_was_cut() {
     assert_eq!(report["shows"][0]["outcome"]["lateness"]["p99_us"], 9.5);
     assert_eq!(report["shows"][0]["result"], "completed");
     assert_eq!(report["actions"][0]["what"], "arm");
-    assert!(report["notes"][0].as_str().unwrap().ends_with("is cut short, and passed over"), "{report}");
+    assert!(report["notes"][0].as_str().unwrap().ends_with("is cut short, skipped"), "{report}");
 }
 
 #[test]

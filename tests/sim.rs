@@ -309,7 +309,7 @@ fn the_program_takes_commands_at_its_control_socket_and_removes_it() {
     };
     assert_eq!(command("c2@pa95=6"), "ok\n");
     assert_eq!(command("3@reboot"), "error there is no controller 3; there are 2\n");
-    assert!(command("jump").starts_with("error \"jump\" is no command; commands are X1=1"));
+    assert!(command("jump").starts_with("error \"jump\" is not a command; commands are X1=1"));
     let host = host();
     assert_eq!([0, 1].map(|index| ask(&host, addresses[index], 1, 0x95)), [0, 6]);
     let second = Program::start(&["--listen", "127.0.0.1:0", "--control", path_arg]).0.wait();

@@ -69,7 +69,7 @@ fn the_program_runs_a_unit_on_a_line_lets_things_happen_to_it_and_says_what_beca
         answers.next().expect("an answer").expect("text")
     };
     assert_eq!(command("1@reset"), "ok");
-    assert_eq!(command("1@blocked6=1"), "error \"6\" is no motor; they are 0 to 5");
+    assert_eq!(command("1@blocked6=1"), "error \"6\" is not a motor; they are 0 to 5");
     assert_eq!(command("2@reset"), "error there is no unit 2; the line has [1]");
     assert_eq!(exchange(&line, unit)[3], 1, "it was reset");
     assert_eq!(position(), (0, 0));

@@ -301,7 +301,7 @@ fn a_channel_that_means_no_axes_is_refused_where_it_stands() {
     frame[7] = 13;
     let error = Message::parse(&frame).unwrap_err();
     assert_eq!(error, WireError::Axes { at: 6, found: 13 });
-    assert_eq!(error.to_string(), "byte 6: 13 names no number of axes; 3 to 12 axes are possible");
+    assert_eq!(error.to_string(), "byte 6: 13 does not fit 3 to 12 axes");
 }
 
 #[test]

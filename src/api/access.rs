@@ -44,7 +44,7 @@ impl Access {
             return Ok(());
         }
         let detail = format!("{host:?} is not a name of this server");
-        Err(Problem::new(Code::Origin, detail, "ask it by a name of hosts in [api], or list this one there"))
+        Err(Problem::new(Code::Origin, detail, "use a name in hosts of [api], or add this one there"))
     }
 
     /// True if the page that asks, if a page asks, is one of this server's.
@@ -53,7 +53,7 @@ impl Access {
         if self.origins.iter().any(|known| known.eq_ignore_ascii_case(origin)) {
             return Ok(());
         }
-        let detail = format!("pages of {origin:?} may not ask this server");
+        let detail = format!("pages of {origin:?} may not use this server");
         Err(Problem::new(Code::Origin, detail, "open the page from this server, or list its origin in [api]"))
     }
 
@@ -83,7 +83,7 @@ impl Access {
             }
             tries.count(address, now);
             let remedy = "check it; `kinocue token` makes a new one for the configuration";
-            return Err(Problem::new(Code::Token, "nobody has this token", remedy));
+            return Err(Problem::new(Code::Token, "unknown token", remedy));
         };
         Ok(Who { role: *role, surface: Surface::Http, name: name.clone() })
     }
@@ -109,7 +109,7 @@ pub(super) fn one<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Result<Optio
     match (first.map(|value| value.to_str()).transpose(), second) {
         (Ok(value), None) => Ok(value),
         _ => {
-            let detail = format!("the header {name} is there more than once, or is no plain text");
+            let detail = format!("the header {name} occurs more than once, or is not plain text");
             Err(Problem::new(Code::Value, detail, "send it once"))
         }
     }

@@ -86,7 +86,7 @@ impl Asker {
         }
         let Who { name, role, .. } = &self.who;
         let detail = format!("{what} needs the role {least}, and {name} has {role}");
-        Err(Problem::new(Code::Role, detail, "ask somebody who may"))
+        Err(Problem::new(Code::Role, detail, "ask somebody with that role"))
     }
 
     /// When it was asked, by our own clock; now, where nobody said and it does not matter.
@@ -96,21 +96,20 @@ impl Asker {
         }
         let Some(age_ms) = self.age_ms.clone()? else {
             if matches!(ask, Command::Go | Command::GoFrom(_)) && self.who.surface != Surface::Socket {
-                let remedy = format!("send the header {SENT}, unix milliseconds, with a go");
-                return Err(bad_value("nobody can tell how old this go is", remedy));
+                let remedy = format!("send the header {SENT}, in Unix milliseconds, with a go");
+                return Err(bad_value("the age of this go is unknown", remedy));
             }
             return Ok(now);
         };
         let most = i128::from(u64::try_from(FRESH.as_millis()).unwrap_or(u64::MAX));
         if age_ms < -most {
             let detail = format!("{} was sent {} ms from now: the clocks differ", ask.word(), -age_ms);
-            let remedy =
-                "set the clock of the machine that asks, or reckon with X-Kinocue-Time of the replies";
+            let remedy = "set the clock of the sender, or correct for it with X-Kinocue-Time of the replies";
             return Err(Problem::new(Code::Late, detail, remedy));
         }
         if age_ms > most {
             let detail = format!("{} came {age_ms} ms after it was sent, more than {most}", ask.word());
-            let remedy = "look at the seats, then ask again; where this happens each time, the clocks differ";
+            let remedy = "check the seats, then repeat it; if this happens every time, the clocks differ";
             return Err(Problem::new(Code::Late, detail, remedy));
         }
         Ok(now.before(Duration::from_millis(u64::try_from(age_ms).unwrap_or(0))))
@@ -132,7 +131,7 @@ impl Asker {
 fn age_ms(headers: &HeaderMap, wall_ns: u64) -> Result<Option<i128>, Problem> {
     let Some(text) = one(headers, &SENT)? else { return Ok(None) };
     let sent: i64 = text.parse().map_err(|_| {
-        bad_value(format!("{text:?} is no time"), format!("{SENT} is in milliseconds since 1970, whole"))
+        bad_value(format!("{text:?} is not a time"), format!("{SENT} is in whole milliseconds since 1970"))
     })?;
     Ok(Some(i128::from(wall_ns / 1_000_000) - i128::from(sent)))
 }

@@ -41,7 +41,7 @@ pub(super) async fn one(
     let found = status.controllers.iter().find(|controller| controller.name == name);
     found.cloned().map(JsonReply).ok_or_else(|| {
         let detail = format!("there is no controller {name:?}");
-        Problem::new(Code::Unknown, detail, "name one of the configuration; the status lists them")
+        Problem::new(Code::Unknown, detail, "give one of the configuration; the status lists them")
     })
 }
 

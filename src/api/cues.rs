@@ -62,7 +62,7 @@ pub(super) async fn one(
     let found = shared.blocking(move || {
         library.get(&id).ok_or_else(|| {
             let detail = format!("there is no cue {id} in the library");
-            Problem::new(Code::Unknown, detail, "upload it, or name another")
+            Problem::new(Code::Unknown, detail, "upload it, or give another")
         })
     });
     found.await.map(JsonReply)
@@ -79,7 +79,7 @@ pub(super) async fn curve(
     request: Request,
 ) -> Result<axum::response::Response, Problem> {
     let query = Query::<CurveQuery>::try_from_uri(request.uri()).map_err(|_| {
-        bad_value("the query is not what is wanted here", format!("?points= and 1 to {MAX_POINTS}"))
+        bad_value("the query is not valid here", format!("send ?points= and 1 to {MAX_POINTS}"))
     })?;
     let points = query.points.unwrap_or(POINTS);
     let library = shared.library.clone();
@@ -170,7 +170,7 @@ fn no_form(request: &Request) -> Result<(), Problem> {
     match content_type.and_then(|text| text.split(';').next()).filter(|essence| form(essence)) {
         None => Ok(()),
         Some(form) => {
-            let detail = format!("{form} is what forms are sent as");
+            let detail = format!("{form} is for forms");
             Err(Problem::new(
                 Code::Media,
                 detail,
@@ -181,7 +181,7 @@ fn no_form(request: &Request) -> Result<(), Problem> {
 }
 
 fn cut_short() -> Problem {
-    bad_value("the upload ended before its length", "send it whole; nothing of it is kept")
+    bad_value("the upload ended before its length", "send all of it; nothing of it is kept")
 }
 
 fn slow(limit: Duration) -> Problem {

@@ -32,7 +32,8 @@ const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 /// Our wall clock in every reply, unix milliseconds, so that a page can tell how far its own is off.
 const TIME: HeaderName = HeaderName::from_static("x-kinocue-time");
 /// Nothing but what this server itself serves, and in nobody's frame.
-const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+const POLICY: &str =
+    "default-src 'self'; img-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
 /// Passes a request on, or refuses it. What was begun is ended also where the connection goes away meanwhile.
 pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
@@ -88,8 +89,8 @@ fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
     let in_the_open = is_public(path);
     if !in_the_open && path != STOP && !takes_query(path) && request.uri().query().is_some() {
         return Err(bad_value(
-            "there is a query, and nothing here takes one",
-            "leave out what is behind the ?",
+            "there is a query, but nothing here takes one",
+            "omit the ? and what follows it",
         ));
     }
     Ok(match peer {
@@ -114,13 +115,14 @@ fn note(shared: &Shared, request: &Request, problem: &Problem) {
     if guessed && matches!(problem.code, Code::Token | Code::Busy) || problem.code == Code::Origin {
         let from = request.extensions().get::<Peer>().map_or_else(String::new, ToString::to_string);
         let line =
-            Line::new(Priority::Warning, "turned-away", format!("turned away {from}: {}", problem.detail));
+            Line::new(Priority::Warning, "turned-away", format!("rejected {from}: {}", problem.detail));
         shared.log.say(line.with("code", problem.code.word()).with("from", from));
     }
 }
 
 fn takes_query(path: &str) -> bool {
-    path.strip_prefix("/api/v1/cues/").is_some_and(|rest| rest.ends_with("/curve"))
+    let drawn = [("/api/v1/cues/", "/curve"), ("/api/v1/recordings/", "/picture")];
+    drawn.iter().any(|(begin, end)| path.strip_prefix(begin).is_some_and(|rest| rest.ends_with(end)))
 }
 
 /// Does it, or gives the reply to the first request with that key.

@@ -86,7 +86,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Name {
         let name = in_path(parts, state).await?;
         if name.is_empty() || name.chars().count() > MAX_NAME || name.chars().any(char::is_control) {
             return Err(bad_value(
-                format!("{name:?} is no name"),
+                format!("{name:?} is not a name"),
                 format!("a name has 1 to {MAX_NAME} characters"),
             ));
         }
@@ -105,13 +105,13 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
 pub(super) async fn in_path<S: Send + Sync>(parts: &mut Parts, state: &S) -> Result<String, Problem> {
     let Path(text) = Path::<String>::from_request_parts(parts, state)
         .await
-        .map_err(|_| bad_value("the path is no UTF-8", "write it as it stands in the status"))?;
+        .map_err(|_| bad_value("the path is not UTF-8", "write it as in the status"))?;
     Ok(text)
 }
 
 /// A text as the id of a cue or a playlist, which is never a path.
 pub(super) fn id(text: &str) -> Result<library::Id, Problem> {
-    text.parse().map_err(|error: library::IdError| bad_value(error.to_string(), "name it as the lists do"))
+    text.parse().map_err(|error: library::IdError| bad_value(error.to_string(), "use the name in the lists"))
 }
 
 /// The body, of at most [`MAX_BODY`] bytes.
@@ -147,16 +147,13 @@ fn json_only(headers: &HeaderMap) -> Result<(), Problem> {
     if headers.get(CONTENT_TYPE).and_then(essence) == Some(true) {
         return Ok(());
     }
-    let detail = "the body is not said to be JSON";
+    let detail = "the body is not declared as JSON";
     Err(Problem::new(Code::Media, detail, "send it with Content-Type: application/json"))
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
     serde_json::from_slice(body).map_err(|error| {
-        bad_value(
-            format!("the body is not what is wanted here: {error}"),
-            "see /api/v1/openapi.json for what is",
-        )
+        bad_value(format!("the body is not valid here: {error}"), "see /api/v1/openapi.json")
     })
 }
 

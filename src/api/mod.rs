@@ -97,7 +97,7 @@ pub struct Setup {
 #[non_exhaustive]
 pub enum ApiError {
     /// The folder of a socket cannot be opened.
-    #[error("cannot open {}, the folder of the socket; make it, or name another socket", path.display())]
+    #[error("cannot open {}, the folder of the socket; create it, or give another socket", path.display())]
     Folder {
         /// The folder.
         path: PathBuf,
@@ -113,19 +113,19 @@ pub enum ApiError {
         source: io::Error,
     },
     /// Something else is where the socket belongs.
-    #[error("{} is there and is no socket; move it away, or name another socket", path.display())]
+    #[error("{} exists and is not a socket; move it away, or give another socket", path.display())]
     NoSocket {
         /// What is there.
         path: PathBuf,
     },
     /// A program serves that socket.
-    #[error("{} is served by a program that runs; end it, or name another socket", path.display())]
+    #[error("{} is served by a running program; end it, or give another socket", path.display())]
     Served {
         /// The socket.
         path: PathBuf,
     },
     /// A TCP port cannot be had.
-    #[error("cannot listen on {address}; is another program there?")]
+    #[error("cannot listen on {address}; does another program use it?")]
     Port {
         /// Which.
         address: SocketAddr,
@@ -133,7 +133,7 @@ pub enum ApiError {
         source: io::Error,
     },
     /// The system gives no thread or no timer.
-    #[error("the system refused what the API needs")]
+    #[error("the system refused a thread or a socket of the API")]
     System(#[source] io::Error),
 }
 

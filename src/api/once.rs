@@ -60,8 +60,8 @@ impl Once {
         now: MonoTime,
     ) -> Result<First, Problem> {
         if key.is_empty() || key.len() > MAX_KEY || !key.bytes().all(|byte| byte.is_ascii_graphic()) {
-            let remedy = format!("1 to {MAX_KEY} characters of ASCII, another for each request");
-            return Err(bad_value(format!("{key:?} is no Idempotency-Key"), remedy));
+            let remedy = format!("use 1 to {MAX_KEY} characters of ASCII, a new key for each request");
+            return Err(bad_value(format!("{key:?} is not an Idempotency-Key"), remedy));
         }
         let mut kept = self.kept();
         forget(&mut kept, now);
@@ -69,8 +69,8 @@ impl Once {
             if before.request == request {
                 return Ok(Arc::clone(&before.first));
             }
-            let detail = format!("the Idempotency-Key {key:?} stands for {} already", before.request);
-            return Err(bad_value(detail, "choose another key for another request"));
+            let detail = format!("the Idempotency-Key {key:?} was already used for {}", before.request);
+            return Err(bad_value(detail, "use a new key for a new request"));
         }
         let first = First::default();
         let [asker, key, request] = [asker, key, request].map(str::to_owned);

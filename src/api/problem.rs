@@ -82,16 +82,16 @@ const fn title(code: Code) -> &'static str {
     match code {
         Code::State => "the state of the hall does not allow it",
         Code::Role => "not allowed",
-        Code::Token => "who asks is not known",
-        Code::Value => "a value is not what it may be",
-        Code::Unknown => "there is nothing of that name",
-        Code::Method => "it cannot be asked that way",
+        Code::Token => "unknown sender",
+        Code::Value => "a value is not allowed",
+        Code::Unknown => "unknown name",
+        Code::Method => "wrong method",
         Code::Size => "too long",
-        Code::Media => "not read in that form",
+        Code::Media => "unsupported format",
         Code::Check => "it does not pass",
         Code::Late => "too late",
-        Code::Origin => "asked from elsewhere",
-        Code::Busy => "too much at once",
+        Code::Origin => "foreign origin",
+        Code::Busy => "too many requests",
         Code::Timeout => "no answer in time",
         Code::File => "a file cannot be read or written",
         Code::Off => "not built, or turned off",
@@ -112,8 +112,8 @@ pub(super) fn bad_value(detail: impl Into<String>, remedy: impl Into<String>) ->
 
 /// What a handler that panicked leaves.
 pub(super) fn panicked() -> Problem {
-    let remedy = "look at the status, and report it with the log of the service";
-    Problem::new(Code::Internal, "the program has a fault here, and goes on", remedy)
+    let remedy = "check the status, and report this with the log of the service";
+    Problem::new(Code::Internal, "an internal fault; the program continues", remedy)
 }
 
 #[cfg(test)]

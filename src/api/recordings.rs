@@ -9,7 +9,7 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use axum::Json as JsonReply;
 use axum::body::Body;
-use axum::extract::{Path as UrlPath, State};
+use axum::extract::{Path as UrlPath, Query, Request, State};
 use axum::http::HeaderValue;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_TYPE, HeaderName};
 use axum::response::{IntoResponse as _, Response};
@@ -17,13 +17,18 @@ use hyper::body::Bytes;
 use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc;
 use tokio::time::timeout;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 
 use super::asker::{Asker, StatusReply};
 use super::input::{Nothing, OrNothing};
 use super::pieces::Pieces;
+use super::problem::bad_value;
 use super::shared::{Shared, turn};
+use crate::control::model::Ending;
 use crate::control::{Code, Command, Problem, is_recording};
+use crate::journal::{Outcome, ShowRecord};
+use crate::library::RecordingPicture;
+use crate::record::report_of;
 
 /// The newest that are listed, and no more.
 const MOST: usize = 500;
@@ -42,6 +47,29 @@ pub(super) struct RecordingInfo {
     bytes: u64,
     /// When it was closed, unix seconds.
     closed: u64,
+    /// What came of the show, where it is of one that is over.
+    #[serde(flatten)]
+    outcome: Option<RecordedOutcome>,
+}
+
+/// What came of a show, by the report in its recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+struct RecordedOutcome {
+    /// How it ended.
+    result: Ending,
+    /// Frames that were lost.
+    lost: u64,
+    /// Ticks that were slept through.
+    missed_ticks: u64,
+}
+
+/// Whom to draw.
+#[derive(Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct PictureQuery {
+    /// The seat; the one that was held back farthest where it is left out.
+    seat: Option<String>,
 }
 
 /// What was seen at a moment.
@@ -70,7 +98,7 @@ pub(super) async fn one(
     State(shared): State<Arc<Shared>>,
     UrlPath(name): UrlPath<String>,
 ) -> Result<Response, Problem> {
-    asker.least_engineer("taking recordings away")?;
+    asker.least_engineer("deleting recordings")?;
     let path = path_of(&shared, &name)?;
     let turn = turn(&shared.reports, "a file").await?;
     let opened = shared.blocking(move || {
@@ -109,6 +137,29 @@ pub(super) async fn one(
     ];
     response.headers_mut().extend(headers.into_iter().flatten());
     Ok(response)
+}
+
+/// A recording drawn: what a seat was asked, sent and measured, and what went wrong. Drawn at the lowest priority, one at a time.
+#[utoipa::path(
+    get, path = "/api/v1/recordings/{name}/picture", tag = "recordings",
+    params(("name" = String, Path, description = "The name of its file"), PictureQuery),
+    responses((status = 200, body = RecordingPicture))
+)]
+pub(super) async fn picture(
+    State(shared): State<Arc<Shared>>,
+    UrlPath(name): UrlPath<String>,
+    request: Request,
+) -> Result<JsonReply<RecordingPicture>, Problem> {
+    let query = Query::<PictureQuery>::try_from_uri(request.uri())
+        .map_err(|_| bad_value("the query is not valid here", "send ?seat= and the name of a seat"))?;
+    let path = path_of(&shared, &name)?;
+    let library = shared.library.clone();
+    let turn = turn(&shared.curves, "a picture").await?;
+    let drawn = shared.blocking(move || {
+        let _turn = turn; // held until it is drawn, also where nobody waits for it any more
+        library.picture(&path, query.seat.as_deref())
+    });
+    drawn.await.map(JsonReply)
 }
 
 /// Deletes a recording. For engineers.
@@ -157,13 +208,24 @@ fn list(dir: &Path) -> Vec<RecordingInfo> {
         let name = entry.file_name().into_string().ok().filter(|name| is_recording(name))?;
         let about = entry.metadata().ok().filter(fs::Metadata::is_file)?;
         let closed = about.modified().ok()?.duration_since(UNIX_EPOCH).ok()?.as_secs();
-        Some(RecordingInfo { name, bytes: about.len(), closed })
+        Some(RecordingInfo { name, bytes: about.len(), closed, outcome: None })
     };
     // Where there is no folder nothing was recorded.
     let mut all: Vec<_> = fs::read_dir(dir).into_iter().flatten().flatten().filter_map(info).collect();
     all.sort_unstable_by(|one, other| other.cmp(one));
     all.truncate(MOST);
+    for one in &mut all {
+        one.outcome = outcome(&dir.join(&one.name));
+    }
     all
+}
+
+/// What came of the show that a file is of.
+fn outcome(path: &Path) -> Option<RecordedOutcome> {
+    let report = report_of(File::open(path).ok()?).ok()??;
+    let Outcome { result, missed_ticks, frames, .. } =
+        serde_json::from_slice::<ShowRecord>(&report).ok()?.outcome?;
+    Some(RecordedOutcome { result, lost: frames.lost, missed_ticks })
 }
 
 fn path_of(shared: &Shared, name: &str) -> Result<PathBuf, Problem> {

@@ -42,7 +42,7 @@ pub(super) async fn one(State(shared): State<Arc<Shared>>, Name(day): Name) -> R
     let dir = shared.journal.clone();
     let report = shared.blocking(move || {
         journal::report(&dir, day, day, MOST).map_err(|error| {
-            Problem::new(Code::File, error.to_string(), "look at the folder of the journal and its disk")
+            Problem::new(Code::File, error.to_string(), "check the folder of the journal and its disk")
         })
     });
     let report = report.await?;
@@ -85,7 +85,7 @@ impl Write for ReportPieces {
 /// `YYYY-MM-DD` and nothing else that could be taken for a day.
 fn date(text: &str) -> Result<Date, Problem> {
     let date = text.parse::<Date>().ok().filter(|date| date.to_string() == text);
-    date.ok_or_else(|| bad_value(format!("{text:?} is no day"), "write it as 2026-01-31"))
+    date.ok_or_else(|| bad_value(format!("{text:?} is not a day"), "write it like 2026-01-31"))
 }
 
 #[cfg(test)]

@@ -23,9 +23,9 @@ use crate::control::Code;
     info(
         title = "kinocue",
         description = "Control of a hall with motion seats. Not a safety device: the emergency stop is hard-wired. Every \
-            change replies with the state that it led to, every refusal with a problem (RFC 9457). Whoever may open the \
-            control socket is engineer; over TCP send Authorization: Bearer TOKEN. Replies carry X-Kinocue-Time, unix \
-            milliseconds, to reckon X-Kinocue-Sent by."
+            change replies with the state that it led to, every refusal with a problem (RFC 9457). The control \
+            socket has the role engineer; over TCP send Authorization: Bearer TOKEN. Replies carry X-Kinocue-Time, in Unix \
+            milliseconds, as the clock for X-Kinocue-Sent."
     ),
     components(schemas(ProblemBody<'static>, Code))
 )]
@@ -72,6 +72,7 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(reports::one))
         .routes(routes!(recordings::all))
         .routes(routes!(recordings::one, recordings::remove))
+        .routes(routes!(recordings::picture))
         .routes(routes!(recordings::mark))
         .routes(routes!(recordings::dump));
     let (router, document) = router.split_for_parts();
@@ -98,11 +99,11 @@ fn describe(path: &mut PathItem) {
         let headers = [
             header(
                 "X-Kinocue-Sent",
-                "When it was asked, unix milliseconds; too old, and what would move is refused.",
+                "When it was asked, unix milliseconds; commands that would move seats are refused if it is too old.",
             ),
             header(
                 "Idempotency-Key",
-                "Of two POSTs with the same one the second does nothing, and gets the same reply.",
+                "A second POST with the same key does nothing, and gets the same reply.",
             ),
         ];
         operation.parameters.get_or_insert_default().extend(headers.map(RefOr::T));

@@ -59,7 +59,7 @@ impl ServedHall {
     }
 
     fn no_room(&self, from: &str) {
-        let text = format!("there is no room for more connections; another was closed for one from {from}");
+        let text = format!("too many connections; another one was closed for one from {from}");
         self.log.say(Line::new(Priority::Warning, "connections", text).with("from", from));
     }
 }

@@ -36,7 +36,7 @@ pub(super) async fn health(State(shared): State<Arc<Shared>>) -> Result<JsonRepl
     if shared.pulse.beats(Monotonic.now()) {
         return Ok(well(&shared));
     }
-    let remedy = "look at the log; the service manager restarts it where it watches it";
+    let remedy = "see the log; the watchdog of the service manager restarts it, if enabled";
     Err(Problem::new(Code::Timeout, "the tick counter stands still", remedy))
 }
 

@@ -42,8 +42,8 @@ pub(super) async fn trim(asker: Asker, Json(trim): Json<Trim>) -> Reply {
         (Some(offset_s), None) => Command::Trim(trim_ms(offset_s)?),
         (None, Some(frames)) if (-TRIM_FRAMES..=TRIM_FRAMES).contains(&frames) => Command::Nudge(frames),
         _ => {
-            let detail = "a trim is offset_s, or frames by which it changes".to_owned();
-            return Err(bad_value(detail, "give one of both; frames of the film are -12 to 12"));
+            let detail = "a trim is either offset_s, or frames by which it changes".to_owned();
+            return Err(bad_value(detail, "give one of them; frames are -12 to 12"));
         }
     };
     asker.ask(ask).await
@@ -55,7 +55,7 @@ fn trim_ms(offset_s: f64) -> Result<i32, Problem> {
         return Ok((1000.0 * offset_s).round() as i32);
     }
     let detail = format!("offset_s: {offset_s} is outside -{MAX_TRIM_S}..={MAX_TRIM_S}");
-    Err(bad_value(detail, "give seconds by which the motion is later than the film"))
+    Err(bad_value(detail, "give the seconds by which the motion is later than the film"))
 }
 
 /// The source by which the film is followed.
@@ -96,7 +96,7 @@ fn check_levels(change: &LevelsChange) -> Result<(), Problem> {
     if faults.is_empty() {
         return Ok(());
     }
-    Err(bad_value(faults.join(", "), "levels are from 0, nothing, to 1, all of it").with(faults))
+    Err(bad_value(faults.join(", "), "levels are 0 to 1").with(faults))
 }
 
 /// Applies a preset of the configuration: levels and effects.

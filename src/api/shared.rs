@@ -82,8 +82,8 @@ pub(super) fn one_at_a_time() -> Arc<Semaphore> {
 pub(super) async fn turn(of: &Arc<Semaphore>, what: &str) -> Result<OwnedSemaphorePermit, Problem> {
     let turn = tokio::time::timeout(TURN, Arc::clone(of).acquire_owned()).await;
     turn.ok().and_then(Result::ok).ok_or_else(|| {
-        let detail = format!("{what} is being made for somebody else already");
-        Problem::new(Code::Busy, detail, "ask again in a few seconds")
+        let detail = format!("{what} is already being made for another request");
+        Problem::new(Code::Busy, detail, "try again in a few seconds")
     })
 }
 
@@ -94,8 +94,8 @@ impl Shared {
         work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
         let Ok(place) = Arc::clone(&self.errands).try_acquire_owned() else {
-            let detail = format!("{ERRANDS} requests wait for a disk already");
-            return Err(Problem::new(Code::Busy, detail, "ask again in a second"));
+            let detail = format!("{ERRANDS} requests already wait for a disk");
+            return Err(Problem::new(Code::Busy, detail, "try again in a second"));
         };
         let done = tokio::task::spawn_blocking(move || {
             let _place = place; // held until it is done, also where nobody waits for it any more

@@ -30,8 +30,8 @@ const KEEP_ALIVE: Duration = Duration::from_secs(5);
 #[utoipa::path(get, path = "/api/v1/status", tag = "hall", responses((status = 200, body = Status)))]
 pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<StatusReply, Problem> {
     if let Some(still) = shared.pulse.stopped(Monotonic.now()) {
-        let detail = format!("nothing new of the hall was heard for {} s", still.as_secs());
-        return Err(Problem::new(Code::Timeout, detail, "look at the seats; a stop works all the same"));
+        let detail = format!("no update of the hall for {} s", still.as_secs());
+        return Err(Problem::new(Code::Timeout, detail, "check the seats; a stop still works"));
     }
     Ok(StatusReply(shared.write(&shared.handle.status())))
 }

@@ -69,8 +69,8 @@ impl Drop for StreamPlace {
 }
 
 fn too_many() -> Problem {
-    let remedy = "close a page elsewhere, or ask for the status now and then";
-    Problem::new(Code::Busy, "too many are watching already", remedy)
+    let remedy = "close another page, or poll the status";
+    Problem::new(Code::Busy, "too many event streams are open", remedy)
 }
 
 fn lock(watching: &Mutex<Vec<Watching>>) -> MutexGuard<'_, Vec<Watching>> {

@@ -3,6 +3,7 @@
 mod company;
 pub(crate) mod film;
 mod helpers;
+mod links;
 mod play;
 pub(crate) mod player;
 pub(crate) mod recorder;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::thread::{self, Builder};
 use std::time::Duration;
 
+use super::links;
 use super::recording::{self, PlayRecording};
 use super::refused::PlayError;
 use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeError};
@@ -17,7 +18,7 @@ use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
 use crate::film::chase::ChaseRules;
 use crate::film::point::PublishedPoint;
-use crate::proof::{self, Digest, Proof, Terms};
+use crate::proof::{self, Digest, LinkPlay, Proof, Terms};
 use crate::record::{About as Recorded, Mode};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock as _, Rate};
@@ -31,6 +32,8 @@ pub struct Play {
     /// True if nothing may move.
     holds: bool,
     recording: Option<PlayRecording>,
+    /// What was proved of its links.
+    links: Vec<LinkPlay>,
 }
 
 impl Play {
@@ -40,8 +43,8 @@ impl Play {
     /// Everything that [`PlayError`] names but the network.
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
-        keeps_limits(&config, &timeline, show.rate, manner.level)?;
-        Self::staged(config, timeline, show, manner, None)
+        let links = keeps_limits(&config, &timeline, show.rate, manner.level)?;
+        Ok(Self { links, ..Self::staged(config, timeline, show, manner, None)? })
     }
 
     /// A play that waits, parked, for a film, and follows that: proved at the greatest pace that the film may ask for.
@@ -57,8 +60,9 @@ impl Play {
     ) -> Result<Self, PlayError> {
         let rules = ChaseRules::until(timeline.duration());
         fit(&config, &timeline)?;
-        keeps_limits(&at_any_pace(&config, rules.pace), &timeline, show.rate, manner.level)?;
-        Self::staged(config, timeline, show, manner, Some(LeadingFilm { source, rules: Some(rules) }))
+        let links = keeps_limits(&at_any_pace(&config, rules.pace), &timeline, show.rate, manner.level)?;
+        let film = LeadingFilm { source, rules: Some(rules) };
+        Ok(Self { links, ..Self::staged(config, timeline, show, manner, Some(film))? })
     }
 
     /// A play of frames that hold every seat at its park pose, whatever the cue asks for, effects off. It does not begin
@@ -93,7 +97,7 @@ impl Play {
         let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default())?;
         let desk = runtime.control().desk;
         staged.mixes.iter().enumerate().for_each(|(lane, mix)| desk.set(lane, *mix));
-        Ok(Self { runtime, staged, holds: false, recording: None })
+        Ok(Self { runtime, staged, holds: false, recording: None, links: Vec::new() })
     }
 
     /// The same play, recorded to a file that is not there yet.
@@ -156,8 +160,8 @@ impl Play {
         if !silent {
             self.look_for_others()?;
         }
-        let Self { runtime, staged, holds, .. } = self;
-        let config = Arc::clone(runtime.config());
+        let Self { runtime, staged, holds, links, .. } = self;
+        let (config, ends) = (Arc::clone(runtime.config()), runtime.links().to_vec());
         let (cue, rate) = (staged.timeline.cue().path().display().to_string(), staged.show.rate);
         let (lanes, live) = (staged.lanes.clone(), runtime.control().live);
         let (end, led) = thread::scope(|scope| {
@@ -181,6 +185,7 @@ impl Play {
         run.origin = led.began.unwrap_or(run.origin);
         let about = SumUp { cue, rate, ending: ending.into(), silent };
         let mut played = sum_up(about, &config.controllers, &led.prepared, &run);
+        played.report.links = links::status(&config, &ends, &links);
         if ending == Ending::Completed {
             let off_park = off_park(&lanes, &live, run.closed_at).into_iter();
             played.off_park = off_park.map(|(lane, _)| config.controllers[lane].name.clone()).collect();
@@ -209,11 +214,17 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
     if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
 }
 
-fn keeps_limits(config: &Config, timeline: &Timeline, rate: Rate, level: f64) -> Result<(), PlayError> {
+/// What was proved of its links, where it keeps all limits.
+fn keeps_limits(
+    config: &Config,
+    timeline: &Timeline,
+    rate: Rate,
+    level: f64,
+) -> Result<Vec<LinkPlay>, PlayError> {
     let terms = Terms::of_hall(config, Digest::of(timeline.cue()), rate, level);
     let proof = proof::prove_in(config, timeline, terms);
     if proof.passed() {
-        return Ok(());
+        return Ok(proof.links);
     }
     let Proof { violations, more, .. } = proof;
     Err(PlayError::Limits { cue: timeline.cue().path().to_path_buf(), violations, more })

@@ -75,7 +75,7 @@ impl PlayRecording {
         };
         finish().map_err(|error| {
             let part = part.display();
-            format!("the recording ended early: {error}; what there is of it is in {part}")
+            format!("the recording ended early: {error}; {part} has what was recorded until then")
         })
     }
 }

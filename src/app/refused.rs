@@ -41,10 +41,10 @@ pub enum PlayError {
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
     /// Somebody else sends to these controllers, so many datagrams within about a second.
-    #[error("{}; end whatever else sends to them: another kinocue, player or tool", others(.0))]
+    #[error("{}; end the other sender: another kinocue, player or tool", others(.0))]
     OtherMaster(Vec<(String, u16)>),
     /// Seats that were to be held did not all tell, just before the first frame, that they stand where they are held.
-    #[error("{}: cannot be held, as the seat did not tell that it still stands where it stood; try again", .0.join(", "))]
+    #[error("{}: cannot be held, as no reading confirmed that the seat is still where it was; try again", .0.join(", "))]
     Unsure(Vec<String>),
     /// Seats that move though nothing was sent to them from here.
     #[error(
@@ -54,21 +54,21 @@ pub enum PlayError {
     Moving(Vec<String>),
     /// Seats that do not tell where all of their axes are, and cannot be known to have come to park.
     #[error(
-        "{}: does not tell where all of its axes are, and cannot be brought to park for certain: it does not ack, or its longest \
+        "{}: does not report the positions of all its axes, and cannot be brought to park for certain: it does not ack, or its longest \
          Time (PA0b, max_interval_ms) is too short for the stroke; home it, and try again",
         .0.join(", ")
     )]
     Unplaced(Vec<String>),
     /// Seats whose drives do not tell that they are home.
     #[error(
-        "{}: does not tell that it is home; nothing was sent. `kinocue home` homes it once the seat is empty, and `kinocue preflight` \
+        "{}: does not report that it is home; nothing was sent. `kinocue home` homes it once the seat is empty, and `kinocue preflight` \
          says what else is wrong",
         .0.join(", ")
     )]
     NotHome(Vec<String>),
     /// Seats with a rotary axis that do not tell where it is: a frame that is slow enough from anywhere there is not.
     #[error(
-        "{}: has a rotary axis, and does not tell where all of its axes are; nothing was sent, as no frame is slow enough from \
+        "{}: has a rotary axis, and does not report the positions of all its axes; nothing was sent, as no frame is slow enough from \
          anywhere. Play with acks to a controller that answers",
         .0.join(", ")
     )]

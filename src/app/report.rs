@@ -6,7 +6,10 @@ use std::time::Duration;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::{Deserialize, Serialize};
 
+use crate::config::Controller;
 use crate::control::model::{Ending, FrameCounts, InMicros, Percentiles};
+use crate::control::{LinkAxisStatus, LinkStatus};
+use crate::motion::{AxisGeometry, AxisUnit, Pulses};
 use crate::observe::ControllerState;
 use crate::rt::Spun;
 use crate::sys::realtime::RealTime;
@@ -36,6 +39,9 @@ pub struct PlayReport {
     pub(crate) strangers: u64,
     /// One entry for each controller.
     pub(crate) controllers: Vec<ControllerReport>,
+    /// One entry for each serial link; left out where there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub links: Vec<LinkStatus>,
     /// What happened to the controllers, oldest first.
     pub(crate) events: Vec<EventReport>,
 }
@@ -68,6 +74,8 @@ pub(crate) struct StateReport {
     pub(crate) outputs: Option<u16>,
     /// Measured positions, pulses; an echo of the command is none.
     pub(crate) measured: Option<Vec<i32>>,
+    /// The same, each in the unit of its axis.
+    pub(crate) places: Option<Vec<Place>>,
     /// Seconds since they were measured.
     pub(crate) measured_s_ago: Option<f64>,
     /// Force of each axis, in the drive's own unit.
@@ -76,10 +84,19 @@ pub(crate) struct StateReport {
     pub(crate) reports: u64,
 }
 
+/// Where an axis is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Place {
+    /// From the zero of its axis.
+    pub(crate) at: f64,
+    /// `mm` or `deg`.
+    pub(crate) unit: AxisUnit,
+}
+
 impl StateReport {
-    /// The state as it was known at `now`.
+    /// The state of a controller as it was known at `now`.
     #[must_use]
-    pub(crate) fn of(state: &ControllerState, now: MonoTime) -> Self {
+    pub(crate) fn of(controller: &Controller, state: &ControllerState, now: MonoTime) -> Self {
         let seconds = |at: MonoTime| now.since(at).as_secs_f64();
         Self {
             heard_s_ago: state.heard_at.map(seconds),
@@ -89,6 +106,13 @@ impl StateReport {
             inputs: state.inputs.map(|heard| heard.value),
             outputs: state.outputs.map(|heard| heard.value),
             measured: state.measured.map(|heard| heard.value.iter().map(|pulses| pulses.0).collect()),
+            places: state.measured.map(|heard| {
+                let place = |(axis, pulses): (&AxisGeometry, &Pulses)| Place {
+                    at: (axis.place(axis.fraction(*pulses)) * 1e3).round() / 1e3,
+                    unit: axis.unit,
+                };
+                controller.seat.own().iter().zip(heard.value.iter()).map(place).collect()
+            }),
             measured_s_ago: state.measured.map(|heard| seconds(heard.at)),
             forces: state.forces.map(|heard| heard.value.to_vec()),
             reports: state.reports,
@@ -210,6 +234,9 @@ impl PlayReport {
         }
         text.push('\n');
         text.push_str(&self.table().to_string());
+        for link in &self.links {
+            write!(text, "\n{}", of_link(link)).expect("a String takes what is written to it");
+        }
         for event in &self.events {
             let EventReport { controller, at_s, what } = event;
             write!(text, "\n{at_s:>9.3} s  {controller}: {what}")
@@ -230,6 +257,34 @@ impl PlayReport {
         }
         table
     }
+}
+
+/// A link, and its axes that did not take all that was made for them.
+fn of_link(link: &LinkStatus) -> String {
+    let beside = link.deviation_mm.map(|most| format!(", at most {most:.2} mm off the cue by the proof"));
+    let mut text = format!(
+        "link {} ({}): {:.1} Hz, {:.0} ms ahead{}; {} of {} requests answered, {} late, {} stray",
+        link.name,
+        link.dialect,
+        link.rate_hz,
+        link.lead_ms,
+        beside.unwrap_or_default(),
+        link.answered,
+        link.asked,
+        link.late,
+        link.stray
+    );
+    for axis in &link.axes {
+        let LinkAxisStatus { made, acked, unconfirmed, refused, in_doubt, skipped, dry, .. } = axis;
+        let taken = if *unconfirmed > 0 { format!("{unconfirmed} sent") } else { format!("{acked} acked") };
+        write!(
+            text,
+            "\n  {} axis {}: {made} made, {taken}, {refused} refused, {in_doubt} in doubt, {skipped} skipped, ran dry {dry} times",
+            axis.controller, axis.axis
+        )
+        .expect("a String takes what is written to it");
+    }
+    text
 }
 
 /// What the table says of each controller.

@@ -51,6 +51,17 @@ pub(crate) struct Places {
     pub(crate) sockets: Sockets,
 }
 
+impl Places {
+    /// Where the recorder of a hall of this configuration has its files.
+    fn of_recordings(&self, config: &Config) -> RecordPlaces {
+        RecordPlaces {
+            runtime: self.sockets.control.parent().map(Path::to_owned).unwrap_or_default(),
+            recordings: config.record.folder(&self.state),
+            config: self.config.clone(),
+        }
+    }
+}
+
 /// Why the daemon does not run. Nothing has moved then.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -75,11 +86,11 @@ pub(crate) enum ServeError {
     },
     /// The supervisor does not end: what it had to write down may be lost.
     #[error(
-        "the supervisor hangs, and the program ends without it: the seats are parked or at rest; what it had to write down may be lost"
+        "the supervisor hangs, and the program ends without it: the seats are parked or at rest; its last journal lines may be lost"
     )]
     Supervisor,
     /// The system gives no signals, or no thread.
-    #[error("the system refused: {0}")]
+    #[error("the system refused a signal handler or a thread: {0}")]
     System(#[source] io::Error),
 }
 
@@ -191,31 +202,19 @@ fn serve_halls(
     let mut film = HallFilm::default();
     let mut runtime = open(&config, crashed, &numbers, &signals.leave, &mut film)?;
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
-    let service_log = ServiceLog::new(log.clone());
     let (settings_file, kept) = SettingsFile::open(&places.state);
-    let carryover = Carryover::of(kept);
-    let record_places = RecordPlaces {
-        runtime: places.sockets.control.parent().map(Path::to_owned).unwrap_or_default(),
-        recordings: config.record.folder(&places.state),
-        config: places.config.clone(),
-    };
-    let surfaces = Surfaces::open(
-        &config,
-        &places.sockets,
-        &handle,
-        library.clone(),
-        record_places.recordings.clone(),
-        pages,
-        &log,
-    )?;
+    let record_places = places.of_recordings(&config);
+    let recordings = record_places.recordings.clone();
+    let surfaces =
+        Surfaces::open(&config, &places.sockets, &handle, library.clone(), recordings, pages, &log)?;
     let mut ports = SupervisorPorts {
         inbox,
         source,
         config: places.config,
         began,
         signals,
-        service_log,
-        carryover,
+        service_log: ServiceLog::new(log.clone()),
+        carryover: Carryover::of(kept),
         settings_file,
         film: None,
         player: None,

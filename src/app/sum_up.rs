@@ -87,6 +87,7 @@ pub(super) fn sum_up(about: SumUp, controllers: &[Controller], prepared: &Prepar
         controllers: (0..controllers.len())
             .map(|index| entry(index, &controllers[index], prepared, run))
             .collect(),
+        links: Vec::new(),
         events: events(controllers, run),
     };
     let tracker = run.accounts.books.tracker();
@@ -121,7 +122,7 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
         late: run.tallies[index].late,
         hurried: run.tallies[index].hurried,
         ack_us: Percentiles::of(tracker.latency(index)),
-        state: StateReport::of(&run.accounts.observer.states()[index], run.closed_at),
+        state: StateReport::of(controller, &run.accounts.observer.states()[index], run.closed_at),
     }
 }
 
@@ -135,7 +136,7 @@ fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<Stri
             (axis.stroke(), axis.unit.name(), axis.unit.park_velocity())
         });
         format!(
-            "{name}: its stroke of {stroke} {unit} was crossed in 3 s at the most (PA0b), so its way to park may have been \
+            "{name}: its move to park over a stroke of {stroke} {unit} took 3 s at most (PA0b), so it may have been \
              faster than {usual} {unit}/s"
         )
     }));
@@ -144,22 +145,20 @@ fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<Stri
         let axis = axis + 1;
         let count = clamps.clamps;
         Some(format!(
-            "{}: the limiter held its motion back {count} times, at the worst from {times:.2} times its limit of {limit} \
-             on axis {axis}; check the cue, and tell us if it passes",
+            "{}: the limiter held its motion back {count} times, at worst from {times:.2} times its limit of {limit} \
+             on axis {axis}; check the cue; if it passes, please report this",
             one.name
         ))
     }));
     notes.extend(controllers.iter().zip(&run.tallies).filter(|(_, tally)| tally.withheld > 0).map(|(one, tally)| {
         format!(
-            "{}: {} frames were withheld, because from somewhere that its seat might have been they would have been too fast",
+            "{}: {} frames were withheld: from some positions at which its seat might have been they were too fast",
             one.name, tally.withheld
         )
     }));
     if run.ended.unposted > 0 {
-        notes.push(format!(
-            "{} records found no room and were inferred from frame numbers",
-            run.ended.unposted
-        ));
+        notes
+            .push(format!("{} records did not fit and were inferred from frame numbers", run.ended.unposted));
     }
     notes
 }

@@ -41,7 +41,7 @@ pub(crate) enum SurfaceError {
     #[error(transparent)]
     Text(#[from] TextError),
     /// There is no thread, or no timer.
-    #[error("the system refused what the ports for OSC and text need")]
+    #[error("the system refused the ports for OSC and text")]
     System(#[source] io::Error),
 }
 
@@ -117,7 +117,7 @@ fn show_control(osc: Option<Osc>, text: Option<Text>, log: Log) -> Result<Servin
     let run = move || {
         runtime.block_on(async move {
             let fail = |what: &str, error: io::Error| {
-                let text = format!("the port for {what} has failed: {error}; start the service anew");
+                let text = format!("the port for {what} has failed: {error}; restart the service");
                 log.say(Line::new(Priority::Error, "port", text));
             };
             let osc = async {

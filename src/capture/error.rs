@@ -39,7 +39,7 @@ pub(crate) enum CaptureError {
         why: &'static str,
     },
     /// A section of pcapng whose byte-order mark is none.
-    #[error("byte {at}: {} is no byte-order mark of pcapng", hex(found))]
+    #[error("byte {at}: {} is not a byte-order mark of pcapng", hex(found))]
     ByteOrder {
         /// Where the mark stands.
         at: u64,

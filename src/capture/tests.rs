@@ -241,7 +241,7 @@ fn damage_is_named_with_its_place() {
     assert_eq!(told(&liar), "byte 48: a block of 32 bytes, where its end gives another length");
     let mut marked = section(BIG);
     marked[8] = 0;
-    assert_eq!(told(&marked), "byte 8: 002b3c4d is no byte-order mark of pcapng");
+    assert_eq!(told(&marked), "byte 8: 002b3c4d is not a byte-order mark of pcapng");
 }
 
 #[test]

@@ -21,10 +21,10 @@ const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::Bad
 
 /// Checks cue and configuration files: every fault, with its place.
 ///
-/// Proves format, units, axes and stroke of a cue, and with --config that each axis has a controller and each effect an
-/// output. Then proves its limits, over the whole cue and however the frames fall on it: velocity, acceleration and jerk of
-/// each axis, vibration on top of motion, the times of effects, and what the controllers themselves allow; with --drive also
-/// what serial drives execute of it. Exit code 1 where a limit is broken; `kinocue fit` lowers the motion until it fits.
+/// Checks format, units, axes and stroke of a cue, and with --config that each axis has a controller and each effect an
+/// output. Then proves its limits over the whole cue, at every phase of the frames: velocity, acceleration and jerk of each
+/// axis, vibration on top of motion, the times of effects, and what the controllers themselves allow; with --drive also
+/// how closely serial drives follow it. Exits with 1 if a limit is broken; `kinocue fit` lowers the motion until it fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue check cues/*.csv",
@@ -49,11 +49,11 @@ pub(super) struct Args {
     #[command(flatten)]
     drives: DriveArgs,
 
-    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. A cue that passes at one level passes at every lower one.
+    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. A cue that passes at one level passes at all lower ones.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 
-    /// Offset against the film, -500ms to 500ms. It only moves the frames on the cue, and the proof holds wherever they fall.
+    /// Offset against the film, -500ms to 500ms. It does not change the result: the proof holds at every phase of the frames.
     #[arg(long, value_name = "MS", value_parser = parse_trim, default_value = "0ms", allow_hyphen_values = true)]
     trim: i32,
 
@@ -330,7 +330,7 @@ fn unwired(path: &Path, timeline: &Timeline) -> Option<String> {
     let names = timeline.switch_names();
     (!names.is_empty()).then(|| {
         let (path, names) = (path.display(), names.join(", "));
-        format!("{path}: whether a hall has its effects ({names}) was not looked at; --config FILE does")
+        format!("{path}: not checked whether the hall has its effects ({names}); --config FILE checks it")
     })
 }
 
@@ -344,6 +344,6 @@ fn hall_in_words(hall: &Config) -> String {
     if !hall.links.is_empty() {
         words.insert(1, counted(hall.links.len(), "link"));
     }
-    words.extend(hall.absent.iter().map(|one| format!("{} out for good", one.controller.name)));
+    words.extend(hall.absent.iter().map(|one| format!("{} disabled", one.controller.name)));
     words.join(", ")
 }

@@ -13,7 +13,7 @@ use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
 use crate::record::{Places, RecordedAxis, tracks};
 
-/// Converts a cue from one format to another, or what a seat was sent in a recording into a cue.
+/// Converts a cue to another format, or the motion of a seat in a recording into a cue.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("\
 Examples:
@@ -25,30 +25,30 @@ Examples:
 
 A cue may have {}.", limits::IN_WORDS))]
 pub(super) struct Args {
-    /// The cue to read, CSV or MCAP, or a file of the format given with --from.
+    /// The cue to read, CSV or MCAP; a file in the format given with --from; or a recording.
     input: PathBuf,
     /// The file to write; its name ends in .csv or .mcap.
     output: PathBuf,
-    /// Format of the field to read: rows are line,time_ms,x,y,z,u,v,w, where time_ms is how long a row takes; u8 are
-    /// raw bytes, one an axis, 0 to 255 over the stroke.
+    /// Foreign format to read: rows is line,time_ms,x,y,z,u,v,w, where time_ms is the duration of the row; u8 is raw
+    /// bytes, one per axis, 0 to 255 over the stroke.
     #[arg(long, value_enum, value_name = "FORMAT")]
     from: Option<ConvertFormat>,
     /// Unit of the positions in rows: mm, percent, fraction or pulse.
     #[arg(long, value_name = "UNIT", requires = "from", required_if_eq("from", "rows"))]
     units: Option<DeclaredUnit>,
-    /// Axes in u8, 1 to 12.
+    /// Number of axes in u8, 1 to 12.
     #[arg(long, value_name = "N", requires = "from", required_if_eq("from", "u8"))]
     axes: Option<usize>,
-    /// Rows a second in u8.
+    /// Rows per second in u8.
     #[arg(long, value_name = "HZ", requires = "from", required_if_eq("from", "u8"))]
     rate: Option<f64>,
-    /// Recover the complete messages of a truncated or damaged MCAP.
+    /// Recover the complete messages of a truncated or damaged MCAP cue.
     #[arg(long, conflicts_with = "from")]
     recover: bool,
-    /// Of a recording, the seat.
+    /// The seat of a recording.
     #[arg(long, value_name = "NAME", requires = "take", conflicts_with_all = ["from", "recover"])]
     seat: Option<String>,
-    /// Of a recording, what is taken: where the seat was sent, or where it was measured to be.
+    /// What to take from a recording: the positions sent to the seat, or those measured.
     #[arg(long, value_enum, value_name = "WHAT", requires = "seat")]
     take: Option<Take>,
     /// Give the cue this title.
@@ -114,7 +114,7 @@ pub(super) fn target(output: &Path) -> anyhow::Result<ConvertTarget> {
     } else if named("mcap") {
         Ok(ConvertTarget::Mcap)
     } else {
-        Err(anyhow!("{}: the name of what is written ends in .csv or .mcap", output.display()))
+        Err(anyhow!("{}: the name of the output has to end in .csv or .mcap", output.display()))
     }
 }
 
@@ -193,7 +193,7 @@ pub(super) fn write(cue: &Cue, output: &Path, target: ConvertTarget) -> Result<(
     match target {
         ConvertTarget::Csv => {
             if !cue.markers().is_empty() {
-                print::tell(&format!("csv has no place for markers; {} are left out", cue.markers().len()));
+                print::tell(&format!("CSV cannot hold markers; {} are left out", cue.markers().len()));
             }
             cue::write_csv(cue, &mut out).map_err(|error| match error {
                 CsvError::Io(error) => failure(error, Exit::Io, output),

@@ -43,19 +43,19 @@ Examples:
   printf '0.5 > 40 31 36 20 30 0d\\n0.6 < 2a 20 31 30 0d\\n' | kinocue decode --dialect silvermax -
   kinocue decode --dialect sixpack2 01 24 00 40 1f 00 00 00 00
 
-Exit codes: 0 all of it was read, 64 not hex, 65 something is malformed, cut short or
-no capture, 66 no such file")]
+Exit codes: 0 everything was read, 64 not hex, 65 a message is malformed or cut short, or
+the file is neither hex nor a capture, 66 no such file")]
 pub(super) struct Args {
-    /// Hex, a capture, or - for the standard input
+    /// Hex, a capture, or - for standard input
     ///
-    /// Hex digits with or without spaces, colons and 0x; words are joined, and a word that opens with 55aa0000 or
-    /// 33cc0000 begins another message. A file, or the standard input, is a pcap or pcapng capture or lines of hex, a
-    /// message each.
+    /// Hex digits with or without spaces, colons and 0x. Words are joined; a word that starts with 55aa0000 or
+    /// 33cc0000 begins another message. A file, or standard input, is a pcap or pcapng capture, or lines of hex, one
+    /// message per line.
     #[arg(value_name = "HEX|FILE")]
     input: Vec<OsString>,
 
     /// Family whose manual the messages follow; imax is the layout as its manual prints it, which no known
-    /// program sends. Of serial drives a file, or the standard input, is their octets, lines of hex, or a log of lines
+    /// program sends. For serial drives, a file or standard input holds raw bytes, lines of hex, or a log of lines
     /// "seconds > hex" to the drive and "seconds < hex" from it.
     #[arg(long, value_enum, default_value_t = MessageReading::Smc)]
     dialect: MessageReading,
@@ -64,19 +64,19 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
     vibration_port_octets: VibrationPort,
 
-    /// In a capture, read the datagrams from or to this port rather than 7408 and 8410; repeatable.
+    /// In a capture, read the datagrams from or to this port instead of 7408 and 8410; repeatable.
     #[arg(long, value_name = "N", conflicts_with = "all")]
     port: Vec<u16>,
 
-    /// In a capture, read every datagram that begins like a message, whatever its port.
+    /// In a capture, read every datagram that begins like a message, on any port.
     #[arg(long)]
     all: bool,
 
-    /// All fields of each message of a file or of the standard input, rather than one line.
+    /// Print all fields of each message of a file or of standard input, instead of one line.
     #[arg(short, long)]
     verbose: bool,
 
-    /// One JSON object a line on the standard output; after a file or the standard input one with the counts.
+    /// Print one JSON object per line on stdout; after a file or standard input, one with the counts.
     #[arg(long)]
     json: bool,
 }
@@ -85,7 +85,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let is_serial = matches!(args.dialect, MessageReading::Silvermax | MessageReading::Sixpack2);
     if is_serial && (args.all || args.verbose || !args.port.is_empty()) {
         return Err(anyhow!(
-            "--port, --all and --verbose are for datagrams; leave them out with a serial line"
+            "--port, --all and --verbose are for datagrams; omit them with a serial dialect"
         ))
         .or_exit(Exit::Usage);
     }

@@ -20,31 +20,31 @@ use crate::doctor::measure::measure;
 use crate::doctor::{FindingLine, Hall, Verdict, facts, judge, ready};
 use crate::sys::realtime::normal_priority;
 
-/// Checks if this machine is fit for real-time use, and says what to change if it is not.
+/// Checks if this machine is fit for real-time use, and how to make it so.
 ///
-/// First come checks: each line has the finding, a verdict, and the exact fix. Then comes a measurement: a bare loop on
-/// the clock and with the scheduling of `play`, 1,000 ticks a second. It changes nothing and sends nothing.
+/// The checks come first, each with its finding, a verdict and the exact fix. Then it measures a bare loop with the clock and
+/// scheduling of `play`, at 1,000 ticks per second. It changes nothing and sends nothing.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Verdicts:
   ok       as it should be
-  warn     a show will run, but with less margin than it could have
+  warn     a show will run, but with less margin than possible
   bad      ticks or frames will be lost: the machine is not ready
-  unknown  it could not be determined from here
+  unknown  cannot be determined by this program
 
-Verdicts of a measured run, by how late the loop woke after each tick's deadline:
-  warn  one of 100 ticks is more than 10 % of the tick (100 µs) late, or any tick is missed.
-        A frame's Time is a whole tick; up to a tenth of it a seat follows as planned.
-  bad   one of 100 is more than 50 % late, or more than one of 1,000 is missed.
-        The work of a tick and the way to the seat need the other half, so frames begin to meet
-        the next ones; and a seat shows ticks that are missed this often.
+Verdicts of a measured run, by how late the loop woke after the deadline of each tick:
+  warn  1 % of the ticks are more than 10 % of a period (100 µs) late, or any tick is missed.
+        A frame's Time is a whole period; up to a tenth of it, a seat follows as planned.
+  bad   1 % of the ticks are more than 50 % of a period late, or over 0.1 % are missed.
+        The work of a tick and the way to the seat need the other half, so frames begin to run
+        into the next ones; and ticks missed this often can be felt in a seat.
 
 Exit codes: 0 ready, 1 not ready: something is bad
 
 Examples:
-  kinocue doctor                                 looks, and measures for 10 s
+  kinocue doctor                                 checks, and measures for 10 s
   kinocue doctor --load --seconds 60             measures again with every processor busy
-  kinocue doctor --config hall.toml --seconds 0  looks only, for the controllers of a hall
+  kinocue doctor --config hall.toml --seconds 0  only checks, for the controllers of a hall
   kinocue doctor --json | jq '.lines[] | select(.verdict != \"ok\")'")]
 pub(super) struct Args {
     /// Duration of each run in seconds, at most an hour; 0 runs none.
@@ -55,11 +55,11 @@ pub(super) struct Args {
     #[arg(long)]
     load: bool,
 
-    /// Number of controllers to be played to.
+    /// Number of controllers that shows will play to.
     #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "config", value_parser = clap::value_parser!(u32).range(1..=65535))]
     controllers: u32,
 
-    /// The configuration whose controllers are to be played to.
+    /// The configuration with the controllers that shows will play to.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 
@@ -208,7 +208,7 @@ fn text(lines: &[FindingLine], runs: &[LatenessRun], hall: Hall) -> String {
     append(
         &mut text,
         format_args!(
-            "\n{} for {} controller{}: {} bad, {} to be warned of, {} not seen, {} ok\n",
+            "\n{} for {} controller{}: {} bad, {} warn, {} unknown, {} ok\n",
             if ready(lines) { "ready" } else { "not ready" },
             hall.controllers,
             if hall.controllers == 1 { "" } else { "s" },

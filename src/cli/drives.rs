@@ -23,14 +23,14 @@ const MOST_HZ: f64 = 500.0;
 /// Serial drives that a cue is judged for as well.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct DriveArgs {
-    /// Also check what serial drives of this family execute of a cue; the seat's pulses are their counts or microsteps.
+    /// Also check how closely serial drives of this family follow a cue; the seat's pulses are their counts or microsteps.
     ///
-    /// A SilverMax is judged by segments of its timed queue, a SIXpack 2 by targets on the fly, with clock_divider 3 and propdiv as its
-    /// seat needs it.
+    /// A SilverMax is judged by segments of its timed queue, a SIXpack 2 by targets on the fly, with clock_divider 3 and the propdiv that
+    /// its seat needs.
     #[arg(long, value_name = "FAMILY", requires = "link_rate", value_parser = drive_family())]
     drive: Option<DriveFamily>,
 
-    /// Segments or targets per second that their link carries for each axis: 10 to 500.
+    /// Segments or targets per second that the link carries for each axis: 10 to 500.
     #[arg(long, value_name = "HZ", requires = "drive", value_parser = parse_link_rate)]
     link_rate: Option<f64>,
 
@@ -149,7 +149,7 @@ fn part(axis: &DriveAxisProof) -> f64 {
 
 fn beside(axis: &DriveAxisProof) -> String {
     let value = (100.0 * axis.deviation.value).ceil() / 100.0;
-    format!("at most {value:.2} {} beside the cue", axis.on.geometry().unit.name())
+    format!("at most {value:.2} {} off the cue", axis.on.geometry().unit.name())
 }
 
 fn ms(span: Duration) -> f64 {
@@ -174,5 +174,5 @@ fn drive_family() -> impl TypedValueParser<Value = DriveFamily> {
 
 fn parse_link_rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate| (10.0..=500.0).contains(rate));
-    rate.ok_or_else(|| "a link carries 10 to 500 segments or targets an axis a second".to_owned())
+    rate.ok_or_else(|| "the link rate is 10 to 500 Hz: segments or targets per axis".to_owned())
 }

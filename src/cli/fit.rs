@@ -17,11 +17,11 @@ use crate::timeline::Timeline;
 
 /// Fits a cue into the limits of its seats.
 ///
-/// Scales the motion down about the neutral pose just as far as needed, and never changes its timing. A cue that ends in motion, with no
-/// way to come to rest from there, is brought to rest over its last stretch where that changes less. What scaling cannot cure, such as the
-/// steps of coarse sources and the corners of straight lines, --smooth removes with a low-pass filter that moves nothing in time; of filter
-/// and scaling, it uses the pair that changes the cue least. Vibration that the seat cannot take on top of that is lowered too. It reports,
-/// but does not fix, what the serial links of the hall cannot carry. The result passes `kinocue check` on the same terms.
+/// Scales the motion down about the neutral pose just as far as needed, and never changes its timing. A cue that ends in motion without
+/// room to stop is brought to rest over its last stretch, if that changes it less. --smooth allows a zero-phase low-pass filter against
+/// what scaling cannot cure, such as the steps of coarse sources and the corners of straight lines; of all pairs of filter and scale it
+/// uses the one that changes the cue least. Vibration that the seat cannot take on top of the motion is lowered too. What the serial
+/// links of the hall cannot carry is reported, not fixed. The result passes `kinocue check` with the same options.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue fit ride.csv -o fitted.csv",
@@ -43,19 +43,19 @@ pub(super) struct Args {
     #[command(flatten)]
     seat: SeatArgs,
 
-    /// The level that the cue is to be played at: 60% or -6dB.
+    /// The level at which the cue will be played: 60% or -6dB.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 
-    /// Scale each axis by itself; otherwise all axes are scaled alike, which keeps the shape of the motion.
+    /// Scale each axis by itself; by default all axes are scaled alike, which keeps the shape of the motion.
     #[arg(long)]
     per_axis: bool,
 
-    /// Allow a low-pass filter (zero phase, so nothing moves in time).
+    /// Allow a low-pass filter (zero phase, so without delay).
     #[arg(long)]
     smooth: bool,
 
-    /// Overwrite OUT if it exists; never the cue itself.
+    /// Overwrite OUT if it exists, but never the cue itself.
     #[arg(long)]
     force: bool,
 
@@ -77,8 +77,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         .map_err(|error| anyhow!("{}: {error}", args.cue.display()))
         .or_exit(Exit::CheckFailed)?;
     if !fitted.after.passed() || !judge.stroke(&fitted.timeline).faults.is_empty() {
-        let error =
-            anyhow!("{}: what was made of it still breaks limits; nothing is written", args.cue.display());
+        let error = anyhow!("{}: the fitted cue still breaks limits; nothing is written", args.cue.display());
         return Err(error).or_exit(Exit::CheckFailed);
     }
     refuse_what_links_miss(args, &judge, &fitted)?;
@@ -100,7 +99,7 @@ fn refuse_what_links_miss(args: &Args, judge: &Judge, fitted: &Fitted) -> Result
     }
     let lines: String = broken.iter().map(|one| format!("{}:{one}\n", args.cue.display())).collect();
     let error = anyhow!(
-        "{lines}what serial links miss of a cue is nothing that fit mends: change the link, the level or the cue; nothing is written"
+        "{lines}fit cannot mend what a serial link cannot carry: change the link, the level or the cue; nothing is written"
     );
     Err(error).or_exit(Exit::CheckFailed)
 }
@@ -171,7 +170,7 @@ impl FitReport {
         let mut lines = Vec::new();
         if let Some(seconds) = self.eased_s {
             lines.push(format!(
-                "brought to rest in its last {seconds:.2} s, as it ended in motion without room for a stop"
+                "brought to rest in its last {seconds:.2} s, because it ended in motion without room for a stop"
             ));
         }
         if let Some(hz) = self.cut_off_hz {
@@ -181,12 +180,12 @@ impl FitReport {
         lines.extend(lowered.map(|(axis, factor)| format!("a{}: amplitude x {factor:.4}", axis + 1)));
         if self.vibration_lowered > 0 {
             lines.push(format!(
-                "vibration lowered {} times, to keep to the stroke and to what the seat stands",
+                "vibration lowered {} times, to keep the stroke and the limits of the seat",
                 self.vibration_lowered
             ));
         }
         if lines.is_empty() {
-            lines.push("kept all limits before; written as it was".to_owned());
+            lines.push("already keeps all limits; written unchanged".to_owned());
         } else {
             let (by, axis, at) = (fitted.change.by, &self.change_axis, fitted.change.at);
             let unit = self.change_deg.map_or(AxisUnit::Millimetre, |_| AxisUnit::Degree).name();

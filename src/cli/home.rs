@@ -24,9 +24,9 @@ use drives::HomingResult;
 ///
 /// Without --to and --config the daemon homes all seats of its hall; `kinocue watch` shows their progress.
 ///
-/// The seats move by themselves, over their whole stroke, at a speed that the controllers set. Ctrl-C ends the command,
-/// not the movement: only the hard-wired emergency stop ends that. Seats with serial drives are led by this command, at the
-/// speed of [seat.NAME.drive] and within its travel; there Ctrl-C has the axes brake.
+/// The seats move by themselves, over their whole stroke, at a speed set in the controllers. Ctrl-C ends the command, not the
+/// movement: only the hard-wired emergency stop ends that. Seats on serial drives are moved by this command, at the speed and
+/// within the travel of [seat.NAME.drive]; there Ctrl-C brakes the axes.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +36,7 @@ Examples:
   kinocue home --config hall.toml --row A --seats-empty
   kinocue home --to 192.168.15.201:7408 --timeout 120
 
-PA0e decides what a controller does: 0 searches zero; 1 goes to zero without a search,
+PA0e decides what a controller does: 0 searches for zero; 1 goes to zero without a search,
 which is right only if it has found zero since power-on.")]
 pub(super) struct Args {
     /// The controllers [default: all].
@@ -47,7 +47,7 @@ pub(super) struct Args {
     /// Confirm that nobody sits on the seats and nothing lies on or under them; do not ask.
     #[arg(long)]
     seats_empty: bool,
-    /// Timeout for each controller in seconds, 1 to 3600; the daemon has its own, and serial drives go by their travel.
+    /// Timeout for each controller in seconds, 1 to 3600. The daemon has its own; for serial drives it follows from their travel.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
     timeout: u64,
     #[command(flatten)]
@@ -118,7 +118,7 @@ fn ready_names<'c, C>(
 
 fn question(names: &[&str]) -> String {
     format!(
-        "{} will move over the whole stroke. Are these seats empty, and is nobody near them?",
+        "{} will move over their whole stroke. Are these seats empty, and is nobody near them?",
         names.join(", ")
     )
 }
@@ -136,7 +136,7 @@ fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<H
         print::tell(&format!("{name}: PA0e = {value}: {meaning}{state}"));
         if let Some(axis) = controller.seat.rotary_axis() {
             print::tell(&format!(
-                "{name}: axis {} does not search its zero: where it stands now becomes its 0",
+                "{name}: axis {} has no search for its zero: its position now becomes 0",
                 axis + 1
             ));
         }

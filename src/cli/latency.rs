@@ -33,47 +33,45 @@ const VIRTUAL: u16 = 4;
 /// Axes of a controller whose `--to` says nothing of them.
 const AXES: &str = "axes=3";
 
-/// Measures how late frames leave and how soon their acks come.
+/// Measures how late frames leave and how soon their acks arrive.
 ///
-/// Sends as `play` does, from the same loop, and moves nothing: each frame holds the seat where it stands, effects off.
-/// Where each seat stands is read first, twice, and again just before the first frame. A controller is left out unless its
-/// seat stands still, inside its stroke, and nothing about it (axes, PA95, PA55, PA0d, an emergency stop, an error) would
-/// make something else of a position than it says. Without --to and --config it measures against virtual controllers of its
-/// own.
+/// Sends frames as `play` does, from the same loop, and moves nothing: each frame holds its seat where it is, effects off.
+/// The position of each seat is read twice first, and again just before the first frame. A controller is left out unless its
+/// seat is at rest within its stroke, and nothing about it (axes, PA95, PA55, PA0d, an emergency stop, an error) could make
+/// a frame mean another position. Without --to and --config it measures against virtual controllers of its own.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Lateness is from a tick's deadline to the instant before its first frame is handed to the kernel;
-ack latency from that instant, of each frame, to the kernel's receive time of its ack. Lateness measures this machine; ack latency also
-the network and the controllers, or with
-virtual controllers this machine again.
+Lateness is the time from a tick's deadline until its first frame is handed to the kernel; ack latency the time from
+handing each frame to the kernel until the kernel receives its ack. Lateness measures this machine; ack latency also
+measures the network and the controllers, or, with virtual controllers, this machine again.
 
---out writes an interval log of HdrHistogram (format 1.3, nanoseconds): a line a second for each of
-the tags lateness and ack_latency. Any program that reads such logs can plot it.
+--out writes an HdrHistogram interval log (format 1.3, nanoseconds), with one line per second for each of the tags
+lateness and ack_latency. Any program that reads such logs can plot it.
 
 Exit codes:
   0   measured
   69  a controller did not answer
-  75  a seat did not stay where it stood, or the frame port is taken
+  75  a seat did not stay where it was, or the frame port is taken
   76  a controller refused frames, or was left out
 
 Examples:
   kinocue latency                                                    to four virtual controllers
-  kinocue latency --count 64 --seconds 60 --out before.hlog          sixty-four of them, kept
+  kinocue latency --count 64 --seconds 60 --out before.hlog          to 64 of them, written to a file
   kinocue latency --count 64 --seconds 60 --spin-us 100 --out after.hlog
   kinocue latency --compare before.hlog after.hlog                   the effect of spinning
-  kinocue latency --to 192.168.15.201:7408 --rate 250                a controller of three axes on the network
+  kinocue latency --to 192.168.15.201:7408 --rate 250                to a controller of three axes
   kinocue latency --config hall.toml --ack-every 10 --json | jq .lateness_us")]
 pub(super) struct Args {
-    /// A controller: HOST:PORT, and after commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or mbox;
-    /// repeatable.
+    /// A controller: HOST:PORT, then optionally, after commas, name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
+    /// mbox; repeatable.
     #[arg(long, value_name = "ADDR", conflicts_with = "config")]
     to: Vec<String>,
 
-    /// Controllers, seats and show settings from a file.
+    /// The configuration, with controllers, seats and show settings.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 
-    /// Virtual controllers of three axes, where no others are named [default: 4]
+    /// Number of virtual controllers of three axes, without --to and --config [default: 4]
     #[arg(long, value_name = "N", conflicts_with_all = ["to", "config"], value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: Option<u16>,
 

@@ -26,11 +26,11 @@ pub(super) fn after_help(examples: &[&str]) -> String {
 /// What a cue file is, where it is none of kinocue's own formats.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct SourceArgs {
-    /// The cue is a file of a motion editor: rows of line, time_ms, x, y, z, u, v, w.
+    /// The cue comes from a motion editor, in this format.
     #[arg(long, value_enum, value_name = "FORMAT", requires = "units")]
     from: Option<Import>,
 
-    /// The unit of its positions, which such a file does not state.
+    /// The unit of its positions, which the file does not state.
     #[arg(long, value_name = "UNIT", requires = "from", value_parser = declared_unit())]
     units: Option<DeclaredUnit>,
 }
@@ -38,7 +38,7 @@ pub(super) struct SourceArgs {
 /// The formats of others that a cue can be read from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Import {
-    /// Lines of line,time_ms,x,y,z,u,v,w; time_ms is how long the row takes.
+    /// Rows of line,time_ms,x,y,z,u,v,w; time_ms is the duration of the row.
     Rows,
 }
 
@@ -65,7 +65,7 @@ pub(super) struct SeatArgs {
     #[arg(long, value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
 
-    /// The seat type to check against [default: each axis that of its controller; bench3 without a configuration].
+    /// The seat type to check against [default: for each axis that of its controller; bench3 without a configuration].
     #[arg(long, value_name = "NAME")]
     pub(super) seat: Option<String>,
 
@@ -100,7 +100,7 @@ fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
     known.ok_or_else(|| {
         let names: Vec<_> =
             hall.map_or(vec!["bench3"], |hall| hall.seats.iter().map(|s| s.name.as_str()).collect());
-        let hint = if hall.is_none() { "; --config FILE brings others" } else { "" };
+        let hint = if hall.is_none() { "; --config FILE adds others" } else { "" };
         Failure {
             exit: Exit::Usage,
             error: anyhow!("--seat {name}: the seat types are {}{hint}", names.join(", ")),
@@ -192,7 +192,7 @@ pub(super) fn streamed(path: &Path, silent: bool) -> Result<Config, Failure> {
     config.streamed().or_exit(Exit::Config)?;
     if silent && let Some(one) = config.on_links().next() {
         let error = anyhow!(
-            "{} is on a serial link, whose drives answer whatever they are sent; leave --no-acks out",
+            "{} is on a serial link, whose drives answer everything they are sent; omit --no-acks",
             one.name
         );
         return Err(error).or_exit(Exit::Usage);

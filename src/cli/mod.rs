@@ -17,6 +17,7 @@ mod convert;
 mod decode;
 mod demo;
 mod doctor;
+mod draw_recording;
 mod drives;
 mod exit;
 mod figures;
@@ -48,20 +49,20 @@ pub(crate) use exit::{Exit, Failure, OrExit};
 
 const AFTER: &str = "\
 Examples:
-  kinocue demo                                  everything at work, with nothing to set up
-  kinocue check hall.toml                       every fault of a configuration
-  kinocue play ride.csv --config hall.toml      one cue, led by keys
-  kinocue serve --config hall.toml              the service, led by the commands from status to test
+  kinocue demo                                  a complete hall, with nothing to set up
+  kinocue check hall.toml                       lists every fault of a configuration
+  kinocue play ride.csv --config hall.toml      plays one cue, controlled by keys
+  kinocue serve --config hall.toml              runs the service; the commands from status to mark control it
 
-kinocue COMMAND --help has the options of each, with examples.
+kinocue COMMAND --help shows the options of each command, with examples.
 
 Exit codes:
   0   done                        70  a fault of kinocue       76   a controller refused
   1   a check failed              71  the system refused       77   not allowed
   64  usage                       74  input or output failed   78   bad configuration
-  65  bad cue                     75  not ready, try again     79   another master
+  65  bad cue                     75  not ready, try again     79   another master sends
   66  no such file or name                                     130  a second Ctrl-C
-  69  no daemon, or no controller, answered";
+  69  no daemon or no controller answered";
 
 /// Plays motion cues to the seats of a theatre, in time with a film.
 ///
@@ -101,6 +102,9 @@ enum ProgramCommand {
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
     Prove(prove::Args),
+    /// Draws one recording for the console, as a process of the lowest priority.
+    #[command(hide = true)]
+    DrawRecording(draw_recording::Args),
     #[command(hide = true)]
     FilmPlayer(film_player::Args),
     #[command(hide = true)] // for those who make packages
@@ -180,6 +184,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Client(command) => client::run(&command),
         ProgramCommand::Completions(args) => completions::run(&args),
         ProgramCommand::Prove(args) => prove::run(&args),
+        ProgramCommand::DrawRecording(args) => draw_recording::run(&args),
         ProgramCommand::FilmPlayer(args) => film_player::run(&args),
         ProgramCommand::Man(args) => man::run(&args),
     }

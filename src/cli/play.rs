@@ -44,8 +44,8 @@ const EXAMPLES: [&str; 4] = [
 
 /// Plays one cue to the controllers, and reports the fate of every frame.
 ///
-/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C, half a second after the first or later, ends at once and
-/// leaves the seats where they are. On a terminal keys lead the play; ? says which. None of it is an emergency stop: that one is
+/// Ctrl-C parks the seats and ends with the report. A second Ctrl-C, at least half a second later, ends at once and leaves the
+/// seats where they are. On a terminal, keys control the play; ? lists them. None of this is an emergency stop: that one is
 /// hard-wired.
 #[derive(Debug, clap::Args)]
 #[command(after_help = after_help(&EXAMPLES))]
@@ -54,41 +54,42 @@ pub(super) struct Args {
     cue: PathBuf,
     #[command(flatten)]
     source: SourceArgs,
-    /// A controller: HOST:PORT, and after commas name=A1, axes=6, offset=0, fan_out=slice or shared, dialect=smc or mbox;
-    /// repeatable.
+    /// A controller: HOST:PORT, then optionally, after commas, name=A1, axes=6, offset=0, fan_out=slice or shared, dialect=smc or
+    /// mbox; repeatable.
     #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
     to: Vec<String>,
-    /// Controllers, seats and show settings from a file.
+    /// The configuration, with controllers, seats and show settings.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Ticks per second, 1 to 1000 [default: 100, or the configuration's].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
-    /// The kind of Time that the frames carry [default: relative, or the configuration's].
+    /// Whether Time in the frames is relative or absolute [default: relative, or the configuration's].
     #[arg(long, value_parser = ["relative", "absolute"])]
     time: Option<String>,
-    /// Where in the cue to start: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
+    /// Start at this position in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     start: Option<ShowTime>,
-    /// Number of plays; 0 plays until stopped.
+    /// Number of plays; 0 repeats until stopped.
     #[arg(long = "loop", value_name = "N", default_value_t = 1)]
     plays: u32,
-    /// Intensity of motion and vibration about the seats' neutral pose: 60% or -6dB.
+    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level)]
     level: Option<f64>,
-    /// An effect's output, for controllers that are not on this machine: NAME=N; repeatable.
+    /// An effect's output Y01 to Y12, for controllers that are not on this machine: NAME=N; repeatable.
     #[arg(long, value_name = "NAME=N", conflicts_with = "config")]
     effect: Vec<String>,
     #[command(flatten)]
     stream: StreamArgs,
-    /// Follow a film: the seats wait at park, join, and hold while it stands. mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH,
-    /// ltc:alsa:DEVICE, ltc:-, ltc:FILE.wav, mtc:DEVICE, artnet:FROM, osc:FROM, http:FROM or clock:TIME; repeatable, the best first.
+    /// Follow a film: the seats wait at park, join it, and rest while it is stopped. mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH,
+    /// ltc:alsa:DEVICE, ltc:-, ltc:FILE.wav, sound:INPUT,index=FILE.kidx, mtc:DEVICE, artnet:FROM, osc:FROM, http:FROM or
+    /// clock:TIME; repeatable, best first.
     #[arg(long, value_name = "SOURCE", conflicts_with_all = ["start", "plays"])]
     chase: Vec<FilmSource>,
-    /// Follow a film that begins at that time, the same as --chase clock:TIME: 2026-11-21T19:00 or 19:00.
+    /// Follow a film that begins at this time of day, as --chase clock:TIME does: 2026-11-21T19:00 or 19:00.
     #[arg(long, value_name = "TIME", conflicts_with_all = ["start", "plays", "chase"])]
     at: Option<ClockStart>,
-    /// Follow a coarse source as well: positions by OSC or HTTP that may be tens of milliseconds off.
+    /// Also follow coarse sources: positions by OSC or HTTP that may be tens of milliseconds off.
     #[arg(long, requires = "chase")]
     allow_coarse: bool,
     /// Frame rate of the film: 23.976, 24, 25, 29.97 or 30 [default: as received].
@@ -97,10 +98,10 @@ pub(super) struct Args {
     /// The film's timecode at which the cue begins, HH:MM:SS:FF [default: 00:00:00:00].
     #[arg(long, value_name = "TIMECODE", requires = "chase")]
     tc_start: Option<String>,
-    /// Record the play to an MCAP file that is not there yet: 20 times a second where each seat was asked to be, and was sent.
+    /// Record the play to a new MCAP file: 20 times a second, the positions asked of each seat and sent to it.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// How much is recorded: samples, each the worst of its twentieth of a second, or every tick and frame beside them.
+    /// How much to record.
     #[arg(long, value_enum, value_name = "MODE", requires = "record", default_value_t)]
     record_mode: Mode,
     /// Print the report as one JSON object on stdout.
@@ -154,7 +155,7 @@ fn play(
     let for_ever = show.plays == 0;
     for controller in config.without_effects().filter(|_| uses_effects(&timeline)) {
         let name = &controller.name;
-        print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
+        print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or [effects]"));
     }
     config.absent.iter().for_each(|one| tell_absent(&one.controller));
     if manner.silent {

@@ -21,15 +21,15 @@ const WIDTH: u16 = 100;
 /// Columns of a file, shared out among the axes: what keeps it under 500 kB.
 const FILE_COLUMNS: usize = 7_200;
 /// The same of a recording, which has more lines.
-const RECORDING_COLUMNS: usize = 900;
+pub(super) const RECORDING_COLUMNS: usize = 900;
 /// The greatest width of a terminal that is used, characters.
 const WIDEST: u16 = 240;
 
 /// Draws a cue, where it goes and what that asks of a seat; or a recording, what a seat was asked and sent, and what went wrong.
 ///
-/// On a terminal in braille; with -o as a page or an SVG that stand alone. Speed, acceleration and jerk are those of `kinocue
-/// info` and `kinocue check`, as parts of their limits. Of a recording, --seat is the seat's name; without it that is drawn which was
-/// held back farthest.
+/// Draws in braille on a terminal; with -o writes a self-contained HTML page or SVG. Speed, acceleration and jerk are those of
+/// `kinocue info` and `kinocue check`, as fractions of their limits. For a recording, --seat is the name of a seat; without it, the
+/// seat that the limiter held back farthest is drawn.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue plot cues/coaster.csv",
@@ -40,10 +40,10 @@ const WIDEST: u16 = 240;
     "kinocue plot tuesday.mcap monday.mcap --seat F4 -o both.html",
 ]))]
 pub(super) struct Args {
-    /// The cue, CSV or MCAP; or a recording; or the word last, for the newest recording of this folder.
+    /// The cue, CSV or MCAP; or a recording; or the word last: the newest recording in this folder.
     cue: PathBuf,
 
-    /// Another recording, whose sent positions are laid over.
+    /// Another recording, whose sent positions are drawn over the first.
     other: Option<PathBuf>,
 
     #[command(flatten)]
@@ -53,11 +53,11 @@ pub(super) struct Args {
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     from: Option<ShowTime>,
 
-    /// End here.
+    /// End here: SS, MM:SS or HH:MM:SS.
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     to: Option<ShowTime>,
 
-    /// Show five seconds to either side of this.
+    /// Show five seconds to either side of this time.
     #[arg(long, value_name = "TIME", value_parser = parse_time, conflicts_with_all = ["from", "to"])]
     at: Option<ShowTime>,
 
@@ -65,7 +65,7 @@ pub(super) struct Args {
     #[arg(short, long, value_name = "OUT", conflicts_with = "json")]
     output: Option<PathBuf>,
 
-    /// What the file is to be looked at on.
+    /// What the file will be viewed on.
     #[arg(long, value_enum, default_value_t, requires = "output")]
     theme: Theme,
 
@@ -105,11 +105,12 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             },
             is_detailed: file.is_some() || args.json,
         };
-        tell(&plot_recording::picture(&asked)?, file, args)?;
+        let (picture, ..) = plot_recording::picture(&asked)?;
+        tell(&picture, file, args)?;
         return Ok(Exit::Done);
     }
     if let Some(other) = &args.other {
-        let error = anyhow!("{}: only a recording is laid over another", other.display());
+        let error = anyhow!("{}: only two recordings can be drawn over each other", other.display());
         return Err(error).or_exit(Exit::Usage);
     }
     let hall = args.seat.config.as_deref().map(load::config).transpose()?;
@@ -159,7 +160,7 @@ fn format(path: &Path) -> Result<PlotFormat, Failure> {
     match path.extension().and_then(|end| end.to_str()) {
         Some("html") => Ok(PlotFormat::Page),
         Some("svg") => Ok(PlotFormat::Svg),
-        _ => Err(anyhow!("{}: its name has to end in .html or .svg", path.display())).or_exit(Exit::Usage),
+        _ => Err(anyhow!("{}: the name has to end in .html or .svg", path.display())).or_exit(Exit::Usage),
     }
 }
 

@@ -51,10 +51,11 @@ fn newest(dir: &Path) -> Result<PathBuf, Failure> {
         .or_exit(Exit::NoInput)
 }
 
-/// The picture.
-pub(super) fn picture(asked: &Asked<'_>) -> Result<Picture, Failure> {
+/// The picture, the seat that is drawn, and all that there are.
+pub(super) fn picture(asked: &Asked<'_>) -> Result<(Picture, String, Vec<String>), Failure> {
     let (contents, summary) = summarize(open(asked.file)?).map_err(|error| unread(error, asked.file))?;
     let lane = lane(asked, &contents, &summary)?;
+    let seats: Vec<String> = contents.seats.iter().map(|seat| seat.name.clone()).collect();
     let time = axis(asked, &summary)?;
     let look = Look { lane, time, is_detailed: asked.is_detailed };
     let gathered = gathered(asked.file, look, &contents)?;
@@ -70,7 +71,7 @@ pub(super) fn picture(asked: &Asked<'_>) -> Result<Picture, Failure> {
         }
         None => None,
     };
-    Ok(plot::of_recording(&contents, &summary, gathered, other))
+    Ok((plot::of_recording(&contents, &summary, gathered, other), seats[lane].clone(), seats))
 }
 
 fn gathered(path: &Path, look: Look, contents: &Contents) -> Result<Gathered, Failure> {

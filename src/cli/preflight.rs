@@ -30,7 +30,8 @@ use report::{ControllerChecks, PreflightReport};
 ///
 /// Checks which controllers answer, how fast, and if their settings are right and safe.
 ///
-/// Reads only; nothing moves and nothing is changed; seats on serial links are read over their ports. Controllers are asked side by side: 64 of them take seconds, even if some are dead. Exits with 0 only if nothing fails. Without --to and --config the daemon checks its own hall.
+/// Only reads: nothing moves and nothing is changed. Seats on serial links are read over their ports. Controllers are read in
+/// parallel: 64 take seconds, even if some are dead. Without --to and --config the daemon checks its own hall.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -42,7 +43,7 @@ Examples:
   kinocue preflight --to 192.168.15.201:7408,axes=3
   kinocue preflight --explain estop-and
 
-A site that lives with a finding names it in its configuration, under [show] or under one [[controller]]:
+To accept a finding, name it with the reason in the configuration, under [show] or under one [[controller]]:
   accept_findings = [{ check = \"estop-disabled\", why = \"hard-wired contactor K1, tested 12 May\" }]
 
 Exit codes:
@@ -68,7 +69,7 @@ pub(super) struct Args {
     rate: Option<f64>,
     #[command(flatten)]
     server: client::ServerArgs,
-    /// Explain the checks, or one of them, and why they matter; contacts no controller.
+    /// Explain all checks, or this one, and why they matter; contacts no controller.
     #[arg(long, value_name = "CHECK", num_args = 0..=1, exclusive = true)]
     explain: Option<Option<String>>,
 }
@@ -80,7 +81,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if !args.targets.are_named() {
         args.targets.refuse_choice(&args.names)?;
         if args.cue.is_some() || args.rate.is_some() {
-            let why = "the daemon checks for what it has loaded, at its own rate; leave --cue and --rate out, or name \
+            let why = "the daemon checks for the loaded show, at its own rate; omit --cue and --rate, or give \
                        controllers with --to or --config";
             return Err(anyhow!(why)).or_exit(Exit::Usage);
         }

@@ -24,10 +24,10 @@ Examples:
 Registers are named as the manuals name them (PA95, pa 0x95, dp 06..0b, dpf0, servo 1 508),
 as the panel of an integrated controller shows them (CP149, cd 006..011), or by their names in
 `kinocue register list`. Numbers of PA and DP are hexadecimal, those of CP and CD decimal;
-values are decimal, or hexadecimal behind 0x.
+values are decimal, or hexadecimal with 0x.
 
-Seats on serial drives are read over their port, which the service must not have open meanwhile: registers of
-SilverMax units as R38 or R0..40, in decimal; queries of a SIXpack 2 as \"\\$20\" or '$43'. Nothing is written to them here.";
+Seats on serial drives are read over their port, which the service must not have open at the same time: registers of
+SilverMax units as R38 or R0..40, in decimal; queries of a SIXpack 2 as '$20' or '$43'. Drives cannot be written here.";
 
 /// Reads, writes, saves and compares the registers of controllers.
 #[derive(Debug, clap::Args)]

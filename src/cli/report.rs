@@ -15,7 +15,7 @@ mod table;
 
 /// Reports what was played, or what operators requested.
 ///
-/// Lists every show of a day with its cue, levels, seats, frames and end, and the totals.
+/// Lists every show of a day with its cue, levels, seats, frames and how it ended, and the totals.
 ///
 /// Reads the journal that `kinocue serve` writes, even while the service runs. A show that neither
 /// ended nor is still running is reported as interrupted. Truncated journal lines are skipped with a
@@ -45,10 +45,10 @@ pub(super) struct Args {
     /// The configuration that names the folder.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Show the commands, who gave them and their results, instead of the shows.
+    /// Show the commands with their issuers and results, instead of the shows.
     #[arg(long)]
     actions: bool,
-    /// Print CSV (RFC 4180), one record a show or action.
+    /// Print CSV (RFC 4180), one record per show or command.
     #[arg(long, conflicts_with = "json")]
     csv: bool,
     /// Print one JSON object.

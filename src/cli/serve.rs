@@ -14,8 +14,8 @@ use crate::{config, console};
 ///
 /// Keeps its seats parked, its controllers monitored and its shows ready, until it is terminated.
 ///
-/// Nothing moves until somebody commands it, by the client commands, the web console or any other surface. SIGTERM parks the
-/// seats and ends with 0; SIGHUP reads the configuration anew where nothing is armed.
+/// Nothing moves without a command from a client, the web console or another surface. SIGTERM parks the seats and ends with 0;
+/// SIGHUP reloads the configuration if nothing is armed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -23,21 +23,21 @@ Examples:
   kinocue serve --config hall.toml --socket ./control.sock --state ./state
 
 Exit codes:
-  0   ended by a signal; whatever moved has parked
+  0   ended by a signal, with the seats parked
   71  the system refused a socket, a thread or a folder
   75  another program holds the frame port
   78  the configuration is bad")]
 pub(super) struct Args {
-    /// The hall.
+    /// The configuration of the hall.
     #[arg(long, value_name = "FILE", env = "KINOCUE_CONFIG")]
     config: PathBuf,
     /// The control socket.
     #[arg(long, value_name = "PATH", default_value = "/run/kinocue/control.sock")]
     socket: PathBuf,
-    /// The socket that takes a stop alone [default: stop.sock beside the control socket].
+    /// The stop socket, which takes only a stop [default: stop.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     stop_socket: Option<PathBuf>,
-    /// The folder for what outlasts a restart.
+    /// The folder for settings that outlast a restart.
     #[arg(long, value_name = "DIR", default_value = "/var/lib/kinocue")]
     state: PathBuf,
 }

@@ -33,8 +33,8 @@ const HOST_PORT: u16 = 8410;
 /// Runs virtual controllers.
 ///
 /// They behave as the manual says: accept and reply codes, registers and their limits, the queue of moves, resets,
-/// emergency stop, errors, outputs, status reports. They start with the manual's defaults, which no preflight passes,
-/// unless --safe is given. They run until Ctrl-C or SIGTERM, which end them with 0.
+/// emergency stop, errors, outputs, status reports. They start with the manual's defaults, which fail preflight; --safe
+/// starts them with settings that pass. Ctrl-C or SIGTERM ends them with exit code 0.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -42,24 +42,24 @@ Examples:
   kinocue sim --count 4 --axes 6 --json              four of six axes, ports 7408 to 7411
   kinocue sim --loss 0.05 --delay 80ms --seed 7      one in twenty unanswered, the others late
   kinocue sim --axes 6 --pa 95=6 --log frames.csv    takes axes 7 to 12 of a shared frame
-  kinocue sim --pa 06=0 --moves moves.csv            never hurries; logs how motors moved
-  kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      an emergency stop comes and goes
-  kinocue sim --count 8 --script \"5:3@err=12\"        the third has an alarm of the drive of axis 3
+  kinocue sim --pa 06=0 --moves moves.csv            never shortens Time (PA06); logs the moves of the motors
+  kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      an emergency stop at 2 s, released at 3 s
+  kinocue sim --count 8 --script \"5:3@err=12\"        an alarm of axis 3's drive at the third controller
   kinocue sim --dialect silvermax --tty ./stalls --units 16,17,18    three units on a serial line
   kinocue sim --dialect silvermax --tty ./stalls --faults \"lost=0.001, 17@dead=1\" --script \"9:16@reset\"
-  kinocue sim --dialect sixpack2 --tty ./stalls --faults \"jump=14400\"    six motors that lose steps above 22.5 mm/s at once
+  kinocue sim --dialect sixpack2 --tty ./stalls --faults \"jump=14400\"    motors lose steps at speed jumps above 22.5 mm/s
 
 Commands of --script, each with TIME: before it (seconds from the start), and of --control:
   X1=1, X1=0     the switch at input X01 closes (active with PA04 = 1), or opens; X1 to X12
-  err=12, err=0  an error comes (1 to 7, 10 to 15, 17, 20, 21), or all go with their causes
-  reboot         the power goes and comes back
-  estop=1        an emergency stop comes that no input asks for; estop=0: it goes
+  err=12, err=0  an error occurs (1 to 7, 10 to 15, 17, 20, 21); all errors and their causes go away
+  reboot         a power cycle
+  estop=1        an emergency stop without an input; estop=0 releases it
   mute=1         requests are carried out but not answered; mute=0: answered again
   pa95=3         a parameter is set at the controller's keys: register in hex, value decimal or 0x
   loss=0.1, duplicate=0.1, delay=50ms   network faults from now on
-A number or name and @ before a command means that controller alone: 2@err=12, c2@err=12.
+A number or a name with @ before a command selects one controller: 2@err=12, c2@err=12.
 
-Commands of serial drives, in --faults too, without a time:
+Commands for serial drives, also for --faults, there without a time:
   lost=0.1, doubled=0.1, flipped=0.1   bytes lost, doubled or flipped at random
   late=0.1/30ms    bytes arrive this much later, at random
   answer_lost=0.1, lose=2   answers are lost after the request was carried out: at random, or the next N
@@ -67,19 +67,19 @@ Commands of serial drives, in --faults too, without a time:
   echo=1           the adapter echoes what is sent; echo=0 ends it
   unplug=1         the adapter is unplugged, and the link is gone; unplug=0: back under the same name
   break            the host sends a break, which a pseudo-terminal does not carry
-and of a SilverMax, of all units or, with 17@ before it, of unit 17:
-  reset            the power goes and comes back
+For a SilverMax, all units, or unit 17 alone with 17@ before it:
+  reset            a power cycle
   hot=1, blocked=1, dead=1   overheated; mechanically blocked; no communication at all; 0 ends it
   X2=0, X2=1       an input is low, or high; X1 (the home switch) to X7
   as=16, as=0      answers as another unit, or as itself
   ppm=200          its clock runs fast by this many parts per million
-and of a SIXpack 2, which wakes at 19200 baud and is switched by its host, with 1@ before it of unit 1 alone:
-  reset, dead=1    as above; dead=0: its power comes back
-  celsius=80, volts=51   its temperature and its supply
-  jump=14400       its motors lose steps if their speed changes by more than this at once, microsteps per second
-  blocked2=1, broken2=1   motor 2, of 0 to 5, is held by something; its switch does not close any more; 0: no more")]
+For a SIXpack 2, unit 1 alone with 1@ before it (it starts at 19200 baud; the host changes that):
+  reset, dead=1    as above; dead=0: power is back
+  celsius=80, volts=51   temperature in °C, supply in V
+  jump=14400       motors lose steps if their speed changes by more than this at once, microsteps/s
+  blocked2=1, broken2=1   motor 2, of 0 to 5, is blocked; its switch no longer closes; 0 ends it")]
 pub(super) struct Args {
-    /// Where the first controller listens; with port 0 each gets a free one.
+    /// Address of the first controller; with port 0 each gets a free port.
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7408", conflicts_with = "tty")]
     listen: SocketAddrV4,
 
@@ -87,7 +87,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000), conflicts_with = "tty")]
     count: u16,
 
-    /// Working axes of each (PA02), 1 to 12.
+    /// Axes of each controller (PA02), 1 to 12.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=12), conflicts_with = "tty")]
     axes: u16,
 
@@ -99,7 +99,7 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = SimFamily::Smc)]
     dialect: SimFamily,
 
-    /// Probability that a datagram goes unanswered, 0..1: half of them never arrive, and the answers of the other half are lost.
+    /// Probability that a datagram goes unanswered, 0..1: in half the cases it is lost, in the other half its answer.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance, conflicts_with = "tty")]
     loss: f64,
 
@@ -115,11 +115,11 @@ pub(super) struct Args {
     #[arg(long, conflicts_with = "tty")]
     mute: bool,
 
-    /// An emergency stop is in effect from then on, counted from the start: SS[.mmm], MM:SS, HH:MM:SS.
+    /// Emergency stop from this time on, counted from the start: SS[.mmm], MM:SS, HH:MM:SS.
     #[arg(long, value_name = "TIME", value_parser = parse::time, conflicts_with = "tty")]
     estop_at: Option<Duration>,
 
-    /// Seed of the random faults [default: a random one, which is printed]
+    /// Seed of the random faults [default: random, and printed]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
@@ -127,7 +127,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "PORT", default_value_t = HOST_PORT, conflicts_with = "tty")]
     host_port: u16,
 
-    /// Start with settings that are safe for people and pass preflight, reports go to this machine; --pa changes them.
+    /// Start with settings that are safe for people and pass preflight, with reports to this machine; --pa changes them.
     #[arg(long, conflicts_with = "tty")]
     safe: bool,
 
@@ -135,24 +135,24 @@ pub(super) struct Args {
     #[arg(long, value_name = "TIME:COMMAND, …", default_value = "", hide_default_value = true)]
     script: String,
 
-    /// Accept commands on a Unix socket, one per line, each answered with ok, or error and the reason.
+    /// Accept commands on a Unix socket, one per line; each is answered with ok, or error and the reason.
     #[arg(long, value_name = "PATH")]
     control: Option<PathBuf>,
 
-    /// Write a CSV row for each motion frame: what was commanded, and where the motors were.
+    /// Write a CSV row for each motion frame: commanded and actual positions.
     #[arg(long, value_name = "FILE", conflicts_with = "tty")]
     log: Option<PathBuf>,
 
-    /// Write a CSV row for each move the motors ran: when it began, how long it took, from where to where, in pulses
-    /// and without vibration; a move begins with its frame, or where the one before it ends.
+    /// Write a CSV row for each move of the motors: start time, duration, start and end position in pulses, without
+    /// vibration. A move begins with its frame, or at the end of the move before it.
     #[arg(long, value_name = "FILE", conflicts_with = "tty")]
     moves: Option<PathBuf>,
 
-    /// At the end, one JSON object with all counts on the standard output.
+    /// At the end, print one JSON object with all counts on stdout.
     #[arg(long)]
     json: bool,
 
-    /// Listen on addresses that other machines reach, too.
+    /// Allow addresses that other machines can reach.
     #[arg(long, conflicts_with = "tty")]
     allow_lan: bool,
 

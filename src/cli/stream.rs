@@ -19,7 +19,7 @@ pub(super) struct StreamArgs {
     #[arg(long)]
     pub(super) no_acks: bool,
 
-    /// Wake up this long before each tick and spin, 0 to 900 µs: less lateness for more processor time [default: 0, or the
+    /// Wake up this long before each tick and spin, 0 to 900 µs: less lateness, more processor time [default: 0, or the
     /// configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
     spin_us: Option<u32>,

@@ -27,11 +27,10 @@ Examples:
   kinocue sync calibrate ltc:alsa:hw:2,0 --against mpv:/run/user/1000/film.sock
   kinocue sync send --ltc --seconds 60 | kinocue play cues/bench-ride.csv --to 127.0.0.1:7408 --chase ltc:-";
 
-/// Shows the film that a running hall follows; makes timecode and indexes of films' sound, and says what is heard of a
-/// film, or is in a recording.
+/// Shows and tests the sync of a hall to its film; makes and checks timecode; makes indexes of films' sound.
 ///
-/// Without a command it is the film of the running service: which source says what, how good it is, which one leads, and how far
-/// from the film the seats are. On a terminal it is shown until Ctrl-C, elsewhere once.
+/// Without a command it shows the film of the running service: each source with its position and quality, which source leads, and
+/// how far the seats are from the film. On a terminal it runs until Ctrl-C, elsewhere it prints once.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 pub(super) struct Args {
@@ -58,7 +57,7 @@ struct LabelArgs {
     /// Frame rate of the film: 23.976, 24, 25, 29.97 or 30 [default: as received].
     #[arg(long, value_name = "N")]
     film_fps: Option<String>,
-    /// The timecode at which the cue, or the reel, begins, HH:MM:SS:FF [default: 00:00:00:00].
+    /// The timecode at which the cue, or the test reel, begins, HH:MM:SS:FF [default: 00:00:00:00].
     #[arg(long, value_name = "TIMECODE")]
     tc_start: Option<String>,
 }

@@ -18,11 +18,11 @@ use crate::wire::ReplyCode;
 /// Which controllers are meant.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct TargetArgs {
-    /// A controller: HOST:PORT, and after commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
-    /// mbox, vibration_port_octets=2 or 4; repeatable.
+    /// A controller: HOST:PORT, then optionally, after commas, name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc
+    /// or mbox, vibration_port_octets=2 or 4; repeatable.
     #[arg(long, value_name = "ADDR", conflicts_with = "config")]
     to: Vec<String>,
-    /// The controllers of a configuration: all of them, unless --row or names choose.
+    /// The configuration with the controllers: all of them, unless --row or names select some.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// The controllers of a row; repeatable.
@@ -97,7 +97,7 @@ impl TargetArgs {
             (std::mem::take(&mut config.controllers), std::mem::take(&mut config.absent));
         let mut show = config.show.clone();
         show.bind = self.bind.unwrap_or(show.bind);
-        // What is out for good is meant only where it is named: whoever repairs it has to reach it.
+        // A controller that is disabled in the configuration is meant only if it is named, so that it can be repaired.
         let (named, left): (Vec<Controller>, Vec<_>) =
             absent.into_iter().map(|one| one.controller).partition(|one| names.contains(&one.name));
         if names.is_empty() && self.row.is_empty() {
@@ -119,7 +119,7 @@ impl TargetArgs {
         if names.is_empty() && self.bind.is_none() {
             return Ok(());
         }
-        let why = "the daemon does this for its whole hall, by its own frame port; leave names and --bind out, or name \
+        let why = "the daemon does this for its whole hall, on its own frame port; omit names and --bind, or give \
                    controllers with --to or --config";
         Err(anyhow!(why)).or_exit(Exit::Usage)
     }
@@ -137,13 +137,13 @@ impl TargetArgs {
         for name in names {
             if !all.iter().any(|one| one.name == *name) {
                 let known: Vec<_> = all.iter().map(|one| one.name.as_str()).collect();
-                let why = anyhow!("no controller is called {name}; there are {}", known.join(", "));
+                let why = anyhow!("there is no controller {name}; there are {}", known.join(", "));
                 return Err(why).or_exit(Exit::Usage);
             }
         }
         for row in &self.row {
             if !all.iter().any(|one| one.row.as_ref() == Some(row)) {
-                return Err(anyhow!("no controller stands in row {row}")).or_exit(Exit::Usage);
+                return Err(anyhow!("no controller is in row {row}")).or_exit(Exit::Usage);
             }
         }
         let chosen = |one: &Controller| {
@@ -168,7 +168,7 @@ impl Targets {
                 NetError::Refused { .. } => Exit::System,
                 _ => Exit::Usage,
             };
-            let held = "this needs the frame port, which nothing else may hold meanwhile, be it a show";
+            let held = "this needs the frame port, to itself; end the program that holds it, such as the service or a play";
             let error = anyhow::Error::new(error);
             Failure { exit, error: if exit == Exit::TryAgain { error.context(held) } else { error } }
         })
@@ -244,7 +244,7 @@ impl Troubles {
 
 /// Tells that a controller has no part in this.
 pub(super) fn tell_absent(controller: &Controller) {
-    print::tell(&format!("kinocue: {} is out for good (enabled = false), and left alone", controller.name));
+    print::tell(&format!("kinocue: {} is disabled (enabled = false), and left out", controller.name));
 }
 
 /// What a controller's state is, where it is not the normal one.

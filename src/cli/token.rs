@@ -18,24 +18,23 @@ const MAX_NAME: usize = 64;
 
 /// Creates an access token for HTTP.
 ///
-/// Prints the token, and the configuration lines that admit its holder.
+/// Prints the token on stdout, and the lines to add to the configuration on stderr.
 ///
-/// The token is shown once, on standard output, and stored nowhere: the configuration holds only its
-/// SHA-256. Treat it like a key. To revoke it, remove its lines from the configuration and restart the
-/// service.
+/// The token is shown only once and stored nowhere: the configuration holds only its SHA-256. Treat
+/// it like a key. To revoke it, remove its lines from the configuration and restart the service.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   kinocue token tablet --role operate
   kinocue token booth --role engineer --json")]
 pub(super) struct Args {
-    /// The name of its holder in the journal.
+    /// The holder's name, as the journal shows it.
     #[arg(value_parser = parse_name)]
     name: String,
-    /// What it permits: viewing; running the show; and homing, arming, clearing and changing the library.
+    /// What it permits. view: viewing; operate: also running shows; engineer: also homing, arming, clearing and the library.
     #[arg(long, value_enum)]
     role: RoleArg,
-    /// Print one JSON object with all of it.
+    /// Print both in one JSON object.
     #[arg(long)]
     json: bool,
 }
@@ -84,7 +83,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     } else {
         print::tell("For the configuration:\n");
         print::tell(&token.config);
-        print::tell("\nThe token, shown this once:");
+        print::tell("\nThe token, shown only this once:");
         print::out(&format!("{}\n", token.token))?;
     }
     Ok(Exit::Done)

@@ -35,7 +35,7 @@ fn check(section: &mut Section<'_, '_, '_>) -> Option<Check> {
     let id = entry.text(section.faults)?;
     let Ok(check) = id.parse::<Check>() else {
         let hint = did_you_mean(id, Check::ALL.iter().map(|check| check.id()));
-        let message = format!("{id:?} is no check; `kinocue preflight --explain` lists them{hint}");
+        let message = format!("{id:?} is not a check; `kinocue preflight --explain` lists them{hint}");
         entry.fault(section.faults, &message);
         return None;
     };
@@ -43,9 +43,9 @@ fn check(section: &mut Section<'_, '_, '_>) -> Option<Check> {
         return Some(check);
     }
     let why = match check.severity() {
-        Severity::Info => "is only told, so there is nothing to accept",
-        _ if check.is_present() => "cannot be accepted: it is about the moment, not for good",
-        _ => "cannot be accepted: what a controller does not tell cannot be known to be safe",
+        Severity::Info => "is for information, so there is nothing to accept",
+        _ if check.is_present() => "cannot be accepted: it is about the present moment, not a setting",
+        _ => "cannot be accepted: a setting that is unknown cannot be known to be safe",
     };
     entry.fault(section.faults, &format!("{check} {why}"));
     None
@@ -97,16 +97,16 @@ mod tests {
     #[test]
     fn an_acceptance_without_a_reason_is_refused() {
         assert!(fault("{ check = \"amplitude\" }").ends_with("accept_findings has no why, which is needed"));
-        assert!(fault("{ check = \"amplitude\", why = \" \" }").contains("nothing to read"));
+        assert!(fault("{ check = \"amplitude\", why = \" \" }").contains("is empty"));
         assert!(fault("{ check = \"amplitude\", why = \"x\", who = \"me\" }").contains("who: unknown key"));
-        assert!(fault("\"amplitude\"").contains("a table is wanted"));
+        assert!(fault("\"amplitude\"").contains("expected a table"));
     }
 
     #[test]
     fn silence_and_mere_news_cannot_be_accepted_and_nothing_twice() {
         assert!(fault("{ check = \"no-answer\", why = \"x\" }").contains("cannot be accepted"));
-        assert!(fault("{ check = \"active-error\", why = \"x\" }").contains("not for good"));
-        assert!(fault("{ check = \"version\", why = \"x\" }").contains("only told"));
+        assert!(fault("{ check = \"active-error\", why = \"x\" }").contains("not a setting"));
+        assert!(fault("{ check = \"version\", why = \"x\" }").contains("for information"));
         let one = "{ check = \"amplitude\", why = \"x\" }";
         assert!(fault(&format!("{one}, {one}")).ends_with("amplitude is accepted twice here"));
     }

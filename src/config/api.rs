@@ -91,7 +91,10 @@ fn address(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SocketAddr> {
     let text = entry.text(faults)?;
     let address = text.parse().ok();
     if address.is_none() {
-        entry.fault(faults, &format!("{text:?} is not an address and port, as 127.0.0.1:8480 or [::1]:8480"));
+        entry.fault(
+            faults,
+            &format!("{text:?} is not an address and port; write 127.0.0.1:8480 or [::1]:8480"),
+        );
     }
     address
 }
@@ -113,14 +116,14 @@ fn checked(
 
 fn check_host(host: &str) -> Result<(), &'static str> {
     let fits = |c: char| c.is_ascii_alphanumeric() || "-.:[]_".contains(c);
-    if host.chars().all(fits) { Ok(()) } else { Err("is no host, as hall-1.example or 192.168.1.5:8480") }
+    if host.chars().all(fits) { Ok(()) } else { Err("is not a host; write hall-1.example:8480") }
 }
 
 fn check_origin(origin: &str) -> Result<(), &'static str> {
     let host = origin.strip_prefix("https://").or_else(|| origin.strip_prefix("http://"));
     match host {
         Some(host) if !host.is_empty() && check_host(host).is_ok() => Ok(()),
-        _ => Err("is no origin, as http://hall-1.example:8480, without a path"),
+        _ => Err("is not an origin, such as http://hall-1.example:8480, without a path"),
     }
 }
 
@@ -130,9 +133,9 @@ fn tokens(section: &mut Section<'_, '_, '_>) -> Vec<ApiToken> {
     for entry in entries {
         let Some(token) = token(entry, section.faults) else { continue };
         if tokens.iter().any(|before| before.name == token.name) {
-            entry.fault(section.faults, &format!("{} has a token already; give each one a name", token.name));
+            entry.fault(section.faults, &format!("{} already has a token; use another name", token.name));
         } else if tokens.iter().any(|before| before.sha256 == token.sha256) {
-            entry.fault(section.faults, &format!("{} has the same token as somebody else", token.name));
+            entry.fault(section.faults, &format!("{} has the same token as another name", token.name));
         }
         tokens.push(token);
     }
@@ -155,7 +158,7 @@ pub(super) fn hash(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<[u8; 32]
     let text = entry.text(faults)?;
     let hash = from_hex(text);
     if hash.is_none() {
-        let message = "is not SHA-256 in 64 hexadecimal digits; `kinocue token NAME --role ROLE` makes one";
+        let message = "is not a SHA-256 of 64 hexadecimal digits; `kinocue token NAME --role ROLE` makes one";
         entry.fault(faults, message);
     }
     hash
@@ -227,10 +230,10 @@ mod tests {
                 .contains("hall.toml:14:11: listen: \"8480\" is not an address")
         );
         assert!(fault("[api]\nlisten = [\"0.0.0.0:8480\"]").contains("any address of this machine"));
-        assert!(fault("[api]\nhosts = [\"http://hall\"]").contains("is no host"));
-        assert!(fault("[api]\norigins = [\"http://hall/page\"]").contains("is no origin"));
-        assert!(fault("[api]\norigins = [\"*\"]").contains("is no origin"));
-        assert!(fault("[api]\nopen_role = \"operate\"").contains("is none of none, view"));
+        assert!(fault("[api]\nhosts = [\"http://hall\"]").contains("is not a host"));
+        assert!(fault("[api]\norigins = [\"http://hall/page\"]").contains("is not an origin"));
+        assert!(fault("[api]\norigins = [\"*\"]").contains("is not an origin"));
+        assert!(fault("[api]\nopen_role = \"operate\"").contains("is not one of none, view"));
         assert!(fault("[api]\nport = 1").contains("port: unknown key in [api]"));
     }
 
@@ -241,8 +244,8 @@ mod tests {
         };
         let (a, b) = ("a".repeat(64), "b".repeat(64));
         assert!(hall(&(token("x", &a) + &token("y", &b))).is_ok());
-        assert!(fault(&(token("x", &a) + &token("x", &b))).contains("x has a token already"));
-        assert!(fault(&(token("x", &a) + &token("y", &a))).contains("the same token as somebody else"));
+        assert!(fault(&(token("x", &a) + &token("x", &b))).contains("x already has a token"));
+        assert!(fault(&(token("x", &a) + &token("y", &a))).contains("the same token as another name"));
         assert!(fault(&token("x", "secret")).contains("`kinocue token NAME --role ROLE` makes one"));
         assert!(fault("[[api.token]]\nname = \"x\"\nrole = \"admin\"").contains("has no sha256"));
     }

@@ -123,7 +123,7 @@ fn shaken(
     let most = section.above_zero(key)?;
     if let Some(least) = least.filter(|least| most < *least) {
         let message =
-            format!("{most} is below {alone}, {least}; motion and vibration together may do what motion may");
+            format!("{most} is below {alone}, {least}; motion and vibration together need at least that");
         section.get(key)?.fault(section.faults, &message);
         return None;
     }
@@ -172,7 +172,7 @@ pub(super) fn own_axis(
         AxisUnit::Millimetre => {
             let stroke = section.get("stroke_mm");
             if let Some(stroke) = stroke.filter(|_| table.contains_key("range")) {
-                stroke.fault(section.faults, "range says that as well; leave one of them out");
+                stroke.fault(section.faults, "range says that as well; omit one of them");
             }
             let ends = section.above_zero("stroke_mm").map(|stroke| (0.0, stroke)).or(seat.ends);
             AxisKeys { ends, ..seat }.with(&mut section, &MILLIMETRES)
@@ -205,13 +205,13 @@ fn ends(entry: &Entry<'_>, unit: AxisUnit, faults: &mut Faults<'_>) -> Option<(f
     let (low, high) = (low.number(faults)?, high.number(faults)?);
     let unit_name = unit.name();
     if low >= high {
-        entry.fault(faults, &format!("{low} to {high} {unit_name} is upside down; put the lower end first"));
+        entry.fault(faults, &format!("{low} to {high} {unit_name} is reversed; put the lower end first"));
         return None;
     }
     if !(low..=high).contains(&0.0) {
         let zero = match unit {
-            AxisUnit::Millimetre => "the axis is at 0 when it has been homed",
-            AxisUnit::Degree => "a rotary axis is at 0 where it stands when its controller starts",
+            AxisUnit::Millimetre => "the axis is at 0 once it is homed",
+            AxisUnit::Degree => "the 0 of a rotary axis is its position when its controller starts",
         };
         entry.fault(
             faults,
@@ -289,11 +289,11 @@ mod tests {
     #[test]
     fn what_an_axis_cannot_be_is_named_with_its_line_and_what_to_do() {
         for (more, line, text) in [
-            ("range = [180, -180]\n", 19, "range: 180 to -180 deg is upside down; put the lower end first"),
+            ("range = [180, -180]\n", 19, "range: 180 to -180 deg is reversed; put the lower end first"),
             (
                 "range = [10, 90]\n",
                 19,
-                "range: 0 is outside 10 to 90 deg; a rotary axis is at 0 where it stands",
+                "range: 0 is outside 10 to 90 deg; the 0 of a rotary axis is its position",
             ),
             ("range = [-180]\n", 19, "range: 1 values; give the lower end and the upper end"),
             (
@@ -313,9 +313,9 @@ mod tests {
             assert!(fault.starts_with(&format!("hall.toml:{line}:")) && fault.contains(text), "{fault}");
         }
         for (more, text) in [
-            ("[seat.s.axis7]\nlead_mm = 2\n", "axis7: the seat has 6 axes; raise axes, or leave this out"),
-            ("[seat.s.axis1]\nunit = \"grad\"\n", "unit: \"grad\" is none of mm, deg"),
-            ("[seat.s.axis1]\nrange = [5, 9]\n", "the axis is at 0 when it has been homed"),
+            ("[seat.s.axis7]\nlead_mm = 2\n", "axis7: the seat has 6 axes; raise axes, or omit this"),
+            ("[seat.s.axis1]\nunit = \"grad\"\n", "unit: \"grad\" is not one of mm, deg"),
+            ("[seat.s.axis1]\nrange = [5, 9]\n", "the axis is at 0 once it is homed"),
             ("[seat.s.axis1]\nrange = [0, 9]\nstroke_mm = 9\n", "stroke_mm: range says that as well"),
         ] {
             let fault = the_fault(more);
@@ -328,6 +328,6 @@ mod tests {
         let range = "range = [-90, 90]\n";
         let second = turntable(range).replace("axis4", "axis5");
         let fault = the_fault(&format!("{}{second}", turntable(range)));
-        assert!(fault.contains("axis5: the seat has a rotary axis already"), "{fault}");
+        assert!(fault.contains("axis5: the seat already has a rotary axis"), "{fault}");
     }
 }

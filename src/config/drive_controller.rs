@@ -111,9 +111,7 @@ pub(super) fn drive_controller<'t>(
     if let (Some(drive), Some(value)) = (&drive, table.get("estop_inputs")) {
         refuse_switch(Entry::new("estop_inputs", value), drive, estop_inputs, faults);
     }
-    let (motors, motors_at) = motors?;
-    let name = name?;
-    let link = link?;
+    let ((motors, motors_at), name, link) = (motors?, name?, link?);
     let drives = Drives { drive: Arc::new(drive?), link: link.clone(), motors: motors.clone() };
     let controller = Controller {
         group: group.unwrap_or_else(|| name.clone()),
@@ -145,7 +143,7 @@ fn link_of(section: &mut Section<'_, '_, '_>, links: &[LinkEntry<'_>]) -> Option
 fn family(section: &mut Section<'_, '_, '_>) -> Option<DriveFamily> {
     let entry = section.get("dialect")?;
     if matches!(entry.value.as_str(), Some("smc" | "mbox")) {
-        let message = "is spoken over UDP; on a link it is \"silvermax\" or \"sixpack2\", else give address = \"IP:PORT\"";
+        let message = "is for UDP; on a link write \"silvermax\" or \"sixpack2\", else address = \"IP:PORT\"";
         entry.fault(section.faults, message);
         return None;
     }
@@ -155,7 +153,7 @@ fn family(section: &mut Section<'_, '_, '_>) -> Option<DriveFamily> {
 /// Inputs 1 to 7 of a SilverMax; a SIXpack 2 has none.
 fn estop_inputs(section: &mut Section<'_, '_, '_>, family: DriveFamily) -> u16 {
     if let Some(entry) = section.get("estop_inputs").filter(|_| family == DriveFamily::Sixpack2) {
-        entry.fault(section.faults, "kinocue reads no inputs of a SIXpack 2; leave it out");
+        entry.fault(section.faults, "kinocue reads no inputs of a SIXpack 2; omit it");
         return 0;
     }
     inputs_up_to(section, "estop_inputs", 7)
@@ -164,12 +162,12 @@ fn estop_inputs(section: &mut Section<'_, '_, '_>, family: DriveFamily) -> u16 {
 /// Notes what controllers have and drives have not, by name.
 fn refuse_keys(section: &mut Section<'_, '_, '_>) {
     if section.get("fan_out").is_some_and(|entry| entry.value.as_str() != Some("slice")) {
-        section.refuse("fan_out", "drives share no frame, each is sent its own; leave it out");
+        section.refuse("fan_out", "drives do not share frames; omit it");
     }
     for (key, why) in [
-        ("accept", "drives have no accept code; leave it out"),
-        ("vibration_port_octets", "drives have no vibration frames; leave it out"),
-        ("belt_inputs", "kinocue reads no belts by drives; leave it out"),
+        ("accept", "drives have no accept code; omit it"),
+        ("vibration_port_octets", "drives have no vibration frames; omit it"),
+        ("belt_inputs", "kinocue reads no belts through drives; omit it"),
     ] {
         section.refuse(key, why);
     }
@@ -219,7 +217,7 @@ fn numbers(
     let entry = section.get(key)?;
     let entries = entry.array(section.faults)?;
     if let Some(axes) = axes.filter(|&axes| axes != entries.len()) {
-        let message = format!("{} numbers for {axes} axes; give one for each", entries.len());
+        let message = format!("{} numbers for {axes} axes; give one for each axis", entries.len());
         entry.fault(section.faults, &message);
         return None;
     }
@@ -269,7 +267,7 @@ fn refuse_home(drive: &SeatDrive, family: DriveFamily, at: usize, faults: &mut F
             HomeWay::Switch { input: None, .. } | HomeWay::Index { input: None, .. },
         ) => "home: a SilverMax needs the input of the switch, 1 to 7, as input = 1",
         (DriveFamily::Sixpack2, HomeWay::Switch { input: Some(_), .. }) => {
-            "home: each motor of a SIXpack 2 has a reference switch of its own; leave input out"
+            "home: each motor of a SIXpack 2 has its own reference switch; omit input"
         }
         (DriveFamily::Sixpack2, HomeWay::Index { .. }) => {
             "home: a SIXpack 2 has no index pulse; use way = \"switch\""

@@ -41,12 +41,12 @@ impl FilmPlayer {
         let found = path.canonicalize().map_err(missing)?;
         if !found.starts_with(&folder) {
             return Err(format!(
-                "the film {movie} lies outside {}; copy it into that folder",
+                "the film {movie} is outside {}; copy it into that folder",
                 self.folder.display()
             ));
         }
         if !found.is_file() {
-            return Err(format!("the film {} is no file; name a film", path.display()));
+            return Err(format!("the film {} is not a file; give a film", path.display()));
         }
         Ok(found)
     }
@@ -141,9 +141,9 @@ mod tests {
         let film = hall_with(&format!("[film]\nplayer = \"mpv\"\nfolder = {folder:?}\n")).film.unwrap();
         assert!(film.find("a.mkv").is_ok() && film.find("reel/b.mkv").is_ok());
         for (movie, says) in [
-            ("link.mkv", "lies outside"),
-            ("../outside.mkv", "lies outside"),
-            ("reel", "is no file"),
+            ("link.mkv", "is outside"),
+            ("../outside.mkv", "is outside"),
+            ("reel", "is not a file"),
             ("none.mkv", "copy it there"),
         ] {
             assert!(film.find(movie).unwrap_err().contains(says), "{movie}");

@@ -22,7 +22,7 @@ const MAX_VIBRATING_AXES: usize = 6;
 #[non_exhaustive]
 pub enum Misfit {
     /// An axis that no controller takes.
-    #[error("a{axis}: no controller takes this axis; give one an axis_offset and a seat that reach it")]
+    #[error("a{axis}: no controller takes this axis; give one an axis_offset and a seat that include it")]
     UntakenAxis {
         /// The axis, from 1.
         axis: usize,
@@ -57,7 +57,7 @@ pub enum Misfit {
         axes: usize,
     },
     /// A swing that no frame can ask for; it would be cut without a word.
-    #[error("v{axis}_amp: {amplitude} is over {limit}, the most that a frame can say; lower the amplitude")]
+    #[error("v{axis}_amp: {amplitude} is over {limit}, the most that a frame can carry; lower the amplitude")]
     UnsaidAmplitude {
         /// The axis, from 1.
         axis: usize,
@@ -87,7 +87,7 @@ pub enum Misfit {
     },
     /// A level over what a controller's output may have.
     #[error(
-        "{column}: the level of {level} at {at} is over {most}, the highest that {controller} may have; lower it, or raise \
+        "{column}: the level of {level} at {at} is over {most}, the highest that {controller} allows; lower it, or raise \
          {column} of that [[controller]]"
     )]
     LevelTooHigh {
@@ -392,7 +392,7 @@ mod tests {
         assert_eq!(
             misfit.to_string(),
             "v1_amp: the amplitude at 00:01.500 (32.768 mm, 65536 pulses, on seat bench3) is over 32.767 mm, 65535 \
-             pulses, the most that a frame can say; lower the amplitude"
+             pulses, the most that a frame can carry; lower the amplitude"
         );
     }
 

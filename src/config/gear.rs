@@ -55,7 +55,7 @@ pub(super) fn sources(section: &mut Section<'_, '_, '_>) -> Option<Vec<Ipv4Addr>
     let entry = section.get("sources")?;
     let entries = entry.array(section.faults)?;
     if entries.is_empty() {
-        entry.fault(section.faults, "names nobody; list the addresses of the gear that may ask");
+        entry.fault(section.faults, "is empty; list the addresses of the gear that may send commands");
     }
     let addresses = entries.into_iter().filter_map(|entry| source(entry, section)).collect();
     Some(addresses)
@@ -65,7 +65,7 @@ fn source(entry: Entry<'_>, section: &mut Section<'_, '_, '_>) -> Option<Ipv4Add
     let text = entry.text(section.faults)?;
     let address = text.parse::<Ipv4Addr>().ok().filter(|address| !address.is_unspecified());
     if address.is_none() {
-        entry.fault(section.faults, &format!("{text:?} is no IPv4 address of a machine, as 10.0.0.5"));
+        entry.fault(section.faults, &format!("{text:?} is not an IPv4 address, such as 10.0.0.5"));
     }
     address
 }
@@ -76,10 +76,10 @@ fn allowed_word(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<GearWord> {
     // Whoever lists what is allowed will list it too.
     if found.is_none() && text != "stop" {
         let message = match text {
-            "arm" | "home" | "clear" => format!("{text} is nothing that gear may ever ask"),
+            "arm" | "home" | "clear" => format!("{text} is never allowed to show-control gear"),
             _ => {
                 let words = GearWord::ALL.map(|(word, _)| word).join(", ");
-                format!("{text:?} is none of {words}, stop")
+                format!("{text:?} is not one of {words}, stop")
             }
         };
         entry.fault(faults, &message);

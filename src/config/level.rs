@@ -13,7 +13,7 @@ use crate::time::TRIM_MS;
 /// # Errors
 /// What is wrong with the text, for a person.
 pub(crate) fn parse_level(text: &str) -> Result<f64, String> {
-    let refuse = || "not a level; write 0% to 100%, or 0dB and below, as -6dB".to_owned();
+    let refuse = || "not a level; write 0% to 100%, or 0dB and below, such as -6dB".to_owned();
     let level = if let Some(percent) = text.strip_suffix('%') {
         percent.trim_end().parse::<f64>().map_err(|_| refuse())? / 100.0
     } else if let Some(decibel) = text.strip_suffix("dB") {

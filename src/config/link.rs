@@ -78,7 +78,7 @@ pub(super) fn links<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Vec<LinkEn
             link.port.is_some() && other.port == link.port && other.port_at < link.port_at
         };
         if let Some(twin) = links.iter().find(is_twin) {
-            let message = format!("port: [link.{}] is on it already; one line is one link", twin.name);
+            let message = format!("port: [link.{}] uses it already; one line is one link", twin.name);
             faults.note(link.port_at, message);
         }
     }
@@ -100,7 +100,7 @@ fn link<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Option<LinkEntry<'t>> 
     let rate_hz = rate(&mut section);
     if wiring == LinkWiring::Can {
         for key in ["stop_bits", "echo"] {
-            section.refuse(key, "a CAN bus has none; leave it out");
+            section.refuse(key, "a CAN bus has none; omit it");
         }
     }
     let port_entry = section.get("port");
@@ -125,9 +125,11 @@ fn link<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Option<LinkEntry<'t>> 
 /// Notes a device without its folder, and an interface with one.
 fn refuse_port(entry: Entry<'_>, port: &str, wiring: LinkWiring, faults: &mut Faults<'_>) {
     match (wiring, port.contains('/')) {
-        (LinkWiring::Can, true) => entry.fault(faults, &format!("{port:?} is no interface, as \"can0\"")),
+        (LinkWiring::Can, true) => {
+            entry.fault(faults, &format!("{port:?} is not an interface like \"can0\""))
+        }
         (LinkWiring::Rs232 | LinkWiring::Rs485, false) => {
-            entry.fault(faults, &format!("{port:?} is no device; write its whole path, as \"/dev/ttyUSB0\""));
+            entry.fault(faults, &format!("{port:?} is not a device; write a path such as \"/dev/ttyUSB0\""));
         }
         _ => {}
     }
@@ -140,7 +142,7 @@ fn rate(section: &mut Section<'_, '_, '_>) -> Option<f64> {
         return None;
     }
     if entry.value.is_str() {
-        entry.fault(section.faults, "is neither a number nor \"auto\", the most that fit");
+        entry.fault(section.faults, "is neither a number nor \"auto\", the highest rate that fits");
         return None;
     }
     entry.number_in(1.0..=MOST_HZ, section.faults)
@@ -180,7 +182,7 @@ fn silvermax_baud(asked: u32) -> Result<u32, String> {
         return Ok(asked);
     }
     let nearest = SILVERMAX_BAUDS.into_iter().min_by_key(|baud| baud.abs_diff(asked)).unwrap_or(57_600);
-    Err(format!("{asked} is no rate of a SilverMax (BRT); the nearest is {nearest}"))
+    Err(format!("{asked} is not a rate of a SilverMax (BRT); the nearest is {nearest}"))
 }
 
 /// The rate next to the one asked for: 1,250,000 divided by a whole number.
@@ -196,5 +198,5 @@ fn sixpack2_baud(asked: u32) -> Result<u32, String> {
     if SIXPACK2_BAUDS.contains(&made) {
         return Ok(made);
     }
-    Err(format!("{asked} is outside {least}..={most}, between which a SIXpack 2 is switched"))
+    Err(format!("{asked} is outside {least}..={most}, the baud rates of a SIXpack 2"))
 }

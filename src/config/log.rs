@@ -79,7 +79,7 @@ fn hours(section: &mut Section<'_, '_, '_>) -> Option<Hours> {
     let entry = section.get("hours")?;
     let times = entry.array(section.faults)?;
     let [from, until] = &times[..] else {
-        entry.fault(section.faults, "two times are wanted, as [\"10:00\", \"01:30\"]");
+        entry.fault(section.faults, "give two times, such as [\"10:00\", \"01:30\"]");
         return None;
     };
     let (from, until) = (from.time(section.faults), until.time(section.faults));
@@ -107,7 +107,7 @@ mod tests {
     fn what_the_journal_cannot_be_told_is_refused() {
         let faults = faults_of("[log]\nmax_size_mib = 10\nmax_total_mib = 19\nhours = [\"10:00\"]\n");
         assert!(faults[0].ends_with("log: max_total_mib 19 is under twice max_size_mib 10"), "{faults:?}");
-        assert!(faults[1].contains("hours: two times are wanted"), "{faults:?}");
+        assert!(faults[1].contains("hours: give two times"), "{faults:?}");
         assert!(faults_of("[log]\nhours = [\"10:00\", \"25:00\"]\n")[0].contains("hours: \"25:00\""));
     }
 }

@@ -335,11 +335,11 @@ fn check_window(offset: usize, axes: usize, fan_out: FanOut) -> Result<(), Strin
 fn check_peer(address: SocketAddrV4) -> Result<(), &'static str> {
     let ip = address.ip();
     if address.port() == 0 {
-        Err("port 0 is no destination; controllers listen on 7408 unless PA14 says otherwise")
+        Err("port 0 is not a destination; controllers listen on 7408 unless PA14 says otherwise")
     } else if ip.is_broadcast() || ip.is_multicast() {
         Err("is not the address of one controller; frames are sent to each by itself")
     } else if ip.is_unspecified() {
-        Err("is no destination; give the controller's own address (PA10 to PA13)")
+        Err("is not a destination; give the controller's own address (PA10 to PA13)")
     } else {
         Ok(())
     }

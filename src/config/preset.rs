@@ -67,6 +67,6 @@ mod tests {
         assert!(vibration.contains("vibration: not a level"), "{vibration}");
         assert!(level.contains("level: unknown key in [preset.kids]"), "{level}");
         assert!(effect.ends_with("watr: is not in [effects]; did you mean water?"), "{effect}");
-        assert!(switch.contains("water: true or false is wanted here"), "{switch}");
+        assert!(switch.contains("water: expected true or false"), "{switch}");
     }
 }

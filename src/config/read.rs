@@ -81,7 +81,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
     let [api_at, link_at, record_at] = ["api", "link", "record"].map(|key| section.get(key));
     if controller_at.is_none() {
-        section.faults.note_missing(0, "there is no [[controller]]; name at least one");
+        section.faults.note_missing(0, "there is no [[controller]]; add at least one");
     }
     let [preset_at, library_at, log_at, osc_at, text_at, sync_at, film_at] =
         ["preset", "library", "log", "osc", "text", "sync", "film"].map(|key| section.get(key));
@@ -232,7 +232,7 @@ fn controllers(
     peers.absent.iter().zip(at).for_each(|(one, at)| refuse_parted(one, at, &peers.present, faults));
     let all_out = peers.placed.iter().all(|one| !one.enabled);
     if peers.present.is_empty() && all_out && peers.absent.len() + peers.placed.len() > 0 {
-        faults.note_missing(entry.at, "enabled: every [[controller]] is out for good; leave at least one in");
+        faults.note_missing(entry.at, "enabled: every [[controller]] is disabled; enable at least one");
     }
     peers
 }
@@ -262,10 +262,7 @@ fn refuse_sparse_acks(show: Option<Entry<'_>>, peers: &Peers, faults: &mut Fault
     let Some(value) = table.and_then(|table| table.get("ack_every")) else { return };
     let entry = Entry::new("ack_every", value);
     if entry.value.as_integer().is_some_and(|every| every.as_str() != "1") {
-        entry.fault(
-            faults,
-            "drives answer each segment, and what they do not answer is in doubt; leave it at 1",
-        );
+        entry.fault(faults, "drives answer each segment, and an unanswered one is in doubt; leave it at 1");
     }
 }
 
@@ -273,7 +270,7 @@ fn refuse_sparse_acks(show: Option<Entry<'_>>, peers: &Peers, faults: &mut Fault
 fn refuse_parted(absent: &Absent, at: usize, present: &[Controller], faults: &mut Faults<'_>) {
     let Controller { name, group, .. } = &absent.controller;
     if let Some(other) = present.iter().find(|one| one.group == *group) {
-        let (other, text) = (&other.name, "one rigid seat does not move by a part of its controllers");
+        let (other, text) = (&other.name, "a rigid seat cannot move with only some of its controllers");
         faults.note(
             at,
             format!(
@@ -292,7 +289,7 @@ fn refuse_repeat<'t>(entry: Entry<'t>, taken: &mut Vec<(&'t str, String, usize)>
         None => taken.push((entry.key, value, entry.at)),
         Some(&(_, _, first)) => {
             let line = faults.line(first);
-            entry.fault(faults, &format!("{value} is that of another controller too, on line {line}"));
+            entry.fault(faults, &format!("{value} is also that of another controller, on line {line}"));
         }
     }
 }
@@ -373,7 +370,7 @@ fn levels_of(section: &mut Section<'_, '_, '_>) -> [f64; SWITCHES] {
 fn named_inputs(section: &mut Section<'_, '_, '_>) -> (u16, u16) {
     let [estop, belts] = ["estop_inputs", "belt_inputs"].map(|key| inputs_up_to(section, key, 12));
     if let Some(entry) = section.get("belt_inputs").filter(|_| estop & belts != 0) {
-        entry.fault(section.faults, "an input of estop_inputs is none of a belt");
+        entry.fault(section.faults, "an input of estop_inputs cannot be that of a belt");
     }
     (estop, belts)
 }
@@ -395,7 +392,7 @@ fn dialect(section: &mut Section<'_, '_, '_>) -> Option<Dialect> {
 fn vibration_port(section: &mut Section<'_, '_, '_>, dialect: Option<Dialect>) -> Option<VibrationPort> {
     let entry = section.get("vibration_port_octets")?;
     if dialect == Some(Dialect::Mbox) {
-        entry.fault(section.faults, "mbox controllers have no vibration frames; leave it out");
+        entry.fault(section.faults, "mbox controllers have no vibration frames; omit it");
     }
     let bytes: u8 = entry.whole_in(2..=4, section.faults)?;
     let port = VibrationPort::of_bytes(bytes);
@@ -418,7 +415,7 @@ fn accept(section: &mut Section<'_, '_, '_>) -> Option<Accept> {
         Some(code) => return Some(Accept::Code(code)),
         None => entry.fault(
             section.faults,
-            &format!("{text:?} is neither \"station\" nor four hex digits, as \"ffff\""),
+            &format!("{text:?} is neither \"station\" nor four hex digits, such as \"ffff\""),
         ),
     }
     None

@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn what_recordings_cannot_be_told_is_refused() {
         let faults = faults_of("[record]\nmode = \"all\"\nsample_hz = 0\nmax_total_gib = -1\nkeep = true\n");
-        for wanted in ["\"all\" is none of off, sampled, full", "sample_hz", "max_total_gib", "keep"] {
+        for wanted in ["\"all\" is not one of off, sampled, full", "sample_hz", "max_total_gib", "keep"] {
             assert!(faults.iter().any(|fault| fault.contains(wanted)), "{wanted}: {faults:?}");
         }
     }

@@ -34,7 +34,7 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
     section.finish();
     let (axes, cylinder) = (axes?, said.axis(AxisUnit::Millimetre));
     for beyond in tables[axes..].iter().flatten() {
-        beyond.fault(faults, &format!("the seat has {axes} axes; raise axes, or leave this out"));
+        beyond.fault(faults, &format!("the seat has {axes} axes; raise axes, or omit this"));
     }
     if own.iter().any(Option::is_none) {
         refuse_pulses(stroke, cylinder, faults);
@@ -76,7 +76,7 @@ fn refuse_pulses(at: Option<Entry<'_>>, axis: Option<AxisGeometry>, faults: &mut
     if !(1.0..=most).contains(&pulses) {
         at.fault(faults, &format!("the stroke is {pulses:.1} pulses, outside 1..={}", i32::MAX));
     } else if range.low < -most || range.high > most {
-        at.fault(faults, &format!("the range is {range} pulses, outside what a frame can say, {most}"));
+        at.fault(faults, &format!("the range is {range} pulses, outside what a frame can carry, {most}"));
     }
 }
 
@@ -84,7 +84,7 @@ fn refuse_pulses(at: Option<Entry<'_>>, axis: Option<AxisGeometry>, faults: &mut
 fn refuse_second_rotary(each: &[AxisGeometry], own: &[Option<Entry<'_>>], faults: &mut Faults<'_>) {
     let turns = each.iter().zip(own).filter(|(axis, _)| axis.unit == AxisUnit::Degree);
     for second in turns.skip(1).filter_map(|(_, own)| own.as_ref()) {
-        second.fault(faults, "the seat has a rotary axis already, and its controller knows of one (PA03)");
+        second.fault(faults, "the seat already has a rotary axis; a controller has only one (PA03)");
     }
 }
 
@@ -103,7 +103,7 @@ impl<'t> SeatPose<'t> {
         if axis.low != 0.0 {
             let (axis, low, unit, key) = (index + 1, axis.low, axis.unit.name(), entry.key);
             let message = format!(
-                "a fraction of the range of axis {axis}, which begins at {low} {unit}, is easily taken for a place; give \
+                "a fraction of the range of axis {axis}, which begins at {low} {unit}, is easily taken for a position; give \
                  axis{axis} {key} of its own, in {unit}"
             );
             entry.fault(faults, &message);

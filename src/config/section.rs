@@ -42,7 +42,7 @@ impl<'t> Entry<'t> {
     }
 
     fn wrong_type(&self, faults: &mut Faults<'_>, wanted: &str) {
-        self.fault(faults, &format!("{wanted} is wanted here, not {}", kind(self.value)));
+        self.fault(faults, &format!("expected {wanted}, not {}", kind(self.value)));
     }
 
     pub(crate) fn table(&self, faults: &mut Faults<'_>) -> Option<&'t DeTable<'t>> {
@@ -67,7 +67,7 @@ impl<'t> Entry<'t> {
         match text {
             None => self.wrong_type(faults, "a string"),
             Some(text) if text.trim().is_empty() || text.chars().any(char::is_control) => {
-                self.fault(faults, &format!("{text:?} has nothing to read, or control characters"));
+                self.fault(faults, &format!("{text:?} is empty, or has control characters"));
                 return None;
             }
             Some(_) => {}
@@ -91,7 +91,7 @@ impl<'t> Entry<'t> {
         if chosen.is_none() {
             let words: Vec<_> = choices.iter().map(|(word, _)| *word).collect();
             let hint = did_you_mean(text, words.iter().copied());
-            self.fault(faults, &format!("{text:?} is none of {}{hint}", words.join(", ")));
+            self.fault(faults, &format!("{text:?} is not one of {}{hint}", words.join(", ")));
         }
         chosen
     }
@@ -103,7 +103,7 @@ impl<'t> Entry<'t> {
         let spelt = text.split(':').all(digits) && matches!(text.len(), 5 | 8);
         let time = text.parse().ok().filter(|_| spelt);
         if time.is_none() {
-            self.fault(faults, &format!("{text:?} is no time of day, as \"19:00\" or \"19:00:30\""));
+            self.fault(faults, &format!("{text:?} is not a time of day, such as \"19:00\" or \"19:00:30\""));
         }
         time
     }
@@ -222,7 +222,7 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
         if address.is_none() {
             entry.fault(
                 self.faults,
-                &format!("{text:?} is not an IPv4 address and port, as 192.168.15.201:7408"),
+                &format!("{text:?} is not an IPv4 address and port, such as 192.168.15.201:7408"),
             );
         }
         address

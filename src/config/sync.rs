@@ -132,7 +132,7 @@ fn source<'t>(name: Entry<'t>, section: &mut Section<'t, '_, '_>) -> Option<(Ent
 /// What a table says, as `play --chase` takes it.
 fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) -> Option<String> {
     let Some(kind) = KINDS.into_iter().find(|kind| *kind == text) else {
-        name.fault(section.faults, &format!("{text:?} is none of {}", KINDS.join(", ")));
+        name.fault(section.faults, &format!("{text:?} is not one of {}", KINDS.join(", ")));
         return None;
     };
     // The key that says who, and the one that may be beside it.
@@ -145,7 +145,7 @@ fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) 
         _ => ("from", "bind"),
     };
     let Some(entry) = section.get(kind) else {
-        name.fault(section.faults, &format!("there is no [sync.{kind}]; it has to say {needed}"));
+        name.fault(section.faults, &format!("there is no [sync.{kind}]; it has to have {needed}"));
         return None;
     };
     let mut table =
@@ -177,7 +177,7 @@ fn latency(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Duration> {
     let entry = table.get("latency").map(|value| Entry::new("latency", value))?;
     let late = milliseconds(entry.text(faults)?).filter(|late| *late <= Duration::from_secs(1));
     if late.is_none() {
-        entry.fault(faults, "is no latency of up to a second; write it as \"10.6ms\"");
+        entry.fault(faults, "is not a latency of up to a second; write it as \"10.6ms\"");
     }
     late
 }
@@ -196,7 +196,7 @@ fn apart(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Duration> {
         let (least, most) = (JOIN_MS.start(), JOIN_MS.end());
         entry.fault(
             faults,
-            &format!("{text:?} is no time within {least}ms to {most}ms; write it as \"40ms\""),
+            &format!("{text:?} is not a time within {least}ms to {most}ms; write it as \"40ms\""),
         );
     }
     span
@@ -216,7 +216,7 @@ fn share(
         let (least, most) = (100.0 * range.start(), 100.0 * range.end());
         entry.fault(
             section.faults,
-            &format!("{text:?} is no share within {least}% to {most}%; write it as \"1%\""),
+            &format!("{text:?} is not a share within {least}% to {most}%; write it as \"1%\""),
         );
     }
     share
@@ -228,7 +228,7 @@ fn signed_ms(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<ShowTime> {
     let later =
         milliseconds(text.strip_prefix('-').unwrap_or(text)).filter(|span| *span <= Duration::from_secs(10));
     let Some(later) = later else {
-        entry.fault(faults, &format!("{text:?} is no time of up to 10000ms; write it as \"-40ms\""));
+        entry.fault(faults, &format!("{text:?} is not a time of up to 10000ms; write it as \"-40ms\""));
         return None;
     };
     Some(if text.starts_with('-') { ShowTime::ZERO - later } else { ShowTime::ZERO + later })
@@ -303,21 +303,21 @@ mod tests {
     fn what_is_wrong_is_named_with_its_place_and_what_to_write() {
         let wrong = [
             ("", "[sync] has no sources, which is needed"),
-            ("sources = [\"tape\"]", "sources: \"tape\" is none of ltc, mpv"),
-            ("sources = [\"artnet\"]", "there is no [sync.artnet]; it has to say from"),
+            ("sources = [\"tape\"]", "sources: \"tape\" is not one of ltc, mpv"),
+            ("sources = [\"artnet\"]", "there is no [sync.artnet]; it has to have from"),
             ("sources = [\"artnet\"]\n[sync.artnet]\nbind = \"0.0.0.0:6454\"", "[sync.artnet] has no from"),
-            ("sources = [\"artnet:anybody\"]", "names no sender"),
-            ("sources = [\"mpv:/s\"]\nfilm_fps = \"26\"", "is no frame rate; take 23.976"),
-            ("sources = [\"mpv:/s\"]\nstart = \"1:2\"", "is no timecode"),
-            ("sources = [\"mpv:/s\"]\nrate_band = \"9%\"", "is no share within 0% to 5%"),
-            ("sources = [\"mpv:/s\"]\nslew = 0.01", "a string is wanted here"),
+            ("sources = [\"artnet:anybody\"]", "has no sender"),
+            ("sources = [\"mpv:/s\"]\nfilm_fps = \"26\"", "is not a frame rate; take 23.976"),
+            ("sources = [\"mpv:/s\"]\nstart = \"1:2\"", "is not a timecode"),
+            ("sources = [\"mpv:/s\"]\nrate_band = \"9%\"", "is not a share within 0% to 5%"),
+            ("sources = [\"mpv:/s\"]\nslew = 0.01", "expected a string"),
             ("sources = [\"mpv:/s\"]\noffset = \"1s\"", "write it as \"-40ms\""),
             (
                 "sources = [\"ltc\"]\n[sync.ltc]\ninput = \"-\"\nlatency = \"2000ms\"",
-                "no latency of up to a second",
+                "not a latency of up to a second",
             ),
-            ("sources = [\"mpv:/s\"]\njoin_above = \"9ms\"", "is no time within 10ms to 200ms"),
-            ("sources = [\"mpv:/s\"]\nfreewheel = \"5%\"", "is no share within 10% to 200%"),
+            ("sources = [\"mpv:/s\"]\njoin_above = \"9ms\"", "is not a time within 10ms to 200ms"),
+            ("sources = [\"mpv:/s\"]\nfreewheel = \"5%\"", "is not a share within 10% to 200%"),
             ("sources = [\"ltc\"]\n[sync.ltc]\ninput = \"-\"\nchannel = 0", "0 is outside 1..=64"),
             ("sources = [\"mpv:/s\"]\nrank = 1", "rank: unknown key in [sync]"),
         ];

@@ -41,7 +41,7 @@ pub enum TargetError {
         reason: String,
     },
     /// Two controllers have one address or one name.
-    #[error("--to {target}: {what} is that of an earlier --to")]
+    #[error("--to {target}: {what} is also that of an earlier --to")]
     Twice {
         /// The later argument.
         target: String,
@@ -157,11 +157,11 @@ fn parse_effects(arguments: &[String]) -> Result<Vec<Effect>, TargetError> {
 fn parse_effect(argument: &str) -> Result<Effect, TargetError> {
     let refuse =
         |reason: &str| TargetError::Effect { effect: argument.to_owned(), reason: reason.to_owned() };
-    let (name, output) = argument.split_once('=').ok_or_else(|| refuse("write NAME=N, as air=1"))?;
+    let (name, output) = argument.split_once('=').ok_or_else(|| refuse("write NAME=N, such as air=1"))?;
     check_effect_name(name).map_err(refuse)?;
     match output.parse() {
         Ok(output @ 1..=12) => Ok(Effect { name: name.to_owned(), output }),
-        _ => Err(refuse("the output is not one of 1..=12")),
+        _ => Err(refuse("the output has to be 1 to 12")),
     }
 }
 
@@ -278,7 +278,7 @@ impl TargetOptions {
             }
             _ => {
                 let hint = did_you_mean(key, KEYS.into_iter());
-                return Err(format!("unknown key {key}, none of {}{hint}", KEYS.join(", ")));
+                return Err(format!("unknown key {key}; the keys are {}{hint}", KEYS.join(", ")));
             }
         }
         Ok(())

@@ -67,13 +67,13 @@ fn a_controller_that_is_out_for_good_takes_no_part_and_its_axes_still_belong_to_
 #[test]
 fn not_all_are_out_for_good_and_no_seat_loses_a_part_of_its_controllers() {
     let [fault] = &faults_of("enabled = false\n")[..] else { panic!("one fault") };
-    assert!(fault.contains("leave at least one in"), "{fault}");
+    assert!(fault.contains("enable at least one"), "{fault}");
     let more = "group = \"g\"\n[[controller]]\nname = \"A2\"\nseat = \"s\"\naddress = \"10.0.0.2:7408\"\ngroup = \"g\"\n\
         enabled = false\n";
     let [fault] = &faults_of(more)[..] else { panic!("one fault") };
     assert!(fault.starts_with("hall.toml:19:") && fault.contains("give A1 the same"), "{fault}");
     let [fault] = &faults_of("enabled = 0\n")[..] else { panic!("one fault") };
-    assert!(fault.contains("true or false is wanted here"), "{fault}");
+    assert!(fault.contains("expected true or false"), "{fault}");
 }
 
 #[test]
@@ -130,21 +130,21 @@ fn every_fault_is_shown_with_its_place() {
     let shown: Vec<_> = faults.iter().map(|f| format!("{}:{}: {}", f.line, f.column, f.message)).collect();
     let expected = [
         "2:11: rate_hz: 2000 is outside 1..=1000",
-        "3:8: time: \"relativ\" is none of relative, absolute; did you mean relative?",
-        "4:8: bind: \"0.0.0.0\" is not an IPv4 address and port, as 192.168.15.201:7408",
+        "3:8: time: \"relativ\" is not one of relative, absolute; did you mean relative?",
+        "4:8: bind: \"0.0.0.0\" is not an IPv4 address and port, such as 192.168.15.201:7408",
         "5:1: ack_evry: unknown key in [show]; did you mean ack_every?",
         "6:11: spin_us: -1 is outside 0..=900",
         "8:1: [seat.bench3] has no max_jerk_mm_s3, which is needed",
         "11:11: lead_mm: nan is not a finite number",
         "13:21: max_velocity_mm_s: 0 is not above 0",
-        "14:26: max_acceleration_mm_s2: a number is wanted here, not a string",
+        "14:26: max_acceleration_mm_s2: expected a number, not a string",
         "15:8: park: 2 values for 3 axes; give one for each",
         "18:7: air: 13 is outside 1..=12",
         "22:8: seat: there is no [seat.bench]; did you mean bench3?",
         "24:10: accept: 0000 means that no station accepts the frame; use \"ffff\"",
         "25:12: effects: airr is not in [effects]; did you mean air?",
-        "28:8: name: A1 is that of another controller too, on line 21",
-        "30:11: address: 192.168.15.201:7408 is that of another controller too, on line 23",
+        "28:8: name: A1 is also that of another controller, on line 21",
+        "30:11: address: 192.168.15.201:7408 is also that of another controller, on line 23",
         "31:15: axis_offset: 12 is outside 0..=11",
         "33:3: controler: unknown key in the file; did you mean controller?",
     ];
@@ -186,7 +186,7 @@ fn columns_are_counted_in_characters() {
         faults,
         [
             "hall.toml:14:12: effects: é is not in [effects]",
-            "hall.toml:14:17: effects: a string is wanted here, not a whole number"
+            "hall.toml:14:17: effects: expected a string, not a whole number"
         ]
     );
 }
@@ -194,7 +194,7 @@ fn columns_are_counted_in_characters() {
 #[test]
 fn a_configuration_without_controllers_is_refused() {
     let faults = parse(SEAT).unwrap_err();
-    assert_eq!(faults, ["hall.toml:1:1: there is no [[controller]]; name at least one"]);
+    assert_eq!(faults, ["hall.toml:1:1: there is no [[controller]]; add at least one"]);
     let faults =
         parse(&format!("{SEAT}{}", CONTROLLER.replace("[[controller]]", "[controller]"))).unwrap_err();
     assert_eq!(faults.len(), 1);
@@ -217,7 +217,7 @@ fn the_same_address_spelt_in_two_ways_is_one_address() {
     let faults = with(&other).unwrap_err();
     assert_eq!(
         faults,
-        ["hall.toml:16:11: address: 10.0.0.1:7408 is that of another controller too, on line 12"]
+        ["hall.toml:16:11: address: 10.0.0.1:7408 is also that of another controller, on line 12"]
     );
 }
 
@@ -241,7 +241,7 @@ fn port_out_of_vibration_frames_has_two_bytes_or_four_and_mbox_controllers_have_
     let place = "hall.toml:13:25: vibration_port_octets: ";
     assert_eq!(port("vibration_port_octets = 3\n"), Err(vec![format!("{place}3 is neither 2 nor 4")]));
     let faults = port("vibration_port_octets = 2\ndialect = \"mbox\"\n").unwrap_err();
-    assert_eq!(faults, [format!("{place}mbox controllers have no vibration frames; leave it out")]);
+    assert_eq!(faults, [format!("{place}mbox controllers have no vibration frames; omit it")]);
 }
 
 #[test]
@@ -294,8 +294,11 @@ fn a_target_that_cannot_be_used_says_why() {
         (&["127.0.0.1:7408,axes=13"], "axes=13 is not one of 1..=12"),
         (&["127.0.0.1:7408,axis=3"], "did you mean axes?"),
         (&["127.0.0.1:7408,axes"], "\"axes\" is not key=value"),
-        (&["127.0.0.1:7408", "127.0.0.1:7408,name=B"], "the address 127.0.0.1:7408 is that of an earlier"),
-        (&["127.0.0.1:7408,name=c2", "127.0.0.1:7409"], "the name c2 is that of an earlier"),
+        (
+            &["127.0.0.1:7408", "127.0.0.1:7408,name=B"],
+            "the address 127.0.0.1:7408 is also that of an earlier",
+        ),
+        (&["127.0.0.1:7408,name=c2", "127.0.0.1:7409"], "the name c2 is also that of an earlier"),
         (&["255.255.255.255:7408"], "not the address of one controller"),
         (&[], "no controller"),
     ] {

@@ -208,7 +208,7 @@ impl fmt::Display for Command {
             Self::Seek(film) => write!(f, " {film}"),
             Self::Trim(ms) => write!(f, " {ms} ms"),
             Self::Nudge(frames) => write!(f, " {frames:+} frames"),
-            Self::Source(name) => write!(f, " {}", name.as_deref().unwrap_or("by the ranking")),
+            Self::Source(name) => write!(f, " {}", name.as_deref().unwrap_or("by rank")),
             Self::Levels(change) => change.fmt(f),
             Self::GoFrom(film) => write!(f, " from {film}"),
             Self::Preset(name) | Self::Enable(name) | Self::Disable { name, why: None } => {

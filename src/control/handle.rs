@@ -181,7 +181,7 @@ impl Handle {
         if who.role < ask.least_role() {
             let (word, least) = (ask.word(), ask.least_role());
             let detail = format!("{word} needs the role {least}, and {} has {}", who.name, who.role);
-            return Err(Problem::new(Code::Role, detail, "ask somebody who may"));
+            return Err(Problem::new(Code::Role, detail, "ask somebody with that role"));
         }
         if ask == Command::Stop {
             self.stop();
@@ -201,8 +201,8 @@ impl Handle {
                 Ok(Posted(answer))
             }
             Err(TrySendError::Full(_)) => {
-                let detail = format!("{ASKS} requests wait already");
-                Err(Problem::new(Code::Busy, detail, "ask again in a second"))
+                let detail = format!("{ASKS} requests are already waiting");
+                Err(Problem::new(Code::Busy, detail, "try again in a second"))
             }
             Err(TrySendError::Disconnected(_)) => Err(gone()),
         }
@@ -224,7 +224,7 @@ impl Posted {
             Err(_) => Err(Problem::new(
                 Code::Timeout,
                 format!("no answer within {} s", PATIENCE.as_secs()),
-                "look at the status before asking again: it may still be done",
+                "check the status before you repeat the command: it may still take effect",
             )),
         }
     }
@@ -233,12 +233,12 @@ impl Posted {
 /// What was asked of a hall that is another since.
 #[must_use]
 pub(crate) fn overtaken(word: &str, state: State) -> Problem {
-    let detail = format!("{word} was asked before the hall was {state}");
+    let detail = format!("{word} was sent before the hall was {state}");
     Problem::new(Code::Late, detail, "look at the seats, then ask again")
 }
 
 fn late(word: &str) -> Problem {
-    let detail = format!("{word} came more than {} s after it was asked", FRESH.as_secs());
+    let detail = format!("{word} came more than {} s after it was sent", FRESH.as_secs());
     Problem::new(Code::Late, detail, "look at the seats, then ask again")
 }
 

@@ -95,6 +95,6 @@ mod tests {
         let names = (0..33).map(|effect| format!("e{effect}")).collect();
         let mut made = CueBuilder::new("made", 1).curved("many", names);
         made.row(ShowTime::ZERO, [0.0], Some(40));
-        assert!(made.build().unwrap_err().to_string().contains("over 32 effects"));
+        assert!(made.build().unwrap_err().to_string().contains("more than 32 effects"));
     }
 }

@@ -71,9 +71,9 @@ mod tests {
 
     #[test]
     fn what_is_no_whole_rows_is_refused() {
-        assert_eq!(faults(&[0; 7], 3, 20.0), "t.u8: 7 bytes are no whole rows of 3 axes");
+        assert_eq!(faults(&[0; 7], 3, 20.0), "t.u8: 7 bytes are not whole rows of 3 axes");
         assert_eq!(faults(&[], 3, 20.0), "t.u8: is empty; a cue needs at least two rows");
-        assert_eq!(faults(&[0; 3], 3, 20.0), "t.u8: 1 of the two rows that a cue needs at least");
+        assert_eq!(faults(&[0; 3], 3, 20.0), "t.u8: number of rows: 1; a cue needs at least two");
         assert_eq!(faults(&[0; 3], 13, 20.0), "t.u8: 13 axes; a cue has 1 to 12");
         assert_eq!(
             faults(&[0; 3], 1, 0.0),
@@ -81,7 +81,7 @@ mod tests {
         );
         assert_eq!(
             faults(&[0; 3], 1, 1e-5),
-            "t.u8: 27:46:40.000 lies after 24:00:00.000, the latest time of a cue"
+            "t.u8: 27:46:40.000 is after 24:00:00.000, the latest time of a cue"
         );
     }
 }

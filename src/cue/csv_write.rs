@@ -16,7 +16,7 @@ pub enum CsvError {
     Io(#[from] io::Error),
     /// Something changes where the cue has no row, which a CSV cannot say.
     #[error(
-        "{what} changes at {at}, between two rows; csv can only switch at a row, so keep the cue as mcap"
+        "{what} changes at {at}, between two rows; CSV can only switch at a row, so keep the cue as MCAP"
     )]
     BetweenRows {
         /// What changes.

@@ -181,8 +181,8 @@ mod tests {
                 "f:1:1: time: unknown column",
                 "f:1:31: wind: unknown column",
                 "f:1:36: a13: unknown column",
-                "f:1:40: fx_Air: an effect's name is made of a to z, 0 to 9 and _",
-                "f:1:47: a1: the column stands twice",
+                "f:1:40: fx_Air: an effect's name may only have a to z, 0 to 9 and _",
+                "f:1:47: a1: the column occurs twice",
                 "f:1:1: v1_amp: the column is missing",
                 "f:1:1: a2: the column is missing",
             ]

@@ -372,7 +372,7 @@ mod tests {
         File::create(&path).unwrap().set_len(limits::MAX_FILE + 1).unwrap(); // a hole, it takes no space
         let faults = load(&path, &Source::Native).unwrap_err();
         assert!(
-            faults.to_string().ends_with("holds over 2147483648 bytes, the most that is read"),
+            faults.to_string().ends_with("has more than 2147483648 bytes, the limit of a cue file"),
             "{faults}"
         );
     }

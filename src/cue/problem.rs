@@ -24,19 +24,19 @@ pub enum Problem {
     #[error("reading failed: {0}")]
     Unread(String),
     /// The file, or what it unpacks to, is too large.
-    #[error("holds over {MAX_FILE} bytes, the most that is read")]
+    #[error("has more than {MAX_FILE} bytes, the limit of a cue file")]
     FileTooLarge,
     /// A line, or a message, is too long.
-    #[error("over {MAX_LINE} bytes long, the most that is read")]
+    #[error("longer than {MAX_LINE} bytes, the limit")]
     TooLong,
     /// There are too many rows.
-    #[error("over {MAX_ROWS} rows, the most that a cue may have")]
+    #[error("more than {MAX_ROWS} rows, the limit of a cue")]
     TooManyRows,
     /// There is nothing in the file.
     #[error("is empty; a cue needs at least two rows")]
     Empty,
     /// There are too few rows to play.
-    #[error("{0} of the two rows that a cue needs at least")]
+    #[error("number of rows: {0}; a cue needs at least two")]
     TooFewRows(usize),
     /// Bytes that are no text.
     #[error("not UTF-8 text")]
@@ -48,7 +48,7 @@ pub enum Problem {
     #[error("a quote that is not closed in its line")]
     OpenQuote,
     /// A comment line after the header.
-    #[error("a comment among the rows; comments stand before the header row")]
+    #[error("a comment among the rows; put comments before the header row")]
     CommentAmongRows,
     /// A declaration with a value that it cannot have.
     #[error("{value:?} is not known; {allowed}")]
@@ -65,16 +65,16 @@ pub enum Problem {
     #[error("unknown column; {0}")]
     UnknownColumn(&'static str),
     /// A column that was there before.
-    #[error("the column stands twice")]
+    #[error("the column occurs twice")]
     ColumnTwice,
     /// A column that must be there is not.
     #[error("the column is missing")]
     MissingColumn,
     /// More effects than are kept.
-    #[error("over {MAX_EFFECTS} effects, the most that a cue may name")]
+    #[error("more than {MAX_EFFECTS} effects, the limit of a cue")]
     TooManyEffects,
     /// An effect's name with other characters than it may have.
-    #[error("an effect's name is made of a to z, 0 to 9 and _")]
+    #[error("an effect's name may only have a to z, 0 to 9 and _")]
     EffectName,
     /// The raw output word beside named effects.
     #[error("the raw output word and named effects exclude each other")]
@@ -96,7 +96,7 @@ pub enum Problem {
         columns: usize,
     },
     /// An empty cell that has nothing before it to hold.
-    #[error("is empty, and there is no value before it to hold")]
+    #[error("is empty, with no value before it to hold")]
     NothingToHold,
     /// An empty cell where each row needs its own value.
     #[error("is empty; every row needs one")]
@@ -111,7 +111,7 @@ pub enum Problem {
     #[error("the first time is {0} and must be 0")]
     TimeNotZero(String),
     /// Time that stands still or goes back.
-    #[error("{time} does not come after {before}, the time before it")]
+    #[error("{time} is not after {before}, the time before it")]
     TimeNotIncreasing {
         /// The time met, as written.
         time: String,
@@ -125,7 +125,7 @@ pub enum Problem {
         early_ns: u64,
     },
     /// A time beyond what a cue may last.
-    #[error("{0} lies after {MAX_TIME}, the latest time of a cue")]
+    #[error("{0} is after {MAX_TIME}, the latest time of a cue")]
     TimeTooLate(String),
     /// A duration that is none.
     #[error("a row's duration of {0} is not above 0")]
@@ -155,7 +155,7 @@ pub enum Problem {
         wanted: &'static str,
     },
     /// A position that no seat could take, whatever its stroke.
-    #[error("{value} is outside {low} to {high}{unit}, and no seat goes there")]
+    #[error("{value} is outside {low} to {high}{unit}, where no seat can go")]
     NoPosition {
         /// The position as the file has it.
         value: f64,
@@ -169,7 +169,7 @@ pub enum Problem {
     /// The curve between two points leaves the stroke by more than may be held back.
     #[error(
         "the curve reaches {value:.4} at {at}, outside the stroke, {low} to {high}{unit}, by more than 0.001 of it; \
-         add points there, or take interpolation monotone"
+         add points there, or use interpolation monotone"
     )]
     CurveOutsideStroke {
         /// The worst value of the curve there.
@@ -197,7 +197,7 @@ pub enum Problem {
         unit: &'static str,
     },
     /// A level of an output that is none.
-    #[error("a level of {0} is outside 0 to 1; 1 is all that the output can do")]
+    #[error("a level of {0} is outside 0 to 1, the full range of the output")]
     Level(f64),
     /// Values that must not stand together.
     #[error("{0}")]
@@ -206,10 +206,10 @@ pub enum Problem {
     #[error("{0:?} is neither 0 nor 1")]
     Switch(String),
     /// A raw output word that is none.
-    #[error("{0:?} is no output word; 0 to 4095, or 0x0 to 0xfff, for Y01 to Y12")]
+    #[error("{0:?} is not an output word; 0 to 4095, or 0x0 to 0xfff, for Y01 to Y12")]
     Word(String),
     /// Bytes that do not fill whole rows.
-    #[error("{bytes} bytes are no whole rows of {axes} axes")]
+    #[error("{bytes} bytes are not whole rows of {axes} axes")]
     PartOfARow {
         /// Bytes in the file.
         bytes: usize,
@@ -243,7 +243,7 @@ pub enum Problem {
     #[error("not the JSON of its topic: {0}")]
     Message(String),
     /// A message with another number of axes than the first.
-    #[error("{here} axes where the first message has {first}")]
+    #[error("{here} axes, but the first message has {first}")]
     AxesChange {
         /// Axes in this message.
         here: usize,
@@ -259,9 +259,9 @@ pub enum Problem {
         axes: usize,
     },
     /// More markers than are kept.
-    #[error("over {MAX_MARKERS} markers, the most that a cue may have")]
+    #[error("more than {MAX_MARKERS} markers, the limit of a cue")]
     TooManyMarkers,
     /// A marker's name that is too long.
-    #[error("a marker's name of {0} bytes; it may have {MAX_MARKER_NAME}")]
+    #[error("a marker's name of {0} bytes; the limit is {MAX_MARKER_NAME}")]
     MarkerName(usize),
 }

@@ -67,7 +67,7 @@ impl RowReading {
                 faults.add(place(column_of(line, index)), expected.copied(), Problem::MissingColumn);
             } else if expected != Some(&name) {
                 let problem =
-                    Problem::UnknownColumn("the header is line,time_ms,x,y,z,u,v,w, or less at the end");
+                    Problem::UnknownColumn("the header is line,time_ms,x,y,z,u,v,w, without unused axes");
                 faults.add(place(column_of(line, index)), Some(name), problem);
             }
         }
@@ -186,7 +186,7 @@ mod tests {
              3:3: time_ms: a row's duration of -5 is not above 0\n\
              5:6: the row ends after 3 of 4 cells\n\
              6:1: line: \"x\" is not a number\n\
-             6:7: y: -200000 is outside -100000 to 100000 mm, and no seat goes there"
+             6:7: y: -200000 is outside -100000 to 100000 mm, where no seat can go"
         );
         assert_eq!(faults(""), " is empty; a cue needs at least two rows");
         assert_eq!(faults("line,time_ms\n1,2\n"), "1:13: x: the column is missing");

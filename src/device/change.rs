@@ -30,7 +30,7 @@ pub(crate) enum Objection {
         name: &'static str,
     },
     /// The controller's dialect has no such register.
-    #[error("{address} ({name}) is no register of {} controllers", dialect_name(*dialect))]
+    #[error("{address} ({name}) is not a register of {} controllers", dialect_name(*dialect))]
     Dialect {
         /// Which register.
         address: Address,
@@ -41,7 +41,7 @@ pub(crate) enum Objection {
     },
     /// A network setting, without being forced.
     #[error(
-        "{address} ({name}) is a network setting, and a wrong one cuts the controller off; --force writes it"
+        "{address} ({name}) is a network setting, and a wrong one makes the controller unreachable; --force writes it"
     )]
     Network {
         /// Which register.
@@ -50,7 +50,7 @@ pub(crate) enum Objection {
         name: &'static str,
     },
     /// The factory reset, without being forced.
-    #[error("{address}=1 takes back every setting of the factory; --force writes it")]
+    #[error("{address}=1 restores all factory settings; --force writes it")]
     Factory {
         /// Which register.
         address: Address,
@@ -163,14 +163,14 @@ mod tests {
     #[test]
     fn a_register_of_the_other_dialect_is_refused() {
         let told = objection(Address::Pa(0x55), 1, Dialect::Mbox, true).unwrap();
-        assert_eq!(told, "PA55 (amplitude) is no register of mbox controllers");
+        assert_eq!(told, "PA55 (amplitude) is not a register of mbox controllers");
     }
 
     #[test]
     fn registers_of_drives_pass_and_keep_what_is_written() {
         let servo = Address::Servo { servo: 1, number: 508 };
         assert_eq!(objection(servo, 65_535, Dialect::Smc, false), None);
-        assert!(objection(servo, 0, Dialect::Mbox, true).unwrap().contains("no register of mbox"));
+        assert!(objection(servo, 0, Dialect::Mbox, true).unwrap().contains("not a register of mbox"));
         assert!(keeps(servo) && !moves(servo));
         assert!(moves(Address::Pa(8)) && moves(Address::Dp(0xf0)) && !keeps(Address::Pa(0x0f)));
     }

@@ -42,7 +42,7 @@ pub enum Fault {
         request: Request,
     },
     /// It was not asked, because the controller had not answered an earlier request.
-    #[error("cannot {request}: not asked, as the controller had stopped answering")]
+    #[error("cannot {request}: not sent, as the controller had stopped answering")]
     Unasked {
         /// What should have been asked.
         request: Request,
@@ -78,9 +78,9 @@ pub enum Odd {
 impl fmt::Display for Odd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Malformed(error) => write!(f, "what came last was broken, {error}"),
+            Self::Malformed(error) => write!(f, "the last reply was broken, {error}"),
             Self::Foreign { start, num } => {
-                write!(f, "what came last answers something else ({num} registers from {start:02x})")
+                write!(f, "the last reply was to another request ({num} registers from {start:02x})")
             }
             Self::Unsent(fault) => write!(f, "{fault}"),
             Self::Closed => {
@@ -98,7 +98,7 @@ fn behind(request: &Request, odd: Option<&Odd>) -> String {
     );
     match request {
         Request::Read { .. } => format!("; {why}"),
-        Request::Write { .. } => format!(", and it may have been written all the same; {why}"),
+        Request::Write { .. } => format!(", and it may have been written nevertheless; {why}"),
     }
 }
 
@@ -112,9 +112,9 @@ pub(crate) fn refusal(code: ReplyCode, error: DeviceError, dialect: Dialect) -> 
         (Dialect::Smc, ReplyCode::Fault) => "the controller runs with an error",
         (Dialect::Smc, ReplyCode::EmergencyStop) => "an emergency stop is in effect",
         (Dialect::Smc, ReplyCode::Command) => "the command was wrong, or the controller is",
-        (Dialect::Mbox, ReplyCode::Fault) => "the controller calls the request wrong",
-        (Dialect::Mbox, ReplyCode::EmergencyStop) => "the controller calls the request too short",
-        (Dialect::Mbox, ReplyCode::Command) => "for a reason no mbox program knows",
+        (Dialect::Mbox, ReplyCode::Fault) => "the controller says that the request is wrong",
+        (Dialect::Mbox, ReplyCode::EmergencyStop) => "the controller says that the request is too short",
+        (Dialect::Mbox, ReplyCode::Command) => "for a reason that no mbox program knows",
     };
     if error.0 == 0 { format!("{words} (x = {x})") } else { format!("{words} (x = {x}, {error})") }
 }
@@ -148,6 +148,6 @@ mod tests {
         let broken = silent(Some(Odd::Malformed(WireError::Length { len: 17, need: 18 })));
         assert!(broken.ends_with("byte 17: ends after 17 bytes; this message takes 18"), "{broken}");
         let other = silent(Some(Odd::Foreign { start: 0x96, num: 1 }));
-        assert!(other.ends_with("answers something else (1 registers from 96)"), "{other}");
+        assert!(other.ends_with("was to another request (1 registers from 96)"), "{other}");
     }
 }

@@ -44,12 +44,12 @@ pub(crate) enum HomeError {
     },
     /// It would go to where it believes zero to be.
     #[error(
-        "would go to zero without searching it (PA0e = {0}), wherever that is since it was last switched off; set PA0e = 0 \
+        "would go to zero without a search (PA0e = {0}), wherever zero has been since power-on; set PA0e = 0 \
          (kinocue register write PA0e=0 --keep), then home. No seat was moved"
     )]
     Unsearched(u16),
     /// It would not tell how far it is.
-    #[error("does not let DPF0 be read: {0}")]
+    #[error("DPF0 cannot be read: {0}")]
     Unreadable(Fault),
     /// Time ran out.
     #[error("not home after {} s: {}", after.as_secs(), last(*dpf0))]
@@ -272,7 +272,7 @@ mod tests {
         let lanes: Vec<_> = (0..3).map(|lane| (lane, Dialect::Smc)).collect();
         let found = unsearched(&mut rig.talk(), &lanes);
         assert_eq!(found, [(1, HomeError::Unsearched(1))]);
-        assert!(found[0].1.to_string().contains("without searching it (PA0e = 1)"));
+        assert!(found[0].1.to_string().contains("without a search (PA0e = 1)"));
     }
 
     #[test]

@@ -17,7 +17,7 @@ const ALIKE: f64 = 0.75;
 #[non_exhaustive]
 pub(crate) enum SelectError {
     /// No number of a register, or a range of them.
-    #[error("{word:?} is no register number; {space} takes {wanted}")]
+    #[error("{word:?} is not a register number; {space} takes {wanted}")]
     Number {
         /// What was read.
         word: String,
@@ -30,7 +30,7 @@ pub(crate) enum SelectError {
     #[error("{0:?} ends before it begins")]
     Backward(String),
     /// A range of a drive that is too long.
-    #[error("{word:?} names {count} registers of a drive; at most {MAX_SERVO_RANGE} at once")]
+    #[error("{word:?} is {count} registers of a drive; read at most {MAX_SERVO_RANGE} at once")]
     TooMany {
         /// What was read.
         word: String,
@@ -38,10 +38,10 @@ pub(crate) enum SelectError {
         count: usize,
     },
     /// A register that no manual has.
-    #[error("{0} is in neither manual; `kinocue register list` shows those that are")]
+    #[error("{0} is in neither manual; `kinocue register list` shows all")]
     Unknown(Address),
     /// A range in which the manuals have no register.
-    #[error("neither manual has a register among {0}; `kinocue register list` shows those that are")]
+    #[error("neither manual has a register among {0}; `kinocue register list` shows all")]
     Nothing(String),
     /// No name of a register.
     #[error(
@@ -72,7 +72,7 @@ pub(crate) enum SelectError {
     #[error("{0} is given two values")]
     Twice(Address),
     /// Nothing was named.
-    #[error("no register is named")]
+    #[error("no register is given")]
     Nobody,
 }
 
@@ -210,7 +210,7 @@ fn on_panel(numbers: &str, panel: &PanelName) -> Result<Selection, SelectError> 
     let bad = || SelectError::Number {
         word: numbers.to_owned(),
         space: panel.name,
-        wanted: "000 to 255, or a range as 128..133",
+        wanted: "000 to 255, or a range like 128..133",
     };
     let decimal = |text: &str| {
         let digits = text.bytes().all(|byte| byte.is_ascii_digit());
@@ -283,8 +283,11 @@ fn alike(word: &str) -> String {
 
 /// The documented registers among `numbers`.
 fn documented(numbers: &str, space: &'static str, of: fn(u8) -> Address) -> Result<Selection, SelectError> {
-    let bad =
-        || SelectError::Number { word: numbers.to_owned(), space, wanted: "00 to ff, or a range as 06..0b" };
+    let bad = || SelectError::Number {
+        word: numbers.to_owned(),
+        space,
+        wanted: "00 to ff, or a range like 06..0b",
+    };
     let (first, last) = ends(numbers).ok_or_else(bad)?;
     let (low, high) = (hex(first).ok_or_else(bad)?, hex(last).ok_or_else(bad)?);
     if high < low {
@@ -371,7 +374,7 @@ mod tests {
         assert_eq!(named("cp128..130 CD006..CD007"), "PA80 PA81 PA82 DP06 DP07");
         assert_eq!(selections(&words("cp")).unwrap(), selections(&words("pa")).unwrap());
         assert!(named("cp 256").contains("CP takes 000 to 255"));
-        assert!(named("CP09a").contains("no register number"));
+        assert!(named("CP09a").contains("not a register number"));
         assert!(named("CP153").starts_with("PA99 is in neither manual"));
         let given = assignments(&words("CP082=5")).unwrap();
         assert_eq!(given, [Assignment { address: Address::Pa(0x52), value: 5 }]);
@@ -388,7 +391,7 @@ mod tests {
     fn what_names_no_register_is_told_in_one_line() {
         assert!(named("PA99").starts_with("PA99 is in neither manual"));
         assert!(named("pa 99..9c").starts_with("neither manual has a register among PA 99..9c"));
-        assert!(named("pa 0x100").contains("\"0x100\" is no register number"));
+        assert!(named("pa 0x100").contains("\"0x100\" is not a register number"));
         assert!(named("pa 0b..06").contains("ends before it begins"));
         assert!(named("axis-ofset").contains("did you mean \"axis offset\", PA95?"));
         assert!(named("servo 0 508").starts_with("servo takes"));

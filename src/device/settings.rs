@@ -21,16 +21,16 @@ pub(crate) type Values = BTreeMap<Address, u16>;
 #[non_exhaustive]
 pub enum SettingsError {
     /// No TOML, or not of this shape.
-    #[error("is no settings file")]
+    #[error("is not a settings file")]
     Shape(#[source] Box<toml::de::Error>),
     /// A later version.
     #[error("is a settings file of version {0}; this kinocue reads version {VERSION}")]
     Version(u32),
     /// Nobody's settings.
-    #[error("has settings of no controller")]
+    #[error("has no settings of any controller")]
     Empty,
     /// A key that is no parameter.
-    #[error("controller {controller}: {key} is no parameter of the manuals, PA00 to PAcf")]
+    #[error("controller {controller}: {key} is not a parameter of the manuals, PA00 to PAcf")]
     Key {
         /// Whose.
         controller: String,
@@ -270,8 +270,8 @@ mod tests {
         };
         let head = "kinocue_settings = 1\n[controller.A]\naddress = \"127.0.0.1:7408\"\ndialect = \"smc\"\n";
         assert!(error("kinocue_settings = 2").contains("version 2"));
-        assert!(error("kinocue_settings = 1").contains("no controller"));
-        assert!(error(&format!("{head}parameters = {{ PA99 = 1 }}")).contains("PA99 is no parameter"));
+        assert!(error("kinocue_settings = 1").contains("no settings of any"));
+        assert!(error(&format!("{head}parameters = {{ PA99 = 1 }}")).contains("PA99 is not a parameter"));
         assert!(error(&format!("{head}parameters = {{ PA95 = 70000 }}")).contains("70000"));
         assert!(error(&format!("{head}parameters = {{}}\ncolour = 1")).contains("colour"));
         assert!(!error("\u{0}").is_empty());

@@ -39,7 +39,7 @@ pub(crate) enum StandError {
         dialect: Dialect,
     },
     /// The seat has axes whose positions no register holds.
-    #[error("has {axes} axes, but only axes 1 to {} have registers that tell where they stand", DP_POSITIONS.len())]
+    #[error("has {axes} axes, but only axes 1 to {} have registers for their positions", DP_POSITIONS.len())]
     TooManyAxes {
         /// How many.
         axes: usize,
@@ -63,15 +63,15 @@ pub(crate) enum StandError {
         wanted: usize,
     },
     /// It would go to other positions than it is sent.
-    #[error("plays positions at {0}0 % (PA55), so would leave where it stands; set PA55 = 0")]
+    #[error("plays positions at {0}0 % (PA55), so it would move; set PA55 = 0")]
     Amplitude(u16),
     /// It would move by itself once the frames end.
-    #[error("resets by itself some time after the last frame (PA0d = {0}), and so would move; set PA0d = 0")]
+    #[error("resets by itself some time after the last frame (PA0d = {0}), so it would move; set PA0d = 0")]
     AutoReset(u16),
     /// Its positions could mean two different places.
     #[error(
-        "axis {axis} stands at {smc} pulses if it is an smc controller, at {mbox} if it is an mbox one, and nothing \
-         tells which; move it to another place"
+        "axis {axis} is at {smc} pulses if this is an smc controller, at {mbox} if it is an mbox one, and nothing \
+         tells which; move it elsewhere"
     )]
     WordOrder {
         /// The axis, from 1.
@@ -82,7 +82,7 @@ pub(crate) enum StandError {
         mbox: i32,
     },
     /// It stands where no frame can hold it.
-    #[error("axis {axis} stands at {pulses} pulses, outside its stroke of {stroke}; check the seat type")]
+    #[error("axis {axis} is at {pulses} pulses, outside its stroke of {stroke}; check the seat type")]
     PastStroke {
         /// The axis, from 1.
         axis: usize,
@@ -92,7 +92,7 @@ pub(crate) enum StandError {
         stroke: PulseRange,
     },
     /// It does not stand still.
-    #[error("axis {axis} moves, from {from} to {to} pulses within {} ms; wait until it stands", APART.as_millis())]
+    #[error("axis {axis} moves, from {from} to {to} pulses within {} ms; wait until it is at rest", APART.as_millis())]
     Moves {
         /// The axis, from 1.
         axis: usize,

@@ -175,7 +175,7 @@ fn read(text: &'static str) -> Result<Table, String> {
     let rows = text.lines().zip(1..).filter(|(line, _)| !line.starts_with('#')).skip(1); // the header
     let mut registers = Vec::new();
     for (line, number) in rows {
-        let row = row(line).ok_or_else(|| format!("line {number} is no register: {line}"))?;
+        let row = row(line).ok_or_else(|| format!("line {number} is not a register: {line}"))?;
         registers.extend(row);
     }
     Ok(Table(registers))

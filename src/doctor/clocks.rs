@@ -55,13 +55,13 @@ impl Clocks {
         if !SLOW.contains(&current) && current != "jiffies" {
             return FindingLine::unknown(
                 ID,
-                format!("{current}, whose cost is not known"),
+                format!("{current}, whose cost is unknown"),
                 "see the measured run",
             );
         }
         let fix = match source.available.iter().find(|name| FAST.contains(&name.as_str())) {
             Some(fast) => format!("echo {fast} > {FILE}"),
-            None => "dmesg | grep -i -e tsc -e clocksource tells why no fast one is trusted; where the processor's is \
+            None => "dmesg | grep -i -e tsc -e clocksource shows why no fast one is trusted; if the processor's is \
                      sound, boot with tsc=reliable"
                 .to_owned(),
         };
@@ -86,13 +86,12 @@ impl Clocks {
 
     fn wall_clock(&self) -> FindingLine {
         const ID: &str = "clock_synchronisation";
-        const FIX: &str =
-            "apt install chrony, or timedatectl set-ntp true; of a container or virtual machine: on the host";
+        const FIX: &str = "apt install chrony, or timedatectl set-ntp true; for a container or virtual machine: on the host";
         match &self.sync {
             Err(why) => FindingLine::unknown(ID, why, "chronyc tracking, or timedatectl show-timesync"),
             Ok(sync) if !sync.synchronised => FindingLine::warn(
                 ID,
-                "nobody disciplines the wall clock; ticks do not follow it, but logs and other machines will disagree",
+                "the wall clock is not synchronised; ticks do not use it, but logs and other machines will disagree",
                 FIX,
             ),
             Ok(sync) if sync.max_error_us > FAR_US => {

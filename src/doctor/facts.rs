@@ -53,7 +53,7 @@ pub(crate) fn facts() -> Facts {
 fn read(path: impl AsRef<Path>) -> Seen<String> {
     let path = path.as_ref();
     fs::read_to_string(path).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => format!("{} is not there", path.display()),
+        ErrorKind::NotFound => format!("{} does not exist", path.display()),
         ErrorKind::PermissionDenied => format!("{} may not be read", path.display()),
         _ => format!("{}: {error}", path.display()),
     })
@@ -65,7 +65,7 @@ fn text_of(path: impl AsRef<Path>) -> String {
 }
 
 fn number<N: std::str::FromStr>(path: &str) -> Seen<N> {
-    read(path)?.trim().parse().map_err(|_| format!("{path} holds no number"))
+    read(path)?.trim().parse().map_err(|_| format!("{path} does not hold a number"))
 }
 
 fn strange(path: &str) -> String {
@@ -100,7 +100,7 @@ fn tried(trial: sys::Trial) -> FifoTrial {
 }
 
 fn slack(trial: &sys::Trial) -> Seen<Slack> {
-    let default_ns = trial.slack_ns.ok_or("the kernel does not tell")?;
+    let default_ns = trial.slack_ns.ok_or("the kernel does not report it")?;
     Ok(Slack { default_ns, settable: trial.slack_settable })
 }
 
@@ -113,7 +113,7 @@ fn may_set_priority() -> Seen<bool> {
 /// The control group that rules processor time, and the folder of its files and of each group above it, its own first.
 fn group_folders() -> Seen<(text::ControlGroup, Vec<PathBuf>)> {
     let path = "/proc/self/cgroup";
-    let group = text::cpu_group(&read(path)?).ok_or("no control group rules processor time")?;
+    let group = text::cpu_group(&read(path)?).ok_or("no control group controls processor time")?;
     let mounts = read("/proc/self/mounts")?;
     let hidden = "the files of the control group are not mounted here";
     let mount = text::group_mount(&mounts, &group).ok_or(hidden)?;
@@ -211,14 +211,14 @@ fn governors() -> Seen<Vec<String>> {
     let files = entries(CPUS, "cpu").into_iter().map(|cpu| cpu.join("cpufreq/scaling_governor"));
     let names: Vec<String> =
         files.map(text_of).map(|name| name.trim().to_owned()).filter(|name| !name.is_empty()).collect();
-    if names.is_empty() { Err("no frequency control can be seen".to_owned()) } else { Ok(names) }
+    if names.is_empty() { Err("no frequency control is visible".to_owned()) } else { Ok(names) }
 }
 
 fn idle_states() -> Seen<Vec<IdleState>> {
     let folders: Vec<PathBuf> =
         entries(CPUS, "cpu").into_iter().flat_map(|cpu| entries(cpu.join("cpuidle"), "state")).collect();
     if folders.is_empty() {
-        return Err("no idle states can be seen".to_owned());
+        return Err("no idle states are visible".to_owned());
     }
     let used = folders.iter().filter(|folder| text_of(folder.join("disable")).trim() != "1");
     let state = |folder: &PathBuf| {

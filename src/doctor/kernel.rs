@@ -94,10 +94,9 @@ impl PreemptionSigns<'_> {
         ];
         let set = built.into_iter().find(|(option, _)| option_set(self.config, option) == Some(true));
         set.map(|(_, model)| model).ok_or_else(|| match dynamic {
-            true => {
-                "chosen at boot; /sys/kernel/debug/sched/preempt, which tells, could not be read".to_owned()
-            }
-            false => "neither the kernel's version nor its configuration tells".to_owned(),
+            true => "chosen at boot; /sys/kernel/debug/sched/preempt, which shows it, could not be read"
+                .to_owned(),
+            false => "neither the kernel's version nor its configuration shows it".to_owned(),
         })
     }
 }
@@ -180,15 +179,15 @@ impl Kernel {
                 ID,
                 format!("at priority {PRIORITY} or more: {}; and {kernels}", some_of(programs, 5)),
                 format!(
-                    "end what a show does not need, or put it below: chrt -f -p {} TID (TIDs: ps -eLo tid,rtprio,comm)",
+                    "end what a show does not need, or lower its priority: chrt -f -p {} TID (TIDs: ps -eLo tid,rtprio,comm)",
                     PRIORITY - 1
                 ),
             );
         }
         if others.whole {
-            FindingLine::ok(ID, format!("no program's at priority {PRIORITY} or more; {kernels}"))
+            FindingLine::ok(ID, format!("no program at priority {PRIORITY} or more; {kernels}"))
         } else {
-            FindingLine::unknown(ID, "none that can be seen here, but other programs are hidden", LOOK)
+            FindingLine::unknown(ID, "none visible here, but other programs are hidden", LOOK)
         }
     }
 }

@@ -15,7 +15,7 @@ pub(crate) struct MemoryFacts {
 }
 
 const UNLIMITED: &str = "LimitMEMLOCK=infinity in the unit, or `@kinocue - memlock unlimited` in \
-                         /etc/security/limits.d/kinocue.conf and log in anew; in a container: --ulimit memlock=-1";
+                         /etc/security/limits.d/kinocue.conf and log in again; in a container: --ulimit memlock=-1";
 
 impl MemoryFacts {
     /// One line for each.
@@ -43,7 +43,7 @@ impl MemoryFacts {
             Some(bytes) => FindingLine::warn(
                 ID,
                 format!(
-                    "RLIMIT_MEMLOCK {bytes} bytes: only what is there at the start is locked, and only if it fits"
+                    "RLIMIT_MEMLOCK {bytes} bytes: only the memory in use at the start is locked, and only if it fits"
                 ),
                 UNLIMITED,
             ),
@@ -61,7 +61,7 @@ impl MemoryFacts {
             Ok(swaps) => FindingLine::warn(
                 ID,
                 format!("{}, and not all memory is locked", some_of(swaps, 3)),
-                "swapoff -a, and take it out of /etc/fstab; or see memory_lock_limit",
+                "swapoff -a, and remove it from /etc/fstab; or see memory_lock_limit",
             ),
         }
     }

@@ -84,7 +84,7 @@ impl NetworkFacts {
             4 * kept
         );
         if need > table.most {
-            FindingLine::bad(ID, found + ": frames to some will find no link address", fix)
+            FindingLine::bad(ID, found + ": frames to some controllers will find no link address", fix)
         } else {
             FindingLine::warn(ID, found + ": idle entries are dropped, and their next frames wait", fix)
         }
@@ -141,7 +141,7 @@ impl NetworkFacts {
             found,
             format!(
                 "LimitNOFILE={enough} in the unit, or `@kinocue - nofile {enough}` in \
-                 /etc/security/limits.d/kinocue.conf and log in anew"
+                 /etc/security/limits.d/kinocue.conf and log in again"
             ),
         )
     }

@@ -43,7 +43,7 @@ pub(crate) fn machine(cpuinfo: &str, hypervisor: &str, maker: &str) -> Seen<Opti
     let named = !hypervisor.is_empty() || MAKERS.iter().any(|known| maker.starts_with(known));
     match marked {
         Some(marked) if !marked && hypervisor.is_empty() => return Ok(None),
-        None if !named => return Err("this processor does not tell".to_owned()),
+        None if !named => return Err("this processor does not report it".to_owned()),
         _ => {}
     }
     let name = [hypervisor, maker].into_iter().find(|name| !name.is_empty());
@@ -108,14 +108,12 @@ impl Processor {
             Ok(None) => FindingLine::ok(ID, "none"),
             Ok(Some(cpus)) if granted || *cpus >= 1.0 => FindingLine::warn(
                 ID,
-                format!(
-                    "{cpus:.2} processors: past it ordinary threads stand still for the rest of a period"
-                ),
+                format!("{cpus:.2} processors: beyond it ordinary threads stop for the rest of a period"),
                 FIX,
             ),
             Ok(Some(cpus)) => FindingLine::bad(
                 ID,
-                format!("{cpus:.2} processors: past it every thread stands still for the rest of a period"),
+                format!("{cpus:.2} processors: beyond it every thread stops for the rest of a period"),
                 FIX,
             ),
         }
@@ -135,7 +133,7 @@ impl Processor {
         }
         FindingLine::warn(
             ID,
-            format!("{found}: a tick may begin on a slow clock"),
+            format!("{found}: a tick may begin at a low clock rate"),
             "cpupower frequency-set -g performance (or: echo performance | tee \
              /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor)",
         )
@@ -175,8 +173,8 @@ impl Processor {
             Err(why) => return FindingLine::unknown(ID, why, "on the host: ls -l /dev/cpu_dma_latency"),
         };
         let held = match device.held_us {
-            None => "; what it holds could not be read".to_owned(),
-            Some(us) if us >= FREE_US => "; nobody holds it".to_owned(),
+            None => "; its value could not be read".to_owned(),
+            Some(us) if us >= FREE_US => "; no program holds it".to_owned(),
             Some(us) => format!("; held at {us} µs"),
         };
         let shallow = self.idle.is_ok() && self.deep().is_none_or(|state| state.latency_us <= DEEP_US);
@@ -202,8 +200,8 @@ impl Processor {
             Ok(None) => FindingLine::ok(ID, format!("no sign of one{container}")),
             Ok(Some(which)) => FindingLine::warn(
                 ID,
-                format!("{which}{container}: its host can take a processor away unseen"),
-                "run on the bare machine; else pin each virtual processor to one of the host's own, shared with nothing",
+                format!("{which}{container}: its host can take a processor away unnoticed"),
+                "run on a physical machine, or pin each virtual processor to a dedicated processor of the host",
             ),
         }
     }

@@ -92,7 +92,7 @@ impl Scheduling {
         let in_force = format!("{} at priority {}", trial.policy, trial.priority);
         match &trial.refusal {
             _ if trial.policy != Policy::Other && trial.given => {
-                FindingLine::ok(ID, format!("{in_force}, given by whoever started the program"))
+                FindingLine::ok(ID, format!("{in_force}, inherited at the start of the program"))
             }
             _ if trial.policy != Policy::Other => FindingLine::ok(ID, format!("{in_force} was granted")),
             Some(refusal) => FindingLine::bad(ID, format!("refused: {}", refusal.words), self.remedy()),
@@ -117,7 +117,7 @@ impl Scheduling {
         let fix = || {
             format!(
                 "LimitRTPRIO={PRIORITY} in the unit, or `@kinocue - rtprio {PRIORITY}` in \
-                 /etc/security/limits.d/kinocue.conf and log in anew"
+                 /etc/security/limits.d/kinocue.conf and log in again"
             )
         };
         if self.limit.soft.is_none_or(|most| most >= u64::from(PRIORITY)) {
@@ -169,7 +169,7 @@ impl Scheduling {
             Some(_) => FindingLine::ok(ID, found),
             None => FindingLine::unknown(
                 ID,
-                found + "; whether it has a real-time share shows only once right or limit allow the policy",
+                found + "; whether it has a real-time share shows only once the policy is permitted",
                 LOOK,
             ),
         }
@@ -187,7 +187,7 @@ impl Scheduling {
         match throttle.runtime_us {
             ..0 => FindingLine::warn(
                 ID,
-                "off: a real-time thread that never sleeps takes its processor for good",
+                "off: a real-time thread that never sleeps keeps its processor forever",
                 LINE,
             ),
             0 => FindingLine::bad(ID, found, LINE),
@@ -210,8 +210,8 @@ impl Group {
             None => String::new(),
         };
         let kernel = match self.configured {
-            Some(false) => "; the kernel does not share out real-time by groups",
-            Some(true) if self.share.is_none() => "; the kernel shares out real-time by groups",
+            Some(false) => "; the kernel has no real-time shares of groups",
+            Some(true) if self.share.is_none() => "; the kernel has real-time shares of groups",
             _ => "",
         };
         format!("cpu control group {}{share}{kernel}", self.path)

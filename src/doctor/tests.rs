@@ -146,7 +146,7 @@ fn a_policy_that_systemd_gave_needs_no_limit() {
         Ok(FifoTrial { given: true, policy: Policy::RoundRobin, priority: 20, refusal: None });
     facts.scheduling.limit = at_most(0);
     assert!(ready(&judge(&facts, ONE)));
-    assert!(line(&facts, "realtime_policy").found.contains("rr at priority 20, given"));
+    assert!(line(&facts, "realtime_policy").found.contains("rr at priority 20, inherited"));
 }
 
 #[test]

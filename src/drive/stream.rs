@@ -77,7 +77,7 @@ impl<P: LinkPort> LinkStream<P> {
         let homed = match self {
             Self::SilverMax(stream) => {
                 let seat = units_of(controller).ok_or(NO_DRIVES)?;
-                let canary = canary().map_err(|error| format!("the system gives no chance: {error}"))?;
+                let canary = canary().map_err(|error| format!("no random number: {error}"))?;
                 let homed =
                     silvermax::home(&mut stream.talk, seat, silvermax::Homing { canary, goes_on, told });
                 homed.map(|()| stream.rejoin(lane, canary)).map_err(|error| error.to_string())

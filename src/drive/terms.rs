@@ -71,8 +71,7 @@ pub(crate) fn in_words(config: &Config) -> (Vec<String>, Vec<String>) {
 
 /// What became of the baud rate that the file asks for, where that is another.
 fn other_baud(Link { name, baud, asked_baud, .. }: &Link) -> Option<String> {
-    (baud != asked_baud)
-        .then(|| format!("link {name} runs at {baud} baud, what its drives make of {asked_baud}"))
+    (baud != asked_baud).then(|| format!("link {name} runs at {baud} baud, the nearest rate to {asked_baud}"))
 }
 
 fn plays_at(link: &Link, load: &LinkLoad, period: Duration) -> String {

@@ -15,10 +15,10 @@ pub enum Unplanned {
 
 plain::displayed!(Unplanned {
     Self::Seek =>
-        "the seek was not done: no move within the limits leads there; seek a little earlier or later",
+        "the seek was not done: no move within the limits gets there; seek a little earlier or later",
     Self::Lane(_) =>
-        "it stays where it is: no move within the limits leads it to where it should be; seek elsewhere in the cue, \
-         or park",
+        "it stays where it is: no move within the limits takes it to its place in the cue; seek elsewhere in the \
+         cue, or park",
 });
 
 /// Something that happened once.

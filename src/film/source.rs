@@ -76,8 +76,8 @@ const CLOCK_ERROR: Duration = Duration::from_millis(1);
 /// Films that a line is held against at once: each takes its share of the processor.
 const MOST_INDEXES: usize = 8;
 /// What there is to choose from.
-const FORMS: &str = "take mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:relay:SOCKET, ltc:-, ltc:FILE.wav, \
-                     sound:INPUT,index=FILE.kidx with an INPUT as of ltc, mtc:DEVICE, artnet:FROM, osc:FROM, http:FROM or clock:TIME";
+const FORMS: &str = "use mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:relay:SOCKET, ltc:-, ltc:FILE.wav, \
+                     sound:INPUT,index=FILE.kidx with an INPUT as for ltc, mtc:DEVICE, artnet:FROM, osc:FROM, http:FROM or clock:TIME";
 
 /// How a film is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -182,7 +182,7 @@ impl FromStr for FilmSource {
     type Err = FilmArgError;
 
     fn from_str(text: &str) -> Result<Self, FilmArgError> {
-        let refuse = || FilmArgError(format!("{text} is no source; {FORMS}"));
+        let refuse = || FilmArgError(format!("{text} is not a source; {FORMS}"));
         let (kind, input) = text.split_once(':').filter(|(_, input)| !input.is_empty()).ok_or_else(refuse)?;
         match kind {
             // Paths and commands are taken as they are: a comma in one is no option.
@@ -210,7 +210,7 @@ impl NamedSender {
         let (from, bind) = with_option(text, "bind=");
         let refuse = || {
             FilmArgError(format!(
-                "{text} names no sender; write its address, as 10.0.0.20, and after a comma where it is heard, as bind=0.0.0.0:{port}"
+                "{text} has no sender; give its address, such as 10.0.0.20, and optionally, after a comma, bind=0.0.0.0:{port}"
             ))
         };
         let from: Ipv4Addr = from.parse().map_err(|_| refuse())?;
@@ -232,13 +232,13 @@ impl FromStr for ClockStart {
         let (time, most) = with_option(text, "max_error=");
         let at = ClockTime::of(time).ok_or_else(|| {
             FilmArgError(format!(
-                "{time} is no time; write 2026-11-21T19:00:00+01:00, 2026-11-21T19:00 or 19:00"
+                "{time} is not a time; write 2026-11-21T19:00:00+01:00, 2026-11-21T19:00 or 19:00"
             ))
         })?;
         let max_error = match most {
             None => CLOCK_ERROR,
             Some(text) => milliseconds(text).ok_or_else(|| {
-                FilmArgError(format!("{text} is no error of a clock; write max_error=1ms, up to 20000ms"))
+                FilmArgError(format!("{text} is not an error of a clock; write max_error=1ms, up to 20000ms"))
             })?,
         };
         Ok(Self { at, max_error })
@@ -286,7 +286,7 @@ impl FilmSound {
             || indexes.len() > MOST_INDEXES
         {
             return Err(FilmArgError(format!(
-                "sound:{text} names no input with 1 to {MOST_INDEXES} indexes; write sound:alsa:hw:2,0,index=FILM.kidx, the show's film \
+                "sound:{text} is not an input with 1 to {MOST_INDEXES} indexes; write sound:alsa:hw:2,0,index=FILM.kidx, the show's film \
                  first, and make the index with `kinocue sync index FILM -o FILM.kidx`"
             )));
         }
@@ -341,10 +341,10 @@ mod tests {
     fn a_sender_has_to_be_named_and_a_clock_to_be_a_time() {
         let refused = [
             ("artnet:", "artnet:FROM"),
-            ("artnet:0.0.0.0", "names no sender"),
-            ("osc:255.255.255.255", "names no sender"),
+            ("artnet:0.0.0.0", "has no sender"),
+            ("osc:255.255.255.255", "has no sender"),
             ("http:10.0.0.20,port=80", "bind=0.0.0.0:8431"),
-            ("artnet:hall.local", "names no sender"),
+            ("artnet:hall.local", "has no sender"),
             ("clock:soon", "19:00"),
             ("clock:2026-11-21", "2026-11-21T19:00"),
             ("clock:19:00,max_error=1", "max_error=1ms"),
@@ -384,7 +384,7 @@ mod tests {
         assert_eq!((read.start.hours, read.start.drops), (1, true));
         for (rate, start) in [(Some("26"), None), (None, Some("1:2"))] {
             let error = args(rate, start).expect_err("it is not").to_string();
-            assert!(error.contains("take") || error.contains("write"), "{error}");
+            assert!(error.contains("use") || error.contains("take") || error.contains("write"), "{error}");
         }
     }
 }

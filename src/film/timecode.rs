@@ -172,9 +172,9 @@ impl fmt::Display for Label {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum TimecodeError {
-    #[error("{0} is no timecode; write HH:MM:SS:FF, as 01:00:00:00")]
+    #[error("{0} is not a timecode; write HH:MM:SS:FF, such as 01:00:00:00")]
     Text(String),
-    #[error("{0} is no frame rate; take 23.976, 24, 25, 29.97 or 30")]
+    #[error("{0} is not a frame rate; take 23.976, 24, 25, 29.97 or 30")]
     Rate(String),
     #[error("{label}: {value} {part} are outside 0..={most}")]
     Range { label: Label, part: &'static str, value: u8, most: u32 },

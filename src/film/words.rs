@@ -6,17 +6,17 @@ use super::point::FilmState;
 impl FilmState {
     const fn words(self) -> &'static str {
         match self {
-            Self::FreeRunning | Self::Locked => "the film is outside the cue, or was found a moment ago",
-            Self::Freewheeling => "nothing is heard of the film at the moment",
-            Self::Absent => "nothing has been heard of the film yet",
-            Self::Acquiring => "where the film is, is not known well enough yet",
+            Self::FreeRunning | Self::Locked => "the film is outside the cue, or has just been found",
+            Self::Freewheeling => "nothing is received from the film at the moment",
+            Self::Absent => "nothing has been received from the film yet",
+            Self::Acquiring => "the position of the film is not known well enough yet",
             Self::Stopped => "the film is stopped",
             Self::Ended => "the film is over",
             Self::Jumped => "the film has jumped",
             Self::Reverse => "the film runs backwards",
-            Self::Shuttle => "the film runs at a speed that the seats may not follow",
-            Self::Unusable => "what is heard of the film makes no sense, or is too coarse",
-            Self::Lost => "nothing is heard of the film any more",
+            Self::Shuttle => "the film runs at a speed that seats may not follow",
+            Self::Unusable => "what is received from the film makes no sense, or is too coarse",
+            Self::Lost => "nothing is received from the film any more",
         }
     }
 }
@@ -54,13 +54,13 @@ impl FilmState {
     pub(crate) const fn next(self, is_followed: bool) -> &'static str {
         match self {
             Self::FreeRunning | Self::Locked if is_followed => "nothing; the seats follow it",
-            Self::FreeRunning | Self::Locked => "nothing; seats follow it once a person has let the show go",
+            Self::FreeRunning | Self::Locked => "nothing; seats follow it once a person starts the show",
             Self::Freewheeling | Self::Acquiring | Self::Jumped => "wait a moment",
-            Self::Absent | Self::Lost => "start the film; see that its source is connected",
-            Self::Stopped => "let the film go on",
-            Self::Ended => "nothing; let the next show go",
+            Self::Absent | Self::Lost => "start the film; check that its source is connected",
+            Self::Stopped => "let the film run on",
+            Self::Ended => "nothing; start the next show",
             Self::Reverse | Self::Shuttle => "let the film run forward at its speed",
-            Self::Unusable => "see what its source sends; allow_coarse allows one that is merely coarse",
+            Self::Unusable => "check what its source sends; allow_coarse permits one that is only coarse",
         }
     }
 }
@@ -71,8 +71,8 @@ impl HoldCause {
     pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Film(state) => state.words(),
-            Self::Apart => "the film was further away from the seats than they slew to it",
-            Self::Unstable => "the seats had to join five times in a minute: see to its source, and resume",
+            Self::Apart => "the film was too far from the seats for them to slew to it",
+            Self::Unstable => "the seats had to join five times in a minute: check its source, and resume",
             Self::Asks => "each join waits for a person: resume",
         }
     }
@@ -85,7 +85,7 @@ impl ParkCause {
         match self {
             Self::FilmEnded => "the film is over",
             Self::FilmCutShort => {
-                "the film is over, and the seats have followed it through a part of the cue alone"
+                "the film is over, and the seats followed it through only a part of the cue"
             }
             Self::CueLeft => "the film has left the cue",
             Self::HeldTooLong => "the film could not be followed for five minutes",

@@ -165,9 +165,9 @@ impl Virtual {
             alarms: RefCell::new(alarms),
             live: &live,
             stands: &stands,
-            deaf: Cell::new(false),
+            deaf: Cell::default(),
             film: Arc::default(),
-            shown: Cell::new(None),
+            shown: Cell::default(),
             showing: RefCell::new(self.film.as_ref().map(Showing::new)),
         };
         let rules = ChaseRules::until(timeline.duration());
@@ -176,22 +176,12 @@ impl Virtual {
         let grid = TickGrid::new(clock.now(), rate);
         let conductor = Conductor::of_a_play(clock.now(), true).chasing(film);
         let sink = Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new() };
-        let places = Places::new(&lanes, rate);
-        let mut tick_loop = TickLoop {
-            places,
-            clock: &clock,
-            grid,
-            engine,
-            conductor,
-            lanes,
-            sink,
-            mail,
-            desk: &desk,
-            leave: &leave,
-        };
-        let ended = tick_loop.run();
-        let clamps = (0..tick_loop.lanes.len()).map(|lane| *tick_loop.engine.lane(lane).clamps()).collect();
-        let frames = tick_loop.sink.frames;
+        let (places, clock) = (Places::new(&lanes, rate), &clock);
+        let (desk, leave) = (&desk, &leave);
+        let mut run = TickLoop { places, clock, grid, engine, conductor, lanes, sink, mail, desk, leave };
+        let ended = run.run();
+        let clamps = (0..run.lanes.len()).map(|lane| *run.engine.lane(lane).clamps()).collect();
+        let frames = run.sink.frames;
         let mut news = news;
         let news = std::iter::from_fn(|| news.pop().ok()).collect();
         Played { ended, frames, happened: clock.happened.take(), news, clamps, join, timeline, rate }
@@ -307,6 +297,51 @@ impl<'a> Stage<'a> {
         }
         self.plans.borrow_mut().serve(&mut Vec::new());
     }
+
+    /// Lets an event of the script happen.
+    fn happens(&self, event: &Event) {
+        match event {
+            Event::Late(span) => {
+                self.now.set(self.now.get() + *span);
+                self.read_all(); // whoever was asleep wants to know
+            }
+            Event::Leave => self.hands.leave.store(true, Ordering::Relaxed),
+            Event::Stop => self.hands.desk.stop(),
+            Event::Ask(request) => self.hands.command(Command::Request(*request)),
+            Event::Seek(film) => self.hands.command(Command::Seek(*film)),
+            Event::Alarm(alarm) => {
+                self.hands.alarms.borrow_mut().push(*alarm).expect("there is room");
+            }
+            Event::Found(lane, pose) => self.is_found(*lane, *pose),
+            Event::FoundThere(lane) => {
+                let pose = self.hands.stands.borrow()[*lane];
+                self.is_found(*lane, pose);
+            }
+            Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
+            Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
+            Event::Film(media, rate, state) => {
+                let epoch = self.hands.shown.get().map_or(0, |point| point.epoch + 1);
+                let point =
+                    FilmPoint { at: self.now.get(), media: *media, rate: *rate, epoch, state: *state };
+                self.hands.shown.set(Some(point));
+                self.hands.show(self.now.get());
+            }
+            Event::Deaf(deaf) => self.hands.deaf.set(*deaf),
+            Event::Refuse => self.planner_refuses.set(true),
+            Event::SlowPlanner(ticks) => {
+                self.planner_delay.set(*ticks);
+                self.planner_waits.set(*ticks);
+            }
+        }
+    }
+
+    /// A seat was read at rest in that pose, and takes part again.
+    fn is_found(&self, lane: usize, pose: Pose) {
+        self.hands.stands.borrow_mut()[lane] = pose;
+        read_at_rest(self.hands.live, lane, pose, self.now.get());
+        let found = Alarm::Found(u16::try_from(lane).expect("few lanes"));
+        self.hands.alarms.borrow_mut().push(found).expect("there is room");
+    }
 }
 
 impl Clock for Stage<'_> {
@@ -325,46 +360,7 @@ impl Clock for Stage<'_> {
         self.hands.show(self.now.get());
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
-            match event {
-                Event::Late(span) => {
-                    self.now.set(self.now.get() + *span);
-                    self.read_all(); // whoever was asleep wants to know
-                }
-                Event::Leave => self.hands.leave.store(true, Ordering::Relaxed),
-                Event::Stop => self.hands.desk.stop(),
-                Event::Ask(request) => self.hands.command(Command::Request(*request)),
-                Event::Seek(film) => self.hands.command(Command::Seek(*film)),
-                Event::Alarm(alarm) => {
-                    self.hands.alarms.borrow_mut().push(*alarm).expect("there is room");
-                }
-                Event::Found(lane, pose) => {
-                    self.hands.stands.borrow_mut()[*lane] = *pose;
-                    read_at_rest(self.hands.live, *lane, *pose, self.now.get());
-                    let found = Alarm::Found(u16::try_from(*lane).expect("few lanes"));
-                    self.hands.alarms.borrow_mut().push(found).expect("there is room");
-                }
-                Event::FoundThere(lane) => {
-                    let pose = self.hands.stands.borrow()[*lane];
-                    read_at_rest(self.hands.live, *lane, pose, self.now.get());
-                    let found = Alarm::Found(u16::try_from(*lane).expect("few lanes"));
-                    self.hands.alarms.borrow_mut().push(found).expect("there is room");
-                }
-                Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
-                Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
-                Event::Film(media, rate, state) => {
-                    let epoch = self.hands.shown.get().map_or(0, |point| point.epoch + 1);
-                    let point =
-                        FilmPoint { at: self.now.get(), media: *media, rate: *rate, epoch, state: *state };
-                    self.hands.shown.set(Some(point));
-                    self.hands.show(self.now.get());
-                }
-                Event::Deaf(deaf) => self.hands.deaf.set(*deaf),
-                Event::Refuse => self.planner_refuses.set(true),
-                Event::SlowPlanner(ticks) => {
-                    self.planner_delay.set(*ticks);
-                    self.planner_waits.set(*ticks);
-                }
-            }
+            self.happens(event);
         }
     }
 }

@@ -30,7 +30,7 @@ impl HealthState {
             Self::Rejoining => "park, or start a show: it joins slowly",
             Self::Degraded => "check the network",
             Self::Lost => "check its power and network; it rejoins by itself unless it rebooted",
-            Self::Stopped => "release the emergency-stop button at its place, then clear",
+            Self::Stopped => "release its emergency-stop button, then clear",
             Self::Error => {
                 "clear the error at the controller; then, with the seats parked or stopped, clear the hall"
             }
@@ -49,7 +49,7 @@ impl Why {
                 Some("find out what moved it; then park, or start a show: it joins slowly from where it is")
             }
             Self::Outside { .. } => Some(
-                "put its word order or PA02 right, or home it with nobody on the seat (`kinocue home --config`, with the service \
+                "correct its word order or PA02, or home it with nobody on the seat (`kinocue home --config`, with the service \
                  stopped); it rejoins by itself once it is inside",
             ),
             Self::Ambiguous(_) => {
@@ -59,10 +59,10 @@ impl Why {
                 Some("stop the other machine; then park, and home it with nobody on the seat")
             }
             Self::Wide(_) => Some(
-                "this IMAX answers as its manual has it and no other that is known: take it out, and send a capture \
-                 (`kinocue decode --dialect imax`) to whoever looks after this program",
+                "this IMAX answers as its manual says, which no other known one does: disable it, and send a capture \
+                 (`kinocue decode --dialect imax`) to the maintainers of this program",
             ),
-            Self::CutShort(_) => Some("wait until it was read"),
+            Self::CutShort(_) => Some("wait until its position has been read"),
             Self::MoreAxes { .. } => Some(
                 "set PA02 to the axes of the seat, or give the seat a type with as many; with the seats parked or stopped, clear",
             ),
@@ -77,7 +77,7 @@ impl fmt::Display for Why {
         match self {
             Self::Outside { axis, pulses, .. } => write!(
                 f,
-                "its axis {} says that it is at {} pulses, outside of its stroke (one that its seat type does not have is led to 0): \
+                "its axis {} reports {} pulses, outside its stroke (frames hold an axis that its seat type does not have at 0): \
                  wrong word order (dialect), other axes (PA02), or not home",
                 axis + 1,
                 pulses.0
@@ -88,11 +88,11 @@ impl fmt::Display for Why {
                 write!(f, "alarm of the servo drives, kind {value} (DPFE)")
             }
             Self::Alarm { register, value, .. } => {
-                write!(f, "it reports that something is wrong (0x1001): DP{register:02x} is {value}")
+                write!(f, "it reports a fault (0x1001): DP{register:02x} is {value}")
             }
             Self::MoreAxes { drives, .. } => write!(
                 f,
-                "PA02 = {drives}: it drives axes that its seat type does not have, nobody can read them, and frames would lead them to 0"
+                "PA02 = {drives}: it drives axes that its seat type does not have; they cannot be read, and frames would move them to 0"
             ),
             _ => f.write_str(self.plainly()),
         }
@@ -111,42 +111,42 @@ impl Why {
             Self::SeenAgain => "back as it was",
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
             Self::Unsure(_) => {
-                "frames to it, or its acks, were missing for over 50 ms: where it is has to be read"
+                "frames to it, or its acks, were missing for over 50 ms: its position has to be read"
             }
-            Self::CutShort(_) => "its drives were stopped: where it stands is read",
+            Self::CutShort(_) => "its drives were stopped: its position is being read",
             Self::Astray(_) => {
-                "it acks frames and is elsewhere than they have led it: it homes by itself or is jogged (PA96 to PA98), or its \
+                "it acks frames but is not where they took it: it homes by itself or is jogged (PA96 to PA98), or its \
                  filters delay it too much"
             }
             Self::Unsteady(_) => {
-                "three times within a minute frames to it or its acks were missing for over 50 ms, or it was elsewhere than \
-                 they led it: check the network, and whether it is jogged"
+                "three times within a minute frames to it or its acks were missing for over 50 ms, or it was not where \
+                 they took it: check the network, and whether it is jogged"
             }
             Self::Ambiguous(_) => {
-                "in either order of their words its positions are inside the stroke, and nothing says which is true: home it"
+                "its positions are inside the stroke in both word orders, and nothing tells which is true: home it"
             }
             Self::Unread(_) => {
-                "not all of its axes tell where they are: those past the sixth have no register"
+                "not all of its axes report their positions: those past the sixth have no register"
             }
             Self::EmergencyStop(_) => "emergency stop",
             Self::HeldUntilReset(_) => "its emergency stop was released, and holds until a reset (PA91 = 2)",
             Self::Refuses(_) => "it refuses frames",
-            Self::Wide(_) => "it answers with registers of 32 bits, and only those of 16 can be read",
-            Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) does not go on",
+            Self::Wide(_) => "it answers with registers of 32 bits, but only those of 16 can be read",
+            Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) started again",
             Self::OtherMaster(_) => {
                 "it got more datagrams (DP34) than were sent from here: another machine sends to it"
             }
             Self::NotHome(_) => "it is not home: it was reset, or was never homed",
             Self::Other(_) => "another controller or another work mode (PA00) than before",
             Self::Gap(_) => {
-                "it was silent for so long that it may have rebooted, and it counts no packets (DP34) that would tell"
+                "it was silent for so long that it may have rebooted, and it has no packet counter (DP34) to show it"
             }
-            Self::Unproved(_) => "whether it has rebooted cannot be told",
+            Self::Unproved(_) => "it is unknown whether it has rebooted",
             Self::Outside { .. }
             | Self::Error { .. }
             | Self::Drive { .. }
             | Self::Alarm { .. }
-            | Self::MoreAxes { .. } => "it says so itself",
+            | Self::MoreAxes { .. } => "it reports this itself",
         }
     }
 }

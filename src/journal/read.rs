@@ -31,7 +31,7 @@ pub(super) fn each(
             Ok(line) => take(line),
             Err(_) => {
                 let what = if line.ends_with(b"\n") { "is no record" } else { "is cut short" };
-                notes.push(format!("{name}:{number}: {what}, and passed over"));
+                notes.push(format!("{name}:{number}: {what}, skipped"));
             }
         }
     }

@@ -204,8 +204,8 @@ impl Days {
         let more = notes.len().saturating_sub(MOST_NOTES);
         notes.truncate(MOST_NOTES);
         notes.extend((more > 0).then(|| format!("and {more} more")));
-        for (more, what) in [(left_out.0, "shows"), (left_out.1, "things that were asked")] {
-            let words = format!("{more} {what} before these are left out; `kinocue report` has them");
+        for (more, what) in [(left_out.0, "shows"), (left_out.1, "commands")] {
+            let words = format!("{more} earlier {what} are left out; `kinocue report` has them");
             notes.extend((more > 0).then_some(words));
         }
         let (totals, actions) = (Totals::of(&shows), actions.into());

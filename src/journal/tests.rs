@@ -189,7 +189,7 @@ fn a_cut_line_at_the_end_is_named_as_cut() {
     drop(Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T08:00:00Z")));
     let mut file = OpenOptions::new().append(true).open(&files(dir.path())[0]).unwrap();
     file.write_all(b"{\"kind\":\"act").unwrap();
-    assert!(of_day(dir.path(), "2026-11-21").notes[0].ends_with("is cut short, and passed over"));
+    assert!(of_day(dir.path(), "2026-11-21").notes[0].ends_with("is cut short, skipped"));
 }
 
 #[test]
@@ -298,7 +298,9 @@ fn of_a_great_day_the_newest_is_taken_and_the_rest_is_named() {
     let report = report(dir.path(), day, day, ReportBounds { shows: 2, actions: 3 }).unwrap();
     assert_eq!((report.shows.len(), report.actions.len()), (2, 3));
     assert_eq!((report.actions[0].what.as_str(), &report.shows[1].record.start[14..16]), ("trim 2", "04"));
-    assert!(report.notes[0].starts_with("3 shows before these") && report.notes[1].starts_with("2 things"));
+    assert!(
+        report.notes[0].starts_with("3 earlier shows") && report.notes[1].starts_with("2 earlier commands")
+    );
 }
 
 #[test]

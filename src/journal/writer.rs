@@ -120,7 +120,7 @@ impl Current {
         self.size += written as u64;
         self.torn = written < line.len();
         if self.torn {
-            return Err(io::Error::new(io::ErrorKind::StorageFull, "the disk took only a part of a line"));
+            return Err(io::Error::new(io::ErrorKind::StorageFull, "the disk took only part of a line"));
         }
         if entry.sync { self.file.sync_data() } else { Ok(()) }
     }

@@ -1,5 +1,5 @@
-//! The process that checks cues: what comes from outside is taken apart there, at the lowest priority and within limits, and
-//! never in the process that moves seats.
+//! The process that checks cues and draws recordings: what comes from outside or is long is taken apart there, at the lowest priority
+//! and within limits, and never in the process that moves seats.
 
 use std::io::{self, Read as _};
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
@@ -12,7 +12,7 @@ use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, pidfd_open};
 use serde::de::DeserializeOwned;
 
-use super::{Bounds, Drawing, Hall, Verdict};
+use super::{Bounds, Drawing, Hall, Sketch, Verdict};
 use crate::control::{Code, Problem};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -22,48 +22,79 @@ const MAX_OUTPUT: u64 = 4 << 20;
 /// How it ends where the configuration has faults (sysexits).
 const BAD_CONFIGURATION: i32 = 78;
 
+/// What the process does with a file.
+struct Chore<'a> {
+    /// In words.
+    name: &'static str,
+    /// What it does about one that takes too much.
+    remedy: &'static str,
+    command: &'a [&'a str],
+    file: &'a Path,
+}
+
+const CHECK: &str = "the check of the cue";
+const FEWER_ROWS: &str =
+    "give the cue fewer rows, or raise max_memory_mib in [library] and MemoryMax of the service";
+const SHORTER: &str =
+    "draw it on another machine with `kinocue plot`, or cut it first with `kinocue record cut`";
+
 /// Has a cue file checked for a hall. Blocks until it is.
 pub(super) fn examine(hall: &Hall, cue: &Path) -> Result<Verdict, Problem> {
-    run(hall, cue, &[])
+    check(hall, cue, &[])
 }
 
 /// Has the curves of a cue file drawn in so many stretches of time. Blocks until they are.
 pub(super) fn draw(hall: &Hall, cue: &Path, points: usize) -> Result<Drawing, Problem> {
-    run(hall, cue, &["--curve", &points.to_string()])
+    check(hall, cue, &["--curve", &points.to_string()])
 }
 
-/// What the process says of a cue.
-fn run<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<T, Problem> {
+/// Has a recording drawn: that seat, or the one that was held back farthest. Blocks until it is.
+pub(super) fn picture(hall: &Hall, recording: &Path, seat: Option<&str>) -> Result<Sketch, Problem> {
+    let seat = seat.map(|seat| format!("--seat={seat}"));
+    let command: Vec<&str> = ["draw-recording"].into_iter().chain(seat.as_deref()).collect();
+    let name = "the picture of the recording";
+    run(hall, &Chore { name, remedy: SHORTER, command: &command, file: recording })
+}
+
+fn check<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<T, Problem> {
+    let config = hall.config.to_str().ok_or_else(|| {
+        let detail = format!("the path of the configuration, {}, is not UTF-8", hall.config.display());
+        Problem::new(Code::File, detail, "rename it")
+    })?;
+    let command: Vec<&str> =
+        ["prove", "--json", "--config", config].into_iter().chain(more.iter().copied()).collect();
+    run(hall, &Chore { name: CHECK, remedy: FEWER_ROWS, command: &command, file: cue })
+}
+
+/// What the process says of a file.
+fn run<T: DeserializeOwned>(hall: &Hall, chore: &Chore<'_>) -> Result<T, Problem> {
     let bounds = &hall.bounds;
-    let mut child = spawn(hall, cue, more).map_err(|error| {
-        let detail = format!("cannot start the check of the cue: {error}");
-        Problem::new(Code::File, detail, "look at the service's limits on processes and memory")
+    let mut child = spawn(hall, chore).map_err(|error| {
+        let detail = format!("cannot start {}: {error}", chore.name);
+        Problem::new(Code::File, detail, "check the service's limits on processes and memory")
     })?;
     let deadline = Monotonic.now() + bounds.time;
     let watched = watch(&mut child, deadline);
     if watched.is_err() {
         let _ = child.kill(); // it may have ended meanwhile
     }
-    let status = child.wait().map_err(|error| failed(&error))?;
+    let status = child.wait().map_err(|error| failed(chore, &error))?;
     let output = watched.map_err(|error| match error.kind() {
-        io::ErrorKind::TimedOut => too_long(bounds),
-        _ => failed(&error),
+        io::ErrorKind::TimedOut => too_long(chore, bounds),
+        _ => failed(chore, &error),
     })?;
-    serde_json::from_slice(&output).map_err(|_| no_verdict(status, bounds))
+    serde_json::from_slice(&output).map_err(|_| no_verdict(chore, status, bounds))
 }
 
 /// Not a copy of this process, which would slow its real-time thread down: the child lowers itself.
-fn spawn(hall: &Hall, cue: &Path, more: &[&str]) -> io::Result<Child> {
+fn spawn(hall: &Hall, chore: &Chore<'_>) -> io::Result<Child> {
     Command::new(&hall.program)
         .arg0("kinocue")
-        .args(["prove", "--json"])
-        .args(more)
-        .arg("--config")
-        .arg(&hall.config)
+        .args(chore.command)
         .args(["--memory-mib", &hall.bounds.memory_mib.to_string()])
         .args(["--seconds", &hall.bounds.time.as_secs().to_string()])
         .arg("--")
-        .arg(cue)
+        .arg(chore.file)
         .env_clear()
         .env("MALLOC_ARENA_MAX", "1") // each arena would take of the address space that it may have
         .stdin(Stdio::null())
@@ -84,7 +115,7 @@ fn watch(child: &mut Child, deadline: MonoTime) -> io::Result<Vec<u8>> {
             bytes => output.extend_from_slice(&buf[..bytes]),
         }
         if output.len() as u64 > MAX_OUTPUT {
-            return Err(io::Error::other("it printed more than any verdict is long"));
+            return Err(io::Error::other("its output is longer than any verdict"));
         }
     }
     let ended = pidfd_open(Pid::from_child(child), PidfdFlags::empty())?;
@@ -108,19 +139,19 @@ fn wait_for(fd: &PollFd<'_>, deadline: MonoTime) -> io::Result<()> {
     }
 }
 
-fn failed(error: &io::Error) -> Problem {
-    Problem::new(Code::File, format!("the check of the cue failed: {error}"), "try again")
+fn failed(chore: &Chore<'_>, error: &io::Error) -> Problem {
+    Problem::new(Code::File, format!("{} failed: {error}", chore.name), "try again")
 }
 
-fn too_long(bounds: &Bounds) -> Problem {
-    let detail = format!("the check of the cue took more than {} s and was ended", bounds.time.as_secs());
-    Problem::new(Code::Check, detail, "try again when nothing plays; a cue that never passes is no good one")
+fn too_long(chore: &Chore<'_>, bounds: &Bounds) -> Problem {
+    let detail = format!("{} took more than {} s and was ended", chore.name, bounds.time.as_secs());
+    Problem::new(Code::Check, detail, "try again when nothing plays; one that never ends in time is too long")
 }
 
 /// It ended without a verdict: its limits ended it, or it could not begin.
-fn no_verdict(status: ExitStatus, bounds: &Bounds) -> Problem {
+fn no_verdict(chore: &Chore<'_>, status: ExitStatus, bounds: &Bounds) -> Problem {
     if status.code() == Some(BAD_CONFIGURATION) {
-        let remedy = "run kinocue check on the configuration and mend it";
+        let remedy = "run kinocue check on the configuration and correct it";
         return Problem::new(Code::Check, "the configuration of the hall has faults", remedy);
     }
     let how = match (status.signal(), status.code()) {
@@ -129,8 +160,8 @@ fn no_verdict(status: ExitStatus, bounds: &Bounds) -> Problem {
     };
     let (memory, time) = (bounds.memory_mib, bounds.time.as_secs());
     let detail = format!(
-        "the check of the cue ended with {how}; it may take {memory} MiB of memory and {time} s of processor time"
+        "{} ended with {how}; it may take {memory} MiB of memory and {time} s of processor time",
+        chore.name
     );
-    let remedy = "give the cue fewer rows, or raise max_memory_mib in [library] and MemoryMax of the service";
-    Problem::new(Code::Check, detail, remedy)
+    Problem::new(Code::Check, detail, chore.remedy)
 }

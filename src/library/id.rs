@@ -15,7 +15,7 @@ pub(crate) type CueId = Id;
 
 /// A text that is no id.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no id; one is made of 1 to {MAX_LEN} of a to z, 0 to 9, _ and -")]
+#[error("{0:?} is not an id; an id has 1 to {MAX_LEN} characters of a to z, 0 to 9, _ and -")]
 pub struct IdError(String);
 
 impl Id {

@@ -11,6 +11,7 @@ mod hashed;
 mod id;
 mod index;
 mod info;
+mod sketch;
 mod upload;
 
 pub(crate) use curve::{CurveData, Drawing, MAX_POINTS, draw, needs_hall};
@@ -18,6 +19,7 @@ pub(crate) use hashed::Hashed;
 pub(crate) use id::{CueId, Id, IdError};
 pub(crate) use info::Verdict;
 pub use info::{CueInfo, Proved};
+pub(crate) use sketch::{RecordingPicture, Sketch};
 pub(crate) use upload::Upload;
 
 use std::collections::BTreeSet;
@@ -44,7 +46,7 @@ const CURVES: usize = 4;
 
 /// The library cannot be opened.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot open the cue library {}; name another with library in [show], or give it to the user of the service", path.display())]
+#[error("cannot open the cue library {}; set another in [show] library, or make it writable for the service", path.display())]
 pub struct LibraryError {
     /// The folder.
     pub(crate) path: PathBuf,
@@ -261,7 +263,7 @@ impl Library {
     pub fn curve(&self, id: &CueId, points: usize) -> Result<Arc<CurveData>, Problem> {
         if !(1..=MAX_POINTS).contains(&points) {
             let detail = format!("{points} points are outside 1..={MAX_POINTS}");
-            return Err(Problem::new(Code::Value, detail, "ask for as many as the page is wide"));
+            return Err(Problem::new(Code::Value, detail, "request as many as the page is wide"));
         }
         let cue = self.cue(id)?;
         let mut curves = lock(&self.inner.curves);
@@ -278,6 +280,19 @@ impl Library {
         let drawn = Drawn { name: cue.name, stamp: cue.stamp, points, curve: Arc::clone(&curve) };
         curves.insert(0, drawn);
         Ok(curve)
+    }
+
+    /// Has a recording drawn as the check of a cue is made: that seat, or the one that was held back farthest. Blocks for as long.
+    ///
+    /// # Errors
+    /// [`Code::Unknown`] where the recording, or the seat in it, is not there; as for a check where drawing it takes too much.
+    pub(crate) fn picture(&self, recording: &Path, seat: Option<&str>) -> Result<RecordingPicture, Problem> {
+        match child::picture(&self.inner.hall, recording, seat)? {
+            Sketch::Picture(picture) => Ok(*picture),
+            Sketch::Fault(fault) => {
+                Err(Problem::new(Code::Unknown, fault, "GET /api/v1/recordings lists what is there"))
+            }
+        }
     }
 
     /// The longest file that is taken in, bytes.
@@ -322,19 +337,19 @@ fn id_of(name: &str) -> Option<CueId> {
 }
 
 fn unknown(id: &CueId) -> Problem {
-    Problem::new(Code::Unknown, format!("there is no cue {id} in the library"), "upload it, or name another")
+    Problem::new(Code::Unknown, format!("there is no cue {id} in the library"), "upload it, or give another")
 }
 
 fn unplayable(id: &CueId, faults: Vec<String>) -> Problem {
-    let detail = format!("the cue {id} cannot be played as it is");
-    Problem::new(Code::Check, detail, "mend what is named, and upload it again").with(faults)
+    let detail = format!("the cue {id} cannot be played");
+    Problem::new(Code::Check, detail, "correct these faults, and upload it again").with(faults)
 }
 
 fn file_problem(what: &str, error: &io::Error) -> Problem {
     Problem::new(
         Code::File,
         format!("cannot {what}: {error}"),
-        "look at the folder of the library and its disk",
+        "check the folder of the library and its disk",
     )
 }
 

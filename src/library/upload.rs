@@ -69,7 +69,7 @@ impl Upload {
         self.size = self.size.saturating_add(bytes.len() as u64);
         if self.size > most {
             let detail = format!("the cue is longer than {} MiB", most >> 20);
-            let remedy = "make it smaller, as MCAP perhaps, or raise max_cue_mib in [library]";
+            let remedy = "make it smaller, for example as MCAP, or raise max_cue_mib in [library]";
             return Err(Problem::new(Code::Size, detail, remedy));
         }
         self.hash.update(bytes);
@@ -97,7 +97,7 @@ impl Upload {
         if !verdict.passed {
             let faults = verdict.lines();
             let detail = format!("the cue {id} is refused: it does not pass");
-            let remedy = "mend what is named, or make it fit with kinocue fit";
+            let remedy = "correct these faults, or fit it with kinocue fit";
             return Err(Problem::new(Code::Check, detail, remedy).with(faults));
         }
         let name = file_name(&id, verdict.mcap);
@@ -107,7 +107,7 @@ impl Upload {
         placed.and_then(|()| place.folder.sync()).map_err(|error| unwritten(&error))?;
         let stamp = place.folder.stamp(&name).map_err(|error| file_problem("read the cue", &error))?;
         let Some(stamp) = stamp else {
-            return Err(Problem::new(Code::File, "the cue is gone again", "upload it again"));
+            return Err(Problem::new(Code::File, "the cue has disappeared", "upload it again"));
         };
         let info = CueInfo::new(&id, stamp.size, Some((&verdict, true)));
         lock(&inner.index).put(&place.folder, &name, stamp, &print, verdict);
@@ -120,7 +120,7 @@ fn unwritten(error: &io::Error) -> Problem {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Problem::new(
             Code::File,
             "the disk with the library is full; nothing of the cue is kept",
-            "make room, and upload it again",
+            "free space, and upload it again",
         ),
         _ => file_problem("write the cue", error),
     }

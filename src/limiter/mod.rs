@@ -1,4 +1,4 @@
-//! The last check before the encoder: whatever came before, what is sent keeps the limits of every axis by the measure of
+//! The check behind the engine: whatever that asks for, what is sent keeps the limits of every axis by the measure of
 //! [`crate::motion::Measure`], on the poses before they are rounded to pulses. Tick thread; told the time; allocates
 //! nothing.
 //!

@@ -11,11 +11,11 @@ pub(super) fn families(controllers: &[ControllerStatus]) -> Vec<MetricFamily> {
 
 fn health(all: &[ControllerStatus]) -> Vec<MetricFamily> {
     vec![
-        gauges(all, "controller_up", "1 where the controller answers", |one| answers(one.health)),
-        gauges(all, "controller_enabled", "1 where it is to take part", |one| Some(flag(one.enabled))),
+        gauges(all, "controller_up", "1 if the controller answers", |one| answers(one.health)),
+        gauges(all, "controller_enabled", "1 if it takes part", |one| Some(flag(one.enabled))),
         MetricFamily {
             name: "controller_health",
-            help: "1, with how it stands",
+            help: "1, with its health as a label",
             values: MetricValues::Gauges(
                 all.iter().map(|one| (and(one, "health", one.health.word()), 1.0)).collect(),
             ),
@@ -24,8 +24,8 @@ fn health(all: &[ControllerStatus]) -> Vec<MetricFamily> {
             Some(flag(one.emergency_stop))
         }),
         gauges(all, "controller_error", "Its error number, 0 for none", |one| one.error.map(f64::from)),
-        gauges(all, "controller_silence_seconds", "Since it was last heard", |one| one.heard_s),
-        gauges(all, "controller_ack_ratio", "Acks over frames that asked, in the last second", |one| {
+        gauges(all, "controller_silence_seconds", "Time since its last answer", |one| one.heard_s),
+        gauges(all, "controller_ack_ratio", "Share of requested acks that came, in the last second", |one| {
             one.ack_rate
         }),
         latencies(all),
@@ -40,10 +40,10 @@ fn frames(all: &[ControllerStatus]) -> Vec<MetricFamily> {
     vec![
         counters(all, "frames_sent", "Frames handed to the kernel", |one| one.frames.sent),
         counters(all, "frames_failed", "Frames that the kernel did not take", |one| one.send_failed),
-        counters(all, "frames_asked", "Frames that asked for a reply", |one| one.frames.asked),
+        counters(all, "frames_asked", "Frames that requested an ack", |one| one.frames.asked),
         MetricFamily {
             name: "acks",
-            help: "What became of the frames that asked; lost: no reply within a second",
+            help: "Results of the frames that requested an ack; lost: no reply within a second",
             values: MetricValues::Counters(acks.collect()),
         },
         counters(all, "limit_interventions", "How often the limiter held motion back", |one| one.clamps),

@@ -15,11 +15,11 @@ fn whole(film: &FilmStatus) -> Vec<MetricFamily> {
     vec![
         MetricFamily {
             name: "sync_state",
-            help: "1, with the state of the film",
+            help: "1, with the state of the film as a label",
             values: MetricValues::Gauges(vec![(vec![("state", film.state.clone())], 1.0)]),
         },
-        MetricFamily::gauge("sync_follows", "1 where the loaded show follows the film", flag(film.leads)),
-        MetricFamily::gauge("sync_position_seconds", "Where the film is in the loaded cue", film.position_s),
+        MetricFamily::gauge("sync_follows", "1 if the loaded show follows the film", flag(film.leads)),
+        MetricFamily::gauge("sync_position_seconds", "Position of the film in the cue", film.position_s),
         MetricFamily::gauge(
             "sync_error_seconds",
             "How far ahead of the film, less the trim, the seats are while they follow it",
@@ -45,31 +45,29 @@ fn sources(film: &FilmStatus) -> Vec<MetricFamily> {
     vec![
         MetricFamily {
             name: "sync_source_state",
-            help: "1, with the state of the source",
+            help: "1, with the state of the source as a label",
             values: MetricValues::Gauges(states.collect()),
         },
         gauges(all, "sync_leads", "1 for the source that leads", |one| is(&film.source, one)),
-        gauges(all, "sync_chosen", "1 for the source that a person chose", |one| is(&film.chosen, one)),
-        gauges(all, "sync_rate_ppm", "How much faster than the clock the film runs, millionths", |one| {
-            one.rate_ppm
-        }),
-        gauges(all, "sync_sigma_seconds", "Deviation of where the film is", |one| {
+        gauges(all, "sync_chosen", "1 for the source that a person selected", |one| is(&film.chosen, one)),
+        gauges(all, "sync_rate_ppm", "Rate of the film against the clock, ppm", |one| one.rate_ppm),
+        gauges(all, "sync_sigma_seconds", "Standard deviation of its position", |one| {
             one.sigma_ms.map(|ms| ms / 1e3)
         }),
-        gauges(all, "sync_level_dbfs", "How loud the line is, decibels of full scale", |one| one.level_dbfs),
+        gauges(all, "sync_level_dbfs", "Level of the line, dBFS", |one| one.level_dbfs),
     ]
 }
 
 fn counts(all: &[FilmSourceStatus]) -> Vec<MetricFamily> {
     vec![
-        counters(all, "sync_dropouts", "How often nothing was heard of the source", |one| one.dropouts),
+        counters(all, "sync_dropouts", "How often nothing was received from the source", |one| one.dropouts),
         counters(all, "sync_rejected", "Samples too far off to be used", |one| one.rejected),
-        counters(all, "sync_jumps", "How often the film jumped by the source", |one| one.jumps),
-        counters(all, "sync_foreign", "What others sent in place of the source", |one| one.foreign),
-        counters(all, "sync_garbage", "What the source sent that says nothing of a film", |one| one.garbage),
+        counters(all, "sync_jumps", "How often the film jumped according to the source", |one| one.jumps),
+        counters(all, "sync_foreign", "Messages from other senders than the source", |one| one.foreign),
+        counters(all, "sync_garbage", "Messages of the source that do not concern a film", |one| one.garbage),
         MetricFamily {
             name: "sync_freewheel_seconds",
-            help: "For how long the film was taken to run on while nothing was heard of the source",
+            help: "How long the position of the film was estimated while nothing was received from the source",
             values: MetricValues::Seconds(all.iter().map(|one| (of(one), one.freewheel_s)).collect()),
         },
     ]

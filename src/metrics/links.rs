@@ -12,22 +12,22 @@ pub(super) fn families(links: &[LinkStatus]) -> Vec<MetricFamily> {
     vec![
         MetricFamily {
             name: "link_up",
-            help: "1 where its port is open",
+            help: "1 if its port is open",
             values: MetricValues::Gauges(up.collect()),
         },
         MetricFamily {
             name: "link_answer_delay_seconds",
-            help: "99 of 100 answers begin no later after the request",
+            help: "99th percentile of the time from a request to the start of its answer",
             values: MetricValues::Gauges(delay.collect()),
         },
         MetricFamily {
             name: "link_exchanges",
-            help: "Requests to drives, and what came of them; stray: what came that answers nothing",
+            help: "Requests to drives, by result; stray: answers without a request",
             values: MetricValues::Counters(links.iter().flat_map(exchanges).collect()),
         },
         MetricFamily {
             name: "axis_segments",
-            help: "Segments of motion made for an axis, and what became of them",
+            help: "Segments of motion made for an axis, by result",
             values: MetricValues::Counters(axes(links).flat_map(segments).collect()),
         },
         MetricFamily {
@@ -39,7 +39,7 @@ pub(super) fn families(links: &[LinkStatus]) -> Vec<MetricFamily> {
         },
         MetricFamily {
             name: "axis_error_meters",
-            help: "How far the motor was beside its target when both were read last",
+            help: "Distance of the motor from its target when both were last read",
             values: MetricValues::Gauges(
                 axes(links).map(|(link, axis)| (at(link, axis), axis.error_mm / 1e3)).collect(),
             ),

@@ -11,7 +11,7 @@ pub(super) fn families(record: &RecordStatus) -> Vec<MetricFamily> {
     vec![
         MetricFamily {
             name: "record_active",
-            help: "1 while a show is recorded, by how much of it is kept",
+            help: "1 while a show is recorded, by recording mode",
             values: MetricValues::Gauges(active),
         },
         MetricFamily::counter("record_bytes", "Bytes of recordings that were closed", record.bytes),
@@ -38,9 +38,9 @@ pub(super) fn families(record: &RecordStatus) -> Vec<MetricFamily> {
         ),
         MetricFamily {
             name: "record_incidents",
-            help: "What was worth an incident, by what it was",
+            help: "Incidents, by cause",
             values: MetricValues::Counters(incidents.collect()),
         },
-        MetricFamily::counter("record_errors", "How often something could not be written", record.errors),
+        MetricFamily::counter("record_errors", "Failed writes", record.errors),
     ]
 }

@@ -14,7 +14,7 @@ pub(super) fn families(status: &Status) -> Vec<MetricFamily> {
     all.push(warnings(status));
     all.extend(status.osc.as_ref().map(|counts| MetricFamily {
         name: "osc_messages",
-        help: "What came to the port for OSC, by what became of it",
+        help: "OSC messages received, by result",
         values: MetricValues::Counters(
             counts.iter().map(|(word, count)| (label("result", word.as_str()), *count)).collect(),
         ),
@@ -29,20 +29,20 @@ fn state(status: &Status) -> Vec<MetricFamily> {
     vec![
         MetricFamily {
             name: "build",
-            help: "What program this is",
+            help: "Version of the program",
             values: MetricValues::Info(label("version", &*status.version)),
         },
-        MetricFamily::gauge("uptime_seconds", "Since the program started", status.uptime_s),
+        MetricFamily::gauge("uptime_seconds", "Time since the program started", status.uptime_s),
         MetricFamily {
             name: "state",
             help: "1 for the state of the hall",
             values: MetricValues::Gauges(states.into()),
         },
-        MetricFamily::gauge("state_age_seconds", "Since the hall is in its state", status.since_s),
+        MetricFamily::gauge("state_age_seconds", "Time since the hall entered its state", status.since_s),
         MetricFamily::gauge("moving", "1 while motion frames leave", flag(status.moving)),
         MetricFamily::gauge(
             "show_position_seconds",
-            "Where the film is in the loaded cue",
+            "Position in the loaded cue",
             show.map(|show| show.position_s),
         ),
         MetricFamily::gauge(
@@ -57,12 +57,12 @@ fn state(status: &Status) -> Vec<MetricFamily> {
         ),
         MetricFamily::gauge(
             "preflight_passed",
-            "1 where the last preflight found nothing that fails",
+            "1 if the last preflight found nothing that fails",
             preflight.map(|preflight| flag(preflight.passed)),
         ),
         MetricFamily::gauge(
             "preflight_age_seconds",
-            "Since the last preflight",
+            "Time since the last preflight",
             preflight.map(|preflight| preflight.age_s),
         ),
     ]
@@ -72,15 +72,15 @@ fn ticks(status: &Status) -> Vec<MetricFamily> {
     vec![
         MetricFamily::gauge("tick_rate_hertz", "Ticks per second, as configured", status.rate_hz),
         MetricFamily::counter("ticks", "Ticks, in every state", status.ticks),
-        MetricFamily::counter("ticks_missed", "Ticks slept through", status.missed_ticks),
+        MetricFamily::counter("ticks_missed", "Ticks that the thread slept through", status.missed_ticks),
         MetricFamily::histogram(
             "tick_lateness_seconds",
-            "First send of a tick after its deadline, of the ticks that sent",
+            "Time from the deadline of a tick to its first send, of ticks that sent",
             &status.lateness.histogram,
         ),
         MetricFamily::histogram(
             "ack_latency_seconds",
-            "From sending a frame to its ack, all controllers",
+            "Time from sending a frame to its ack, all controllers",
             &status.ack_latency.histogram,
         ),
     ]
@@ -95,17 +95,17 @@ fn levels(status: &Status) -> Vec<MetricFamily> {
     vec![
         MetricFamily {
             name: "level_ratio",
-            help: "How much of the cue the seats make, 0 to 1",
+            help: "Level of the hall, 0 to 1",
             values: MetricValues::Gauges(groups.into()),
         },
         MetricFamily {
             name: "row_level_ratio",
-            help: "The same of a row, on top of the hall's",
+            help: "Level of a row, on top of the hall's, 0 to 1",
             values: MetricValues::Gauges(rows.collect()),
         },
         MetricFamily {
             name: "effect_allowed",
-            help: "1 where the effect may be on",
+            help: "1 if the effect may be on",
             values: MetricValues::Gauges(effects.collect()),
         },
     ]
@@ -128,7 +128,7 @@ fn machine(status: &Status) -> Vec<MetricFamily> {
         },
         MetricFamily::gauge(
             "realtime",
-            "1 where the tick thread is real-time and memory is locked",
+            "1 if the tick thread is real-time and memory is locked",
             flag(realtime),
         ),
     ]
@@ -144,7 +144,7 @@ fn warnings(status: &Status) -> MetricFamily {
     let counts = counts.iter().map(|((id, severity), count)| (labels(id, severity), f64::from(*count)));
     MetricFamily {
         name: "warnings",
-        help: "What a person should know, how many of each kind",
+        help: "Active warnings, by kind",
         values: MetricValues::Gauges(counts.collect()),
     }
 }

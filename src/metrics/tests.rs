@@ -46,6 +46,9 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         inputs: Some(0),
         outputs: None,
         positions_mm: None,
+        commanded: None,
+        measured: None,
+        axis_offset: 0,
         rotary_axis: None,
     }
 }

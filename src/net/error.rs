@@ -42,7 +42,7 @@ impl NetError {
                 "ports below 1024 and broadcast addresses are not allowed: use another"
             }
             Some(libc::ENETUNREACH | libc::EHOSTUNREACH) => {
-                "no route leads there: check the cable and this machine's address and mask"
+                "no route to it: check the cable and this machine's address and mask"
             }
             Some(libc::EINVAL) => {
                 "the local address that is bound does not lead there: give --bind (or bind under [show]) this \

@@ -60,11 +60,11 @@ impl SendFault {
                 "earlier frames still wait for the wire: is the controller on, is its address right?"
             }
             libc::ENETUNREACH | libc::EHOSTUNREACH | libc::ENETDOWN => {
-                "no way leads there: check the cable and this machine's address"
+                "no route to it: check the cable and this machine's address"
             }
-            libc::ECANCELED => "what it was for was called off",
-            libc::EPERM | libc::EACCES => "a firewall of this machine keeps it back",
-            _ => "the system is short of something; see its log",
+            libc::ECANCELED => "it was cancelled",
+            libc::EPERM | libc::EACCES => "a firewall of this machine blocks it",
+            _ => "the system is out of some resource; see its log",
         }
     }
 }

@@ -23,7 +23,7 @@ pub(super) enum OscOrder {
 /// Why a message is not obeyed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(super) enum OscFault {
-    #[error("{0:?} is no address of kinocue; docs/show-control.md lists them")]
+    #[error("{0:?} is not an address of kinocue; docs/show-control.md lists them")]
     Unknown(String),
     #[error("OSC may never {0}; a person does that on the console or with `kinocue {0}`")]
     Forbidden(&'static str),
@@ -31,9 +31,7 @@ pub(super) enum OscFault {
     NotAllowed(String),
     #[error("{address:?} takes {wanted}")]
     Argument { address: String, wanted: &'static str },
-    #[error(
-        "{0:?} was in a bundle for a later time, and nothing is done later; send it when it is to be done"
-    )]
+    #[error("{0:?} was in a bundle for a later time, and nothing is scheduled here; send it when it is due")]
     Early(String),
     #[error("{0} receivers of feedback are subscribed already; let one lapse")]
     Crowded(usize),
@@ -107,10 +105,8 @@ impl Taken<'_> {
         ask.gear_word().map_or(Ok(self), |word| self.allowed(word))?;
         let pressed = match self.message.args.as_slice() {
             [] => true,
-            [value] => {
-                switch(value).ok_or_else(|| self.wants("nothing, or 1 for a button that goes down"))?
-            }
-            _ => return Err(self.wants("nothing, or 1 for a button that goes down")),
+            [value] => switch(value).ok_or_else(|| self.wants("nothing, or 1 for a pressed button"))?,
+            _ => return Err(self.wants("nothing, or 1 for a pressed button")),
         };
         Ok(if pressed { OscOrder::Command(ask) } else { OscOrder::Released })
     }

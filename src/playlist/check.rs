@@ -32,7 +32,7 @@ impl Playlist {
             faults.push(self.fault(entry.places.preset, message));
         }
         if entry.film.movie.is_some() && config.film.is_none() {
-            let message = "movie: the configuration has no [film], which says who shows it".to_owned();
+            let message = "movie: the configuration has no [film], with the player that shows it".to_owned();
             faults.push(self.fault(entry.places.movie, message));
         }
         for name in entry.effects.keys() {

@@ -54,7 +54,7 @@ fn timezone(section: &mut Section<'_, '_, '_>) -> Option<TimeZone> {
     let name = entry.text(section.faults)?;
     let zone = TimeZone::get(name).ok();
     if zone.is_none() {
-        let message = format!("{name:?} is no time zone of this machine, as Europe/Berlin (package tzdata)");
+        let message = format!("{name:?} is not a time zone here, such as Europe/Berlin (package tzdata)");
         entry.fault(section.faults, &message);
     }
     zone
@@ -146,14 +146,13 @@ fn movie(section: &mut Section<'_, '_, '_>, has_begin: bool) -> Option<String> {
     let entry = section.get("movie")?;
     let text = entry.text(section.faults)?;
     if !stays_below(text) {
-        let message =
-            format!("{text:?} names no file below the folder of films; write it as \"feature.mkv\"");
+        let message = format!("{text:?} is not a file in the folder of films; write it as \"feature.mkv\"");
         entry.fault(section.faults, &message);
     }
     if has_begin {
         entry.fault(
             section.faults,
-            "its cue begins with it; film = is for one that others show, leave one of them out",
+            "its cue begins with it; film = is for a film that another player shows; omit one of them",
         );
     }
     Some(text.to_owned())
@@ -180,7 +179,7 @@ fn at(section: &mut Section<'_, '_, '_>) -> Option<At> {
 fn days(entry: Entry<'_>, faults: &mut Faults<'_>) -> BTreeSet<i8> {
     let Some(names) = entry.array(faults) else { return BTreeSet::new() };
     if names.is_empty() {
-        entry.fault(faults, "no day at all; leave it out for all days");
+        entry.fault(faults, "is empty; omit it for all days");
     }
     names.iter().filter_map(|name| name.choice(&DAYS, faults)).collect()
 }

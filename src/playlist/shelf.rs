@@ -77,12 +77,12 @@ impl Shelf {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(unknown(id)),
             Err(error) => {
                 let detail = format!("cannot read {}: {error}", path.display());
-                return Err(Problem::new(Code::File, detail, "look at the file; it is text in UTF-8"));
+                return Err(Problem::new(Code::File, detail, "check the file; it has to be UTF-8 text"));
             }
         };
         Playlist::parse(&path, &text).map_err(|faults| {
             let lines = faults.to_string().lines().map(str::to_owned).collect();
-            Problem::new(Code::Check, format!("the playlist {id} has faults"), "mend what is named")
+            Problem::new(Code::Check, format!("the playlist {id} has faults"), "correct these faults")
                 .with(lines)
         })
     }
@@ -99,5 +99,5 @@ impl Shelf {
 }
 
 fn unknown(id: &PlaylistId) -> Problem {
-    Problem::new(Code::Unknown, format!("there is no playlist {id}"), "name one of the list")
+    Problem::new(Code::Unknown, format!("there is no playlist {id}"), "give one of the list")
 }

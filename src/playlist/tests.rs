@@ -78,14 +78,14 @@ fn every_fault_is_named_with_its_line() {
     for wanted in [
         "day.toml:1:1: the playlist has no title",
         "day.toml:1:1: titel: unknown key in the playlist; did you mean title?",
-        "day.toml:3:7: cue: \"../etc/passwd\" is no id",
+        "day.toml:3:7: cue: \"../etc/passwd\" is not an id",
         "day.toml:4:9: level: 2 is outside 0..=1",
-        "day.toml:5:6: at: \"25:00\" is no time of day",
-        "day.toml:6:8: then: \"stop\" is none of hold, go",
+        "day.toml:5:6: at: \"25:00\" is not a time of day",
+        "day.toml:6:8: then: \"stop\" is not one of hold, go",
         "day.toml:7:1: [[entry]] has no cue",
         "day.toml:8:11: trim_ms: 900 is outside -500..=500",
         "day.toml:9:8: days: there is no time to start at",
-        "day.toml:9:9: days: \"someday\" is none of mon",
+        "day.toml:9:9: days: \"someday\" is not one of mon",
     ] {
         assert!(faults.iter().any(|fault| fault.starts_with(wanted)), "{wanted}: {faults:#?}");
     }
@@ -96,11 +96,9 @@ fn every_fault_is_named_with_its_line() {
 fn times_of_day_are_spelt_in_full() {
     for bad in ["7:00", "19", "19:00:00.5", "24:00", "19:60", "T19:00", "19:00Z", "noon"] {
         let faults = faults_of(&format!("cue = \"c\"\nat = \"{bad}\""));
-        assert!(faults[0].contains("is no time of day"), "{bad}: {faults:?}");
+        assert!(faults[0].contains("is not a time of day"), "{bad}: {faults:?}");
     }
-    assert!(
-        faults_of("cue = \"c\"\nat = 19:00:00")[0].contains("a string is wanted here, not a date or time")
-    );
+    assert!(faults_of("cue = \"c\"\nat = 19:00:00")[0].contains("expected a string, not a date or time"));
 }
 
 #[test]
@@ -108,7 +106,7 @@ fn an_empty_list_an_unknown_zone_and_two_starts_at_once_are_refused() {
     assert!(parse("title = \"x\"\n").unwrap_err()[0].contains("has no entry"));
     assert!(parse("title = \"x\"\nentry = []\n").unwrap_err()[0].contains("0 entries"));
     let zone = parse("title = \"x\"\ntimezone = \"Mars/Olympus\"\n[[entry]]\ncue = \"c\"\n").unwrap_err();
-    assert!(zone[0].contains("is no time zone"), "{zone:?}");
+    assert!(zone[0].contains("is not a time zone"), "{zone:?}");
     let twice =
         faults_of("cue = \"c\"\nat = \"19:00\"\n[[entry]]\ncue = \"d\"\nat = \"19:00:00\"\ndays = [\"sun\"]");
     assert!(twice[0].ends_with("starts at 19:00:00 on sun, as the one on line 2 does"), "{twice:?}");
@@ -161,7 +159,7 @@ fn a_shelf_lists_all_playlists_and_names_the_faults_of_bad_ones() {
     let [bad, day] = &shelf.list()[..] else { panic!("two playlists") };
     assert_eq!((day.id.as_str(), day.title.as_deref()), ("day", Some("Saturday")));
     assert_eq!(day.cues, ["seat-demo", "storm"]);
-    assert!(bad.faults[0].contains("bad.toml:1:9: title: a string is wanted"), "{bad:?}");
+    assert!(bad.faults[0].contains("bad.toml:1:9: title: expected a string"), "{bad:?}");
     assert_eq!(shelf.read(&"link".parse().unwrap()).unwrap_err().code, Code::Unknown);
     assert_eq!(shelf.read(&"bad".parse().unwrap()).unwrap_err().code, Code::Check);
     assert!(Shelf::new(&dir.path().join("none")).list().is_empty());
@@ -307,9 +305,9 @@ fn a_movie_is_a_file_below_the_folder_of_films_and_needs_somebody_to_show_it() {
     let playlist = parse("title = \"x\"\n[[entry]]\ncue = \"c\"\nmovie = \"reel/feature.mkv\"\n").unwrap();
     assert_eq!(playlist.entries[0].film.movie.as_deref(), Some("reel/feature.mkv"));
     for (entry, says) in [
-        ("movie = \"../feature.mkv\"", "names no file below the folder of films"),
-        ("movie = \"/srv/feature.mkv\"", "names no file below the folder of films"),
-        ("movie = \"a.mkv\"\nfilm = \"01:00:00:00\"", "leave one of them out"),
+        ("movie = \"../feature.mkv\"", "is not a file in the folder of films"),
+        ("movie = \"/srv/feature.mkv\"", "is not a file in the folder of films"),
+        ("movie = \"a.mkv\"\nfilm = \"01:00:00:00\"", "omit one of them"),
     ] {
         let faults = faults_of(&format!("cue = \"c\"\n{entry}"));
         assert!(faults.iter().any(|fault| fault.contains(says)), "{entry}: {faults:?}");

@@ -49,11 +49,11 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         notes.add(check, found, "check cable, switch and load of the network");
     }
     if survey.odds.malformed > 0 {
-        let found = format!("{} datagrams from its address were no messages", survey.odds.malformed);
+        let found = format!("{} datagrams from its address were not messages", survey.odds.malformed);
         notes.add(
             Check::BrokenReplies,
             found,
-            "check cable and switch, and that nothing else has this address",
+            "check cable and switch, and that no other device has this address",
         );
     }
     if let Some((median, most)) = round_trip(&survey.round_trips).filter(|(_, most)| *most > SLOW) {

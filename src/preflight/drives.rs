@@ -16,7 +16,7 @@ use crate::wire::silvermax::{Poll, StatusWord as _};
 
 /// Answers that begin so late are held back by an adapter, no unit waits so long.
 const HELD_BACK: Duration = Duration::from_millis(12);
-const HOME: &str = "home it, seats empty";
+const HOME: &str = "home it, with nobody on the seat";
 /// What answers may be later than was reckoned with, as a part of it.
 const LATER: f64 = 1.25;
 
@@ -130,11 +130,11 @@ impl DriveSubject<'_> {
 pub(super) fn one(subject: &DriveSubject<'_>) -> Notes {
     let mut notes = Notes::default();
     if subject.link.wiring == LinkWiring::Can {
-        let found = format!("link {} is a CAN bus, which is not opened yet", subject.link.name);
+        let found = format!("link {} is a CAN bus, which is not supported yet", subject.link.name);
         notes.add(
             Check::DrivesUnasked,
             found,
-            "put its units on a serial line, or look at them with their own program",
+            "put its units on a serial line, or check them with their own program",
         );
     } else if let Some(error) = &subject.survey.fault {
         port(error, &mut notes);
@@ -173,10 +173,10 @@ fn told(check: Check, words: &str, notes: &mut Notes) {
 fn sixpack(subject: &DriveSubject<'_>, unit: u8, notes: &mut Notes) {
     line(subject, notes);
     let facts = match subject.survey.sixpacks.get(&unit) {
-        None => return told(Check::NoAnswer, &format!("unit {unit} was not asked; ask again"), notes),
+        None => return told(Check::NoAnswer, &format!("unit {unit} was not read; try again"), notes),
         Some(Err(fault)) => return told(Check::NoAnswer, &fault.to_string(), notes),
         Some(Ok(None)) => {
-            let found = format!("unit {unit} answers as it woke: it was not homed since it was switched on");
+            let found = format!("unit {unit} has its power-on settings: it was not homed since power-on");
             notes.add(Check::NotHome, found, HOME);
             return;
         }
@@ -187,16 +187,15 @@ fn sixpack(subject: &DriveSubject<'_>, unit: u8, notes: &mut Notes) {
     let seat = motors_of(subject.controller, period.unwrap_or(Duration::from_millis(20)));
     let lost = seat.map(|seat| seat.strangers(facts)).unwrap_or_default();
     if facts.was_reset {
-        let found = format!("unit {unit} was reset since somebody asked last: it has no settings");
+        let found = format!("unit {unit} was reset since it was last read: it has no settings");
         notes.add(Check::NotHome, found, HOME);
     } else if !lost.is_empty() {
         let lost: Vec<String> = lost.iter().map(u8::to_string).collect();
-        let found = format!("motors {} of unit {unit} count no place of this seat", lost.join(", "));
+        let found = format!("motors {} of unit {unit} count no position of this seat", lost.join(", "));
         notes.add(Check::NotHome, found, HOME);
     }
     for motor in facts.motors.iter().filter(|motor| motor.searches()) {
-        let found =
-            format!("motor {} of unit {unit} looks for its zero, and nobody has it do so", motor.motor);
+        let found = format!("motor {} of unit {unit} searches for its zero without a command", motor.motor);
         notes.add(Check::DriveError, found, HOME);
     }
 }
@@ -209,7 +208,7 @@ fn answers(subject: &DriveSubject<'_>, notes: &mut Notes) {
                 told(Check::DuplicateUnit, &fault.to_string(), notes)
             }
             Some(Err(fault)) => told(Check::NoAnswer, &fault.to_string(), notes),
-            None => told(Check::NoAnswer, &format!("unit {unit} was not asked"), notes),
+            None => told(Check::NoAnswer, &format!("unit {unit} was not read"), notes),
             Some(Ok(_)) => {}
         }
     }
@@ -220,17 +219,17 @@ fn line(subject: &DriveSubject<'_>, notes: &mut Notes) {
     let (link, TalkCounts { asked, answered, malformed, doubled, echo_differs, .. }) =
         (&subject.link.name, subject.survey.counts);
     if subject.link.has_echo && 2 * echo_differs > asked {
-        let found = format!("{echo_differs} of {asked} requests did not come back on link {link}");
-        notes.add(Check::EchoDiffers, found, "this adapter does not repeat what is sent: set echo = false");
+        let found = format!("{echo_differs} of {asked} requests were not echoed on link {link}");
+        notes.add(Check::EchoDiffers, found, "this adapter does not echo what is sent: set echo = false");
     } else if !subject.link.has_echo && 2 * malformed > asked && 2 * answered > asked {
-        let found = format!("{malformed} lines came back beside {answered} answers on link {link}");
-        notes.add(Check::EchoDiffers, found, "this adapter repeats what is sent: set echo = true");
+        let found = format!("{malformed} lines besides {answered} answers came back on link {link}");
+        notes.add(Check::EchoDiffers, found, "this adapter echoes what is sent: set echo = true");
     } else if doubled > 0 {
-        let found = format!("{doubled} answers more than were asked for on link {link}");
+        let found = format!("{doubled} more answers than requests on link {link}");
         notes.add(
             Check::DuplicateUnit,
             found,
-            "ask each unit alone on the line, and set IDT where two share a number",
+            "connect each unit alone to the line, and set IDT of those that share a number",
         );
     }
 }
@@ -249,21 +248,17 @@ fn rate(subject: &DriveSubject<'_>, notes: &mut Notes) {
     let (late, fits) = (1e3 * delay.as_secs_f64(), measured.rate_hz());
     let reckoned = 1e3 * load.answer_delay.as_secs_f64();
     let found = format!(
-        "answers take {late:.1} ms, {reckoned:.1} were reckoned with: {} Hz become {}",
+        "answers take {late:.1} ms instead of the assumed {reckoned:.1} ms: {} Hz become {}",
         short(hz),
         short(fits.min(hz))
     );
     let alone = LinkLoad { share: 1.0, ..measured };
     if delay >= HELD_BACK {
         let remedy =
-            "if it is a USB adapter, install 60-kinocue-drives.rules, which has it hold nothing back";
+            "if it is a USB adapter, install 60-kinocue-drives.rules, which sets its latency timer to 1 ms";
         notes.add(Check::AdapterSlow, found.clone(), remedy);
     } else if late > LATER * reckoned && fits < hz {
-        notes.add(
-            Check::SlowReplies,
-            found.clone(),
-            "lower ADL of the units, or take a serial port of the machine",
-        );
+        notes.add(Check::SlowReplies, found.clone(), "lower ADL of the units, or use a built-in serial port");
     }
     if alone.rate_hz() < hz {
         notes.add(
@@ -299,13 +294,13 @@ fn trouble(facts: &UnitFacts, notes: &mut Notes) {
     if facts.poll.has(Poll::KILLED) {
         let cause = kill_names(facts.kill_cause);
         let found = format!("unit {unit} was killed by {cause} (register 211)");
-        notes.add(Check::Killed, found, "look for what blocks or heats it, then home");
+        notes.add(Check::Killed, found, "find out what blocks or heats it, then home");
     }
     if facts.internal.is_hot() {
         notes.add(
             Check::DriveHot,
             format!("unit {unit} is too hot"),
-            "let it cool, and look at what loads it",
+            "let it cool, and find out what loads it",
         );
     }
     let says = |names: [&'static str; 2]| -> Vec<&'static str> {
@@ -314,19 +309,18 @@ fn trouble(facts: &UnitFacts, notes: &mut Notes) {
     let errors = says(["moving error", "holding error"]);
     if !errors.is_empty() && !facts.poll.has(Poll::KILLED) {
         let found = format!("unit {unit} has had a {}", errors.join(" and a "));
-        notes.add(Check::DriveError, found, "look for what blocks it, then home");
+        notes.add(Check::DriveError, found, "find out what blocks it, then home");
     }
     let supply = says(["low voltage", "high voltage"]);
     if !supply.is_empty() {
-        let found = format!("unit {unit} has met {}", supply.join(" and "));
-        notes.add(Check::Supply, found, "look at the supply; braking needs a clamp");
+        let found = format!("unit {unit} has had {}", supply.join(" and "));
+        notes.add(Check::Supply, found, "check the supply; braking needs a clamp");
     }
 }
 
 /// Registers that homing wrote, of a seat that is home.
 fn settings(subject: &DriveSubject<'_>, notes: &mut Notes) {
-    const REMEDY: &str =
-        "home it, which writes them; if they change by themselves another program is on the line";
+    const REMEDY: &str = "home it, which writes them; if they change again, another program uses the line";
     let wanted = subject.settings();
     for facts in subject.facts().filter(|unit| unit.canary != 0) {
         let Some(wanted) = wanted.iter().find(|one| one.unit == facts.unit) else { continue };

@@ -49,11 +49,10 @@ fn judge_belts(subject: &Subject<'_>, notes: &mut Notes) -> bool {
         _ => "no manual says what the seat does once all of them are open",
     };
     let found = format!(
-        "PA92 = {mask}: {} are belts (belt_inputs), so none is an emergency stop; {then}",
+        "PA92 = {mask}: {} are belts (belt_inputs), so no input is an emergency stop; {then}",
         inputs(mask)
     );
-    let remedy =
-        "accept it where the emergency stop is hard-wired; else give belts inputs that PA92 does not name";
+    let remedy = "accept it if the emergency stop is hard-wired; otherwise move the belts to inputs that PA92 does not name";
     notes.add(Check::EstopIsBelts, found, remedy);
     true
 }
@@ -73,7 +72,7 @@ fn judge_inputs(subject: &Subject<'_>, notes: &mut Notes) {
                 inputs(mask)
             );
             let remedy = format!(
-                "wire the buttons in series to one input and name only that in PA92; where these are belts, write \
+                "wire the buttons in series to one input and name only that in PA92; if these are belts, write \
                  belt_inputs = [{}]",
                 numbers(mask)
             );
@@ -89,7 +88,7 @@ fn judge_inputs(subject: &Subject<'_>, notes: &mut Notes) {
         notes.add(Check::EstopUnwatched, found, remedy);
     } else if watched == 0 && mbox && mask != 0 {
         let found =
-            "replies of MBOX controllers do not tell of an emergency stop, and estop_inputs names no input";
+            "replies of MBOX controllers do not report an emergency stop, and estop_inputs names no input";
         notes.add(Check::EstopUnwatched, found, remedy);
     }
 }
@@ -109,8 +108,7 @@ fn judge_action(subject: &Subject<'_>, notes: &mut Notes) {
             notes.add(Check::EstopReturns, found, remedy);
         }
         Some(value) => {
-            let found =
-                format!("PA91 = {value}: no manual says what the seat then does in an emergency stop");
+            let found = format!("PA91 = {value}: no manual says what the seat does in an emergency stop");
             notes.add(Check::EstopAction, found, remedy);
         }
     }
@@ -123,13 +121,13 @@ fn judge_filter_and_release(subject: &Subject<'_>, notes: &mut Notes) {
     }
     match (subject.pa(0x94), subject.pa(0x07)) {
         (Some(0), _) => {
-            let found = "PA94 = 0: perhaps no limit on the speed at which the seat leaves an emergency stop";
-            notes.add(Check::EstopRelease, found, "set PA94 to a slow speed in rpm, as 300");
+            let found = "PA94 = 0: possibly no limit on the speed at which the seat leaves an emergency stop";
+            notes.add(Check::EstopRelease, found, "set PA94 to a slow speed, such as 300 rpm");
         }
         (Some(release), Some(most)) if most != 0 && release >= most => {
             let found =
                 format!("PA94 = {release}: the seat leaves an emergency stop at full speed (PA07 = {most})");
-            notes.add(Check::EstopReleaseFast, found, "set PA94 to a slow speed in rpm, as 300");
+            notes.add(Check::EstopReleaseFast, found, "set PA94 to a slow speed, such as 300 rpm");
         }
         _ => {}
     }

@@ -28,7 +28,7 @@ fn judge_encoder(subject: &Subject<'_>, notes: &mut Notes) {
     let seat = &subject.controller.seat;
     let told = |axis: &AxisGeometry| {
         let (name, pulses) = (&seat.name, axis.pulses_per_rev);
-        format!("PA54 = {value}: an encoder of {lines} lines, and seat {name} has {pulses} pulses a turn")
+        format!("PA54 = {value}: an encoder of {lines} lines, but seat {name} has {pulses} pulses per turn")
     };
     let counts = |axis: &AxisGeometry, each: f64| (axis.pulses_per_rev / lines - each).abs() < 1e-6;
     let neither = cylinders(subject).find(|axis| !counts(axis, 2.0) && !counts(axis, 4.0));
@@ -40,11 +40,11 @@ fn judge_encoder(subject: &Subject<'_>, notes: &mut Notes) {
             4.0 * lines
         );
         let told = told(axis);
-        notes.add(Check::Encoder, format!("{told}, so neither two nor four for each line"), remedy);
+        notes.add(Check::Encoder, format!("{told}, neither two nor four for each line"), remedy);
     } else if let Some(axis) = by_four {
-        let remedy = "send the empty seat a known distance, measure it, and accept this if it was right";
+        let remedy = "move the empty seat a known distance, measure it, and accept this if it is right";
         let told = told(axis);
-        notes.add(Check::EncoderUnsure, format!("{told}, so four for each line"), remedy);
+        notes.add(Check::EncoderUnsure, format!("{told}, four for each line"), remedy);
     }
 }
 
@@ -75,7 +75,7 @@ fn judge_stroke(subject: &Subject<'_>, notes: &mut Notes) {
     if stroke < longest - HALF_A_UNIT_MM {
         let found =
             format!("PA42 = {tenths}: a stroke of {stroke} mm, but seat {} has {longest} mm", seat.name);
-        let remedy = "correct stroke_mm of the seat type, or have PA42 set at the controller itself";
+        let remedy = "correct stroke_mm of the seat type, or set PA42 at the controller itself";
         notes.add(Check::Stroke, found, remedy);
     }
 }

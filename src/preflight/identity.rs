@@ -18,7 +18,7 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         notes.add(Check::Version, format!("software {version}"), "");
     }
     if subject.controller.connection.dialect == Dialect::Mbox {
-        let found = "not in the IMAX manual, so not asked: auto reset (PA0d), status reports (PA1e, PA1f), amplitude \
+        let found = "not in the IMAX manual, so not read: auto reset (PA0d), status reports (PA1e, PA1f), amplitude \
                      (PA55), encoder (PA54), bus period (PA59), analogue positions (PA60), speed of single axes (PA80 to PA85), \
                      emergency reset (PA98), outputs (PA9d), packets (DP34)";
         notes.add(Check::NotAsked, found, "");
@@ -29,7 +29,7 @@ fn judge_address(subject: &Subject<'_>, notes: &mut Notes) {
     let address = subject.controller.connection.address;
     let (Some(ip), Some(port)) = (subject.ip(0x10), subject.pa(0x14)) else { return };
     if (ip, port) != (*address.ip(), address.port()) {
-        let found = format!("takes itself for {ip}:{port} (PA10 to PA14), but was reached at {address}");
+        let found = format!("is set to {ip}:{port} (PA10 to PA14), but was reached at {address}");
         notes.add(Check::Address, found, "set PA10 to PA14 to its address, or correct the configuration");
     }
 }
@@ -40,7 +40,7 @@ fn judge_company(subject: &Subject<'_>, notes: &mut Notes) {
     let look = "look for a second controller with this address, and for another program that sends to it";
     if !survey.changed.is_empty() {
         let names: Vec<_> = survey.changed.iter().map(Address::to_string).collect();
-        let found = format!("{} told two values within seconds", names.join(", "));
+        let found = format!("{} had two values within seconds", names.join(", "));
         notes.add(Check::Contradiction, found, look);
     }
     match survey.odds.duplicate {
@@ -49,16 +49,12 @@ fn judge_company(subject: &Subject<'_>, notes: &mut Notes) {
         count => notes.add(Check::TwoAnswer, format!("{count} answers came twice"), look),
     }
     if survey.odds.foreign > 0 {
-        let found = format!("{} answers to what was not asked", survey.odds.foreign);
+        let found = format!("{} answers without a request", survey.odds.foreign);
         notes.add(Check::ForeignReplies, found, look);
     }
     if let Some(count) = survey.foreign_packets.filter(|count| *count > 0) {
         let found = format!("got {count} more packets (DP34) than were sent from here");
-        notes.add(
-            Check::OtherMaster,
-            found,
-            "end whatever else sends to it: another kinocue, player or tool",
-        );
+        notes.add(Check::OtherMaster, found, "end the other sender: another kinocue, player or tool");
     }
 }
 
@@ -88,20 +84,19 @@ fn judge_rotary(subject: &Subject<'_>, notes: &mut Notes) {
     match (told, own) {
         (0, 0) => {}
         (told, own) if told == own => {
-            let found =
-                format!("PA03 = {told}: axis {told} takes for zero wherever it stands at a reset or start");
-            let remedy = format!("before either, see that axis {told} stands at its 0; then accept this");
+            let found = format!("PA03 = {told}: axis {told} takes its position at a reset or start for zero");
+            let remedy = format!("make sure that axis {told} is at its 0 before either; then accept this");
             notes.add(Check::RotaryZero, found, remedy);
         }
         (0, own) => {
             let found = format!(
-                "PA03 = 0: the controller searches a zero for axis {own}, which is a rotary one of seat {name}"
+                "PA03 = 0: the controller searches for the zero of axis {own}, a rotary axis of seat {name}"
             );
             notes.add(Check::RotaryAxis, found, format!("set PA03 = {own}, or describe the axis in mm"));
         }
         (told, _) => {
             let found = format!(
-                "PA03 = {told}: axis {told} is a rotary one, which takes for zero wherever it stands"
+                "PA03 = {told}: axis {told} is a rotary axis, whose position at a reset becomes zero"
             );
             let remedy = format!("set PA03 = {own}, or describe it: [seat.{name}.axis{told}] unit = \"deg\"");
             notes.add(Check::RotaryAxis, found, remedy);
@@ -117,7 +112,7 @@ fn judge_mode(subject: &Subject<'_>, notes: &mut Notes) {
         (10, _) | (0, Dialect::Mbox) => return,
         (0, Dialect::Smc) => {
             let found = "PA00 = 0: the work mode of RS-485 units; that of CAN units is 10";
-            let remedy = "accept it where this is an RS-485 unit; else have the integrator set PA00 = 10";
+            let remedy = "accept it if this is an RS-485 unit; otherwise have the integrator set PA00 = 10";
             return notes.add(Check::WorkModeOpen, found, remedy);
         }
         (1, _) => "manual test",
@@ -167,7 +162,7 @@ pub(super) fn judge_together(subjects: &[Subject<'_>], all: &mut [Notes]) {
         let others = subjects[..index].iter().chain(&subjects[index + 1..]);
         let twins: Vec<&str> = others.filter(twin).map(|other| other.controller.name.as_str()).collect();
         if !twins.is_empty() {
-            let found = format!("has the address, or hardware address, of {} too", twins.join(", "));
+            let found = format!("has the same address, or hardware address, as {}", twins.join(", "));
             all[index].add(Check::DuplicateAddress, found, "give each controller its own (PA10 to PA1b)");
         }
     }
@@ -188,8 +183,8 @@ fn judge_versions(subjects: &[Subject<'_>], all: &mut [Notes]) {
         let same_dialect = counts.iter().filter(|((dialect, _), _)| *dialect == smc);
         let Some(((_, most), _)) = same_dialect.max_by_key(|(_, count)| **count) else { continue };
         if own != *most {
-            let found = format!("software {own}, while most have {most}");
-            notes.add(Check::VersionDiffers, found, "try it by itself, its emergency stop first");
+            let found = format!("software {own}, but most have {most}");
+            notes.add(Check::VersionDiffers, found, "test it by itself, its emergency stop first");
         }
     }
 }

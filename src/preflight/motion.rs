@@ -14,7 +14,7 @@ pub(super) fn judge(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes)
     }
     match subject.pa(0x06) {
         Some(1) => {
-            let found = "PA06 = 1: hurries when more than two frames wait";
+            let found = "PA06 = 1: shortens Time when more than two frames are queued";
             notes.add(
                 Check::FastForward,
                 found,
@@ -22,7 +22,7 @@ pub(super) fn judge(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes)
             );
         }
         Some(value @ 2..) => {
-            let found = format!("PA06 = {value}: no manual says what this does with a backlog");
+            let found = format!("PA06 = {value}: no manual says what it does with a backlog");
             notes.add(Check::FastForwardUnknown, found, "set PA06 = 0 or 1");
         }
         _ => {}
@@ -33,7 +33,7 @@ pub(super) fn judge(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes)
     judge_bus(subject, terms, notes);
     judge_delay(subject, terms, notes);
     if let Some(value) = subject.pa(0x0e).filter(|value| *value != 0) {
-        let found = format!("PA0e = {value}: a reset goes to zero without a search, wherever that was lost");
+        let found = format!("PA0e = {value}: a reset goes to zero without a search, even if zero was lost");
         notes.add(Check::HomesUnsearched, found, "set PA0e = 0");
     }
 }
@@ -43,7 +43,7 @@ fn judge_source(subject: &Subject<'_>, notes: &mut Notes) {
     // SMC has another meaning for it: a time for commands that have none. Ours always have one.
     let imax = subject.controller.connection.dialect == Dialect::Mbox;
     if let Some(value) = subject.pa(0x0a).filter(|value| imax && *value != 0) {
-        let found = format!("PA0a = {value}: ignores the Time of frames and goes by when they come");
+        let found = format!("PA0a = {value}: ignores the Time of frames and uses their arrival times");
         notes.add(Check::TimeIgnored, found, "set PA0a = 0");
     }
     if let Some(value) = subject.pa(0x60).filter(|value| *value != 0) {
@@ -60,7 +60,7 @@ fn judge_bus(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     let period = 1e3 / terms.rate_hz;
     if f64::from(ms) > period {
         let found = format!(
-            "PA59 = {ms}: tells the drives every {ms} ms at most, but frames come every {period:.1} ms"
+            "PA59 = {ms}: commands the drives every {ms} ms at most, but frames come every {period:.1} ms"
         );
         let remedy =
             format!("set PA59 = 0, or play at {:.0} Hz or less", (1e3 / f64::from(ms)).floor().max(1.0));
@@ -88,7 +88,7 @@ fn judge_delay(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
             let depth = value(0x51).min(16);
             let frames = [depth.saturating_sub(1), (1_u16 << depth.saturating_sub(1)).saturating_sub(1)];
             let [least, most] = frames.map(|frames| f64::from(frames) * 1e3 / terms.rate_hz);
-            (format!("PA51 = {} (and PA50 = {}): by that filter", value(0x51), value(0x50)), least, most)
+            (format!("PA51 = {} (and PA50 = {}): with this filter", value(0x51), value(0x50)), least, most)
         }
         Dialect::Smc => {
             let (delay, smooth) = (f64::from(value(0x4c)), f64::from(value(0x4d)));
@@ -104,7 +104,7 @@ fn judge_delay(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
         Dialect::Mbox => "set PA51 = 0",
         Dialect::Smc => "set PA4c = 0 and PA4d = 0",
     };
-    let remedy = format!("{remedy}; or measure it, and set trim to as much less than 0");
+    let remedy = format!("{remedy}; or measure the delay, and set a negative trim of that size");
     notes.add(Check::MotionLate, format!("{what} motion comes {span} later than the film"), remedy);
 }
 
@@ -113,7 +113,7 @@ fn judge_interval(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
     let Some(most) = subject.pa(0x0b) else { return };
     if most == 0 {
         if subject.controller.connection.dialect == Dialect::Mbox {
-            let found = "PA0b = 0: no limit by the SMC manual, unexplained by this controller's own";
+            let found = "PA0b = 0: no limit in the SMC manual, unexplained in that of this controller";
             notes.add(Check::IntervalUnlimited, found, "set PA0b = 3000");
         }
         return;
@@ -125,8 +125,7 @@ fn judge_interval(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
         longest => (longest, "the frame that brings the seat to its park pose"),
     };
     if u32::from(most) < longest {
-        let found =
-            format!("PA0b = {most}: {what}, of {longest} ms, are cut to {most} ms and so made faster");
+        let found = format!("PA0b = {most}: {what}, of {longest} ms, are cut to {most} ms and become faster");
         let found = if frame < slow { found.replace("are cut", "is cut") } else { found };
         notes.add(Check::IntervalLimit, found, format!("set PA0b = {}", longest.max(3_000)));
     }
@@ -137,7 +136,7 @@ fn judge_amplitude(subject: &Subject<'_>, notes: &mut Notes) {
     let found = match subject.pa(0x55) {
         None | Some(0) => return,
         Some(tenths @ 1..=9) => format!("PA55 = {tenths}: plays every position at {tenths}0 %"),
-        Some(value) => format!("PA55 = {value}: no manual says how far the seat then moves"),
+        Some(value) => format!("PA55 = {value}: no manual says how far the seat moves"),
     };
-    notes.add(Check::Amplitude, found, "set PA55 = 0, and use level to play with less");
+    notes.add(Check::Amplitude, found, "set PA55 = 0, and use the level to reduce motion");
 }

@@ -7,8 +7,8 @@ pub(super) fn judge_way(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut No
     let address = subject.controller.connection.address;
     match &subject.route {
         Err(why) => {
-            let found = format!("no way to {address}: {why}");
-            notes.add(Check::Route, found, "check cable and this machine's address and mask, and bind");
+            let found = format!("no route to {address}: {why}");
+            notes.add(Check::Route, found, "check the cable, this machine's address and mask, and bind");
         }
         Ok(route) => {
             let need = terms.packet_len(subject.controller);
@@ -26,18 +26,18 @@ pub(super) fn judge_replies(subject: &Subject<'_>, terms: &ShowTerms, notes: &mu
     if let (Ok(route), Some(host)) = (&subject.route, subject.ip(0x20))
         && host != route.local
     {
-        let found = format!("PA20 to PA23 = {host}, but this machine is {} towards it", route.local);
+        let found = format!("PA20 to PA23 = {host}, but this machine's address is {}", route.local);
         notes.add(Check::ReplyAddress, found, format!("set PA20 to PA23 to {}", route.local));
     }
     let Some(port) = subject.pa(0x24) else { return };
     match terms.frame_port {
         0 => {
-            let found = format!("PA24 = {port}, but bind has port 0, so the frame port is another each time");
-            notes.add(Check::FramePortFree, found, format!("give bind the port {port}"));
+            let found = format!("PA24 = {port}, but bind has port 0: another frame port at every start");
+            notes.add(Check::FramePortFree, found, format!("set port {port} in bind"));
         }
         own if own != port => {
             let found = format!("PA24 = {port}, but the frame port is {own}");
-            notes.add(Check::ReplyPort, found, format!("set PA24 = {own}, or bind port {port}"));
+            notes.add(Check::ReplyPort, found, format!("set PA24 = {own}, or port {port} in bind"));
         }
         _ => {}
     }

@@ -5,12 +5,12 @@ use super::{Check, Notes, Subject};
 pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     if subject.pa(0x9d) == Some(1) {
         let found = "PA9d = 1: ignores the outputs of frames, so effects never switch";
-        notes.add(Check::OutputsIgnored, found, "set PA9d = 0, or take its effects out of the configuration");
+        notes.add(Check::OutputsIgnored, found, "set PA9d = 0, or remove its effects from the configuration");
     }
     if let Some(value) = subject.pa(0x05).filter(|value| *value != 0) {
         let found =
             format!("PA05 = {value}: outputs are inverted, so every effect is on while it should be off");
-        notes.add(Check::OutputsInverted, found, "set PA05 = 0, or accept it where relays invert it again");
+        notes.add(Check::OutputsInverted, found, "set PA05 = 0, or accept it if relays invert it again");
     }
     if let Some(word) = subject.pa(0x9f).filter(|word| *word != 0) {
         let outputs: Vec<_> = (1..=16)

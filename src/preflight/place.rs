@@ -32,7 +32,7 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         WordOrder::Both => notes.add(
             Check::WordOrderOpen,
             stand.two_readings(),
-            "set PA1f = 1, so that its reports tell, or home the seat and try again",
+            "set PA1f = 1, so that its reports decide, or home the seat and try again",
         ),
         WordOrder::Neither => notes.add(Check::Position, stand.what_cannot_be(), AFTER_HOMING),
     }
@@ -40,11 +40,11 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
 }
 
 const AFTER_HOMING: &str =
-    "home the seat; where it says so then too, correct stroke_mm, lead_mm and pulses_per_rev of its type";
+    "home the seat; if this remains, correct stroke_mm, lead_mm and pulses_per_rev of its type";
 
 fn remedy(dialect: Dialect) -> String {
     format!(
-        "write dialect = \"{}\" for this controller, if it is one; else have its firmware looked at, and do not play to it",
+        "write dialect = \"{}\" for this controller, if it is one; otherwise have its firmware checked, and do not play to it",
         dialect_name(other(dialect))
     )
 }
@@ -91,8 +91,8 @@ impl Stand<'_> {
         let Some((axis, own, by_other)) = readings.next() else { return String::new() };
         let (dialect, other) = (dialect_name(self.dialect), dialect_name(other(self.dialect)));
         format!(
-            "axis {axis} stands at {own} pulses by the word order of {dialect}, at {by_other} by that of {other}; its \
-             stroke is {}",
+            "axis {axis} is at {own} pulses in the word order of {dialect}, at {by_other} in that of {other}; its stroke \
+             is {}",
             self.strokes[axis - 1]
         )
     }
@@ -112,7 +112,7 @@ impl Stand<'_> {
                 .max_by_key(|(_, (one, two))| one.0.abs_diff(two.0))?;
             let axis = axis + 1;
             Some(format!(
-                "axis {axis} stands at {} pulses by its registers, at {} by its reports",
+                "axis {axis} is at {} pulses by its registers, at {} by its reports",
                 place.0, report.0
             ))
         };
@@ -127,7 +127,7 @@ impl Stand<'_> {
 }
 
 fn outside(axis: usize, place: Pulses, stroke: PulseRange) -> String {
-    format!("axis {} stands at {} pulses, outside its stroke of {stroke}", axis + 1, place.0)
+    format!("axis {} is at {} pulses, outside its stroke of {stroke}", axis + 1, place.0)
 }
 
 const fn other(dialect: Dialect) -> Dialect {

@@ -26,14 +26,14 @@ fn judge_state(subject: &Subject<'_>, notes: &mut Notes) {
     match survey.state {
         Some((ReplyCode::EmergencyStop, _)) if are_belts(subject) => {
             let found = "no belt is closed (x = 4), so the controller takes no motion";
-            notes.add(Check::BeltsOpen, found, "close a belt before arming, or take the seat out");
+            notes.add(Check::BeltsOpen, found, "close a belt before arming, or disable the seat");
         }
         Some((ReplyCode::EmergencyStop, _)) => {
             let found = "an emergency stop is in effect (x = 4)";
             notes.add(
                 Check::EmergencyStopActive,
                 found,
-                "release the button, reset at the place, then home the seat",
+                "release the button, reset the controller, then home the seat",
             );
         }
         Some((_, DeviceError(0))) if reported == 0 => {
@@ -63,7 +63,7 @@ fn add_error(found: &str, notes: &mut Notes) {
     notes.add(
         Check::ActiveError,
         found,
-        "see the error in the manual; Err17 and Err21 go with a reset (kinocue home)",
+        "look the error up in the manual; a reset (kinocue home) clears Err17 and Err21",
     );
 }
 
@@ -72,7 +72,7 @@ fn judge_reports(subject: &Subject<'_>, terms: &ShowTerms, notes: &mut Notes) {
         Some(1) | None => {}
         Some(2) => judge_second_host(subject, terms, notes),
         Some(value) => {
-            let what = if value == 0 { "no status reports" } else { "no manual says where reports then go" };
+            let what = if value == 0 { "no status reports" } else { "no manual says where reports go" };
             notes.add(Check::StatusOff, format!("PA1f = {value}: {what}"), "set PA1f = 1 and PA1e = 100");
         }
     }

@@ -40,7 +40,7 @@ refused! {
     an_unknown_fast_forward_is_refused: [0x06 = 2] => FastForwardUnknown, "PA06 = 2";
     no_speed_limit_is_refused: [0x07 = 0] => SpeedUnlimited, "PA07 = 0: no limit on speed";
     a_speed_limit_below_the_seats_is_refused: [0x07 = 2000] => SpeedTooLow, "2000 rpm (PA07), 166.7 mm/s";
-    a_rotary_axis_is_refused: [0x03 = 3] => RotaryAxis, "PA03 = 3: axis 3 is a rotary one";
+    a_rotary_axis_is_refused: [0x03 = 3] => RotaryAxis, "PA03 = 3: axis 3 is a rotary axis";
     inverted_outputs_are_refused: [0x05 = 1] => OutputsInverted, "every effect is on while it should be off";
     a_reset_without_a_search_is_refused: [0x0e = 1] => HomesUnsearched, "goes to zero without a search";
     another_encoder_is_refused: [0x54 = 2] => Encoder, "PA54 = 2: no manual says which encoder";
@@ -50,7 +50,7 @@ refused! {
     a_bus_slower_than_the_show_is_refused: [0x59 = 11] => BusPeriod, "every 11 ms at most, but frames come every 10.0 ms";
     positions_of_analogue_inputs_are_refused: [0x60 = 1, 0x61 = 2, 0x62 = 3] => AnaloguePosition, "analogue inputs, times 2/3";
     a_cut_of_long_times_is_refused: [0x0b = 2999] => IntervalLimit, "PA0b = 2999: the frame that brings the seat to its park pose, of 3000 ms, is cut to 2999 ms";
-    a_cut_of_the_shows_frames_is_refused: [0x0b = 5] => IntervalLimit, "made faster";
+    a_cut_of_the_shows_frames_is_refused: [0x0b = 5] => IntervalLimit, "become faster";
     a_reset_by_itself_is_refused: [0x0d = 500] => AutoReset, "PA0d = 500: resets by itself";
     switched_off_replies_are_refused: [0x15 = 0] => RepliesDisabled, "PA15 = 0";
     reports_on_alarm_alone_are_refused: [0x1e = 0] => StatusSlow, "PA1e = 0: reports only when an alarm begins";
@@ -58,7 +58,7 @@ refused! {
     no_reports_are_refused: [0x1f = 0] => StatusOff, "PA1f = 0: no status reports";
     reports_to_nobody_known_are_refused: [0x1f = 3] => StatusOff, "no manual says";
     reports_to_another_host_are_refused: [0x1f = 2] => StatusElsewhere, "0.0.0.0:0 (PA25 to PA29), not to 192.168.15.101:8410";
-    replies_to_another_host_are_refused: [0x23 = 100] => ReplyAddress, "192.168.15.100, but this machine is 192.168.15.101";
+    replies_to_another_host_are_refused: [0x23 = 100] => ReplyAddress, "192.168.15.100, but this machine's address is 192.168.15.101";
     replies_to_another_port_are_refused: [0x24 = 8411] => ReplyPort, "PA24 = 8411, but the frame port is 8410";
     a_scaled_amplitude_is_refused: [0x55 = 5] => Amplitude, "plays every position at 50 %";
     an_unknown_amplitude_is_refused: [0x55 = 10] => Amplitude, "no manual says";
@@ -75,7 +75,7 @@ refused! {
     an_unlimited_release_is_refused: [0x94 = 0] => EstopRelease, "PA94 = 0";
     an_axis_offset_of_a_sliced_controller_is_refused: [0x95 = 3] => AxisOffset, "takes axes from 4 on, but fan_out = slice means PA95 = 0";
     a_reset_by_the_stop_button_is_refused: [0x90 = 9, 0x98 = 1] => EstopResetShared, "share X01";
-    another_address_of_its_own_is_refused: [0x13 = 202] => Address, "takes itself for 192.168.15.202:7408";
+    another_address_of_its_own_is_refused: [0x13 = 202] => Address, "is set to 192.168.15.202:7408";
 }
 
 /// The one finding of a case, or none.
@@ -189,7 +189,7 @@ fn a_slow_show_needs_long_times() {
     assert_eq!(check(&case), None);
     case.terms.rate_hz = 1.0;
     let found = only(&case).unwrap().found;
-    assert_eq!(found, "PA0b = 900: frames of the show, of 1000 ms, are cut to 900 ms and so made faster");
+    assert_eq!(found, "PA0b = 900: frames of the show, of 1000 ms, are cut to 900 ms and become faster");
 }
 
 #[test]
@@ -333,7 +333,7 @@ fn controllers_with_one_address_or_hardware_address_are_told_both() {
     let all = judge(&[one.subject(), two.subject()], &one.terms, &[]);
     for (findings, other) in all.iter().zip(["A2", "A1"]) {
         assert_eq!(findings[0].check, Check::DuplicateAddress);
-        assert!(findings[0].found.ends_with(&format!("of {other} too")), "{}", findings[0].found);
+        assert!(findings[0].found.ends_with(&format!("as {other}")), "{}", findings[0].found);
     }
 }
 
@@ -351,7 +351,7 @@ fn the_one_with_other_software_is_told() {
     let differs = |findings: &Vec<Finding>| findings.iter().any(|one| one.check == Check::VersionDiffers);
     assert_eq!(all.iter().map(differs).collect::<Vec<_>>(), [false, true, false]);
     let told = all[1].iter().find(|one| one.check == Check::VersionDiffers).unwrap();
-    assert_eq!(told.found, "software 4.2, while most have 4.0");
+    assert_eq!(told.found, "software 4.2, but most have 4.0");
 }
 
 #[test]
@@ -408,13 +408,9 @@ fn chair(dialect: Dialect, told: u16) -> Case {
 #[test]
 fn the_axis_that_takes_its_place_for_zero_is_the_one_that_turns() {
     for (told, fails, words) in [
-        (3, false, "PA03 = 3: axis 3 takes for zero wherever it stands"),
-        (
-            0,
-            true,
-            "PA03 = 0: the controller searches a zero for axis 3, which is a rotary one of seat bench3",
-        ),
-        (2, true, "PA03 = 2: axis 2 is a rotary one"),
+        (3, false, "PA03 = 3: axis 3 takes its position at a reset or start for zero"),
+        (0, true, "PA03 = 0: the controller searches for the zero of axis 3, a rotary axis of seat bench3"),
+        (2, true, "PA03 = 2: axis 2 is a rotary axis"),
     ] {
         let finding = only(&chair(Dialect::Smc, told)).expect("one finding");
         assert!(finding.found.contains(words) && finding.fails() == fails, "{finding:?}");

@@ -82,7 +82,7 @@ pub(crate) enum FitError {
 
 fn list(broken: &[String]) -> String {
     format!(
-        "{}\nonly motion and vibration can be made to fit; change these in the cue or the hall",
+        "{}\nonly motion and vibration can be fitted; change these in the cue or the hall",
         broken.join("\n")
     )
 }

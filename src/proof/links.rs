@@ -282,9 +282,7 @@ mod tests {
         let named = "a2: link stalls, D1, D3: a drive of seat silver3 at 29.0 Hz would be 0.0";
         let fits = "it fits at 54.5 Hz: baud = 230400";
         let all = |one: &String| {
-            one.contains("mm beside the cue at 00:0")
-                && one.contains("0.03 are allowed")
-                && one.ends_with(fits)
+            one.contains("mm off the cue at 00:0") && one.contains("0.03 are allowed") && one.ends_with(fits)
         };
         assert!(said.iter().any(|one| one.contains(named)) && said.iter().all(all), "{said:?}");
         let faster = hall(&[SECOND, allowed, ("baud = 57600", "baud = 230400")]);

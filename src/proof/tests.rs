@@ -278,7 +278,7 @@ fn a_cue_that_ends_in_motion_where_the_stroke_has_no_room_for_a_stop_is_refused_
         "{message}"
     );
     assert!(
-        message.contains("it lacks 5.8") && message.contains("mm of the stroke, 0 to 150 mm"),
+        message.contains("needs 5.8") && message.contains("mm more than the stroke, 0 to 150 mm"),
         "{message}"
     );
     assert!(matches!(proof.violations[0].place, Place::Text { line: 103, .. }), "{:?}", proof.violations[0]);

@@ -114,7 +114,7 @@ pub(crate) enum Breach {
     /// Vibration takes an axis past an end of its stroke.
     #[error(
         "vibration of {amplitude:.3} {0} about {position:.3} {0} at {at} leaves the stroke of seat {seat}, {low} to {high} {0}; \
-         lower the amplitude, or keep away from the end", unit.name()
+         lower the amplitude, or stay away from the end", unit.name()
     )]
     VibrationPastStroke {
         /// What the axis is measured in.
@@ -134,8 +134,8 @@ pub(crate) enum Breach {
     },
     /// The cue ends in motion, and the stroke has no room to come to rest.
     #[error(
-        "the cue ends at {at} in motion, {velocity:.1} {0}/s at {position:.3} {0}, and to come to rest within the limits of seat \
-         {seat} it lacks {missing:.3} {0} of the stroke, {low} to {high} {0}; end more slowly, or further from the end", unit.name()
+        "the cue ends at {at} in motion, {velocity:.1} {0}/s at {position:.3} {0}, and needs {missing:.3} {0} more than \
+         the stroke, {low} to {high} {0}, to come to rest within the limits of seat {seat}; end more slowly, or further from the end", unit.name()
     )]
     NoRoomToRest {
         /// What the axis is measured in.
@@ -268,7 +268,7 @@ pub(crate) enum Breach {
     },
     /// Frames are farther apart than the longest Time that the controller executes as it is.
     #[error(
-        "PA0b = {most}: frames of the show, of {frame} ms, are cut to {most} ms and so made faster; set PA0b and max_interval_ms \
+        "PA0b = {most}: frames of the show, of {frame} ms, are cut to {most} ms and become faster; set PA0b and max_interval_ms \
          of seat {seat} to {frame} or more, or raise the rate"
     )]
     Interval {

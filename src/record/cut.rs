@@ -53,10 +53,10 @@ pub(crate) enum CutError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The file has no ticks.
-    #[error("is a sampled recording; only one in full (play --record-mode full) has every tick")]
+    #[error("is a sampled recording; only a full one (play --record-mode full) has every tick")]
     Sampled,
     /// There is no such seat.
-    #[error("no seat {0:?}; its seats are {1}")]
+    #[error("there is no seat {0:?}; its seats are {1}")]
     Seat(String, String),
     /// None of its ticks is in the stretch.
     #[error("no tick between {0} and {1}")]

@@ -12,7 +12,7 @@ use super::ack_columns;
 use super::full;
 use super::judging::Judging;
 use super::margins::Margin;
-use super::recording::{ACKS, SENT, VERSION};
+use super::recording::{ACKS, REPORT, SENT, VERSION};
 use super::sampled::{SeatSample, TickSample};
 use super::seat::RecordedSeat;
 use crate::container::{self, ChannelRecord, Trouble};
@@ -36,7 +36,7 @@ pub(crate) enum ReadError {
     #[error("{0}")]
     File(Trouble),
     /// It is MCAP, and no recording.
-    #[error("is no recording of kinocue: it has no metadata record \"kinocue\" of kind \"recording\"")]
+    #[error("is not a recording of kinocue: it has no metadata record \"kinocue\" of kind \"recording\"")]
     Foreign,
     /// It says something of itself that cannot be.
     #[error("its metadata record \"kinocue\": {field}: {why}")]
@@ -269,7 +269,7 @@ impl Reading<'_, '_> {
             op::ATTACHMENT => {
                 if let Some((name, data)) = container::attachment(body) {
                     self.contents.attachments.insert(name.to_owned(), data.len());
-                    if name == "report.json" && data.len() <= KEPT {
+                    if name == REPORT && data.len() <= KEPT {
                         self.contents.report = Some(data.to_vec());
                     }
                 }

@@ -23,6 +23,8 @@ pub(super) const VERSION: &str = "1";
 pub(super) const SENT: &str = "/full/sent";
 /// That of what the ack thread took.
 pub(crate) const ACKS: &str = "/full/acks";
+/// The attachment that has the report.
+pub(super) const REPORT: &str = "report.json";
 /// Samples a second of each seat.
 pub(crate) const SAMPLE_HZ: u32 = 20;
 /// Topics of notes.
@@ -257,7 +259,7 @@ impl<W: Write + Seek> Recording<W> {
     /// Ends the file with these figures, and a report if there is one; gives what was written to.
     pub(crate) fn finish(mut self, end: &[(&str, String)], report: Option<&[u8]>) -> McapResult<W> {
         if let Some(report) = report {
-            self.attach("report.json", "application/json", report)?;
+            self.attach(REPORT, "application/json", report)?;
         }
         let end = end.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
         write_metadata(&mut self.writer, "kinocue.end", end)?;

@@ -62,7 +62,7 @@ pub enum CommandError {
     #[error("there is no Err{0}; errors are 1 to 7, 10 to 15, 17, 20 and 21, and 0 clears them")]
     Error(u16),
     /// A chance lies from 0 to 1.
-    #[error("a chance lies from 0 to 1")]
+    #[error("a probability is 0 to 1")]
     Chance,
     /// The controllers have ended.
     #[error("the virtual controllers have ended")]

@@ -21,7 +21,7 @@ use crate::time::{Clock as _, MonoTime};
 #[non_exhaustive]
 pub enum FarmError {
     /// The ports run past the last one.
-    #[error("{count} controllers from port {first} on run past port 65535; take a lower first port")]
+    #[error("{count} controllers from port {first} on run past port 65535; use a lower first port")]
     Ports {
         /// The first port.
         first: u16,

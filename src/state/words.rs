@@ -9,6 +9,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::{Cause, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why};
 use crate::plain;
 
+/// Without --config or --to the command would ask the service.
+const HOME_BY_COMMAND: &str =
+    "quit, then `kinocue home` with this --config or --to, with nobody on the seats";
+
 impl State {
     /// The state in one word, as every surface shows it.
     #[must_use]
@@ -84,11 +88,11 @@ plain::displayed!(Next {
     Self::Go => "go, or disarm",
     Self::Watch => "nothing; pause, park or stop as needed",
     Self::AwaitJoin => "nothing; the seats rejoin by themselves",
-    Self::AwaitFilm => "see to the film; the seats join it by themselves",
-    Self::LetJoin => "see to the film, then resume; or park",
+    Self::AwaitFilm => "check the film; the seats join it by themselves",
+    Self::LetJoin => "check the film, then resume; or park",
     Self::Resume => "resume, or park",
     Self::Release =>
-        "release the emergency-stop button, then clear; or disable a seat that cannot tell that it is",
+        "release the emergency-stop button, then clear; or disable a seat that cannot report it",
 
     Self::PutRight => "clear the error at the controller, then clear the hall; or disable its seat",
 
@@ -98,7 +102,7 @@ plain::displayed!(Next {
     Self::StopOtherMaster => "stop the other master, then clear",
     Self::Clear => "clear, then park or home",
     Self::Restart =>
-        "clear, then park; where the positions are not read then, start the service anew",
+        "clear, then park; if the positions are still not read, restart the service",
 });
 
 impl Next {
@@ -106,14 +110,14 @@ impl Next {
     #[must_use]
     pub(crate) const fn by_keys(self) -> Option<&'static str> {
         Some(match self {
-            Self::Home | Self::ArmAndHome => "leave, then `kinocue home` with nobody on the seats",
+            Self::Home | Self::ArmAndHome => HOME_BY_COMMAND,
             Self::ParkOrHome => "park",
             Self::Release => "release the emergency-stop button, then clear",
             Self::PutRight => "clear the error at the controller, then clear the hall",
-            Self::AwaitAnswers => "wait until every controller has answered, or leave",
-            Self::StopOtherMaster => "stop the other master, then leave and start the play anew",
+            Self::AwaitAnswers => "wait until every controller has answered, or quit",
+            Self::StopOtherMaster => "stop the other master, then quit and start the play again",
             Self::Clear => "clear, then park",
-            Self::Restart => "leave, then start the play anew",
+            Self::Restart => "quit, then start the play again",
             _ => return None,
         })
     }
@@ -124,10 +128,10 @@ impl Refusal {
     #[must_use]
     pub(crate) fn by_keys(&self) -> String {
         let remedy = match self.why {
-            Why::PositionUnknown | Why::HomesFirst => "leave, then `kinocue home` with nobody on the seats",
+            Why::PositionUnknown | Why::HomesFirst => HOME_BY_COMMAND,
             Why::StillPressed => "release its button",
-            Why::StillWrong => "clear the error there",
-            Why::NotIdentified => "wait until they answer, or leave",
+            Why::StillWrong => "clear the error at the controller",
+            Why::NotIdentified => "wait until they answer, or quit",
             why => why.remedy(),
         };
         format!("cannot {} while {}: {}; {remedy}", self.asked, self.state, self.why.words())
@@ -137,7 +141,7 @@ impl Refusal {
 impl Trouble {
     const fn words(self) -> &'static str {
         match self {
-            Self::Limiter => "the limits held motion back three times in a second",
+            Self::Limiter => "the limiter held motion back three times in a second",
             Self::Planner => "a move could not be planned",
             Self::Deaf => "replies were not read for too long; an emergency stop would have gone unnoticed",
             Self::Homing(_) => "a seat failed to home",
@@ -185,12 +189,12 @@ impl Cause {
             Self::FilmLeads => "the seats join the film",
             Self::FilmAwaited(why) => why.words(),
             Self::FilmOver(why) => why.words(),
-            Self::PausedTooLong => "the pause took more than five minutes",
+            Self::PausedTooLong => "the pause lasted more than five minutes",
             Self::GroupOut(_) => "a group of seats is out",
             Self::EmergencyStop(_) => "emergency stop",
             Self::Trouble(trouble) => trouble.words(),
             Self::Cleared => "cleared by the operator",
-            Self::Slept => "the machine slept, or the program was held, for more than 2 s",
+            Self::Slept => "the machine slept, or the program was suspended, for more than 2 s",
         }
     }
 }
@@ -229,11 +233,11 @@ impl Why {
             Self::NotProved => Readiness::NotProved.words(),
             Self::NotPreflighted => Readiness::NotPreflighted.words(),
             Self::NotArmed => "the hall is not armed",
-            Self::PlaysAlready => "the cue plays already",
+            Self::PlaysAlready => "the cue is already playing",
             Self::PausedNow => "the cue is paused",
             Self::FilmLeads => "the film leads",
             Self::Riding => "the cue is under way",
-            Self::NothingPlays => "nothing plays",
+            Self::NothingPlays => "nothing is playing",
             Self::HomingNow => "the seats are homing",
             Self::ParkingNow => "the seats are on their way to park",
             Self::StoppingNow => "the seats are coming to rest",
@@ -271,8 +275,8 @@ impl Why {
             Self::Latched => "clear it first",
             Self::SeatsAnywhere => "park or home first",
             Self::ArmedNow => "disarm first",
-            Self::StillPressed => "release its button, or disable a seat that cannot tell that it is",
-            Self::StillWrong => "clear the error there, or disable its seat",
+            Self::StillPressed => "release its button, or disable a seat that cannot report it",
+            Self::StillWrong => "clear the error at the controller, or disable its seat",
             Self::NothingToClear => "go on",
         }
     }

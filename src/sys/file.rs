@@ -23,7 +23,7 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
         (_, true) => Err(ErrorKind::IsADirectory.into()),
         _ => Err(io::Error::new(
             ErrorKind::InvalidInput,
-            "it is a pipe or a device, not a file; write what comes from it into a file, and name that",
+            "it is a pipe or a device, not a file; copy its data to a file, and give that",
         )),
     }
 }

@@ -107,7 +107,7 @@ impl Folder {
         let mode = Mode::RUSR | Mode::WUSR | Mode::RGRP;
         let fd = rustix::fs::openat(&self.fd, name, flags, mode)?;
         if FileType::from_raw_mode(rustix::fs::fstat(&fd)?.st_mode) != FileType::RegularFile {
-            return Err(io::Error::other(format!("{name} is no regular file")));
+            return Err(io::Error::other(format!("{name} is not a regular file")));
         }
         Ok(File::from(fd))
     }

@@ -64,8 +64,8 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<TextOrder, TextFa
             return Err(Problem::new(Code::Role, detail, "a person does that on the console").into());
         }
         _ => {
-            let detail = format!("{:?} is no line of kinocue", text.unwrap_or_default());
-            return Err(TextFault::NoOrder(value(detail, &format!("there are {LINES}"))));
+            let detail = format!("{:?} is not a line that kinocue knows", text.unwrap_or_default());
+            return Err(TextFault::NoOrder(value(detail, &format!("the lines are {LINES}"))));
         }
     });
     allowed(order, allow)
@@ -170,12 +170,12 @@ mod tests {
     #[test]
     fn what_is_no_line_is_refused_with_what_to_write() {
         for (line, says) in [
-            ("", "there are go, pause"),
-            ("GO", "\"GO\" is no line"),
-            ("go now", "no line"),
-            ("seek", "no line"),
-            ("effect water maybe", "no line"),
-            ("POST / HTTP/1.1", "no line"),
+            ("", "the lines are go, pause"),
+            ("GO", "\"GO\" is not a line"),
+            ("go now", "not a line"),
+            ("seek", "not a line"),
+            ("effect water maybe", "not a line"),
+            ("POST / HTTP/1.1", "not a line"),
             ("gö", "not ASCII"),
         ] {
             let TextFault::NoOrder(problem) = ordered(line.as_bytes()).unwrap_err() else { panic!("{line}") };

@@ -146,8 +146,8 @@ impl TextTalk {
             self.place.show(&self.who.name);
             return (Read::Answered(Ok(self.hall.status())), Then::Listen);
         }
-        let remedy = "send the line: token TOKEN, with the one whose SHA-256 is token_sha256 of [text]";
-        let problem = Problem::new(Code::Token, "the first line shows no token that is known here", remedy);
+        let remedy = "send the line: token TOKEN, with the token whose SHA-256 is token_sha256 of [text]";
+        let problem = Problem::new(Code::Token, "the first line has no known token", remedy);
         (Read::Answered(Err(problem)), Then::End)
     }
 

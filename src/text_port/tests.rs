@@ -201,7 +201,7 @@ fn a_page_of_anybody_cannot_have_a_browser_start_the_show() {
         let mut peer = stage.connect();
         let head = "POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: text/plain;charset=UTF-8\r\n\r\n";
         peer.send(format!("{head}{body}").as_bytes());
-        assert!(peer.line().starts_with("error value \"POST / HTTP/1.1\" is no line of kinocue"));
+        assert!(peer.line().starts_with("error value \"POST / HTTP/1.1\" is not a line that kinocue knows"));
         assert_eq!(peer.line(), "", "and that was all of it");
     }
     let mut peer = stage.connect();

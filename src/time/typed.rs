@@ -41,7 +41,7 @@ pub(crate) fn parse_time(text: &str) -> Result<ShowTime, String> {
 /// # Errors
 /// What is wrong with the text, for a person.
 pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
-    let refuse = |why: &str| format!("{why}; write a number and its unit, as 80ms, 1.5s, 100us, 5min or 2h");
+    let refuse = |why: &str| format!("{why}; write a number and its unit: 80ms, 1.5s, 100us, 5min or 2h");
     let unit_at = text.find(|c: char| c.is_ascii_alphabetic()).ok_or_else(|| refuse("no unit"))?;
     let (number, unit) = text.split_at(unit_at);
     let unit = match unit {

@@ -29,13 +29,13 @@ pub enum WireError {
         found: u16,
     },
     /// No function, or not one of those asked for.
-    #[error("byte 4: function code {found:04x} is none that belongs here")]
+    #[error("byte 4: function code {found:04x} does not belong here")]
     Function {
         /// What stands there.
         found: u16,
     },
     /// The object channel, or the count of axes, fits no number of axes from 1 to 12.
-    #[error("byte {at}: {found} names no number of axes; 3 to 12 axes are possible")]
+    #[error("byte {at}: {found} does not fit 3 to 12 axes")]
     Axes {
         /// Where the channel or count stands.
         at: usize,
@@ -51,7 +51,7 @@ pub enum WireError {
         need: usize,
     },
     /// It is longer than its layout, where nothing may follow.
-    #[error("byte {need}: goes on to {len} bytes; this message takes {need}")]
+    #[error("byte {need}: continues to {len} bytes; this message takes {need}")]
     Surplus {
         /// Bytes there are.
         len: usize,
@@ -109,7 +109,7 @@ impl fmt::Display for DeviceError {
             1..=6 => write!(f, "Err{number}: no communication with the servo of axis {number}"),
             7 => f.write_str("Err7: the servo is of another model"),
             10..=15 => write!(f, "Err{number}: alarm of the servo of axis {}", number - 9),
-            17 => f.write_str("Err17: the play time began too long"),
+            17 => f.write_str("Err17: the play time is too long at the start"),
             20 => f.write_str("Err20: UDP memory overflow"),
             21 => f.write_str("Err21: UDP data buffer overflow; needs a reset"),
             _ => write!(f, "Err{number}: not in the manual"),

@@ -123,10 +123,7 @@ fn reports_of_a_great_day_are_bounded_whole_and_made_in_turn() {
     assert!(report.body.len() < 5_000 * 600, "{} bytes", report.body.len());
     let report: serde_json::Value = serde_json::from_slice(&unchunked(&report.body)).unwrap();
     assert_eq!(report["actions"].as_array().unwrap().len(), 5_000);
-    assert_eq!(
-        report["notes"][0],
-        "400 things that were asked before these are left out; `kinocue report` has them"
-    );
+    assert_eq!(report["notes"][0], "400 earlier commands are left out; `kinocue report` has them");
 }
 
 /// What is in the chunks of a body.

@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::client::{Request, problem};
 use crate::hall::Hall;
 
-const GETS: [&str; 16] = [
+const GETS: [&str; 17] = [
     "/api/v1/controllers",
     "/api/v1/controllers/{name}",
     "/api/v1/cues",
@@ -16,6 +16,7 @@ const GETS: [&str; 16] = [
     "/api/v1/playlists",
     "/api/v1/recordings",
     "/api/v1/recordings/{name}",
+    "/api/v1/recordings/{name}/picture",
     "/api/v1/reports/{day}",
     "/api/v1/status",
     "/api/v1/sync",

@@ -104,7 +104,7 @@ fn film() -> Value {
         "sources": [
             {"source": "artnet:10.0.0.20", "state": "locked", "cause": "the film runs", "timecode": "01:00:05:12",
                 "rate_ppm": 12.0, "sigma_ms": 0.03},
-            {"source": "mtc:/dev/snd/midiC1D0", "state": "absent", "cause": "nothing has been heard of the film yet"},
+            {"source": "mtc:/dev/snd/midiC1D0", "state": "absent", "cause": "nothing has been received from the film yet"},
         ],
     })
 }
@@ -294,7 +294,7 @@ fn a_stop_goes_by_its_own_socket_while_the_other_is_stuck() {
     assert_eq!(run.code, Some(0), "{run:?}");
     assert_eq!(socket.join().expect("it was asked"), "stop\n");
     assert!(daemon.is_done(), "the control socket was not asked");
-    told(&run, &format!("stopping, by {}", daemon.socket("stop.sock").display()));
+    told(&run, &format!("stopping, via {}", daemon.socket("stop.sock").display()));
     told(&run, "the emergency stop is hard-wired");
 }
 
@@ -308,7 +308,7 @@ fn a_stop_goes_by_the_control_socket_where_its_own_fails() {
         assert_eq!(daemon.request().path, "/api/v1/show/stop");
         assert!(run.stdout.contains("\"state\":\"stopping\""), "{run:?}");
         told(&run, "did not take the stop");
-        told(&run, &format!("by {}", daemon.socket("control.sock").display()));
+        told(&run, &format!("via {}", daemon.socket("control.sock").display()));
         socket.map(thread::JoinHandle::join);
     }
 }
@@ -395,7 +395,7 @@ fn watch_says_when_what_it_shows_is_old() {
     let mut watch = Running(daemon.command(&["watch"]).spawn().expect("it starts"));
     let mut said = BufReader::new(watch.0.stderr.take().expect("piped")).lines();
     let line = said.next().expect("a line").expect("text");
-    assert_eq!(line, "kinocue: the daemon has said nothing for 2 s: what is shown is old");
+    assert_eq!(line, "kinocue: no update from the daemon for 2 s: what is shown is old");
 }
 
 #[test]
@@ -440,7 +440,7 @@ fn a_sweep_that_loses_its_daemon_says_to_look_at_the_seats() {
     });
     let run = daemon.run(&["test", "sweep", "--seats-empty", "--json"]);
     assert_eq!(run.code, Some(69));
-    told(&run, "look at the seats");
+    told(&run, "check the seats");
 }
 
 #[test]

@@ -212,7 +212,7 @@ fn a_cue_is_taken_in_from_the_page_or_refused_with_every_fault() {
     browser.press("#upload");
     browser.reads("playlist-reply", "not done");
     browser.reads("upload-faults", "1.4 is outside the stroke");
-    browser.reads("upload-faults", "400 does not come after");
+    browser.reads("upload-faults", "400 is not after");
     browser.shot("50-upload-refused");
 
     browser.choose("#upload-file", &Path::new(env!("CARGO_MANIFEST_DIR")).join("cues/bench-ride.csv"));
@@ -248,7 +248,7 @@ fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_pr
     browser.wait("!document.getElementById('follow-panel').hidden");
     browser.reads("follow-word", "absent");
     browser.reads("follow-next", "start the film");
-    browser.reads("timecode-of", "not known");
+    browser.reads("timecode-of", "unknown");
     browser.reads("sources", "/nowhere/midi cannot be opened");
     assert_eq!(
         browser.eval("return document.getElementById('error-curve').hidden"),
@@ -270,7 +270,7 @@ fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_pr
     browser.wait("/^01:00:\\d\\d:\\d\\d$/.test(document.getElementById('timecode').textContent)");
     go(&browser);
     browser.wait("document.querySelector('#error-curve canvas') !== null");
-    browser.reads("error-scale", " ms; above 0");
+    browser.reads("error-scale", " ms; positive");
     browser.wait("/^[+−]?\\d+\\.\\d\\d ms$/.test(document.getElementById('error-now').textContent)");
     for (width, height) in [(1600, 1000), (768, 1024), (390, 844)] {
         browser.resize(width, height);
@@ -401,4 +401,48 @@ fn whoever_may_only_look_sees_all_is_asked_for_a_token_upon_a_press_and_can_stop
     browser.press("#token-leave");
     browser.type_text(ESCAPE);
     browser.reads("state", "stopped");
+}
+
+#[test]
+fn a_moment_is_marked_by_a_key_and_its_recording_is_looked_at_seat_by_seat() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    browser.wait("document.getElementById('recordings-none').textContent === 'Nothing was recorded yet.'");
+    arm(&browser);
+    go(&browser);
+    // Bars say how each seat stands, in the map and large where one is looked at; points follow over the curves of the cue.
+    browser.press("[data-controller=A1]");
+    browser.wait("document.querySelectorAll('.pose.small i').length === 12");
+    browser.wait("document.querySelectorAll('#controller .pose.large i').length === 3");
+    browser.wait("parseFloat(document.querySelector('.pose.large i').style.getPropertyValue('--is')) > 5");
+    browser.reads("curves-note", "where A1 was");
+    browser.shot("30-seats-that-move");
+    browser.type_text("m");
+    browser.reads("show-reply", "mark");
+    browser.wait("document.querySelectorAll('#recordings tbody tr').length === 1");
+    assert!(text(&browser, "#recordings tbody tr").contains("incident"));
+    browser.press("#park");
+    browser.reads("state", "parked");
+    browser.wait("document.querySelectorAll('#recordings tbody tr').length === 2");
+    browser.wait("[...document.querySelectorAll('#recordings td')].some((cell) => cell.textContent.startsWith('stopped'))");
+    // The incident is the newer of the two.
+    browser.press("#recordings tbody tr:nth-child(2) button");
+    browser.wait("document.getElementById('picture').naturalWidth > 500");
+    assert!(
+        text(&browser, "#picture-sentence").starts_with('A')
+            || text(&browser, "#picture-sentence").starts_with('B')
+    );
+    browser.shot("31-picture-of-a-recording");
+    browser.eval("const seat = document.getElementById('picture-seat'); seat.value = 'B2'; seat.dispatchEvent(new Event('change'))");
+    browser.wait("document.getElementById('picture-sentence').textContent.startsWith('B2')");
+    browser.press("#picture-close");
+    browser.wait("document.getElementById('picture-panel').hidden");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+/// What an element says.
+fn text(browser: &Browser, selector: &str) -> String {
+    let said = browser.eval(&format!("return document.querySelector({selector:?}).textContent"));
+    said.as_str().expect("it is text").to_owned()
 }

@@ -135,7 +135,10 @@ fn a_controller_that_is_out_for_good_gets_no_datagram_and_is_waited_for_by_nobod
     let status = hall.comes_to("parked");
     assert_eq!((&seat(&status, 1)["name"], &seat(&status, 1)["health"]), (&"A2".into(), &"out".into()));
     let refused = hall.run(&["enable", "A2"]);
-    assert!(refused.code == Some(75) && refused.stderr.contains("out for good"), "{refused:?}");
+    assert!(
+        refused.code == Some(75) && refused.stderr.contains("disabled in the configuration"),
+        "{refused:?}"
+    );
     hall.play("night");
     hall.done(&["stop"]);
     hall.comes_to("stopped");

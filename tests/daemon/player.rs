@@ -205,7 +205,7 @@ fn a_player_that_is_killed_leaves_the_seats_holding_and_is_back_paused_until_a_p
     let before = hall.wait(|status| together(status, 2.0));
     let killed = mpv(&hall).expect("it runs");
     kill_process(killed, Signal::KILL).unwrap();
-    hall.wait(|status| status["state"] == "waiting" && warns(status, "once its film is back"));
+    hall.wait(|status| status["state"] == "waiting" && warns(status, "once the film is back"));
     let back = hall.wait(stands);
     assert_eq!(back["state"], "waiting", "nothing runs by itself");
     assert!((at(&back, "film") - at(&before, "film")).abs() < 2.0, "where it was: {}", back["film"]);

@@ -8,7 +8,7 @@ use kinocue::harness::recording::datagrams;
 use kinocue::harness::sys::clock::wall_now_ns;
 use kinocue::wire::MotionRequest;
 use mcap::{MessageStream, Summary};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::hall::Hall;
 use crate::http::Request;
@@ -91,6 +91,20 @@ fn a_show_leaves_a_recording_whose_counts_are_those_of_its_report_and_in_which_n
         configuration.contains("rate_hz = 100") && !configuration.contains("0011223344"),
         "{configuration}"
     );
+    // Listed with what came of it, and drawn.
+    let listed = hall.socket().get("/api/v1/recordings").value()[0].clone();
+    assert_eq!(
+        [&listed["result"], &listed["lost"], &listed["missed_ticks"]],
+        [&frames["result"], &frames["lost"], &frames["missed_ticks"]],
+        "{listed}"
+    );
+    let at = format!("/api/v1/recordings/{}/picture", listed["name"].as_str().unwrap());
+    let picture = hall.socket().get(&format!("{at}?seat=A2")).value();
+    assert_eq!((&picture["seat"], &picture["seats"]), (&"A2".into(), &json!(["A1", "A2"])));
+    assert!(picture["sentence"].as_str().unwrap().starts_with("A2"), "{}", picture["sentence"]);
+    assert!(picture["svg"].as_str().unwrap().starts_with("<svg "), "a picture");
+    let other = hall.socket().get(&format!("{at}?seat=Z9"));
+    assert!(other.problem().0 == 404 && other.text().contains("the seats are A1, A2"), "{}", other.text());
     // From before the show to after it, with what people asked.
     let states: Vec<_> = recorded.of("/hall").map(|(_, _, value)| value["state"].clone()).collect();
     assert!(states.len() > 3, "{states:?}");

@@ -61,7 +61,7 @@ fn an_emergency_stop_in_mid_show_is_cleared_once_it_was_released_though_no_frame
 fn what_is_pressed_stays_so_through_a_reload_and_clear_is_refused() {
     let hall = pressed_at_rest();
     hall.done(&["reload"]);
-    hall.serving().heard(|line| line.contains("before the configuration was read anew").then_some(()));
+    hall.serving().heard(|line| line.contains("before the configuration was reloaded").then_some(()));
     // The first looks of the new hall may still be under way.
     assert_eq!(hall.run(&["clear"]).code, Some(75));
     hall.lives_on(30);
@@ -126,7 +126,10 @@ fn an_error_while_parked_is_put_right_and_cleared_and_preflight_blames_nobody_el
     assert_eq!((wrong["state"].as_str(), wrong["may_clear"].as_bool()), (Some("parked"), Some(false)));
     assert_eq!(health(&wrong, 0), "error");
     let refused = hall.run(&["clear"]);
-    assert!(refused.code == Some(75) && refused.stderr.contains("clear the error there"), "{refused:?}");
+    assert!(
+        refused.code == Some(75) && refused.stderr.contains("clear the error at the controller"),
+        "{refused:?}"
+    );
     let preflight = hall.run(&["preflight"]);
     assert!(!preflight.stdout.contains("other-master"), "{preflight:?}");
     hall.happens("1@err=0");

@@ -67,7 +67,7 @@ fn the_stop_socket_brings_the_seats_to_rest_while_the_api_is_flooded() {
     let hall = Hall::open();
     hall.play("night");
     let flood = [(); 2].map(|()| Flood::of(hall.path("control.sock")));
-    hall.serving().heard(|line| line.contains("no room for more connections").then_some(()));
+    hall.serving().heard(|line| line.contains("too many connections").then_some(()));
     assert_eq!(hall.stop_socket("stop\n"), "stopping\n");
     hall.serving().heard(|line| line.contains("stopped: ").then_some(()));
     drop(flood);
@@ -222,7 +222,7 @@ fn the_halls_homing_refuses_a_controller_that_would_not_search_its_zero() {
     let told = |status: &Value| {
         let warnings = status["warnings"].as_array().expect("a list");
         let texts = warnings.iter().filter_map(|warning| warning["text"].as_str());
-        texts.filter(|text| text.contains("without searching it (PA0e = 1)")).count() == 2
+        texts.filter(|text| text.contains("without a search (PA0e = 1)")).count() == 2
     };
     let status = hall.wait(|status| status["state"] == "fault" && told(status));
     assert_eq!(status["cause"], "A1: a seat failed to home");

@@ -55,7 +55,7 @@ fn a_pipe_or_a_device_in_place_of_a_cue_is_refused_at_once() {
         for command in [vec!["check", path], vec!["info", path], vec!["play", path, "--to", "127.0.0.1:9"]] {
             let run = kinocue(&command);
             assert_eq!(run.code, Some(66), "{run:?}");
-            assert!(run.stderr.contains("it is a pipe or a device, not a file; write what comes"), "{run:?}");
+            assert!(run.stderr.contains("it is a pipe or a device, not a file; copy its data"), "{run:?}");
         }
     }
 }

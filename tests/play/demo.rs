@@ -184,7 +184,7 @@ fn on_a_terminal_the_console_stays_after_the_ride_to_go_again_until_ctrl_c() {
     let end = || Stdio::from(theirs.try_clone().expect("a handle"));
     let demo = Playing::demo(&folder.path(""), &["--json"], end(), end());
     let mut said = String::new();
-    while !said.contains("the console stays up; arm and go again there, Ctrl-C ends: http://") {
+    while !said.contains("the console stays up: arm and go again there; Ctrl-C ends: http://") {
         said += &written.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("it is silent: {said}"));
     }
     assert!(said.contains("parked: the seats have parked"), "{said}");
@@ -215,7 +215,7 @@ fn ridden(dialect: &str) -> (Run, Folder) {
         let args = ["--json", "--dialect", dialect];
         let mut demo = Playing::demo(&folder.path(""), &args, Stdio::null(), Stdio::piped());
         let begun = demo.wait_for("homing: homed by the operator");
-        assert!(begun.contains("the demo plays that person"), "{begun}");
+        assert!(begun.contains("the demo does both"), "{begun}");
         demo.wait_for("playing: the seats are on the cue");
         let run = demo.finish();
         if tries == 2 || run.code != Some(75) {

@@ -216,7 +216,7 @@ fn a_reel_that_ends_before_it_has_reached_the_cue_ends_the_play_and_moves_nobody
     let args = ["--json", "--chase", &chase, "--film-fps", "25", "--tc-start", "01:00:00:00"];
     let run = Playing::start(&rise(&folder, 4), &sim.to(), &args).finish();
     assert_eq!(run.code, Some(0), "{}", run.stderr);
-    assert!(run.stderr.contains("no source can tell of another"), "{}", run.stderr);
+    assert!(run.stderr.contains("no source can report another"), "{}", run.stderr);
     assert!(sim.end().rows.iter().all(|row| row.commanded[0] == 0));
 }
 
@@ -226,7 +226,7 @@ fn a_relay_ends_with_its_lines() {
     let at = folder.write("none", String::new()).parent().expect("it lies in the folder").to_owned();
     let run = kinocue(&["sync", "relay", "ltc:-", "--folder", at.to_str().expect("text")]);
     assert_eq!(run.code, Some(0), "{run:?}");
-    assert!(run.stderr.contains("each line has ended"), "{run:?}");
+    assert!(run.stderr.contains("every line has ended"), "{run:?}");
 }
 
 #[test]
@@ -249,15 +249,15 @@ fn a_source_that_is_none_is_refused_and_so_is_what_a_film_cannot_be_led_with() {
     let (folder, to) = (Folder::new(), ["127.0.0.1:9".to_owned()]);
     let cue = rise(&folder, 2);
     let refused = [
-        (&["--chase", "tape:1"][..], 64, "is no source; take mpv:SOCKET"),
+        (&["--chase", "tape:1"][..], 64, "is not a source; use mpv:SOCKET"),
         (&["--chase", "ltc:nothing.wav"], 71, "nothing.wav cannot be opened"),
         (&["--chase", "ltc:-", "--start", "1"], 64, "cannot be used with"),
-        (&["--chase", "ltc:-", "--film-fps", "26"], 64, "is no frame rate; take"),
+        (&["--chase", "ltc:-", "--film-fps", "26"], 64, "is not a frame rate; take"),
         (&["--chase", "ltc:-", "--film-fps", "25", "--tc-start", "01:00:00:25"], 64, "outside 0..=24"),
         (&["--film-fps", "25"], 64, "--chase"),
-        (&["--chase", "artnet:anybody"], 64, "names no sender"),
+        (&["--chase", "artnet:anybody"], 64, "has no sender"),
         (&["--chase", "mtc:/nowhere/midi"], 71, "/nowhere/midi cannot be opened"),
-        (&["--at", "soon"], 64, "is no time; write"),
+        (&["--at", "soon"], 64, "is not a time; write"),
         (&["--at", "19:00", "--chase", "ltc:-"], 64, "cannot be used with"),
         (&["--at", "19:00,max_error=0ms"], 71, "have chrony or"),
     ];
@@ -288,7 +288,7 @@ fn artnet_of_the_named_sender_leads_the_seat_and_whoever_else_sends_is_named_and
     let to = format!("{here}:6454");
     let _other = sent(&["--artnet", &to, "--from", &foreign, "--tc-start", "01:00:01:00"]);
     let mut playing = Playing::start(&rise(&folder, 4), &sim.to(), &args);
-    playing.wait_for(&format!("{foreign} sends as well, and is not heard"));
+    playing.wait_for(&format!("{foreign} sends as well, and is ignored"));
     let _film = sent(&["--artnet", &to, "--from", &named, "--tc-start", "01:00:00:00"]);
     playing.wait_for("playing: ");
     playing.wait_for("parking: the cue is over");
@@ -307,7 +307,7 @@ fn midi_timecode_of_a_fifo_leads_the_seat_which_rests_once_it_falls_silent() {
     let film = sent(&["--mtc", fifo]);
     playing.wait_for("playing: ");
     drop(film);
-    playing.wait_for("waiting: nothing is heard of the film any more");
+    playing.wait_for("waiting: nothing is received from the film any more");
     playing.signal(Signal::INT);
     let run = playing.finish();
     assert_eq!(run.code, Some(0), "{}", run.stderr);
@@ -372,7 +372,7 @@ fn a_film_is_found_by_its_sound_with_the_index_that_was_made_of_it() {
     };
     assert!(tables.into_iter().any(|table| leads(&table)), "{}", seen.stdout);
     for (foreign, says) in
-        [(film.as_str(), "no index of a film's sound"), ("/nowhere.kidx", "cannot be opened")]
+        [(film.as_str(), "not an index of a film's sound"), ("/nowhere.kidx", "cannot be opened")]
     {
         let refused = kinocue(&["sync", "watch", &format!("sound:-,index={foreign}")]);
         assert!(refused.code != Some(0) && refused.stderr.contains(says), "{refused:?}");

@@ -67,7 +67,7 @@ fn a_controller_that_falls_silent_is_given_up_and_joins_again_once_it_speaks_whi
     tell(&hall.control, "2@mute=1");
     playing.wait_for("c2: lost: frames to it, or its acks, were missing for over 50 ms");
     tell(&hall.control, "2@mute=0");
-    playing.wait_for("c2: back as it was; it joins again from where it stands");
+    playing.wait_for("c2: back as it was; it rejoins from where it is");
     playing.wait_for("c2: takes part again");
     let report = playing.finish().report_of(0);
     let [first, second] = [0, 1].map(|index: usize| &report["controllers"][index]);

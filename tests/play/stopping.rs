@@ -70,7 +70,7 @@ fn a_second_ctrl_c_ends_at_once_and_the_next_play_parks_the_seat_that_was_left_b
     playing.signal(Signal::INT);
     // Twice within an instant is one press that came by two ways.
     playing.signal(Signal::INT);
-    playing.wait_for("half a second from now on Ctrl-C again would end it at once");
+    playing.wait_for("Ctrl-C again, half a second from now or later, ends it at once");
     playing.wait_for("Ctrl-C again ends at once");
     playing.signal(Signal::INT);
     let run = playing.finish();

@@ -75,7 +75,7 @@ fn a_turntable_that_nobody_asked_where_it_is_is_sent_nothing() {
     let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
     let run = kinocue(&["play", cue, "--config", config, "--no-acks"]);
     assert_eq!(run.code, Some(75), "{run:?}");
-    assert!(run.stderr.contains("C1: has a rotary axis, and does not tell where"), "{}", run.stderr);
+    assert!(run.stderr.contains("C1: has a rotary axis, and does not report"), "{}", run.stderr);
     assert_eq!(sim.end().motion(), 0);
 }
 

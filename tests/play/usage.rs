@@ -32,7 +32,7 @@ fn wrong_use_is_64_and_says_what_is_wrong() {
         (&["--to", to, "--config", "hall.toml"], "--config"),
         (&["--to", "127.0.0.1"], "port"),
         (&["--to", "127.0.0.1:0"], "port"),
-        (&["--to", "0.0.0.0:7408"], "--to 0.0.0.0:7408: is no destination"),
+        (&["--to", "0.0.0.0:7408"], "--to 0.0.0.0:7408: is not a destination"),
         (&["--to", "127.0.0.1:7408,axis=2"], "axis"),
         (&["--to", "127.0.0.1:7408,axes=13"], "12"),
         (&["--to", "127.0.0.1:7408,offset=2"], "offset"),

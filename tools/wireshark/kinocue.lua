@@ -57,7 +57,7 @@ local ANSWERS = {
 local ERRORS = {
   [0] = "unspecified",
   [7] = "the servo is of another model",
-  [17] = "the play time began too long",
+  [17] = "the play time is too long at the start",
   [20] = "UDP memory overflow",
   [21] = "UDP data buffer overflow; needs a reset",
 }
@@ -191,7 +191,7 @@ local function fault(byte, why, ...)
 end
 
 local function no_axes(byte, found)
-  return fault(byte, "%d names no number of axes; 3 to 12 axes are possible", found)
+  return fault(byte, "%d does not fit 3 to 12 axes", found)
 end
 
 local function ends(len, need)
@@ -199,7 +199,7 @@ local function ends(len, need)
 end
 
 local function goes_on(len, need)
-  return fault(need, "goes on to %d bytes; this message takes %d", len, need)
+  return fault(need, "continues to %d bytes; this message takes %d", len, need)
 end
 
 local function port_len(vibrating)
@@ -313,13 +313,13 @@ local function read(tvb)
   if confirm ~= expected then
     return fault(0, wrong, confirm, expected)
   elseif not is then
-    return fault(4, "function code %04x is none that belongs here", code)
+    return fault(4, "function code %04x does not belong here", code)
   end
   local header_len = is.kind == "status" and 10 or HEADER_LEN
   if len < header_len then
     return fault(len, short, len, header_len)
   elseif not FUNCTIONS[code] then
-    return fault(4, "function code %04x is none that belongs here", code)
+    return fault(4, "function code %04x does not belong here", code)
   end
   local message = { is = is, code = code, low = code % 256 }
   if is.kind == "motion" then

@@ -33,15 +33,15 @@ pub(crate) enum IndexingError {
     )]
     NoPlayer(#[source] io::Error),
     /// The player gave up.
-    #[error("mpv does not play it ({0}); see what `mpv --no-video` says of it")]
+    #[error("mpv does not play it ({0}); see what `mpv --no-video` reports")]
     Player(std::process::ExitStatus),
     /// There is not enough to be heard.
     #[error(
-        "it has {0:.1} s of sound, and {LEAST_S} s are needed; see that it is the film, and that its sound is in it"
+        "it has {0:.1} s of sound, but {LEAST_S} s are needed; make sure that it is the film, with its sound"
     )]
     Short(f64),
     /// All of it is silence.
-    #[error("nothing is to be heard in it; see that its sound is in it")]
+    #[error("it is silent; make sure that it has the sound of the film")]
     Silent,
 }
 

@@ -105,7 +105,7 @@ pub(crate) enum FilmError {
     },
     /// The day has no such time, as where clocks are set forward.
     #[error(
-        "there is no such time in this machine's time zone; write it with its offset, as 2026-11-21T19:00:00+01:00"
+        "there is no such time in this machine's time zone; write it with its offset, such as 2026-11-21T19:00:00+01:00"
     )]
     NoSuchTime,
     /// There are too many of them.
@@ -113,7 +113,7 @@ pub(crate) enum FilmError {
     Many(usize),
     /// There is no line that could be relayed.
     #[error(
-        "{0} is no line that a relay reads; take ltc:alsa:DEVICE, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:- or mtc:DEVICE"
+        "{0} is not a line that a relay reads; take ltc:alsa:DEVICE, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:- or mtc:DEVICE"
     )]
     NoLine(String),
     /// The system starts no further thread.

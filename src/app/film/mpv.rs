@@ -87,7 +87,7 @@ impl MpvPlayer {
             notes.garbage = client.garbage();
             let other = client.path().filter(|open| !self.args.counts(Some(open)));
             notes.refused = other.map(|open| {
-                format!("{open} is none of its films, so it leads nobody; if it should, name it in films of [sync.mpv]")
+                format!("{open} is not one of its films, so no seat follows it; if seats should, add it to films of [sync.mpv]")
             });
             notes.trouble = None;
         });

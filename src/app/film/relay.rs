@@ -139,7 +139,7 @@ mod tests {
         let source = FilmSource::Ltc(SoundLine::Stdin);
         let listeners = Listeners::serve(&source, folder.path()).unwrap();
         let refused = RelayedRead::begin(UnixStream::connect(&socket).unwrap(), LineKind::Ltc).err().unwrap();
-        assert!(refused.to_string().contains("has no line now"), "{refused}");
+        assert!(refused.to_string().contains("has no line at present"), "{refused}");
 
         let mut line = listeners.begin();
         let join = || RelayedRead::begin(UnixStream::connect(&socket).unwrap(), LineKind::Ltc).unwrap();

@@ -43,11 +43,11 @@ impl<R: Read> RelayedRead<R> {
         let fault = |what: String| io::Error::new(io::ErrorKind::InvalidData, what);
         match stream.read_exact(&mut greeted) {
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-                Err(fault("the relay has no line now; its log says why".to_owned()))
+                Err(fault("the relay has no line at present; its log says why".to_owned()))
             }
             Err(error) => Err(error),
             Ok(()) if greeted != wanted.as_bytes() => {
-                Err(fault(format!("it is no relay of {}", kind.name())))
+                Err(fault(format!("it does not relay {}", kind.name())))
             }
             Ok(()) => Ok(Self { stream, bytes: [0; BLOCK], newest: MonoTime::default() }),
         }
@@ -69,7 +69,7 @@ impl<R: Read> RelayedRead<R> {
         let now = Monotonic.now();
         let is_sound = (1..=BLOCK).contains(&length) && (self.newest..=now).contains(&at);
         if !is_sound || now.since(at) > OLDEST {
-            let what = "the relay sends what was not read just now; see that one kinocue serves both ends";
+            let what = "the relay sends a wrong time or length; use the same version of kinocue at both ends";
             return Err(io::Error::new(io::ErrorKind::InvalidData, what));
         }
         self.newest = at;
@@ -105,7 +105,10 @@ mod tests {
             let mut relayed = said(&text).unwrap();
             let fault = std::iter::from_fn(|| relayed.next().map(|one| one.map(|_| ())).transpose())
                 .find_map(Result::err);
-            assert!(fault.is_some_and(|fault| fault.to_string().contains("not read just now")), "{bytes:?}");
+            assert!(
+                fault.is_some_and(|fault| fault.to_string().contains("wrong time or length")),
+                "{bytes:?}"
+            );
         }
         let cut = [greeting(LineKind::Ltc).as_bytes(), &record(b"xyz", now)[..11]].concat();
         assert!(said(&cut).unwrap().next().is_err());

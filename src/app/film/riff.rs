@@ -21,13 +21,11 @@ pub(crate) enum RiffFault {
          it, as with ffmpeg -i IN.wav -c:a pcm_s16le OUT.wav"
     )]
     Format(WavFormat),
-    #[error("it begins like a WAV file and does not say of what kind its samples are; make it anew")]
+    #[error("it begins like a WAV file but does not state its sample format; make it again")]
     NoFormat,
-    #[error(
-        "it has {has} channels, and timecode is to be read from channel {wanted}; see channel in [sync.ltc]"
-    )]
+    #[error("it has {has} channels, but timecode is read from channel {wanted}; see channel in [sync.ltc]")]
     Channel { has: usize, wanted: u8 },
-    #[error("it begins like a WAV file and has no samples")]
+    #[error("it begins like a WAV file but has no samples")]
     NoData,
 }
 

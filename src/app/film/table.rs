@@ -285,14 +285,14 @@ impl SourceRow {
         let Self { source, notes, .. } = self;
         let foreign = notes
             .foreign_from
-            .map(|from| format!("{source}: {from} sends as well, and is not heard; see who that is"));
+            .map(|from| format!("{source}: {from} sends as well, and is ignored; find out what it is"));
         let set = (notes.clock_steps > 0).then(|| {
             format!("{source}: the system's clock was set while the film ran; the film goes on as it was")
         });
         let sentences = [&notes.trouble, &notes.refused].into_iter().flatten();
         let sentences = sentences.map(|why| format!("{source}: {why}"));
         let coarse = (self.state == FilmState::Locked && !self.may_lead).then(|| {
-            format!("{source}: too coarse to lead seats; --allow-coarse, or allow_coarse in [sync], allows it if it has to")
+            format!("{source}: too coarse for seats to follow; --allow-coarse, or allow_coarse in [sync], permits it")
         });
         sentences.chain(foreign).chain(set).chain(coarse).collect()
     }

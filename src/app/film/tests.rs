@@ -177,7 +177,7 @@ fn two_halls_hear_through_a_relay_what_its_devices_carry_and_hear_it_again_once_
     let at = |kind: &str| format!("{kind}:relay:{}", folder.path().join(format!("{kind}.sock")).display());
     let halls = [(); 2].map(|()| listen(&[at("mtc"), at("ltc")]));
     let is_without =
-        |row: &SourceRow| row.notes.trouble.as_deref().is_some_and(|why| why.contains("no line now"));
+        |row: &SourceRow| row.notes.trouble.as_deref().is_some_and(|why| why.contains("no line at present"));
     until(&halls[0], "no device", |table| is_without(&table.sources[0]));
     assert_eq!(fifo(&folder, "midi"), midi, "it is plugged in");
 
@@ -204,7 +204,7 @@ fn what_has_no_device_is_not_relayed() {
     for source in ["mpv:/s", "artnet:10.0.0.20", "ltc:reel.wav", "ltc:relay:/run/ltc.sock", "clock:19:00"] {
         let args = FilmArgs::of(source.parse().expect("it is a source"));
         let error = FilmReader::relay(&[args], folder.path()).expect_err(source).to_string();
-        assert!(error.contains("is no line that a relay reads; take ltc:alsa:DEVICE"), "{error}");
+        assert!(error.contains("is not a line that a relay reads; take ltc:alsa:DEVICE"), "{error}");
     }
 }
 
@@ -246,7 +246,7 @@ fn a_player_leads_nobody_with_a_film_that_is_none_of_its_own() {
         row.notes
             .refused
             .as_deref()
-            .is_some_and(|why| why.starts_with("/srv/trailer.mkv is none of its films"))
+            .is_some_and(|why| why.starts_with("/srv/trailer.mkv is not one of its films"))
     );
     assert_eq!((row.used, row.state), (0, FilmState::Absent));
     next.send(()).expect("it lives");

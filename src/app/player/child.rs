@@ -124,7 +124,7 @@ impl PlayerProcess {
             }
             Monotonic.sleep_until(Monotonic.now() + LOOK);
         }
-        if shared.is_over() { Ok(None) } else { Err("mpv does not answer; see what holds it up".to_owned()) }
+        if shared.is_over() { Ok(None) } else { Err("mpv does not answer; see what blocks it".to_owned()) }
     }
 
     /// How it ended, where it has.
@@ -144,14 +144,14 @@ impl Drop for PlayerProcess {
 fn why_none(status: ExitStatus) -> String {
     match status.code() {
         Some(NONE) => {
-            "mpv is not installed; install it (`apt-get install mpv`), and it is started by itself".to_owned()
+            "mpv is not installed; install it (`apt-get install mpv`), and it starts by itself".to_owned()
         }
         Some(NOT_HERE) => {
             "mpv may not be started here; the service's sandbox keeps it out (docs/configuration.md, [film])"
                 .to_owned()
         }
         _ => format!(
-            "mpv ended as it began ({status}); see that mpv shows a film here as this user, and what [film] says of screen and sound"
+            "mpv ended at its start ({status}); try mpv as this user on this machine, and check screen and sound in [film]"
         ),
     }
 }
@@ -179,5 +179,5 @@ pub(crate) fn film_length_s(film: &Path) -> Result<f64, String> {
     let length = text.lines().find_map(|line| line.strip_prefix("length ")?.trim().parse::<f64>().ok());
     length
         .filter(|length| *length > 0.0)
-        .ok_or_else(|| format!("mpv does not know how long {} is; name a film that it plays", film.display()))
+        .ok_or_else(|| format!("mpv does not know how long {} is; give a film that it plays", film.display()))
 }

@@ -77,7 +77,7 @@ impl Deck {
     /// Why it ended, where it was not to.
     fn one(&mut self) -> Result<(), String> {
         let mut running = self.starter.start().map_err(|error| {
-            format!("no process could be started for mpv: {error}; look at the service's limits")
+            format!("no process could be started for mpv: {error}; check the limits of the service")
         })?;
         let Some(stream) = running.connect(&self.starter, &self.shared)? else { return Ok(()) };
         let ended = MpvTalk::new(stream, self.shared.clone()).and_then(|mut talk| self.keep(&mut talk));
@@ -88,7 +88,7 @@ impl Deck {
             Err(error) => {
                 let why = how(&mut running, &error);
                 self.shared.note(|state| (state.ends, state.ended) = (state.ends + 1, why.clone()));
-                Err(format!("{why}; it is started again, with its film paused where it was"))
+                Err(format!("{why}; it is restarted, with its film paused where it was"))
             }
         }
     }
@@ -188,7 +188,7 @@ impl Deck {
         let opened = talk.open(&name)?;
         self.reel.iter_mut().for_each(|reel| reel.tried = true);
         if let Err(why) = opened {
-            let trouble = format!("the film {name} cannot be shown: {why}; see that `mpv` plays it");
+            let trouble = format!("the film {name} cannot be shown: {why}; check that `mpv` plays it");
             self.shared.note(|state| state.trouble = Some(trouble));
             return Ok(());
         }

@@ -37,7 +37,7 @@ pub(super) fn clear_up(
 ) {
     let told = |what: &str, result: io::Result<()>| {
         if let Err(error) = result {
-            link.trouble(Some(format!("{what} of before the start could not be recovered: {error}")));
+            link.trouble(Some(format!("{what} from before the start could not be recovered: {error}")));
         }
     };
     if let Some(leftover) = leftover {
@@ -109,14 +109,14 @@ fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     let (recovered, out) =
         record::recover(input, BufWriter::new(File::create(to)?)).map_err(io::Error::other)?;
     if recovered.messages.is_empty() {
-        return Err(io::Error::other("it has no whole message"));
+        return Err(io::Error::other("it has no complete message"));
     }
     out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
     let again = Patient { file: BufReader::new(File::open(to)?), may };
     let unwanted = Wanted { samples: false, full: false, ..Wanted::ALL };
     let read = record::read(again, unwanted, &mut |_, _, _| ()).map_err(io::Error::other)?;
     if read.trouble.is_some() || read.messages != recovered.messages {
-        return Err(io::Error::other("what was written does not read back; the disk may be failing"));
+        return Err(io::Error::other("the written file does not read back; the disk may be failing"));
     }
     Ok(())
 }

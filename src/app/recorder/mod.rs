@@ -123,7 +123,7 @@ impl Drop for TellsOfPanic {
         if thread::panicking() {
             self.0.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
             self.0.trouble(Some(
-                "nothing is recorded any more: the recorder failed; restart the service between two shows"
+                "recording has stopped: the recorder failed; restart the service between two shows"
                     .to_owned(),
             ));
         }

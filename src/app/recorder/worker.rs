@@ -302,9 +302,9 @@ impl Worker {
             (show.file, show.again_at) = (None, Some(now + AGAIN));
         }
         self.link.tell(|status| status.recording = None);
-        let remedy = "make room on that disk, or set [record] dir to a folder that the service may write to";
+        let remedy = "free space on that disk, or set [record] dir to a folder that the service may write to";
         self.link.trouble(Some(format!(
-            "the show is not recorded: {dir}: {error}; the show goes on, and another file is tried every 30 s; {remedy}"
+            "the show is not recorded: {dir}: {error}; {remedy}; the show goes on, and a new file is tried every 30 s"
         )));
     }
 
@@ -312,7 +312,7 @@ impl Worker {
         self.incident = None;
         let dir = self.disk.dir().display();
         self.link.trouble(Some(format!(
-            "an incident is not kept: {dir}: {error}; make room on that disk, or set [record] dir"
+            "an incident is not kept: {dir}: {error}; free space on that disk, or set [record] dir"
         )));
     }
 
@@ -376,7 +376,7 @@ impl Worker {
             let before = self.show.as_mut().and_then(|show| show.file.take());
             self.open_part(now);
             if let Some(Err(error)) = before.map(|open| self.close_file(open, None)) {
-                self.link.trouble(Some(format!("a part of a recording is not whole: {error}")));
+                self.link.trouble(Some(format!("a part of a recording is incomplete: {error}")));
             }
         }
     }

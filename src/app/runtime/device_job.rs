@@ -144,7 +144,7 @@ fn home_all(
         seats.into_iter().map(|lane| (lane, stations[lane].connection.dialect)).collect();
     let would_not_search = unsearched(talk, &seats).into_iter().map(|(lane, why)| (lane, why.to_string()));
     let unsearched = others.iter().filter(|lane| is_unsearched(&config.controllers[**lane]));
-    let here = || "its home is where it stands; stop the service, and home it by `kinocue home`".to_owned();
+    let here = || "its home is where it is; stop the service, and use `kinocue home --config`".to_owned();
     let refused: Vec<_> = would_not_search.chain(unsearched.map(|lane| (*lane, here()))).collect();
     if !refused.is_empty() {
         return refused.into_iter().map(|(lane, why)| (lane, Err(why))).collect();
@@ -154,7 +154,7 @@ fn home_all(
     let results = results.into_iter().map(|one| one.map(drop).map_err(|error| error.to_string()));
     let told: BTreeMap<_, _> = told.iter().collect();
     let of_link = |lane: usize| {
-        let gone = || Err("the thread of its link has ended; start the service again".to_owned());
+        let gone = || Err("the thread of its link has ended; restart the service".to_owned());
         (lane, told.get(&lane).cloned().unwrap_or_else(gone))
     };
     let results = seats.iter().map(|(lane, _)| *lane).zip(results);

@@ -277,6 +277,11 @@ impl Runtime {
         &self.handle.config
     }
 
+    /// The control plane's ends of its serial links.
+    pub(super) fn links(&self) -> &[LinkEnd] {
+        &self.handle.links
+    }
+
     /// True if no frame asks for a reply.
     pub(super) const fn is_silent(&self) -> bool {
         self.silent

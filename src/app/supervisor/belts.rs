@@ -38,7 +38,7 @@ impl Unbuckled<'_> {
     fn words(&self) -> String {
         let of =
             |mask| numbers(mask).iter().map(|input| format!("X{input:02}")).collect::<Vec<_>>().join(", ");
-        self.open.map_or_else(|| "does not tell of its belts".to_owned(), of)
+        self.open.map_or_else(|| "does not report its belts".to_owned(), of)
     }
 
     fn warning(&self) -> Warning {
@@ -52,7 +52,7 @@ impl Unbuckled<'_> {
             severity: if self.holds { Severity::Warning } else { Severity::Info },
             controller: Some(self.controller.name.clone()),
             text,
-            remedy: format!("{remedy}have it buckled, or take the seat out where nobody sits"),
+            remedy: format!("{remedy}buckle it, or disable the seat if nobody sits there"),
         }
     }
 }
@@ -84,7 +84,7 @@ pub(super) fn check(hall: &HallContext) -> Result<(), Problem> {
     match awaited(hall, &hall.live.table()) {
         None => Ok(()),
         Some(who) => {
-            let remedy = "have them buckled, or take out the seats where nobody sits";
+            let remedy = "buckle them, or disable the seats where nobody sits";
             Err(Problem::new(Code::State, format!("cannot go: not buckled: {who}"), remedy))
         }
     }
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn a_belt_of_which_nobody_tells_is_not_closed_and_a_seat_that_is_out_needs_none() {
         let mut rig = armed(Belts::One, [None, Some(0)]);
-        assert_eq!(refused(&mut rig), "cannot go: not buckled: A1 (does not tell of its belts)");
+        assert_eq!(refused(&mut rig), "cannot go: not buckled: A1 (does not report its belts)");
         assert_eq!(rig.supervisor.status().controllers[0].belts_open, None);
         rig.ask(Command::Disable { name: "A1".to_owned(), why: None }).unwrap();
         rig.ask(Command::Go).unwrap();

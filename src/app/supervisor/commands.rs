@@ -76,8 +76,8 @@ impl Features {
             return Err(if is_absent(name, hall) {
                 Problem::new(
                     Code::State,
-                    format!("{name} is out for good: the configuration says enabled = false"),
-                    "take that line out of its [[controller]], and reload",
+                    format!("{name} is disabled in the configuration (enabled = false)"),
+                    "remove that line from its [[controller]], and reload",
                 )
             } else {
                 no_controller(name)
@@ -122,7 +122,7 @@ fn go_from(film: ShowTime, who: &Who, hall: &HallContext) -> Result<Vec<Act>, Pr
     belts::check(hall)?;
     if hall.mirror.state != State::Armed {
         let detail = format!("cannot go from {film} while {}", hall.mirror.state);
-        return Err(Problem::new(Code::State, detail, "arm first; while it plays or is paused, seek"));
+        return Err(Problem::new(Code::State, detail, "arm first; while the cue plays or is paused, seek"));
     }
     let mut acts = seek(film, hall)?;
     acts.extend([Act::Otherwise(vec![Act::Stage(ShowChange::Rewind)]), go(who)]);

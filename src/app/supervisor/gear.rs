@@ -33,16 +33,16 @@ impl GearLimits {
         };
         let mirror = &hall.mirror;
         if mirror.state == State::Paused && self.paused != Some(mirror.since) {
-            return refused("it did not pause the hall", "a person goes on where a person paused");
+            return refused("it did not pause the hall", "let a person resume it");
         }
         match ask {
             Command::Resume if !hall.is_on_cue() => {
-                refused("nothing is paused", "a person looks at the hall first")
+                refused("nothing is paused", "let a person check the hall first")
             }
             Command::Enable(name)
                 if hall.settings.out.get(group(hall, name)).is_some_and(|out| !out.surface.is_gear()) =>
             {
-                refused(&format!("it did not take {name} out"), "a person takes in whom a person took out")
+                refused(&format!("it did not disable {name}"), "let a person enable it")
             }
             _ => Ok(()),
         }
@@ -75,8 +75,8 @@ pub(super) fn levels(change: &LevelsChange, hall: &HallContext) -> Result<Vec<Ac
     settings.change_below(&change)?;
     let mut acts = vec![Act::Stage(ShowChange::Settings(Box::new(settings)))];
     if !over.is_empty() {
-        let detail = format!("a person has set less than was asked for: {}", over.join(", "));
-        let remedy = "a person raises it, on the console or with `kinocue level`";
+        let detail = format!("a person has set a lower level: {}", over.join(", "));
+        let remedy = "let a person raise it, on the console or with `kinocue level`";
         acts.push(Act::Fail(Problem::new(Code::Role, detail, remedy)));
     }
     Ok(acts)
@@ -165,7 +165,7 @@ mod tests {
         rig.ask_as(Surface::Osc, disable()).unwrap();
         rig.ask_as(Surface::Osc, enable()).unwrap();
         rig.ask(disable()).unwrap();
-        assert!(role(rig.ask_as(Surface::Osc, enable())).ends_with("it did not take A1 out"));
+        assert!(role(rig.ask_as(Surface::Osc, enable())).ends_with("it did not disable A1"));
         rig.ask_as(Surface::Osc, disable()).unwrap();
         role(rig.ask_as(Surface::Osc, enable()));
         rig.ask(enable()).unwrap();

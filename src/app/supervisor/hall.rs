@@ -149,12 +149,12 @@ impl HallContext {
     /// Why it may not.
     pub(super) fn is_free(&self) -> Result<(), Problem> {
         if self.is_closing() {
-            return Err(Problem::new(Code::Busy, "the hall is being closed", "ask again in a second"));
+            return Err(Problem::new(Code::Busy, "the hall is closing", "try again in a second"));
         }
         match self.job {
             None => Ok(()),
             Some(word) => {
-                Err(Problem::new(Code::Busy, format!("{word} is under way"), "ask again when it is done"))
+                Err(Problem::new(Code::Busy, format!("{word} is under way"), "try again when it is done"))
             }
         }
     }

@@ -84,7 +84,7 @@ impl HallSettings {
             faults.push(format!("there is no effect {name}"));
         }
         if !faults.is_empty() {
-            let remedy = "give levels from 0 to 1, and names of the configuration";
+            let remedy = "give levels from 0 to 1, and rows and effects of the configuration";
             return Err(Problem::new(Code::Value, "levels not changed", remedy).with(faults));
         }
         apply(&mut self.levels, change);

@@ -115,7 +115,7 @@ fn new_zeros(hall: &HallContext) -> impl Iterator<Item = Act> {
         let controller = &hall.config.controllers[lane];
         let (name, axis) = (&controller.name, controller.seat.rotary_axis()? + 1);
         Some(Act::Note(format!(
-            "{name}: axis {axis} does not search its zero: where it stands now becomes its 0; stop if that is wrong, turn it, and home \
+            "{name}: axis {axis} has no search for its zero: its position now becomes 0; if that is wrong, stop, turn it, and home \
              again"
         )))
     })
@@ -212,7 +212,7 @@ mod tests {
         let mut homing = Homing::default();
         let acts = told(&mut homing, &SupervisorEvent::Entered(State::Homing), &hall);
         let [Act::Note(note), Act::Start(_)] = &acts[..] else { panic!("{acts:?}") };
-        assert!(note.starts_with("B1: axis 1 does not search its zero: where it stands now"), "{note}");
+        assert!(note.starts_with("B1: axis 1 has no search for its zero: its position now"), "{note}");
     }
 
     #[test]

@@ -176,7 +176,7 @@ impl Jobs {
             Ok(result) => Ok(result),
             Err(TryRecvError::Empty) => return None,
             Err(TryRecvError::Disconnected) => {
-                Err(Problem::new(Code::Check, "it ended before it was done", "look at the journal"))
+                Err(Problem::new(Code::Check, "it ended before it was done", "see the log of the service"))
             }
         };
         let (_, asked) = self.running.take()?;

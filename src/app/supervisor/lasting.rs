@@ -75,7 +75,7 @@ impl Lasting {
             }
         }
         let words = self.came_back.as_ref();
-        out.extend(words.map(|words| kept(format!("as it was before the start: {words}"))));
+        out.extend(words.map(|words| kept(format!("restored from before the start: {words}"))));
     }
 
     /// What is worth a word of it.
@@ -90,15 +90,15 @@ impl Lasting {
         };
         let mut notes = Vec::new();
         for (group, out) in &hall.settings.out {
-            let remedy = "take it in once it is whole";
+            let remedy = "enable it once it is repaired";
             notes.extend(
                 hall.names_of(group)
                     .map(|name| note("seat-out", Some(name.to_owned()), out.words(&now), remedy)),
             );
         }
         notes.extend(self.came_back.as_ref().map(|words| {
-            let remedy = "set anew what is to be otherwise today";
-            note("kept", None, format!("as it was before the start: {words}"), remedy)
+            let remedy = "change what should be different today";
+            note("kept", None, format!("restored from before the start: {words}"), remedy)
         }));
         notes
     }

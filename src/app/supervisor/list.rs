@@ -39,7 +39,7 @@ impl List {
             let faults = faults.iter().map(ToString::to_string).collect();
             let detail = format!("the playlist {id} cannot be played");
             return Err(
-                Problem::new(Code::Check, detail, "put right what is named, and load it again").with(faults)
+                Problem::new(Code::Check, detail, "correct these faults, and load it again").with(faults)
             );
         }
         let about = |entry: &Entry| {

@@ -16,7 +16,6 @@ mod hall_settings;
 mod homing;
 mod job;
 mod lasting;
-mod links;
 mod list;
 mod perform;
 mod player;
@@ -27,6 +26,7 @@ mod readiness;
 mod record;
 mod recorded;
 mod reload;
+mod seat_places;
 mod seat_test;
 mod seat_testing;
 mod service_log;
@@ -402,7 +402,7 @@ impl Supervisor {
         let latched = self.hall.mirror.state.is_latched();
         if latched {
             let (state, cause) = (self.hall.mirror.state, self.hall.cause());
-            self.note(format!("the hall was in {state} before the configuration was read anew: {cause}"));
+            self.note(format!("the hall was in {state} before the configuration was reloaded: {cause}"));
         }
         Carryover {
             settings: Some(self.settings()),

@@ -2,6 +2,7 @@
 
 use super::act::{Act, ShowBegun, SupervisorEvent};
 use super::hall::{ShowChange, Undo};
+use super::job::Job;
 use super::procedures::Awaited;
 use super::reload::reload;
 use super::state_mirror::{ANSWER, busy};
@@ -63,12 +64,7 @@ impl Supervisor {
                 self.hall.forget_place();
                 self.happens(&SupervisorEvent::Begun(&begun));
             }
-            Act::Start(job) => {
-                self.hall.is_free()?;
-                let word = job.word();
-                self.jobs.start(job, || self.procedures.first().asked.take())?;
-                self.hall.job = Some(word);
-            }
+            Act::Start(job) => self.start(job)?,
             Act::Take(result) => {
                 let acts = self.features.take(result, &self.hall)?;
                 self.procedures.first().go_on_with(acts);
@@ -92,6 +88,15 @@ impl Supervisor {
             Act::Log(line) => self.ports.service_log.put(line),
             Act::Record(event) => self.features.records.event(event),
         }
+        Ok(())
+    }
+
+    /// Starts what takes longer than the supervisor waits, one at a time.
+    fn start(&mut self, job: Job) -> Result<(), Problem> {
+        self.hall.is_free()?;
+        let word = job.word();
+        self.jobs.start(job, || self.procedures.first().asked.take())?;
+        self.hall.job = Some(word);
         Ok(())
     }
 

@@ -80,7 +80,7 @@ impl FilmShown {
     fn note_end(&mut self, hall: &HallContext) -> Option<Act> {
         let state = hall.player.as_ref()?.state();
         let is_new = self.ends.replace(state.ends).is_some_and(|noted| noted < state.ends);
-        let note = || format!("{}; once its film is back, paused where it was, resume", state.ended);
+        let note = || format!("{}; resume once the film is back, paused where it was", state.ended);
         is_new.then(|| Act::Note(note()))
     }
 }
@@ -105,7 +105,7 @@ fn apart(movie: &str, length_s: f64, cue: &str, until_s: f64) -> Option<String> 
         (format!("{movie} is {length_s:.1} s long"), format!("{cue} ends at {until_s:.1} s of it"));
     if over_s > ALIKE_S {
         Some(format!(
-            "{of_film}, and {of_cue}; the seats park there, and the next entry to go cuts the rest of the film"
+            "{of_film}, and {of_cue}; the seats park there, and the next entry that starts cuts off the rest of the film"
         ))
     } else if over_s < -ALIKE_S {
         Some(format!(

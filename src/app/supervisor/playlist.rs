@@ -70,7 +70,7 @@ impl Onward {
             return Err(Problem::new(
                 Code::Unknown,
                 format!("there is no entry {} in a playlist of {count}", entry.saturating_add(1)),
-                "choose one that there is; the API counts them from 0",
+                "choose an existing one; the API counts them from 0",
             ));
         }
         hall.may("load")?;
@@ -203,10 +203,10 @@ impl Onward {
         let cue = list.playlist.entries[entry].cue.to_string();
         if hall.mirror.state != State::Armed {
             let state = hall.mirror.state;
-            let note = format!("{cue} was to start now, but nobody had armed the hall: it was {state}");
+            let note = format!("{cue} was due to start, but nobody had armed the hall: it was {state}");
             return vec![Act::Note(note)];
         }
-        let mut acts = vec![Act::Name(format!("{cue} was to start now"))];
+        let mut acts = vec![Act::Name(format!("{cue} was due to start"))];
         match hall.is_free() {
             Err(problem) => acts.push(Act::Fail(problem)),
             Ok(()) if self.is_entry(entry, hall) => acts.extend(starting(Start::Time)),

@@ -144,7 +144,7 @@ pub(super) fn name_of(who: &Who, hall: &HallContext) -> String {
 pub(super) fn mark(text: Option<&str>, who: &Who, hall: &HallContext) -> Result<Vec<Act>, Problem> {
     records(hall)?;
     let text = text.map_or(Ok(None), Out::reason).map_err(|fault| {
-        Problem::new(Code::Value, fault, format!("say it in a line of {LONGEST_WHY} characters at the most"))
+        Problem::new(Code::Value, fault, format!("give one line of at most {LONGEST_WHY} characters"))
     })?;
     let film_s = hall.live.show().as_secs_f64();
     let note = MarkNote { film_s, text: text.unwrap_or_default(), who: name_of(who, hall) };

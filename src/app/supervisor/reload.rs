@@ -81,8 +81,8 @@ pub(super) fn reload(hall: &HallContext, path: &Path) -> Result<Arc<Config>, Pro
         State::Boot | State::Recovering | State::Parked | State::Stopped | State::Fault
     );
     if !idle {
-        let detail = format!("cannot read the configuration anew while {}", hall.mirror.state);
-        return Err(Problem::new(Code::State, detail, "park, and disarm first"));
+        let detail = format!("cannot reload the configuration while {}", hall.mirror.state);
+        return Err(Problem::new(Code::State, detail, "park and disarm first"));
     }
     hall.is_free()?;
     let config = config::load(path).map_err(|faults| {

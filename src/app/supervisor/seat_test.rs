@@ -108,7 +108,7 @@ impl SeatTest {
     pub(super) fn make(config: &Config) -> Result<(Box<Self>, Box<ProvedShow>), Problem> {
         let (parts, cue) = script(config);
         let cue = cue.build().map_err(|faults| {
-            Problem::new(Code::Check, "no test fits these seats", "look at their park poses")
+            Problem::new(Code::Check, "no test fits these seats", "check their park poses")
                 .with(faults.to_string().lines().map(str::to_owned).collect())
         })?;
         let cued = ProvedShow::prove("test".to_owned(), config, Timeline::new(cue), String::new())?;

@@ -22,7 +22,7 @@ impl SeatTesting {
     pub(super) fn make(rows: &[String], hall: &HallContext) -> Result<Vec<Act>, Problem> {
         may_test(hall)?;
         if let Some(row) = rows.iter().find(|row| !hall.settings.levels.rows.contains_key(*row)) {
-            let remedy = "the status names the rows";
+            let remedy = "`kinocue status` lists the rows";
             return Err(Problem::new(Code::Unknown, format!("there is no row {row}"), remedy));
         }
         hall.is_free()?;

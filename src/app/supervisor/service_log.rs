@@ -71,7 +71,7 @@ impl ServiceLog {
             Ok(())
         };
         if let Err(error) = told {
-            self.say(Priority::Warning, "notify", format!("the service manager cannot be told: {error}"));
+            self.say(Priority::Warning, "notify", format!("cannot notify the service manager: {error}"));
         }
     }
 

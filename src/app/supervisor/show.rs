@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::hall_settings::HallSettings;
 use crate::app::StagedShow;
 use crate::app::staged::{at_any_pace, headroom};
-use crate::config::Config;
+use crate::config::{Config, Misfit};
 use crate::control::{Code, Problem, ShowStatus};
 use crate::engine::{Headroom, Show};
 use crate::film::chase::ChaseRules;
@@ -45,16 +45,10 @@ pub(super) struct ProvedShow {
     /// The film that is shown with it from here.
     pub(super) movie: Option<Movie>,
     /// What the links of the hall execute of it.
-    links: Vec<LinkPlay>,
+    pub(super) links: Vec<LinkPlay>,
 }
 
 impl ProvedShow {
-    /// How far drives on a link are beside it at the most, mm; none where nobody on it plays it.
-    pub(super) fn deviation_on(&self, link: &str) -> Option<f64> {
-        let axes = self.links.iter().filter(|play| play.link == link).flat_map(|play| &play.axes);
-        axes.map(|axis| axis.deviation.value).reduce(f64::max)
-    }
-
     /// Proves a cue for a hall.
     ///
     /// # Errors
@@ -82,16 +76,9 @@ impl ProvedShow {
                 .with(faults)
         };
         let rate = Rate::from_hz(config.show.rate_hz);
-        let misfits = config.misfits(&timeline);
-        if !misfits.is_empty() {
-            let place = |misfit: &crate::config::Misfit| {
-                format!("{}{misfit}", timeline.cue().column_place(&misfit.column(), misfit.at()))
-            };
-            return Err(refused(misfits.iter().map(place).collect()));
-        }
-        let strokes = config.fits_stroke(&timeline).faults;
-        if !strokes.is_empty() {
-            return Err(refused(strokes.iter().map(ToString::to_string).collect()));
+        let faults = faults_of_seats(config, &timeline);
+        if !faults.is_empty() {
+            return Err(refused(faults));
         }
         let paced = film.map(|film| at_any_pace(config, film.rules.pace));
         let paced = paced.as_ref().unwrap_or(config);
@@ -152,7 +139,7 @@ impl ProvedShow {
         };
         let staged = StagedShow::mixed(config, &self.timeline, self.headroom.clone(), show, &mixes, false);
         let staged = staged.map_err(|error| {
-            Problem::new(Code::Check, error.to_string(), "begin elsewhere in the cue, or lower its level")
+            Problem::new(Code::Check, error.to_string(), "start elsewhere in the cue, or lower its level")
         })?;
         let course = &staged.course;
         self.join_s = course.settled().as_secs_f64() - course.start.as_secs_f64();
@@ -172,6 +159,17 @@ const fn motion_at(film: ShowTime, trim_ms: i32) -> ShowTime {
     ShowTime::from_nanos(film.as_nanos() - trim_ms as i64 * 1_000_000)
 }
 
+/// Why a cue does not fit the seats before anything is reckoned: columns that they do not have, places beyond their strokes.
+fn faults_of_seats(config: &Config, timeline: &Timeline) -> Vec<String> {
+    let place =
+        |misfit: &Misfit| format!("{}{misfit}", timeline.cue().column_place(&misfit.column(), misfit.at()));
+    let misfits: Vec<String> = config.misfits(timeline).iter().map(place).collect();
+    if !misfits.is_empty() {
+        return misfits;
+    }
+    config.fits_stroke(timeline).faults.iter().map(ToString::to_string).collect()
+}
+
 /// How a cue that ends there follows the film of a hall, if one leads; an entry of a playlist may name the timecode of its beginning.
 fn film_of(config: &Config, of: &EntryFilm, end: ShowTime) -> Result<Option<FilmStart>, Problem> {
     let refused =
@@ -179,7 +177,7 @@ fn film_of(config: &Config, of: &EntryFilm, end: ShowTime) -> Result<Option<Film
     let named = of.begin;
     let Some(sync) = &config.sync else {
         let why =
-            named.map(|label| refused(format!("film = \"{label}\", and the configuration has no [sync]")));
+            named.map(|label| refused(format!("film = \"{label}\", but the configuration has no [sync]")));
         return why.map_or(Ok(None), Err);
     };
     let (pace, join_above, rejoin) = (sync.pace, sync.join_above, sync.rejoin);

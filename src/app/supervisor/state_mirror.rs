@@ -61,7 +61,7 @@ fn not_loaded(state: State) -> Problem {
 
 /// More commands wait than a person can give.
 pub(super) fn busy() -> Problem {
-    Problem::new(Code::Busy, "too many commands wait for the tick thread", "ask again in a second")
+    Problem::new(Code::Busy, "too many commands wait for the tick thread", "try again in a second")
 }
 
 /// The tick thread says nothing.
@@ -69,6 +69,6 @@ pub(super) fn no_answer() -> Problem {
     Problem::new(
         Code::Timeout,
         format!("the tick thread did not answer within {} s", ANSWER.as_secs()),
-        "look at the status before asking again: it may still be done",
+        "check the status before you repeat the command: it may still take effect",
     )
 }

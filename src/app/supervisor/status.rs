@@ -4,13 +4,14 @@ use jiff::Zoned;
 
 use super::features::Features;
 use super::hall::HallContext;
-use super::{belts, film, links};
+use super::seat_places::SeatPlaces;
+use super::{belts, film};
+use crate::app::links;
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
     ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
-use crate::motion::{AxisGeometry, Pulses};
 use crate::rt::Row;
 use crate::state::Next;
 use crate::time::MonoTime;
@@ -86,7 +87,11 @@ impl StatusParts<'_> {
                 refusals: hall.granted.refusals.clone(),
             },
             controllers: self.controllers(table),
-            links: links::status(hall),
+            links: links::status(
+                &hall.config,
+                &hall.links,
+                hall.cued.as_ref().map_or(&[], |cued| &cued.links),
+            ),
             preflight: preflighted.as_ref().map(|it| it.status(now, |lane| hall.settings.is_on(lane))),
             warnings,
             test: features.seats.test.as_ref().map(|test| test.status.clone()),
@@ -99,8 +104,8 @@ impl StatusParts<'_> {
     fn next(&self) -> String {
         let next = self.hall.mirror.next;
         match self.hall.cued.as_ref().and_then(|cued| cued.left_at) {
-            Some(film) if next == Next::Go => format!("{next}; or go on from {film}, where it was left"),
-            Some(film) if next == Next::Arm => format!("{next}; it can go on from {film}, where it was left"),
+            Some(film) if next == Next::Go => format!("{next}; or go from {film}, where it was left"),
+            Some(film) if next == Next::Arm => format!("{next}; it can go from {film}, where it was left"),
             _ => next.to_string(),
         }
     }
@@ -122,7 +127,8 @@ impl StatusParts<'_> {
         let counts = row.map(|row| row.counts).unwrap_or_default();
         let state = row.map(|row| row.state).unwrap_or_default();
         let ack = row.and_then(|row| row.ack_ns);
-        let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
+        let why = row.map_or_else(|| "not polled yet".to_owned(), |row| row.why.to_string());
+        let SeatPlaces { positions_mm, commanded, measured } = SeatPlaces::of(controller, &state);
         ControllerStatus {
             enabled: hall.settings.is_on(index),
             health: row.map_or(Health::Unknown, |row| row.standing.into()),
@@ -144,11 +150,9 @@ impl StatusParts<'_> {
             inputs: state.inputs.map(|heard| heard.value),
             belts_open: belts::open(controller, &state, now).map(belts::numbers),
             outputs: state.outputs.map(|heard| heard.value),
-            positions_mm: state.measured.or(state.echoed).map(|heard| {
-                let own = controller.seat.own().iter();
-                let place = |(axis, pulses): (&AxisGeometry, &Pulses)| axis.place(axis.fraction(*pulses));
-                own.zip(heard.value.iter()).map(place).collect()
-            }),
+            positions_mm,
+            commanded,
+            measured,
             ..nameplate(controller)
         }
     }
@@ -162,16 +166,17 @@ fn nameplate(controller: &Controller) -> ControllerStatus {
         seat: controller.seat.name.clone(),
         address: controller.address(),
         group: controller.group.clone(),
+        axis_offset: controller.axis_offset,
         rotary_axis: controller.seat.rotary_axis().map(|axis| axis + 1),
         ..ControllerStatus::default()
     }
 }
 
-/// A controller that is out for good: nothing is known of it.
+/// A controller that is disabled in the configuration: nothing is known of it.
 fn absent(controller: &Controller) -> ControllerStatus {
     ControllerStatus {
         health: Health::Out,
-        why: "out for good: enabled = false in the configuration".to_owned(),
+        why: "disabled in the configuration: enabled = false".to_owned(),
         ..nameplate(controller)
     }
 }

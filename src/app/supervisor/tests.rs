@@ -70,7 +70,7 @@ fn a_seat_that_was_taken_out_is_out_after_a_restart_and_whoever_arms_first_is_to
     let said = |id: &str| status.warnings.iter().find(|one| one.id == id).map(|one| one.text.clone());
     let out = said("seat-out").unwrap();
     assert!(out.starts_with("out since ") && out.ends_with(", by anna: broken leg"), "{out}");
-    assert_eq!(said("kept").unwrap(), "as it was before the start: motion 60 %, trim -40 ms, cue one");
+    assert_eq!(said("kept").unwrap(), "restored from before the start: motion 60 %, trim -40 ms, cue one");
     assert!(status.controllers[1].why.contains("broken leg"), "{}", status.controllers[1].why);
     rig.ask(Command::Enable("B1".to_owned())).unwrap();
     assert!(rig.supervisor.settings().out.is_empty());
@@ -153,11 +153,11 @@ fn a_show_that_was_stopped_goes_on_from_there_once_a_person_asks_and_not_before(
     let mut rig = stopped_in_its_midst();
     let status = rig.supervisor.status();
     assert_eq!(status.show.as_ref().unwrap().resume_s, Some(2.5));
-    assert!(status.next.contains("it can go on from 00:02.500"), "{}", status.next);
+    assert!(status.next.contains("it can go from 00:02.500"), "{}", status.next);
     let place = Command::GoFrom(ShowTime::from_millis(2_500));
     assert_eq!(rig.ask(place.clone()).unwrap_err().code, Code::State, "nobody has armed it");
     rig.ask(ARM).unwrap();
-    assert!(rig.supervisor.status().next.contains("or go on from 00:02.500"));
+    assert!(rig.supervisor.status().next.contains("or go from 00:02.500"));
     assert_eq!(rig.ask(Command::GoFrom(ShowTime::from_millis(4_000))).unwrap_err().code, Code::Value);
     rig.ask(place).unwrap();
     assert_eq!(rig.state(), State::Playing(PlayMode::Joining));

@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::status::StatusParts;
-use super::{belts, links, player};
+use super::{belts, player};
+use crate::app::links;
 use crate::control::{Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -49,7 +50,7 @@ impl StatusParts<'_> {
         let of_the_film = hall.film.iter().flat_map(|table| table.read().warnings());
         warnings.extend(of_the_film.map(|sentence| in_two("film", &sentence)));
         warnings.extend(player::warnings(hall).iter().map(|trouble| in_two("player", trouble)));
-        warnings.extend(links::troubles(hall).map(|trouble| in_two("link", &trouble)));
+        warnings.extend(links::troubles(&hall.links).map(|trouble| in_two("link", &trouble)));
         warnings.extend(features.lasting.warnings(hall));
         warnings.extend(hall.recorder.status().trouble.map(|trouble: String| in_two("record", &trouble)));
         warnings.extend(settings_file.map(|trouble| in_two("settings", &trouble)));
@@ -105,7 +106,7 @@ impl StatusParts<'_> {
                 id: "another-master".to_owned(),
                 severity: Severity::Error,
                 controller: Some(controller.name.clone()),
-                text: format!("{answers} answers within a minute to frames that were not sent from here"),
+                text: format!("{answers} acks within a minute of frames that were not sent from here"),
                 remedy: "another machine may drive this seat: find it and stop it, before anybody sits down"
                     .to_owned(),
             })
@@ -118,7 +119,7 @@ impl StatusParts<'_> {
 
     fn of_preflight(&self) -> Option<Warning> {
         let (text, severity) = match &self.features.readiness.preflighted {
-            None => ("preflight was not run since the program started", Severity::Info),
+            None => ("preflight has not been run since the program started", Severity::Info),
             Some(it) if !it.has_passed(|lane| self.hall.settings.is_on(lane)) => {
                 ("preflight failed", Severity::Error)
             }
@@ -156,7 +157,7 @@ fn nobody(table: &[Row], state: State, takes_part: impl FnMut((usize, &Row)) -> 
         id: "no-seat".to_owned(),
         severity: Severity::Error,
         controller: None,
-        text: format!("no seat takes part: \"{state}\" is said of none"),
-        remedy: "take seats in (`kinocue enable`), or see at each what keeps it out".to_owned(),
+        text: format!("no seat takes part: none of them is {state}"),
+        remedy: "enable seats (`kinocue enable`), or see at each why it is out".to_owned(),
     })
 }

@@ -37,7 +37,7 @@ Examples:
   kinocue upload coaster.csv
   kinocue upload \"New Ride v3.mcap\" --id new-ride
 
-Exit codes: 0 taken, 1 it does not pass (every fault is said), 66 no such file, 77 not allowed")]
+Exit codes: 0 in the library, 1 it does not pass (every fault is listed), 66 no such file, 77 not allowed")]
     Upload(UploadArgs),
 }
 
@@ -47,7 +47,7 @@ pub(in crate::cli) struct UploadArgs {
     /// The cue file.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// What it is to be called, of a to z, 0 to 9, _ and - [default: the name of the file].
+    /// Its id in the library: a to z, 0 to 9, _ and - [default: the file's name without its ending].
     #[arg(long, value_name = "ID")]
     id: Option<String>,
     #[command(flatten)]
@@ -86,7 +86,7 @@ fn list(server: &ServerArgs) -> Result<Exit, Failure> {
     reply::done(&reply)?;
     if !server.json {
         let cues: Vec<ListedCue> =
-            serde_json::from_str(&reply.text).context("the reply is no list").or_exit(Exit::Internal)?;
+            serde_json::from_str(&reply.text).context("the reply is not a list").or_exit(Exit::Internal)?;
         let header = ["cue", "title", "length", "axes", "effects", "proved"];
         print::out(&table(header, cues.iter().map(ListedCue::row)))?;
     }
@@ -133,7 +133,7 @@ fn id_of(file: &Path) -> Result<String, Failure> {
     if (1..=64).contains(&stem.len()) && stem.bytes().all(fits) {
         return Ok(stem.to_owned());
     }
-    let why = "cannot be an id, which is 1 to 64 of a to z, 0 to 9, _ and -; name one with --id";
+    let why = "cannot be an id, which is 1 to 64 characters of a to z, 0 to 9, _ and -; give one with --id";
     Err(anyhow!("{stem:?} {why}")).or_exit(Exit::Usage)
 }
 

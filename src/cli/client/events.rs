@@ -30,7 +30,7 @@ impl Events {
     /// Begins to listen.
     pub(super) async fn open(socket: &Path) -> Result<Self, Failure> {
         let asked = request(Method::GET, "/api/v1/events", None, Full::<Bytes>::default())?;
-        let silent = || anyhow!("the daemon at {} lets us in, but says nothing", socket.display());
+        let silent = || anyhow!("the daemon at {} connects, but sends nothing", socket.display());
         let response = timeout(BEGINNING, send(socket, asked))
             .await
             .map_err(|_| silent())
@@ -40,7 +40,7 @@ impl Events {
             let text = response.into_body().collect().await.map(|body| body.to_bytes()).unwrap_or_default();
             let text = String::from_utf8_lossy(&text).into_owned();
             reply::done(&HttpReply { status, text })?;
-            return Err(anyhow!("the daemon has no events for us ({status})")).or_exit(Exit::Internal);
+            return Err(anyhow!("the daemon sends no events (HTTP status {status})")).or_exit(Exit::Internal);
         }
         Ok(Self { body: response.into_body(), lines: EventLines::default() })
     }
@@ -80,7 +80,7 @@ impl EventLines {
         self.seen = 0;
         self.bytes.extend_from_slice(piece);
         let data = self.data.as_ref().map_or(0, String::len);
-        if self.bytes.len() + data > LONGEST { Err("it sends an event without end") } else { Ok(()) }
+        if self.bytes.len() + data > LONGEST { Err("it sends an endless event") } else { Ok(()) }
     }
 
     /// The data of the next event that is whole. Names of events, ids and comments are of no use to us.

@@ -21,9 +21,9 @@ const EVERY: Duration = Duration::from_millis(250);
 /// Whoever leaves the choice to the ranking says so by this word.
 const BY_RANK: &str = "auto";
 
-/// Chooses the source of the film by hand, or leaves it to the ranking.
+/// Selects the source of the film by hand, or by rank again.
 ///
-/// A source that says another place than the one before moves the seats there, as any jump of the film does.
+/// If the new source reports another position, the seats move there, as after any jump of the film.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -31,9 +31,9 @@ Examples:
   kinocue sync use ltc:alsa:hw:2,0
   kinocue sync use auto
 
-Exit codes: 0 done, 64 several sources are meant, 66 no such source, or no film, 69 no daemon, 77 not allowed")]
+Exit codes: 0 done, 64 several sources match, 66 no such source, or no film, 69 no daemon, 77 not allowed")]
 pub(in crate::cli) struct UseArgs {
-    /// A source as `kinocue sync` names it, or its kind where there is one of it; `auto` for the ranking.
+    /// A source as `kinocue sync` lists it, or its kind if it is the only one of it; `auto` selects by rank.
     #[arg(value_name = "SOURCE|auto")]
     source: String,
     #[command(flatten)]
@@ -99,7 +99,7 @@ fn text(film: &FilmStatus) -> String {
     let label = timecode.as_ref().map_or_else(String::new, |code| format!("{code}, "));
     let error = error_ms.map_or_else(
         || "none: the seats follow no film at the moment".to_owned(),
-        |ms| format!("{ms:+.2} ms, above 0 the seats are ahead of the film"),
+        |ms| format!("{ms:+.2} ms; positive: the seats are ahead of the film"),
     );
     let mut text =
         format!("film    {state}{by}: {cause}\nnext    {next}\nat      {label}{at}\nerror   {error}\n");
@@ -113,7 +113,7 @@ fn text(film: &FilmStatus) -> String {
 
 fn chosen(film: &FilmStatus) -> Option<String> {
     let name = film.chosen.as_ref()?;
-    Some(format!("{name} by hand; kinocue sync use {BY_RANK} leaves it to the ranking"))
+    Some(format!("{name} by hand; kinocue sync use {BY_RANK} selects by rank again"))
 }
 
 fn apart(film: &FilmStatus) -> Option<String> {
@@ -124,7 +124,7 @@ fn apart(film: &FilmStatus) -> Option<String> {
 }
 
 fn led(film: &FilmStatus) -> Option<String> {
-    (!film.leads).then(|| "no show that is loaded follows the film".to_owned())
+    (!film.leads).then(|| "the loaded show does not follow the film".to_owned())
 }
 
 fn cells(row: &FilmSourceStatus, film: &FilmStatus) -> [String; 9] {

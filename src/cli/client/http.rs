@@ -54,7 +54,7 @@ pub(super) fn request<B>(
         request = request.header("Idempotency-Key", key());
         request = request.header("X-Kinocue-Sent", wall_now_ns() / 1_000_000);
     }
-    request.body(body).with_context(|| format!("{path} is nothing that can be asked")).or_exit(Exit::Usage)
+    request.body(body).with_context(|| format!("{path} cannot be requested")).or_exit(Exit::Usage)
 }
 
 /// Sends a request and reads its reply, which may take so long.
@@ -79,8 +79,8 @@ where
     timeout(patience, whole).await.unwrap_or_else(|_| {
         let seconds = patience.as_secs();
         let why = anyhow!(
-            "the daemon at {} did not answer within {seconds} s; look at `kinocue status` before asking again: it may \
-             still be done",
+            "the daemon at {} did not answer within {seconds} s; check `kinocue status` before you repeat the command: \
+             it may still take effect",
             socket.display()
         );
         Err(why).or_exit(Exit::Unavailable)
@@ -113,12 +113,11 @@ fn unreachable_at(socket: &Path, error: io::Error) -> Failure {
     let path = socket.display();
     let (exit, why) = match error.kind() {
         ErrorKind::PermissionDenied => {
-            let group = "whoever leads the show is in the group kinocue: `sudo usermod -aG kinocue $USER`, then sign in \
-                         anew";
+            let group = "operators have to be in the group kinocue: `sudo usermod -aG kinocue $USER`, then log in again";
             (Exit::NotAllowed, format!("may not open {path}; {group}"))
         }
         ErrorKind::WouldBlock | ErrorKind::TimedOut => {
-            (Exit::TryAgain, format!("the daemon at {path} lets nobody in at present; try again"))
+            (Exit::TryAgain, format!("the daemon at {path} accepts no connection at the moment; try again"))
         }
         _ => {
             let start = "start it with `sudo systemctl start kinocue` or `kinocue serve --config FILE`, or name its \
@@ -131,7 +130,7 @@ fn unreachable_at(socket: &Path, error: io::Error) -> Failure {
 
 fn cut_off(socket: &Path) -> String {
     format!(
-        "the daemon at {} hung up; look at `kinocue status` before asking again: it may have been done",
+        "the daemon at {} hung up; check `kinocue status` before you repeat the command: it may have taken effect",
         socket.display()
     )
 }

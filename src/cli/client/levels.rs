@@ -57,16 +57,16 @@ Examples:
   kinocue disable F4
   kinocue disable F4 --why \"broken leg\"
 
-It stays out over a restart of the service, until somebody takes it in; whoever arms is told. What is out for good says
-enabled = false in the configuration.")]
+It stays out until it is enabled again, even after a restart of the service; `kinocue arm` lists it. To take a controller
+out permanently, set enabled = false in the configuration.")]
     Disable(DisableArgs),
 }
 
 /// A trim.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct TrimArgs {
-    /// -500ms to 500ms: the motion comes so much later than the film, or earlier where it is negative. Or frames of the film, as +2f and
-    /// -1f, by which it comes later or earlier than it does.
+    /// -500ms to 500ms: positive makes the motion later than the film, negative earlier. Or a change in film frames: +2f is two
+    /// frames later than now, -1f one earlier.
     #[arg(value_name = "TRIM", value_parser = parse_trim_change, allow_hyphen_values = true)]
     trim: TrimChange,
     #[command(flatten)]
@@ -76,13 +76,13 @@ pub(in crate::cli) struct TrimArgs {
 /// A level, of what and whose.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct LevelArgs {
-    /// `motion` or `vibration`, where it is not for both.
+    /// `motion` or `vibration` [default: both].
     #[arg(value_name = "WHAT", allow_hyphen_values = true)]
     first: String,
     /// 0% to 100%, or 0dB and below.
     #[arg(value_name = "LEVEL", allow_hyphen_values = true)]
     second: Option<String>,
-    /// The rows that it is for, as A, A,C or A-C [default: the whole hall].
+    /// Only these rows: A, or A,C, or A-C [default: the whole hall].
     #[arg(long, value_name = "ROWS")]
     row: Option<String>,
     #[command(flatten)]
@@ -92,10 +92,10 @@ pub(in crate::cli) struct LevelArgs {
 /// Effects.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct EffectsArgs {
-    /// True if they may be on.
+    /// on lets the cue switch them, off keeps them off.
     #[arg(value_name = "on|off", value_parser = ["on", "off"])]
     switch: String,
-    /// Their names [default: all].
+    /// The effects [default: all].
     #[arg(value_name = "NAME")]
     names: Vec<String>,
     #[command(flatten)]
@@ -105,7 +105,7 @@ pub(in crate::cli) struct EffectsArgs {
 /// Something by its name.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct NameArgs {
-    /// Its name.
+    /// The name, as `kinocue status` shows it.
     #[arg(value_name = "NAME")]
     name: String,
     #[command(flatten)]
@@ -115,10 +115,10 @@ pub(in crate::cli) struct NameArgs {
 /// A controller, and why it is taken out.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct DisableArgs {
-    /// Its name.
+    /// The controller, as `kinocue status` shows it.
     #[arg(value_name = "NAME")]
     name: String,
-    /// Why, for whoever comes next.
+    /// The reason, for the next operator.
     #[arg(long, value_name = "REASON")]
     why: Option<String>,
     #[command(flatten)]
@@ -169,7 +169,7 @@ fn level(first: &str, second: Option<&str>, rows: Option<&str>) -> Result<Levels
             "a row has one level for its motion and its vibration; write kinocue level {level} --row {rows}"
         )),
         ("motion" | "vibration", None, _) => {
-            Err(format!("how much {first}? write kinocue level {first} 60%"))
+            Err(format!("the level is missing; write for example kinocue level {first} 60%"))
         }
         (level, None, None) => {
             let level = Some(parse_level(level)?);
@@ -180,7 +180,7 @@ fn level(first: &str, second: Option<&str>, rows: Option<&str>) -> Result<Levels
             let rows = parse_rows(rows)?.into_iter().map(|row| (row, level)).collect();
             Ok(LevelsChange { rows, ..none })
         }
-        (what, Some(_), _) => Err(format!("{what:?} has no level; there are motion and vibration")),
+        (what, Some(_), _) => Err(format!("{what:?} has no level; only motion and vibration have one")),
     }
 }
 

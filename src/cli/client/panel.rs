@@ -40,7 +40,7 @@ impl WatchPanel {
 
     /// Says that what is shown is what was.
     pub(super) fn gone(&mut self, why: &str) {
-        self.bar.set_message(format!("!! {why}\n\nas it was last:\n{}", self.last));
+        self.bar.set_message(format!("!! {why}\n\nlast known:\n{}", self.last));
         self.bar.tick();
     }
 }

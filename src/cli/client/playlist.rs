@@ -19,9 +19,9 @@ Examples:
   kinocue load coaster
   kinocue cues
 
-Exit codes: 0 loaded, 1 it does not pass (every fault is said), 66 there is no such cue, 75 not now")]
+Exit codes: 0 loaded, 1 it does not pass (every fault is listed), 66 no such cue, 75 the hall's state does not allow it")]
     Load(LoadArgs),
-    /// Loads a playlist, drops it, or shows the one that is loaded.
+    /// Loads, unloads or shows a playlist.
     #[command(after_help = "\
 Examples:
   kinocue playlist saturday
@@ -30,7 +30,7 @@ Examples:
     Playlist(PlaylistArgs),
     /// Selects the playlist entry to play next.
     ///
-    /// Counted from 1, as `kinocue playlist` shows it.
+    /// Entries are numbered from 1, as `kinocue playlist` shows them.
     #[command(after_help = "Example:\n  kinocue select 2")]
     Select(SelectArgs),
 }
@@ -48,10 +48,10 @@ pub(in crate::cli) struct LoadArgs {
 /// A playlist.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct PlaylistArgs {
-    /// The id of the playlist [default: show the one that is loaded].
+    /// The id of the playlist [default: show the loaded one].
     #[arg(value_name = "ID")]
     id: Option<String>,
-    /// Drop the playlist that is loaded.
+    /// Unload the playlist.
     #[arg(long, conflicts_with = "id")]
     none: bool,
     #[command(flatten)]
@@ -61,7 +61,7 @@ pub(in crate::cli) struct PlaylistArgs {
 /// An entry.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct SelectArgs {
-    /// Which entry, counted from 1.
+    /// Number of the entry, from 1.
     #[arg(value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     entry: u32,
     #[command(flatten)]

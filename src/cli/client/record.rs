@@ -7,14 +7,14 @@ use crate::cli::{Exit, Failure, print};
 
 /// Marks this moment.
 ///
-/// What was before and comes after it is kept as an incident, whatever the hall does. No words are needed.
+/// The service keeps the last minute and the next ten seconds as an incident, whatever the hall does. TEXT is optional.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   kinocue mark
   kinocue mark \"F4 jerked\"
 
-Exit codes: 0 marked, 75 nothing is recorded")]
+Exit codes: 0 marked, 75 nothing is being recorded")]
 pub(in crate::cli) struct MarkArgs {
     /// What was seen.
     #[arg(value_name = "TEXT")]
@@ -34,7 +34,7 @@ pub(super) fn mark(args: &MarkArgs) -> Result<Exit, Failure> {
     Ok(server.tell(&status))
 }
 
-/// Has the running service write out what its flight recorder holds, as an incident.
+/// Has the running service write the contents of its flight recorder to an incident file.
 pub(in crate::cli) fn dump(server: &ServerArgs) -> Result<Exit, Failure> {
     server.act("/api/v1/record/dump", &json!({}))
 }

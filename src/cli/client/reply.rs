@@ -34,7 +34,7 @@ fn parsed<T: DeserializeOwned>(reply: &HttpReply, what: &str) -> Result<T, Failu
     done(reply)?;
     serde_json::from_str(&reply.text).map_err(|error| Failure {
         exit: Exit::Internal,
-        error: anyhow!(error).context(format!("the daemon's reply is no {what}; is it of another version?")),
+        error: anyhow!(error).context(format!("the daemon's reply is not a {what}; is it another version?")),
     })
 }
 

@@ -5,7 +5,7 @@ pub(super) fn parse_rows(text: &str) -> Result<Vec<String>, String> {
     let mut rows: Vec<String> = Vec::new();
     for part in text.split(',').map(str::trim) {
         if part.is_empty() {
-            return Err("a row has no name; write A, A,C or A-C".to_owned());
+            return Err("a row has no name; write A, or A,C, or A-C".to_owned());
         }
         for row in range(part)? {
             if !rows.contains(&row) {
@@ -19,7 +19,7 @@ pub(super) fn parse_rows(text: &str) -> Result<Vec<String>, String> {
 /// From letter to letter or from number to number; anything else is a name as it is.
 fn range(part: &str) -> Result<Vec<String>, String> {
     let Some((from, to)) = part.split_once('-') else { return Ok(vec![part.to_owned()]) };
-    let backward = || format!("{part} goes backward; write the lower row first");
+    let backward = || format!("{part} runs backward; write the lower row first");
     if let (Some(from), Some(to)) = (letter(from), letter(to))
         && from.is_ascii_uppercase() == to.is_ascii_uppercase()
     {
@@ -29,7 +29,7 @@ fn range(part: &str) -> Result<Vec<String>, String> {
     if let (Ok(from), Ok(to)) = (from.parse::<u16>(), to.parse::<u16>()) {
         return match to.checked_sub(from) {
             None => Err(backward()),
-            Some(count) if count >= 1_000 => Err(format!("{part} are more than 1000 rows")),
+            Some(count) if count >= 1_000 => Err(format!("{part} is more than 1000 rows")),
             Some(_) => Ok((from..=to).map(|row| row.to_string()).collect()),
         };
     }

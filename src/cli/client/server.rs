@@ -23,7 +23,7 @@ const PATIENCE: Duration = Duration::from_secs(65);
 // Where the daemon is, and how its replies are shown. No documentation: clap would show it as the help of `arm` and others.
 #[derive(Debug, Clone, clap::Args)]
 pub(in crate::cli) struct ServerArgs {
-    /// The control socket of the daemon [default: that of KINOCUE_SOCKET, or /run/kinocue/control.sock].
+    /// The control socket of the daemon [default: $KINOCUE_SOCKET, or /run/kinocue/control.sock].
     #[arg(long, value_name = "PATH")]
     pub(super) socket: Option<PathBuf>,
     /// Print the reply as JSON, unchanged.

@@ -16,31 +16,31 @@ const FEW: usize = 9;
 pub(in crate::cli) enum ShowCommand {
     /// Arms the hall: ready to go.
     ///
-    /// A cue is loaded, its limits proved, preflight passed. It lapses after ten minutes.
+    /// A cue has to be loaded and proved, and preflight has to pass. Arming lapses after ten minutes.
     #[command(after_help = "\
 Examples:
   kinocue load coaster && kinocue arm
-  kinocue arm --seats-empty              where a controller does not know its position
+  kinocue arm --seats-empty              if a controller does not know its position
   kinocue arm --json
 
-Where a position is unknown, after a reboot of a controller, the seats have to home first. They move over their whole stroke
-by themselves then, so that is not done without --seats-empty.
+If a position is unknown, as after a controller reboots, the seats have to home first. They then move by themselves over
+their whole stroke, so this needs --seats-empty.
 
-Exit codes: 0 armed, or homing first, 75 not ready (what is missing is said), 77 not allowed, 69 no daemon")]
+Exit codes: 0 armed, or homing first, 69 no daemon, 75 not ready (the message says why), 77 not allowed")]
     Arm(ArmArgs),
     /// Disarms the hall: nothing can start until a person arms it again.
     #[command(after_help = "Example:\n  kinocue disarm")]
     Disarm(ServerArgs),
-    /// Starts what is loaded and armed. The seats move.
+    /// Starts the loaded, armed show. The seats move.
     #[command(after_help = "\
 Examples:
   kinocue go
   kinocue arm && kinocue go
-  kinocue go --from 12:30       after a stop: status says where the show was left; the seats join the cue there
+  kinocue go --from 12:30       after a stop: the seats join the cue there; `kinocue status` shows where it stopped
 
-A request that arrives more than two seconds late, or twice, starts nothing.
+A request that arrives more than two seconds late, or a second time, starts nothing.
 
-Exit codes: 0 it plays, 75 not armed or too late, 77 not allowed, 69 no daemon")]
+Exit codes: 0 playing, 69 no daemon, 75 not armed or too late, 77 not allowed")]
     Go(GoArgs),
     /// Holds the seats where they are; the film waits.
     #[command(after_help = "Example:\n  kinocue pause")]
@@ -60,16 +60,16 @@ Examples:
     /// Brings the seats to their park poses, and ends the show.
     #[command(after_help = "Example:\n  kinocue park")]
     Park(ServerArgs),
-    /// Clears a latched stop or fault, once what caused it is gone.
+    /// Clears a latched stop or fault once its cause is gone.
     #[command(after_help = "\
 Example:
   kinocue status && kinocue clear
 
-All positions are read anew before anything moves.")]
+All positions are read again before anything moves.")]
     Clear(ServerArgs),
     /// Reloads the daemon's configuration.
     ///
-    /// It does so while nothing is armed; a bad one changes nothing.
+    /// Only while nothing is armed; a bad configuration changes nothing.
     #[command(after_help = "Example:\n  kinocue check /etc/kinocue/kinocue.toml && kinocue reload")]
     Reload(ServerArgs),
 }
@@ -87,7 +87,7 @@ pub(in crate::cli) struct ArmArgs {
 /// From where on, and where the daemon is.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct GoArgs {
-    /// Start there in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24 [default: its beginning, or where seek set it].
+    /// Where in the cue to start: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24 [default: its beginning, or the last seek].
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     from: Option<ShowTime>,
     #[command(flatten)]
@@ -97,7 +97,7 @@ pub(in crate::cli) struct GoArgs {
 /// The position, and where the daemon is.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct SeekArgs {
-    /// Where in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
+    /// Position in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
     #[arg(value_name = "TIME", value_parser = parse_time)]
     at: ShowTime,
     #[command(flatten)]
@@ -134,7 +134,7 @@ pub(super) fn run(command: &ShowCommand) -> Result<Exit, Failure> {
 /// Has the daemon home all controllers, once a person says that the seats are empty.
 pub(in crate::cli) fn home(server: &ServerArgs, seats_empty: bool) -> Result<Exit, Failure> {
     let question =
-        "All seats of the hall will move over the whole stroke. Are they empty, and is nobody near them?";
+        "All seats of the hall will move over their whole stroke. Are they empty, and is nobody near them?";
     if !ask::agreed(question, seats_empty, "--seats-empty")? {
         print::tell("nothing was moved");
         return Ok(Exit::Done);

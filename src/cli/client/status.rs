@@ -9,7 +9,7 @@ use crate::control::{ControllerStatus, FilmStatus, PlaylistStatus, ShowStatus, S
 
 /// Shows the hall's status.
 ///
-/// State with its cause and the next action, what is loaded, levels, controllers, warnings.
+/// State, its cause and the next action; the loaded cue, levels, controllers and warnings.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -21,15 +21,15 @@ const NO_EMERGENCY: &str = "this is a soft stop; the emergency stop is hard-wire
 
 /// Brings the seats to rest at once, until `kinocue clear`.
 ///
-/// Goes by the stop socket of the daemon, which a thread of its own reads, so that it works while anything else is stuck;
-/// by the control socket only where that fails. A soft stop: the emergency stop is hard-wired.
+/// Uses the daemon's stop socket, which has a thread of its own and works even if everything else hangs; the control
+/// socket only if that fails. This is a soft stop: the emergency stop is hard-wired.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   kinocue stop
   kinocue stop --stop-socket /run/kinocue/stop.sock
 
-Exit codes: 0 the seats come to rest, 69 no daemon took it: use the hard-wired emergency stop")]
+Exit codes: 0 the seats are coming to rest, 69 no daemon confirmed it: use the hard-wired emergency stop")]
 pub(in crate::cli) struct Args {
     /// The stop socket of the daemon [default: stop.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
@@ -47,12 +47,12 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             if args.server.json {
                 print::json(&json!({ "state": "stopping", "by": "stop-socket" }))?;
             }
-            print::tell(&format!("kinocue: stopping, by {path}; next: kinocue clear; {NO_EMERGENCY}"));
+            print::tell(&format!("kinocue: stopping, via {path}; next: kinocue clear; {NO_EMERGENCY}"));
             Ok(Exit::Done)
         }
         Err(error) => {
             print::tell(&format!(
-                "kinocue: {path} did not take the stop ({error}); asking the control socket"
+                "kinocue: {path} did not take the stop ({error}); trying the control socket"
             ));
             by_control_socket(&args.server)
         }
@@ -82,6 +82,6 @@ fn by_control_socket(server: &ServerArgs) -> Result<Exit, Failure> {
         Failure { error, ..failure }
     })?;
     let (line, socket) = (status.line(), server.socket());
-    print::tell(&format!("kinocue: {line}; by {}; {NO_EMERGENCY}", socket.display()));
+    print::tell(&format!("kinocue: {line}; via {}; {NO_EMERGENCY}", socket.display()));
     Ok(Exit::Done)
 }

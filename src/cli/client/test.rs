@@ -29,7 +29,7 @@ enum TestedPart {
     Sweep(TestSweep),
 }
 
-/// Moves each axis and switches each effect of empty, armed seats slowly in turn, and ends with a table of acks and latency.
+/// Slowly moves each axis of empty, armed seats in turn, switches each effect, and ends with a table of acks and latency.
 ///
 /// The daemon keeps the table. Ctrl-C parks the seats.
 #[derive(Debug, clap::Args)]
@@ -39,9 +39,9 @@ Examples:
   kinocue test sweep --rows A-C
   kinocue test sweep --rows A,C --seats-empty --json
 
-Exit codes: 0 all passed, 1 something did not, 75 the hall is not armed")]
+Exit codes: 0 all passed, 1 something failed, 75 the hall is not armed")]
 struct TestSweep {
-    /// The rows whose seats move, as A, A,C or A-C [default: all].
+    /// The rows to test: A, or A,C, or A-C [default: all].
     #[arg(long, value_name = "ROWS")]
     rows: Option<String>,
     /// Confirm that nobody sits on the seats and nothing lies on or under them; do not ask.
@@ -120,7 +120,7 @@ fn follow(server: &ServerArgs, begun: Status) -> Result<TestOutcome, Failure> {
 async fn listen(server: &ServerArgs, bar: Option<&ProgressBar>) -> Result<TestOutcome, Failure> {
     let mut events = Events::open(&server.socket()).await?;
     loop {
-        let gone = |why| anyhow!("the daemon is gone: {why}; look at the seats, and at `kinocue status`");
+        let gone = |why| anyhow!("the daemon is gone: {why}; check the seats, then `kinocue status`");
         // While it says nothing there is nothing to show; the test may well go on.
         let Some(data) = events.next().await.map_err(gone).or_exit(Exit::Unavailable)? else { continue };
         let Ok(status) = serde_json::from_str::<Status>(&data) else { continue };

@@ -21,8 +21,8 @@ const AGAIN: Duration = Duration::from_millis(500);
 ///
 /// State, position, levels, controllers, warnings.
 ///
-/// On a terminal it is a panel; in a pipe one line for each change. When the daemon is gone it says so at once, and goes on
-/// as soon as it is back.
+/// On a terminal it shows a panel; into a pipe it writes one line for each change. If the daemon goes away it says so at
+/// once, and resumes when the daemon is back.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -81,7 +81,7 @@ async fn listen(events: &mut Events, shown: &mut WatchShown) -> Result<Option<&'
             Ok(None) => {
                 is_old = true;
                 let seconds = QUIET.as_secs();
-                shown.gone(&format!("the daemon has said nothing for {seconds} s: what is shown is old"));
+                shown.gone(&format!("no update from the daemon for {seconds} s: what is shown is old"));
             }
             Err(why) => return Ok(Some(why)),
         }

@@ -35,7 +35,7 @@ impl Input {
     pub(super) fn of(words: &[OsString]) -> Result<Self, Failure> {
         match words {
             [] if io::stdin().is_terminal() => {
-                Err(anyhow!("nothing to decode; give hex, a capture, or - for the standard input"))
+                Err(anyhow!("nothing to decode; give hex, a capture, or - for standard input"))
                     .or_exit(Exit::Usage)
             }
             [] => Ok(Self::Stdin),
@@ -55,7 +55,7 @@ fn is_file(word: &OsString) -> bool {
 fn messages(words: &[OsString]) -> anyhow::Result<Vec<Vec<u8>>> {
     let mut messages: Vec<String> = Vec::new();
     for word in words {
-        let word = word.to_str().with_context(|| format!("{} is no hex", word.display()))?;
+        let word = word.to_str().with_context(|| format!("{} is not hex", word.display()))?;
         let digits = digits_of(word).to_ascii_lowercase();
         match messages.last_mut() {
             Some(message) if !OPENINGS.iter().any(|opening| digits.starts_with(opening)) => {
@@ -75,7 +75,7 @@ pub(super) fn bytes(text: &str) -> anyhow::Result<Vec<u8>> {
         for c in digits_of(word).chars() {
             let Some(digit) = c.to_digit(16).and_then(|digit| u8::try_from(digit).ok()) else {
                 bail!(
-                    "{c:?} after {} hex digits is no hex digit; give the message as 0-9 and a-f",
+                    "{c:?} after {} hex digits is not a hex digit; give the message as 0-9 and a-f",
                     digits.len()
                 );
             };
@@ -83,10 +83,10 @@ pub(super) fn bytes(text: &str) -> anyhow::Result<Vec<u8>> {
         }
     }
     if digits.is_empty() || digits.len() % 2 != 0 {
-        bail!("{} hex digits are no whole bytes; give two for each byte", digits.len());
+        bail!("{} hex digits are not whole bytes; give two for each byte", digits.len());
     }
     if digits.len() > 2 * MAX_BYTES {
-        bail!("{} bytes are more than a datagram holds; give at most {MAX_BYTES}", digits.len() / 2);
+        bail!("{} bytes do not fit into a datagram; give at most {MAX_BYTES}", digits.len() / 2);
     }
     Ok(digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
 }

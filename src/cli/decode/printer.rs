@@ -165,7 +165,7 @@ impl<W: Write> Printer<W> {
                     return Ok(());
                 }
                 let (source, to) = ends(&fragment);
-                let why = format!("from byte {} of it on; not put together", fragment.offset);
+                let why = format!("from byte {} of it on; not reassembled", fragment.offset);
                 self.refuse(place(source, to), "fragment", json!({ "offset": fragment.offset }), &why)
             }
             Content::Other => {

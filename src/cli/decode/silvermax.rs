@@ -137,7 +137,7 @@ impl SilverDecoder {
             return Some(SerialSaid::stray(
                 Some(direction),
                 octets,
-                "it may be in nine bits or a piece of a line; which of them cannot be told",
+                "it may be nine-bit or part of a line; which of them is unknown",
             ));
         }
         let (text, mut fields) = match read {

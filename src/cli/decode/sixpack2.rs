@@ -78,13 +78,13 @@ impl SerialDecoder for SixpackDecoder {
         let mut said = Vec::new();
         if direction == Some(Direction::ToDrive) {
             // A host hands over whole frames; what is behind a piece of one is none of it.
-            said.extend(self.give_up(direction, "a piece of a frame"));
+            said.extend(self.give_up(direction, "a part of a frame"));
         }
         for octet in octets {
             let Some(frame) = self.collectors.of(direction).push(*octet, Duration::ZERO) else { continue };
             if direction == Some(Direction::ToDrive) && is_query(SixpackCommand::of(frame)) {
                 // Whoever asks again waits for no answer any more.
-                said.extend(self.give_up(Some(Direction::FromDrive), "a piece of an answer"));
+                said.extend(self.give_up(Some(Direction::FromDrive), "a part of an answer"));
             }
             said.push(self.frame(direction, frame));
         }
@@ -128,7 +128,7 @@ fn worded(
         }
     });
     if !is_clean {
-        text += "  (octets that it does not use are not 0)";
+        text += "  (bytes that it does not use are not 0)";
     }
     let named = [
         ("kind", json!(kind)),

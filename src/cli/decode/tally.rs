@@ -70,9 +70,9 @@ impl MessageTally {
         let unknown = format!("packets of link type {}, which is not read", link_types.join(", "));
         for (count, what) in [
             (self.malformed, "malformed"),
-            (self.not_hex, "lines that are no hex"),
+            (self.not_hex, "lines that are not hex"),
             (self.cut, "cut short by the capture"),
-            (self.fragments, "fragments of datagrams, not put together"),
+            (self.fragments, "fragments of datagrams, not reassembled"),
             (self.other_datagrams, "other datagrams"),
             (self.other_packets, "other packets"),
             (self.unknown_links.0, &unknown),

@@ -39,12 +39,12 @@ impl DemoFilm {
         let path = path.canonicalize().with_context(|| path.display().to_string()).or_exit(Exit::NoInput)?;
         let name = path.file_name().and_then(|name| name.to_str()).map(str::to_owned);
         let (Some(folder), Some(name), Some(_)) = (path.parent(), name, path.to_str()) else {
-            return Err(anyhow!("{} is no file with a name of UTF-8", path.display())).or_exit(Exit::NoInput);
+            return Err(anyhow!("{} is not a file with a UTF-8 name", path.display())).or_exit(Exit::NoInput);
         };
         let length_s = film_length_s(&path).map_err(anyhow::Error::msg).or_exit(Exit::Unavailable)?;
         let shortest_s = f64::from(SWELL_MS + REST_MS) / 1e3;
         if !(shortest_s..LONGEST_S).contains(&length_s) {
-            let short = format!("{name} is {length_s:.1} s long; take a film of {shortest_s} s to a day");
+            let short = format!("{name} is {length_s:.1} s long; use a film of {shortest_s} s to a day");
             return Err(anyhow!(short)).or_exit(Exit::NoInput);
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "up to a day")]

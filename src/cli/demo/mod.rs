@@ -37,10 +37,10 @@ const CUE: &str = include_str!("../../../cues/bench-ride.csv");
 
 /// Plays the bench ride to virtual seats, with nothing to set up.
 ///
-/// Runs the daemon itself with its web console, and prints the console's address at once. On a terminal the console stays up after the
-/// ride until Ctrl-C, to arm and go again there. There are four controllers, two of them a pair that shares one frame (PA95); or,
-/// by --dialect, two seats on serial drives, which the demo homes first, as a person has to with real ones. Everything stays on this
-/// machine, in a temporary folder that is removed at the end.
+/// Runs the real daemon with its web console, and prints its address first. On a terminal the console stays up after the
+/// ride until Ctrl-C, so that you can arm and go again. There are four controllers, two of which share one frame (PA95); or,
+/// with --dialect, two seats on serial drives. The demo homes those first, as an operator homes real ones. Everything stays on
+/// this machine, in a temporary folder that is removed at the end.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json\n  kinocue demo --film film.mkv\n  \
@@ -50,10 +50,10 @@ pub(super) struct Args {
     /// Ticks per second, 1 to 1000.
     #[arg(long, value_name = "HZ", value_parser = super::load::parse_rate, default_value = "100")]
     rate: f64,
-    /// What moves the seats: controllers, or serial drives at the ends of pseudo-terminals.
+    /// What moves the seats: virtual controllers (smc, mbox), or virtual serial drives on pseudo-terminals.
     #[arg(long, value_enum, default_value_t = SimFamily::Smc)]
     dialect: SimFamily,
-    /// Show this film with mpv, and play a gentle cue of its length to it. mpv has to be installed.
+    /// Show this film with mpv, and play a gentle cue of the same length to it. Needs mpv.
     #[arg(long, value_name = "FILE")]
     film: Option<PathBuf>,
     /// Print the report as one JSON object on stdout.

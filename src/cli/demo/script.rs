@@ -87,7 +87,7 @@ async fn lead(
             if let Err(problem) = led {
                 screen.tell(&format!("kinocue: {problem}"));
             }
-            screen.tell(&format!("the console stays up; arm and go again there, Ctrl-C ends: {console}"));
+            screen.tell(&format!("the console stays up: arm and go again there; Ctrl-C ends: {console}"));
             Ok(())
         }
         (None, led) => {
@@ -131,8 +131,8 @@ async fn home(handle: &Handle, screen: &Screen) -> Result<Option<()>, Problem> {
         return Ok(None);
     }
     screen.tell(
-        "drives do not know where they stand until somebody homes them. With real seats a person looks that nobody sits on them, and \
-         asks for it; here the demo plays that person: nobody is on virtual seats",
+        "drives do not know their position until they are homed. With real seats a person first makes sure that nobody sits on them, \
+         then homes them; here the demo does both",
     );
     handle.ask(demo(Role::Engineer), Command::Home).await?;
     within(HOMING, handle, State::Parked).await

@@ -82,8 +82,8 @@ impl VirtualHall {
         };
         match self {
             Self::Stations(_, farm) => format!("virtual controllers {}", stations(farm)),
-            Self::SilverMax(_) => format!("virtual SilverMax units of the seats {}", DRIVEN.join(", ")),
-            Self::Sixpack2(_) => format!("a virtual SIXpack 2 each of the seats {}", DRIVEN.join(", ")),
+            Self::SilverMax(_) => format!("virtual SilverMax units of seats {}", DRIVEN.join(", ")),
+            Self::Sixpack2(_) => format!("one virtual SIXpack 2 for each of seats {}", DRIVEN.join(", ")),
         }
     }
 

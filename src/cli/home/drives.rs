@@ -43,7 +43,7 @@ pub(super) fn explain(driven: &DrivenTargets, troubles: &mut Troubles) -> Vec<Ho
         let is_bus = |link: &Link| link.name == drives.link && link.wiring == LinkWiring::Can;
         if driven.links.iter().any(is_bus) {
             return Err(
-                "no CAN bus is spoken to yet; connect it by a serial line, or home it with its own program",
+                "CAN buses are not supported yet; connect it by a serial line, or home it with its own program",
             );
         }
         let list = |numbers: &[u8]| numbers.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
@@ -71,9 +71,9 @@ fn way(homing: &DriveHoming) -> String {
         HomeWay::Switch { .. } => "look for their switch",
         HomeWay::Index { .. } => "look for their switch and the index behind it",
         HomeWay::HardStop => "run gently into the stop",
-        HomeWay::Here => return "take the place where they stand for their zero, and go to park".to_owned(),
+        HomeWay::Here => return "take their present position for their zero, and go to park".to_owned(),
     };
-    format!("{by}, {toward}, at {speed} mm/s and {travel} mm at the most, and go to park")
+    format!("{by}, {toward}, at {speed} mm/s over at most {travel} mm, and go to park")
 }
 
 /// Homes those of the seats that can be; the results take the place of theirs. Says whether somebody ended it.
@@ -140,7 +140,7 @@ fn words(step: Step) -> String {
     match step {
         Step::Held(axis) => format!("axis {} is held, and will home", axis + 1),
         Step::OffSwitch(axis) => format!("axis {} moves off its switch", axis + 1),
-        Step::Searching(axis) => format!("axis {} looks for its zero", axis + 1),
+        Step::Searching(axis) => format!("axis {} searches for its zero", axis + 1),
         Step::Found(axis) => format!("axis {} has found its zero", axis + 1),
         Step::Parking => "goes to park".to_owned(),
         Step::Set(axis) => format!("axis {} is set up for shows", axis + 1),
@@ -195,14 +195,14 @@ impl LinkTalk {
         told: &mut dyn FnMut(Step),
     ) -> Result<Duration, HomingFault> {
         if abort.load(Ordering::Relaxed) {
-            return Err(HomingFault::Refused("not begun, as you asked for the end".to_owned()));
+            return Err(HomingFault::Refused("not begun, as Ctrl-C was pressed".to_owned()));
         }
         let none = || HomingFault::Refused("it has no drives of that link".to_owned());
         let (begun, goes_on) = (Instant::now(), &|| !abort.load(Ordering::Relaxed));
         match self {
             Self::SilverMax(talk) => {
-                let canary = canary()
-                    .map_err(|error| HomingFault::Refused(format!("the system gives no chance: {error}")))?;
+                let canary =
+                    canary().map_err(|error| HomingFault::Refused(format!("no random number: {error}")))?;
                 let seat = units_of(controller).ok_or_else(none)?;
                 silvermax::home(talk, seat, silvermax::Homing { canary, goes_on, told })?;
             }

@@ -27,7 +27,7 @@ impl HealthMessages {
             let line = match (seen.trouble, trouble) {
                 (before, now) if before == now => None,
                 (_, Some((HealthState::Rejoining, why))) => {
-                    Some(format!("{name}: {why}; it joins again from where it stands"))
+                    Some(format!("{name}: {why}; it rejoins from where it is"))
                 }
                 (_, Some((standing, why))) => {
                     let next = why.next().unwrap_or(standing.next());
@@ -83,7 +83,7 @@ mod tests {
         );
         assert_eq!(said(lost), [""; 0]);
         let told = said(row(HealthState::Rejoining, Why::SeenAgain));
-        assert_eq!(told, ["A2: back as it was; it joins again from where it stands"]);
+        assert_eq!(told, ["A2: back as it was; it rejoins from where it is"]);
         assert_eq!(said(well), ["A2: takes part again"]);
     }
 

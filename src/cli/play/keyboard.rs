@@ -75,16 +75,16 @@ impl Leader {
     fn ask(&mut self, command: Command) -> Option<&'static str> {
         match &mut self.commands {
             Some(commands) => {
-                commands.push(command).is_err().then_some("too much was asked at once; press the key again")
+                commands.push(command).is_err().then_some("too many keys at once; press the key again")
             }
-            None => Some("the cue has not begun; wait, or leave with q"),
+            None => Some("the cue has not begun; wait, or quit with q"),
         }
     }
 
     fn stop(&self) -> Option<&'static str> {
         self.control.desk.stop();
         self.commands.is_none().then_some(
-            "the cue will not begin; a slow move to park goes on to its end, which only the hard-wired emergency stop \
+            "the cue will not begin; a slow move to park continues to its end, which only the hard-wired emergency stop \
              prevents",
         )
     }
@@ -103,7 +103,7 @@ impl Leader {
     fn level(&mut self, step: i32) -> Option<&'static str> {
         let begun = percent(&self.begun);
         if step > 0 && self.percent == begun {
-            return Some("this is the level that the play began with; begin with a higher one for more");
+            return Some("this is the level at the start of the play; start with a higher --level for more");
         }
         self.percent = (self.percent + step).clamp(0, begun);
         self.set_levels();
@@ -241,7 +241,11 @@ mod tests {
         let (mut leader, _commands) = leading(0.62);
         let desk = Arc::clone(&leader.control.desk);
         let levels = || [0, 1].map(|lane| (desk.mix(lane).motion * 1000.0).round());
-        assert!(leader.act(KeyAction::Level(5), at(0)).is_some_and(|said| said.contains("began with")));
+        assert!(
+            leader
+                .act(KeyAction::Level(5), at(0))
+                .is_some_and(|said| said.contains("at the start of the play"))
+        );
         assert_eq!(levels(), [620.0, 310.0]);
         assert_eq!(leader.act(KeyAction::Level(-5), at(0)), None);
         assert_eq!(levels(), [570.0, 285.0]);

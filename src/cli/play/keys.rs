@@ -32,15 +32,15 @@ pub(super) const IN_SHORT: &str =
 /// What the keys do.
 pub(super) const HELP: &str = "\
 space    pause, or resume
-←  →     5 s back or on in the film
+←  →     5 s back or forward in the film
 s        stop: the seats slow down and rest; a soft stop, the emergency stop is hard-wired
-c        clear, after a stop or a fault
+c        clear a stop or a fault
 p        park the seats, and end
 + -      motion and vibration of all seats 5 % up or down, never above the level at the start
 , .      motion 10 ms earlier or later than the film
 < >      the same by a frame of the film
-q        park as far as the seats may move, and leave; Ctrl-C does the same, a second one
-         half a second later or more ends at once";
+q        park the seats that may move, and end; Ctrl-C does the same, and a second one at
+         least half a second later ends at once";
 
 /// Where in the bytes of one key we are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -30,7 +30,7 @@ impl Messages {
     pub(super) fn preparing(&self) -> String {
         let (seats, time) = self.control.live.parking();
         if seats == 0 {
-            return "asking where the seats stand".to_owned();
+            return "reading the positions of the seats".to_owned();
         }
         let noun = if seats == 1 { "seat" } else { "seats" };
         format!("bringing {seats} {noun} to park (up to {:.1} s)", time.as_secs_f64())
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn before_the_play_it_says_what_the_seats_are_doing() {
         let said = said();
-        assert_eq!(said.preparing(), "asking where the seats stand");
+        assert_eq!(said.preparing(), "reading the positions of the seats");
         [2_000, 3_000].into_iter().for_each(|ms| said.control.live.on_parking(ms));
         assert_eq!(said.preparing(), "bringing 2 seats to park (up to 3.0 s)");
     }
@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn it_names_nothing_that_its_keys_cannot_do() {
         let text = |next| said().news(&entered(State::Recovering, Cause::Cleared, next)).unwrap();
-        assert!(text(Next::Home).ends_with("leave, then `kinocue home` with nobody on the seats"));
+        assert!(text(Next::Home).contains("quit, then `kinocue home` with this --config or --to"));
         assert!(text(Next::ParkOrHome).ends_with("next: park"));
         for next in Next::ALL {
             assert!(!text(next).contains("disable"), "{next}");

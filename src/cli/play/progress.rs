@@ -27,10 +27,10 @@ const ARM_AFTER: u32 = 6;
 /// How often is looked.
 const LOOK: Duration = Duration::from_millis(100);
 /// What a first Ctrl-C does, and what a second one will.
-const LEAVING: &str = "the seats park as far as they may move, and the play ends; half a second from now on Ctrl-C again would end it at once";
+const LEAVING: &str = "the seats that may move park, and the play ends; Ctrl-C again, half a second from now or later, ends it at once";
 /// What a play ends with that nothing can lead any more.
 const NO_FILM: &str =
-    "the film is over and did not lead the seats, and no source can tell of another; the play ends";
+    "the film is over, the seats did not follow it, and no source can report another; the play ends";
 
 /// The threads; `None` if the system starts no further one, which is no reason to fail.
 pub(super) struct Progress {

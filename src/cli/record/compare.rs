@@ -8,15 +8,15 @@ use super::{open, shown, unread};
 use crate::record::{Comparison, compare};
 use crate::time::ShowTime;
 
-/// Holds two recordings against each other by show time: how far what was sent differs, seat by seat and axis by axis.
+/// Compares two recordings by show time: how far the sent positions differ, for each axis of each seat.
 ///
-/// Ends with 1 where an axis differs by more than the tolerance.
+/// Exits with 1 if an axis differs by more than the tolerance.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue record compare monday.mcap tuesday.mcap --tolerance 0.1mm")]
 pub(in super::super) struct Args {
-    /// The one.
+    /// The first recording.
     one: PathBuf,
-    /// The other.
+    /// The second recording.
     other: PathBuf,
     /// How far an axis may differ, mm or degrees.
     #[arg(long, value_name = "LENGTH", default_value = "0.1mm", value_parser = tolerance)]
@@ -58,13 +58,13 @@ fn text(comparison: &Comparison) -> String {
         .expect("a String takes all text");
     }
     for seat in &comparison.alone {
-        out += &format!("{}: in one of them alone\n", shown(seat));
+        out += &format!("{}: only in one of them\n", shown(seat));
     }
     if comparison.axes.is_empty() {
         out += "no seat is in both\n";
     }
     if !comparison.whole {
-        out += "samples alone were compared, 20 a second and each the worst of its window; recordings in full have every tick\n";
+        out += "only samples were compared, 20 a second, each the worst of its window; full recordings have every tick\n";
     }
     out
 }

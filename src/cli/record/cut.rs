@@ -12,7 +12,7 @@ use super::open;
 use crate::record::{Chunk, Contents, CutError, CutManner, Piece, RecordedSeat, Stretch, cut, each_tick};
 use crate::time::{ShowTime, parse_time};
 
-/// Cuts a stretch out of a recording in full, every tick of it as plain topics that each viewer draws.
+/// Cuts a stretch out of a full recording, with every tick as plain topics that any viewer can draw.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinocue record cut tuesday.mcap --film 47:00..47:20 --seat F4 -o jerk.mcap
@@ -22,7 +22,7 @@ use crate::time::{ShowTime, parse_time};
 pub(in super::super) struct Args {
     /// The recording.
     file: PathBuf,
-    /// The stretch, show times: 47:00..47:20 [default: all of it].
+    /// The stretch, in show time: 47:00..47:20 [default: all].
     #[arg(long, value_name = "FROM..TO", value_parser = stretch)]
     film: Option<(ShowTime, ShowTime)>,
     /// The seat [default: all].
@@ -31,19 +31,19 @@ pub(in super::super) struct Args {
     /// The file to write.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Write rows of text, a frame each.
+    /// Write CSV, one row per frame.
     #[arg(long, conflicts_with_all = ["pcap", "film_time", "anonymous", "whole"])]
     csv: bool,
-    /// Write the datagrams as a capture.
+    /// Write the datagrams as a pcap capture.
     #[arg(long, conflicts_with_all = ["film_time", "anonymous", "whole"])]
     pcap: bool,
-    /// Give messages the film's time in place of the clock's.
+    /// Time messages by the film rather than by the clock.
     #[arg(long)]
     film_time: bool,
-    /// Leave out names of seats, hall and cue, and addresses, also in frames and answers.
+    /// Omit the names of seats, hall and cue, and addresses, also those in frames and replies.
     #[arg(long)]
     anonymous: bool,
-    /// Keep ticks and replies as they were as well, so that the cut is a whole recording too.
+    /// Also keep the original ticks and replies, so that the cut is itself a full recording.
     #[arg(long, conflicts_with = "film_time")]
     whole: bool,
     /// Overwrite OUT if it exists.

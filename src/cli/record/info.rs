@@ -16,9 +16,9 @@ const OVER: f64 = 1.01;
 /// Happenings that are printed.
 const PRINTED: usize = 40;
 
-/// Shows what is in a recording: seats, counts, what came nearest to its limits, and what happened.
+/// Shows the contents of a recording: seats, counts, what came nearest to its limits, and events.
 ///
-/// Ends with 1 where a seat was sent over a limit by more than 1 %.
+/// Exits with 1 if a seat was sent beyond a limit by more than 1 %.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  kinocue record info tuesday.mcap\n  kinocue record info tuesday.mcap --json"

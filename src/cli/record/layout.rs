@@ -4,14 +4,14 @@ use serde_json::json;
 
 use super::super::{Exit, Failure, print};
 
-/// Prints a layout of one seat for Foxglove and Lichtblick: asked and sent, lateness, states.
+/// Prints a Foxglove and Lichtblick layout for one seat: asked and sent positions, lateness, states.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue record layout --seat F4 > f4.json")]
 pub(in super::super) struct Args {
     /// The seat.
     #[arg(long, value_name = "NAME")]
     seat: String,
-    /// How many of its axes are drawn.
+    /// Number of its axes to draw.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=12))]
     axes: u8,
 }

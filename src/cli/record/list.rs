@@ -11,8 +11,9 @@ use super::super::{Exit, Failure, OrExit as _, print};
 use super::{open, shown, wall};
 use crate::record::beginning;
 
-/// Lists the recordings of a folder, the oldest first.
+/// Lists the recordings in a folder, oldest first.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue record list /var/lib/kinocue/recordings")]
 pub(in super::super) struct Args {
     /// The folder.
     #[arg(default_value = ".")]

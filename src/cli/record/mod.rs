@@ -20,7 +20,7 @@ mod layout;
 mod list;
 mod recover;
 
-/// Looks at recordings of plays and shows.
+/// Lists, cuts, compares and repairs recordings of plays and shows.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     #[command(subcommand)]
@@ -35,7 +35,8 @@ enum Command {
     Info(info::Args),
     Recover(recover::Args),
     Layout(layout::Args),
-    /// Has the running service write out what its flight recorder holds, as an incident.
+    /// Has the running service write the contents of its flight recorder to an incident file.
+    #[command(after_help = "Example:\n  kinocue record dump")]
     Dump(ServerArgs),
 }
 
@@ -70,7 +71,9 @@ pub(super) fn unread(error: ReadError, path: &Path) -> Failure {
 pub(super) fn flaws(contents: &Contents) -> Vec<String> {
     let mut flaws = Vec::new();
     if let Some(trouble) = &contents.trouble {
-        flaws.push(format!("the file {trouble}; what is told is of what came before that; kinocue record recover writes it anew"));
+        flaws.push(format!(
+            "the file {trouble}; only what precedes is shown; kinocue record recover saves it"
+        ));
     }
     flaws.extend(contents.faults.iter().map(|fault| format!("not read: {fault}")));
     flaws

@@ -10,15 +10,15 @@ use super::super::{Exit, Failure, OrExit as _, print};
 use super::{beside, open, unread};
 use crate::record::{self, RecoverError, Wanted};
 
-/// Writes a recording that was cut short anew: all that is complete in it, with an index, so that every viewer reads it.
+/// Repairs a recording that was cut short: writes all its complete messages, with an index, so that any viewer reads it.
 ///
-/// What is written is read back before it gets its name. The cut file stays.
+/// The new file is read back before it gets its name. The original stays.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue record recover tuesday.part.mcap")]
 pub(in super::super) struct Args {
     /// The recording that was not closed.
     file: PathBuf,
-    /// The file to write [default: its name without .part].
+    /// The file to write [default: the recording's name without .part].
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 }
@@ -28,7 +28,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         let named = beside(&args.file, ".mcap");
         if named == args.file { beside(&args.file, ".recovered.mcap") } else { named }
     });
-    let taken = || anyhow!("{} exists; -o FILE names another", output.display());
+    let taken = || anyhow!("{} exists; give another name with -o FILE", output.display());
     if output.try_exists().or_exit(Exit::Io)? {
         return Err(taken()).or_exit(Exit::Usage);
     }
@@ -64,7 +64,7 @@ fn written(args: &Args, out: File, part: &std::path::Path) -> Result<record::Rec
     let back = record::read(open(part)?, unwanted, &mut |_, _, _| ()).map_err(|error| unread(error, part))?;
     if back.trouble.is_some() || back.messages != recovered.messages {
         let error =
-            anyhow!("{}: what was written does not read back; the disk may be failing", part.display());
+            anyhow!("{}: the written file does not read back; the disk may be failing", part.display());
         return Err(error).or_exit(Exit::Io);
     }
     Ok(recovered)

@@ -14,8 +14,7 @@ use crate::config::{Controller, Station};
 use crate::device::settings::{self, Difference, Saved, SavedDrives, SavedHall, differences};
 use crate::device::{Address, table};
 
-/// Compares controllers with a file that `kinocue register save` wrote. Ends with 0 where nothing differs, with 1 where
-/// something does.
+/// Compares controllers with a file of `kinocue register save`. Exits with 0 if nothing differs, with 1 if something does.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -24,14 +23,14 @@ Examples:
   kinocue register diff A7.toml --to 192.168.15.207:7408
   kinocue register diff hall-settings.toml --as A7 --to 192.168.15.207:7408")]
 pub(super) struct Args {
-    /// The settings to compare with.
+    /// The file of `kinocue register save` to compare with.
     file: PathBuf,
     #[command(flatten)]
     targets: TargetArgs,
     /// The controller of this name; repeatable.
     #[arg(long, value_name = "NAME")]
     name: Vec<String>,
-    /// Compare with what the file has of this controller [default: the one of the same name].
+    /// Compare with this controller of the file [default: the one of the same name].
     #[arg(long = "as", value_name = "NAME")]
     like: Option<String>,
     /// Compare a controller's own address too (PA10 to PA14, PA16 to PA1b).
@@ -145,7 +144,7 @@ fn matched_drives<'f>(
     let of = |controller: &Controller| {
         let name = like.unwrap_or(&controller.name);
         let saved = file.iter().find(|one| one.name == name);
-        saved.ok_or_else(|| anyhow!("has no settings of the drives of {name}; --as NAME chooses"))
+        saved.ok_or_else(|| anyhow!("has no settings of the drives of {name}; select others with --as NAME"))
     };
     driven.controllers.iter().map(of).collect()
 }
@@ -213,7 +212,7 @@ fn tell(report: &DiffReport<'_>, all: bool) -> Result<(), Failure> {
         print::tell("nothing differs");
     }
     if !all && !report.controllers.is_empty() {
-        print::tell("PA10-14 and PA16-1b, which are each controller's own, were not compared; --all does");
+        print::tell("PA10-14 and PA16-1b, each controller's own, were not compared; --all does");
     }
     Ok(())
 }

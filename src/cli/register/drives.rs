@@ -101,8 +101,7 @@ pub(super) fn take(words: &[String]) -> anyhow::Result<(Vec<String>, DriveRegist
 fn registers(word: &str, range: &str) -> anyhow::Result<impl Iterator<Item = u8>> {
     let (first, last) = range.split_once("..").unwrap_or((range, range));
     let last = last.strip_prefix('R').unwrap_or(last);
-    let none =
-        || anyhow!("{word} is no register of a SilverMax; they are R0 to R40 and R200 to R211, in decimal");
+    let none = || anyhow!("{word} is not a SilverMax register; they are R0 to R40 and R200 to R211, decimal");
     let number = |text: &str| text.parse::<u8>().map_err(|_| none());
     let (first, last) = (number(first)?, number(last)?);
     if !readable().any(|known| (first..=last).contains(&known)) {
@@ -119,7 +118,7 @@ fn query(text: &str) -> anyhow::Result<u8> {
                 "${number:02X}: a SIXpack 2 has no command that reads its settings back; `kinocue home` writes them whole"
             )
         }
-        _ => bail!("${text} is no query of a SIXpack 2; they are $20, $30 and $43"),
+        _ => bail!("${text} is not a query of a SIXpack 2; they are $20, $30 and $43"),
     }
 }
 
@@ -214,12 +213,12 @@ enum PortRefused {
 
 fn open(link: &Link) -> Result<LinkLine, PortRefused> {
     if link.wiring == LinkWiring::Can {
-        return Err(PortRefused::Other(format!("link {} is a CAN bus, which is not opened yet", link.name)));
+        return Err(PortRefused::Other(format!("link {} is a CAN bus: not supported yet", link.name)));
     }
     LinkLine::open(link).map_err(|error| match error {
         SerialError::Taken(_) => PortRefused::Taken(anyhow!(
-            "{error}. If that is the service, stop it first (`systemctl stop kinocue`); `kinocue preflight` without --config asks \
-             through it"
+            "{error}. If that is the service, stop it first (`systemctl stop kinocue`); `kinocue preflight` without --config reads them \
+             through the service"
         )),
         _ => PortRefused::Other(error.to_string()),
     })
@@ -260,8 +259,7 @@ impl RegisterReader {
                 match sixpack2::look_for(talk, *unit, motors) {
                     Ok(Some(facts)) => found.values = of_pack(&facts, wanted),
                     Ok(None) => {
-                        let why =
-                            format!("unit {unit} answers as it woke, at 19,200 baud; home it, seats empty");
+                        let why = format!("unit {unit} is at its power-on baud, 19,200; home it, seat empty");
                         found.faults.push(why);
                     }
                     Err(fault) => found.faults.push(fault.to_string()),
@@ -321,7 +319,7 @@ fn of_pack(facts: &sixpack2::UnitFacts, wanted: &DriveRegisters) -> Vec<DriveVal
                 [
                     value(of("position"), "position, microsteps", motor.position.into()),
                     value(of("action"), "action", motor.action.into()),
-                    value(of("stop"), "stopped by its switch since it was asked", motor.was_stopped.into()),
+                    value(of("stop"), "stopped by its switch since last read", motor.was_stopped.into()),
                 ]
             })),
             0x30 => {
@@ -333,7 +331,7 @@ fn of_pack(facts: &sixpack2::UnitFacts, wanted: &DriveRegisters) -> Vec<DriveVal
             }
             _ => values.extend([
                 value("$43.firmware".to_owned(), "firmware", facts.firmware.into()),
-                value("$43.reset".to_owned(), "was reset since it was asked", facts.was_reset.into()),
+                value("$43.reset".to_owned(), "was reset since last read", facts.was_reset.into()),
                 value("$43.celsius".to_owned(), "°C", facts.celsius.into()),
                 value("$43.serial".to_owned(), "serial number", facts.serial.into()),
             ]),

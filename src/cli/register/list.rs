@@ -7,8 +7,8 @@ use super::drives::{self, DriveRegister, DriveRegisters};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::device::{Family, Flags, Register, selections, table};
 
-/// Lists the registers that the manuals document: unit, range, default, dialect, whether they are saved, and what their
-/// values mean.
+/// Lists the registers that the manuals document: unit, range, default, dialect, whether they are saved, and the meaning of
+/// their values.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  kinocue register list\n  kinocue register list PA90..98 dpf0\n  kinocue \

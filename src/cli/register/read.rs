@@ -83,7 +83,7 @@ fn wanted(selections: &[Selection], controller: &Controller<Station>) -> anyhow:
     for selection in selections {
         if let Some(first) = selection.addresses.first().filter(|_| !selection.addresses.iter().any(has)) {
             let (name, dialect) = (&controller.name, dialect_name(dialect));
-            let what = if selection.single { "is no register" } else { "and on are no registers" };
+            let what = if selection.single { "is not a register" } else { "and on are no registers" };
             return Err(anyhow!("{first} {what} of {dialect} controllers, as {name} is one"));
         }
         wanted.extend(selection.addresses.iter().copied().filter(has));

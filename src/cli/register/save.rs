@@ -6,12 +6,12 @@ use anyhow::anyhow;
 
 use super::drives::{self, DriveRegisters};
 use super::read_values;
-use crate::cli::targets::{TargetArgs, Troubles, write_file};
+use crate::cli::targets::{DrivenTargets, TargetArgs, Targets, Troubles, write_file};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::device::Address;
 use crate::device::settings::{Saved, SavedDrives, parameters, text};
 
-/// Keeps the parameters of controllers, and the settings of SilverMax units, as a file, to compare others with or to write back.
+/// Saves the parameters of controllers, and the settings of SilverMax units, to a file, to compare with or write back later.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -19,7 +19,7 @@ Examples:
   kinocue register save hall-settings.toml --config hall.toml
   kinocue register save - --config hall.toml --row A")]
 pub(super) struct Args {
-    /// Where to; `-` for standard output. A file that is there is replaced.
+    /// The file to write, or `-` for stdout. An existing file is replaced.
     file: PathBuf,
     #[command(flatten)]
     targets: TargetArgs,
@@ -33,40 +33,18 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let none = drives::unreadable(&driven);
     if !none.is_empty() {
         print::tell(&format!(
-            "kinocue: {}: left out, as no setting of a SIXpack 2 can be read; `kinocue home` writes them whole",
+            "kinocue: {}: left out, as the settings of a SIXpack 2 cannot be read; `kinocue home` writes all of them",
             none.join(", ")
         ));
     }
     let driven = drives::asked(driven, &DriveRegisters::settings());
     let mut troubles = Troubles::default();
-    let found = if targets.controllers.is_empty() {
-        Vec::new()
-    } else {
-        let wanted: Vec<Vec<Address>> = (targets.controllers.iter())
-            .map(|one| parameters(one.connection.dialect).map(|register| register.address).collect())
-            .collect();
-        read_values(&mut targets.open()?, &targets, &wanted, &mut troubles)
-    };
-    let on_links = drives::read(&driven, &DriveRegisters::settings(), &mut troubles)?;
+    let saved = of_controllers(&targets, &mut troubles)?;
+    let of_drives = of_drives(&driven, &mut troubles)?;
     if !troubles.none() {
         return Err(anyhow!("nothing saved: some controllers did not return all registers"))
             .or_exit(troubles.exit());
     }
-    let saved: Vec<Saved> = (targets.controllers.iter().zip(found))
-        .map(|(controller, found)| Saved {
-            name: controller.name.clone(),
-            address: controller.connection.address,
-            dialect: controller.connection.dialect,
-            values: found.values,
-        })
-        .collect();
-    let of_drives: Vec<SavedDrives> = (driven.controllers.iter().zip(&on_links))
-        .map(|(controller, found)| SavedDrives {
-            name: controller.name.clone(),
-            address: controller.address(),
-            registers: drives::kept(found),
-        })
-        .collect();
     let names: Vec<_> =
         saved.iter().map(|one| &*one.name).chain(of_drives.iter().map(|one| &*one.name)).collect();
     if names.is_empty() {
@@ -80,4 +58,33 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::tell(&format!("saved the parameters of {} to {}", names.join(", "), args.file.display()));
     }
     Ok(Exit::Done)
+}
+
+/// The parameters of the controllers on the network.
+fn of_controllers(targets: &Targets, troubles: &mut Troubles) -> Result<Vec<Saved>, Failure> {
+    if targets.controllers.is_empty() {
+        return Ok(Vec::new());
+    }
+    let wanted: Vec<Vec<Address>> = (targets.controllers.iter())
+        .map(|one| parameters(one.connection.dialect).map(|register| register.address).collect())
+        .collect();
+    let found = read_values(&mut targets.open()?, targets, &wanted, troubles);
+    let saved = targets.controllers.iter().zip(found).map(|(controller, found)| Saved {
+        name: controller.name.clone(),
+        address: controller.connection.address,
+        dialect: controller.connection.dialect,
+        values: found.values,
+    });
+    Ok(saved.collect())
+}
+
+/// The settings of the units on links.
+fn of_drives(driven: &DrivenTargets, troubles: &mut Troubles) -> Result<Vec<SavedDrives>, Failure> {
+    let found = drives::read(driven, &DriveRegisters::settings(), troubles)?;
+    let saved = driven.controllers.iter().zip(&found).map(|(controller, found)| SavedDrives {
+        name: controller.name.clone(),
+        address: controller.address(),
+        registers: drives::kept(found),
+    });
+    Ok(saved.collect())
 }

@@ -30,12 +30,12 @@ Examples:
   kinocue register write servo 1 508=7 --config hall.toml --name A1
   kinocue register write --file hall-settings.toml --config hall.toml --name A7 --keep
 
-A power cycle undoes what is written, unless --keep is given. Homing: see `kinocue home`.")]
+Without --keep, a power cycle undoes what is written. To home seats, use `kinocue home`.")]
 pub(super) struct Args {
     /// What to write: PA95=6, pa 80..85 = 3000, dpf1=0, servo 1 508=7.
     #[arg(value_name = "REGISTER=VALUE", required_unless_present = "file", conflicts_with = "file")]
     values: Vec<String>,
-    /// Write what a file of `kinocue register save` has of each controller, except addresses and network settings.
+    /// Write the settings in a file of `kinocue register save`, except addresses and network settings.
     #[arg(long, value_name = "FILE")]
     file: Option<PathBuf>,
     #[command(flatten)]
@@ -43,13 +43,13 @@ pub(super) struct Args {
     /// The controller of this name; repeatable.
     #[arg(long, value_name = "NAME")]
     name: Vec<String>,
-    /// Have the controllers keep it over a power cycle (PA0f = 2; mbox: object channel 1).
+    /// Have the controllers save them, to keep them over a power cycle (PA0f = 2; mbox: object channel 1).
     #[arg(long)]
     keep: bool,
     /// Write without asking.
     #[arg(long)]
     yes: bool,
-    /// Let network settings (PA10-1b, PA20-29) and the factory reset (PA0f = 1) be written.
+    /// Allow network settings (PA10-1b, PA20-29) and the factory reset (PA0f = 1) to be written.
     #[arg(long)]
     force: bool,
     /// Print one JSON object.
@@ -91,7 +91,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut talk = targets.open()?;
     let mut changes = changes(&mut talk, &targets, &wanted)?;
     if changes.is_empty() {
-        print::tell("nothing to change: all hold these values already");
+        print::tell("nothing to change: all registers already have these values");
         if !args.keep {
             return finish(args, &targets, &changes, false).map(|()| Exit::Done);
         }
@@ -182,7 +182,7 @@ fn changes(
     let mut troubles = Troubles::default();
     let found = read_values(talk, targets, &addresses, &mut troubles);
     if !troubles.none() {
-        return Err(anyhow!("nothing was written, as not all told what they hold")).or_exit(troubles.exit());
+        return Err(anyhow!("nothing written: not all registers could be read")).or_exit(troubles.exit());
     }
     let mut changes = Vec::new();
     for (lane, (assignments, found)) in wanted.iter().zip(found).enumerate() {
@@ -206,7 +206,7 @@ fn changes(
 fn warn_of_moves(changes: &[RegisterChange]) {
     if let Some(change) = changes.iter().find(|change| moves(change.register)) {
         print::tell(&format!(
-            "warning: {} moves the seat, which must be empty; `kinocue home` does this with more care",
+            "warning: {} moves the seat, which must be empty; `kinocue home` is the safer way",
             change.register
         ));
     }

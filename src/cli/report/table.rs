@@ -36,7 +36,7 @@ pub(super) fn shows(report: &JournalReport) -> String {
 /// One row for each thing that was asked.
 pub(super) fn actions(report: &JournalReport) -> String {
     if report.actions.is_empty() {
-        return format!("nothing was asked {}\n", days(report));
+        return format!("no commands {}\n", days(report));
     }
     let mut table = Table::new();
     table.load_style(STYLE);

@@ -20,11 +20,11 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "MS", default_value_t = 500)]
     homing_ms: u32,
 
-    /// Fraction of its Time that a command takes while more than two wait (PA06 = 1).
+    /// Fraction of its Time that a command takes while more than two are queued (PA06 = 1).
     #[arg(long, value_enum, default_value_t = FastForward::Half)]
     fast_forward: FastForward,
 
-    /// The greatest Time of a first absolute frame, ms: a longer one is Err17 where PA0d = 0.
+    /// The greatest Time of a first absolute frame, ms: a longer one is Err17 if PA0d = 0.
     #[arg(long, value_name = "MS", default_value_t = 30_000)]
     first_time_max_ms: u32,
 
@@ -48,11 +48,11 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u16).range(1..))]
     pulses_per_turn: u16,
 
-    /// Speed after an emergency stop where PA94 = 0, rpm [default: no limit]
+    /// Speed after an emergency stop if PA94 = 0, rpm [default: no limit]
     #[arg(long, value_name = "RPM", value_parser = clap::value_parser!(u16).range(1..))]
     release_rpm: Option<u16>,
 
-    /// Speed of jogging where PA70 to PA75 set none, rpm.
+    /// Jog speed if PA70 to PA75 set none, rpm.
     #[arg(long, value_name = "RPM", default_value_t = 60, value_parser = clap::value_parser!(u16).range(1..))]
     jog_rpm: u16,
 
@@ -60,7 +60,7 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "N", default_value_t = 1)]
     servo_alarm: u16,
 
-    /// Registers of a servo drive, from 0 on.
+    /// Number of registers of a servo drive, from 0 on.
     #[arg(long, value_name = "N", default_value_t = 1_000)]
     servo_registers: u16,
 

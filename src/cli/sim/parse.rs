@@ -83,7 +83,7 @@ pub(super) fn command(text: &str) -> anyhow::Result<Command> {
 fn controller(name: &str) -> anyhow::Result<usize> {
     let number = name.strip_prefix('c').unwrap_or(name).parse::<usize>().ok();
     let index = number.and_then(|number| number.checked_sub(1));
-    index.with_context(|| format!("{name:?} is no controller; they are 1, 2 … or c1, c2 …"))
+    index.with_context(|| format!("{name:?} is not a controller; they are 1, 2 … or c1, c2 …"))
 }
 
 fn action(text: &str) -> anyhow::Result<Action> {
@@ -91,7 +91,7 @@ fn action(text: &str) -> anyhow::Result<Action> {
         return Ok(Action::Reboot);
     }
     let Some((name, value)) = text.split_once('=').map(|(name, value)| (name.trim(), value.trim())) else {
-        bail!("{text:?} is no command; {COMMANDS}");
+        bail!("{text:?} is not a command; {COMMANDS}");
     };
     let of_register = name.strip_prefix("pa").or_else(|| name.strip_prefix("PA"));
     Ok(match (name, name.strip_prefix(['X', 'x']), of_register) {
@@ -102,11 +102,11 @@ fn action(text: &str) -> anyhow::Result<Action> {
         ("duplicate", ..) => Action::Duplicate(chance(value)?),
         ("delay", ..) => Action::Delay(parse_duration(value).map_err(|why| anyhow!(why))?),
         (_, Some(input), _) => {
-            let input = input.parse().with_context(|| format!("{name:?} is no input; they are X1 to X12"))?;
+            let input = input.parse().with_context(|| format!("{name:?} is not X1 to X12"))?;
             Action::Switch { input, closed: switch(value)? }
         }
         (_, _, Some(register)) => Action::Parameter(register_number(register)?, value_number(value)?),
-        _ => bail!("{text:?} is no command; {COMMANDS}"),
+        _ => bail!("{text:?} is not a command; {COMMANDS}"),
     })
 }
 

@@ -89,7 +89,11 @@ const COMMANDS: &str = "commands of a unit are reset, hot=1, blocked=1, dead=1, 
 
 fn action(name: &str, value: Option<&str>) -> anyhow::Result<Action> {
     let Some(value) = value else {
-        return if name == "reset" { Ok(Action::Reset) } else { bail!("{name:?} is no command; {COMMANDS}") };
+        return if name == "reset" {
+            Ok(Action::Reset)
+        } else {
+            bail!("{name:?} is not a command; {COMMANDS}")
+        };
     };
     Ok(match (name, name.strip_prefix(['X', 'x'])) {
         ("hot", _) => Action::Hot(parse::switch(value)?),
@@ -105,9 +109,9 @@ fn action(name: &str, value: Option<&str>) -> anyhow::Result<Action> {
         }
         (_, Some(input)) => {
             let input = input.parse().ok().filter(|input| (1..=7).contains(input));
-            let input = input.with_context(|| format!("{name:?} is no input; they are X1 to X7"))?;
+            let input = input.with_context(|| format!("{name:?} is not an input; they are X1 to X7"))?;
             Action::Input { input, is_high: parse::switch(value)? }
         }
-        _ => bail!("{name:?} is no command; {COMMANDS}"),
+        _ => bail!("{name:?} is not a command; {COMMANDS}"),
     })
 }

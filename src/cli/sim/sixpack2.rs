@@ -18,7 +18,7 @@ use crate::time::Clock as _;
 /// Runs units until a signal comes.
 pub(super) fn run(args: &Args, path: &Path, signals: SignalSocket) -> Result<Exit, Failure> {
     if args.tty.baud.is_some() {
-        let refusal = anyhow!("a SIXpack 2 wakes at 19200 baud, and its host switches it; leave --baud out");
+        let refusal = anyhow!("a SIXpack 2 starts at 19200 baud, and its host changes that; omit --baud");
         return Err(refusal).or_exit(Exit::Usage);
     }
     let shafts = [ShaftSetup::default(); MOTORS];
@@ -104,7 +104,7 @@ fn fault(name: &str, value: Option<&str>) -> anyhow::Result<SixpackFault> {
         return if name == "reset" {
             Ok(SixpackFault::Reset)
         } else {
-            bail!("{name:?} is no command; {COMMANDS}")
+            bail!("{name:?} is not a command; {COMMANDS}")
         };
     };
     let of_motor = |words: &str| name.strip_prefix(words).map(motor_number).transpose();
@@ -119,12 +119,12 @@ fn fault(name: &str, value: Option<&str>) -> anyhow::Result<SixpackFault> {
         _ => match (of_motor("blocked")?, of_motor("broken")?) {
             (Some(motor), _) => SixpackFault::Block { motor, is_blocked: parse::switch(value)? },
             (_, Some(motor)) => SixpackFault::BreakSwitch { motor, is_broken: parse::switch(value)? },
-            _ => bail!("{name:?} is no command; {COMMANDS}"),
+            _ => bail!("{name:?} is not a command; {COMMANDS}"),
         },
     })
 }
 
 fn motor_number(text: &str) -> anyhow::Result<usize> {
     let number = text.parse().ok().filter(|number| *number < MOTORS);
-    number.with_context(|| format!("{text:?} is no motor; they are 0 to {}", MOTORS - 1))
+    number.with_context(|| format!("{text:?} is not a motor; they are 0 to {}", MOTORS - 1))
 }

@@ -17,7 +17,7 @@ use crate::time::parse_duration;
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Serial drives")]
 pub(super) struct TtyArgs {
-    /// Simulate drives on a serial line, a pseudo-terminal with this link to it.
+    /// Simulate drives on a serial line: a pseudo-terminal, with a symbolic link to it at this path.
     #[arg(long, value_name = "LINK", conflicts_with = "Leeway")]
     pub(super) tty: Option<PathBuf>,
 
@@ -26,7 +26,7 @@ pub(super) struct TtyArgs {
     #[arg(value_parser = clap::value_parser!(u8).range(1..=254))]
     units: Vec<u8>,
 
-    /// Baud rate of a SilverMax line; the simulator paces bytes by it, as a pseudo-terminal does not [default: 57600].
+    /// Baud rate of a SilverMax line, at which the simulator paces bytes [default: 57600].
     #[arg(long, value_name = "BAUD", requires = "tty")]
     #[arg(value_parser = clap::value_parser!(u32).range(300..=1_000_000))]
     pub(super) baud: Option<u32>,

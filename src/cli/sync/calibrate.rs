@@ -10,21 +10,24 @@ use crate::film::source::{FilmArgs, FilmSource};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
-/// Measures how much later than another source a capture chain tells of the same film: the `latency` of [sync.ltc].
+/// Measures the delay of a capture chain against another source of the same film: the `latency` of [sync.ltc].
 ///
-/// With mpv playing a reel of timecode into a cable that leads back to the input, it is what the input takes, as far as mpv knows what its
-/// output does.
+/// Let mpv play a reel of timecode into a cable back to the input: the result is the delay of the input, plus what mpv does not know
+/// of the delay of its own output.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  kinocue sync calibrate ltc:alsa:hw:2,0 --against mpv:/run/user/1000/film.sock"
+)]
 pub(in crate::cli) struct Args {
-    /// What is measured, as `play --chase` takes it.
+    /// The source to measure, as for `play --chase`.
     #[arg(value_name = "SOURCE")]
     source: FilmSource,
-    /// What knows where the same film is, as mpv does that plays the reel.
+    /// The reference: a source that knows the position of the same film, such as the mpv that plays the reel.
     #[arg(long, value_name = "SOURCE")]
     against: FilmSource,
     #[command(flatten)]
     labels: LabelArgs,
-    /// How long it measures.
+    /// Duration of the measurement in seconds.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3_600))]
     seconds: u32,
     /// Print a JSON object.
@@ -111,7 +114,7 @@ fn lost(table: &FilmTable) -> Failure {
         format!("{}: {}{trouble}", row.source, row.words)
     });
     let each: Vec<String> = each.collect();
-    let error = anyhow::anyhow!("both have to be heard while the reel plays; {}", each.join("; "));
+    let error = anyhow::anyhow!("both sources have to be received while the reel plays; {}", each.join("; "));
     Failure { exit: Exit::Unavailable, error }
 }
 
@@ -119,11 +122,11 @@ fn text(args: &Args, late: Lateness) -> String {
     let Lateness { median_ms, low_ms, high_ms } = late;
     let (source, against) = (&args.source, &args.against);
     let found = format!(
-        "{source} is {median_ms:.1} ms later than {against} ({low_ms:.1} to {high_ms:.1} ms in nine of ten looks).\n"
+        "{source} is {median_ms:.1} ms later than {against} ({low_ms:.1} to {high_ms:.1} ms in nine of ten readings).\n"
     );
     if median_ms < -NOISE_MS {
         return found
-            + "The other one is the later: it is none to measure by, or --tc-start is not the reel's first label.\n";
+            + "The reference is the later one: it is no reference, or --tc-start is not the reel's first label.\n";
     }
     if median_ms > 1_000.0 {
         return found + "No capture takes that long: --tc-start is not the reel's first label.\n";

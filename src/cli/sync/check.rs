@@ -6,12 +6,13 @@ use anyhow::{Context as _, anyhow};
 use crate::app::film::{LtcFound, look_for_ltc};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 
-/// Says what timecode is in a WAV file: its labels, its gaps and jumps, and how loud it is.
+/// Checks the timecode in a WAV file: its labels, gaps, jumps and level.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue sync check reel.wav")]
 pub(in crate::cli) struct Args {
-    /// The file: 16 bits; the first channel counts.
+    /// The file: 16 bits; only its first channel is read.
     file: PathBuf,
-    /// Print it as one JSON object.
+    /// Print one JSON object.
     #[arg(long)]
     json: bool,
 }

@@ -12,19 +12,19 @@ Examples:
   kinocue sync index storm.mkv -o storm.kidx --name 'The Storm'
   kinocue sync watch sound:alsa:hw:2,0,index=storm.kidx";
 
-/// Makes the index of a film's sound, by which `sound:INPUT,index=FILE.kidx` finds the film from anywhere.
+/// Makes the index of a film's sound, with which `sound:INPUT,index=FILE.kidx` finds any position in the film.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(in crate::cli) struct Args {
-    /// The film, or its sound as a WAV file: 16 bits, all channels count; anything else is read by mpv.
+    /// The film's sound as a WAV file (16 bits, all channels are used), or any file that mpv can play.
     film: PathBuf,
     /// The index.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// What the film is called [default: as its file].
+    /// Name of the film [default: the name of its file].
     #[arg(long)]
     name: Option<String>,
-    /// Say what was made as one JSON object.
+    /// Print the result as one JSON object.
     #[arg(long)]
     json: bool,
 }
@@ -32,7 +32,7 @@ pub(in crate::cli) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let name = args.name.clone().unwrap_or_else(|| name_of(&args.film));
     if !is_name(&name) {
-        return Err(anyhow!("{name:?} is no name of a film; write 1 to 200 letters with --name"))
+        return Err(anyhow!("{name:?} cannot be a film's name; give 1 to 200 letters with --name"))
             .or_exit(Exit::Usage);
     }
     let film = || args.film.display().to_string();
@@ -55,5 +55,5 @@ fn name_of(film: &Path) -> String {
 
 fn text(made: &Indexed, output: &Path) -> String {
     let Indexed { name, seconds, landmarks, octets } = made;
-    format!("{}: {name}, {seconds:.1} s, {landmarks} landmarks, {octets} octets\n", output.display())
+    format!("{}: {name}, {seconds:.1} s, {landmarks} landmarks, {octets} bytes\n", output.display())
 }

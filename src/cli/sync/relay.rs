@@ -8,15 +8,17 @@ use crate::film::source::{FilmArgs, FilmSource};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
-/// Reads timecode devices for services that have none: each line at a socket of its own, ltc.sock or mtc.sock, for up to eight halls on
-/// this machine, with ltc:relay:SOCKET or mtc:relay:SOCKET as their source. It ends once each line has, as a command does that ends well;
-/// a device that is gone is waited for.
+/// Reads timecode devices for services that may not open them.
+///
+/// Passes each line on at a socket of its own, ltc.sock or mtc.sock, to up to eight halls on this machine. Their source is
+/// ltc:relay:SOCKET or mtc:relay:SOCKET. It waits for a device that is gone, and ends once every line has ended.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue sync relay ltc:alsa:hw:2,0 --folder /tmp")]
 pub(in crate::cli) struct Args {
-    /// One line of LTC, one of MIDI timecode, or both, as `play --chase` takes them.
+    /// One line of LTC, one of MIDI timecode, or both, as for `play --chase`.
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<FilmSource>,
-    /// The folder of the sockets; whoever may enter it may listen.
+    /// The folder of the sockets; everybody with access to it may read the timecode.
     #[arg(long, value_name = "DIR", default_value = "/run/kinocue-sync")]
     folder: PathBuf,
 }
@@ -40,7 +42,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             }
         }
         if now.over {
-            print::tell("there is nothing more to relay: each line has ended");
+            print::tell("nothing left to relay: every line has ended");
             return Ok(Exit::Done);
         }
         at = at + EVERY;

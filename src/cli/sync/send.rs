@@ -11,14 +11,17 @@ use crate::cli::{Exit, Failure, OrExit as _};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
-/// Makes timecode: into a file at once, or at the speed of a film.
+/// Generates timecode: LTC into a file, at once, or Art-Net or MIDI timecode in real time.
 #[derive(Debug, clap::Args)]
-#[command(group = clap::ArgGroup::new("kind").required(true))]
+#[command(
+    group = clap::ArgGroup::new("kind").required(true),
+    after_help = "Examples:\n  kinocue sync send --ltc --film-fps 25 --seconds 60 -o reel.wav\n  kinocue sync send --artnet 10.0.0.255"
+)]
 pub(in crate::cli) struct Args {
-    /// Linear timecode, as the sound of a WAV file.
+    /// Linear timecode, as a WAV file.
     #[arg(long, group = "kind")]
     ltc: bool,
-    /// Art-Net timecode, to that address; its port is 6454 unless another is named.
+    /// Art-Net timecode, to this address: IP or IP:PORT; the port is 6454 unless given.
     #[arg(long, value_name = "ADDR", group = "kind", value_parser = artnet_address)]
     artnet: Option<SocketAddrV4>,
     /// MIDI timecode, into a raw MIDI device or a FIFO.
@@ -30,10 +33,10 @@ pub(in crate::cli) struct Args {
     /// Frames a second: 23.976, 24, 25, 29.97 or 30.
     #[arg(long, value_name = "N", default_value = "25")]
     film_fps: String,
-    /// The first label; with a semicolon before the frames it drops.
+    /// The first timecode, HH:MM:SS:FF; HH:MM:SS;FF for drop frame.
     #[arg(long, value_name = "TIMECODE", default_value = "00:00:00:00")]
     tc_start: String,
-    /// How long it lasts.
+    /// Duration in seconds.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     seconds: u32,
     /// The file [default: stdout].
@@ -47,7 +50,7 @@ const ARTNET_PORT: u16 = 6454;
 
 fn artnet_address(text: &str) -> Result<SocketAddrV4, String> {
     let whole = text.parse().or_else(|_| text.parse().map(|ip| SocketAddrV4::new(ip, ARTNET_PORT)));
-    whole.map_err(|_| format!("{text} is no address; write 10.0.0.255 or 127.0.0.1:6454"))
+    whole.map_err(|_| format!("{text} is not an address; write for example 10.0.0.255 or 127.0.0.1:6454"))
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {

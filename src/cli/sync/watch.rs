@@ -9,10 +9,11 @@ use crate::film::source::FilmSource;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
 
-/// Says what is heard of a film, with no hall, no cue and no seat: which source says what, how good it is, and which would lead.
+/// Shows what the sources report of a film, without a hall, cue or seat: position and quality of each, and which would lead.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue sync watch artnet:10.0.0.20 mtc:/dev/snd/midiC1D0")]
 pub(in crate::cli) struct Args {
-    /// The sources in their ranking, as `play --chase` takes them.
+    /// The sources, best first, as for `play --chase`.
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<FilmSource>,
     #[command(flatten)]
@@ -20,7 +21,7 @@ pub(in crate::cli) struct Args {
     /// Let coarse sources lead as well.
     #[arg(long)]
     allow_coarse: bool,
-    /// End after so many seconds [default: at Ctrl-C].
+    /// End after this many seconds [default: at Ctrl-C].
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=86_400))]
     seconds: Option<u32>,
     /// Print a JSON object twice a second.
@@ -92,9 +93,9 @@ fn line(row: &SourceRow) -> String {
     let counts = [
         (row.dropouts, "dropouts"),
         (row.jumps, "jumps"),
-        (row.rejected, "left out"),
-        (notes.foreign, "of others"),
-        (notes.garbage, "that say nothing"),
+        (row.rejected, "rejected"),
+        (notes.foreign, "from other senders"),
+        (notes.garbage, "unreadable"),
     ];
     for (count, what) in counts.into_iter().filter(|(count, _)| *count > 0) {
         let _ = write!(text, ", {count} {what}");

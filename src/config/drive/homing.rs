@@ -10,7 +10,7 @@ use super::share;
 const USUAL_SPEED: f64 = 10.0;
 /// A search that is faster runs into what it looks for.
 const MOST_SPEED: f64 = 50.0;
-/// How much longer than needed the travel of a search may be: it ends the search where a switch has failed.
+/// How much longer than needed the travel of a search may be: travel ends the search if a switch has failed.
 const LONGEST_TRAVEL: f64 = 1.5;
 
 /// How an axis finds its zero.
@@ -127,8 +127,8 @@ fn refuse_unused(section: &mut Section<'_, '_, '_>, way: HomeWay, keys: [Option<
     let [input, active, travel] = keys;
     let (unused, why): (&[_], _) = match way {
         HomeWay::Switch { .. } | HomeWay::Index { .. } => return,
-        HomeWay::HardStop => (&[input, active], "a hard stop has no switch; leave it out"),
-        HomeWay::Here => (&[input, active, travel], "nothing moves where a person says where it stands"),
+        HomeWay::HardStop => (&[input, active], "a hard stop has no switch; omit it"),
+        HomeWay::Here => (&[input, active, travel], "nothing moves if a person confirms its position"),
     };
     unused.iter().flatten().for_each(|entry| entry.fault(section.faults, why));
 }
@@ -147,10 +147,10 @@ impl DriveHoming {
         let message = match (self.way, self.toward) {
             (HomeWay::Here, _) => format!("{zero} mm is outside the stroke, {low} to {high} mm"),
             (_, Side::Down) => format!(
-                "{zero} mm is above {low} mm, the lower end of the stroke; what an axis is homed by lies at it or below"
+                "{zero} mm is above {low} mm, the lower end of the stroke; the homing point of an axis is at it or below"
             ),
             (_, Side::Up) => format!(
-                "{zero} mm is below {high} mm, the upper end of the stroke; what an axis is homed by lies at it or above"
+                "{zero} mm is below {high} mm, the upper end of the stroke; the homing point of an axis is at it or above"
             ),
         };
         entry.fault(faults, &message);
@@ -169,7 +169,7 @@ impl DriveHoming {
         let (travel, most) = (self.travel_mm, LONGEST_TRAVEL * needed);
         if travel < needed {
             let message =
-                format!("{travel} mm do not reach {} mm from the far end; {needed} are needed", self.zero_mm);
+                format!("{travel} mm do not reach {} mm from the far end; {needed} do", self.zero_mm);
             entry.fault(faults, &message);
         } else if travel > most {
             let message = format!(

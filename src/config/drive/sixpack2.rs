@@ -83,11 +83,11 @@ fn share_of(section: &mut Section<'_, '_, '_>, key: &'static str, usual: u8) -> 
     let Some(text) = entry.text(section.faults) else { return usual };
     let percent = text.strip_suffix('%').and_then(|number| number.trim_end().parse().ok());
     match percent.filter(|percent| SHARES.contains(percent)) {
-        Some(0) => entry.fault(section.faults, "0 holds nothing up: the seat would drop; give more"),
+        Some(0) => entry.fault(section.faults, "0 holds no load: the seat would drop; give more"),
         Some(percent) => return percent,
         None => {
             let shares = SHARES.map(|share| format!("{share}%")).join(", ");
-            entry.fault(section.faults, &format!("{text:?} is none of {shares}, which a SIXpack 2 has"));
+            entry.fault(section.faults, &format!("{text:?} is not one of {shares}, which a SIXpack 2 has"));
         }
     }
     usual

@@ -138,7 +138,9 @@ fn a_baud_rate_that_cannot_be_made_is_refused_with_the_nearest() {
     let baud = |link: &str| only(parse(&format!("{LINK}{link}{SEAT}{DRIVE}{A1}")));
     let fault = baud("baud = 56000\n");
     assert!(
-        fault.starts_with("hall.toml:3:8: baud: 56000 is no rate of a SilverMax (BRT); the nearest is 57600")
+        fault.starts_with(
+            "hall.toml:3:8: baud: 56000 is not a rate of a SilverMax (BRT); the nearest is 57600"
+        )
     );
     let bus = format!("{LINK}wiring = \"can\"\n{SEAT}{DRIVE}{A1}").replace("/dev/ttyUSB0", "can0");
     assert!(only(parse(&bus)).contains("wiring: a SilverMax has no CAN; use \"rs485\" or \"rs232\""));
@@ -159,11 +161,11 @@ fn a_baud_rate_that_cannot_be_made_is_refused_with_the_nearest() {
 #[test]
 fn what_drives_do_not_have_is_refused_by_name() {
     for (more, why) in [
-        ("fan_out = \"shared\"\n", "fan_out: drives share no frame"),
+        ("fan_out = \"shared\"\n", "fan_out: drives do not share frames"),
         ("accept = \"ffff\"\n", "accept: drives have no accept code"),
         ("effects = [\"air\"]\n[effects]\nair = 1\n", "effects: drives switch no effects"),
         ("dac1 = 0.5\n", "dac1: drives have no such output"),
-        ("belt_inputs = [1]\n", "belt_inputs: kinocue reads no belts by drives"),
+        ("belt_inputs = [1]\n", "belt_inputs: kinocue reads no belts through drives"),
         ("estop_inputs = [8]\n", "estop_inputs: 8 is outside 1..=7"),
         ("motors = [1]\n", "motors: a SilverMax is one motor; list the unit of each axis as units"),
         ("axes = 3\n", "axes: unknown key in [[controller]]"),
@@ -184,7 +186,7 @@ fn what_drives_do_not_have_is_refused_by_name() {
 fn a_controller_names_a_link_a_dialect_and_a_drive_for_each_axis() {
     for (of, new, why) in [
         ("link:stalls", "link:stall", "address: there is no [link.stall]; did you mean stalls?"),
-        ("\"silvermax\"", "\"smc\"", "dialect: is spoken over UDP"),
+        ("\"silvermax\"", "\"smc\"", "dialect: is for UDP"),
         ("dialect = \"silvermax\"\n", "", "[[controller]] has no dialect, which is needed"),
         ("[16, 17, 18]", "[16, 17]", "units: 2 numbers for 3 axes; give one for each"),
         ("[16, 17, 18]", "[16, 17, 255]", "units: 255 is outside 1..=254"),
@@ -228,7 +230,7 @@ fn a_way_home_says_where_it_ends_and_how_far_it_may_go() {
         (
             "travel_mm = 165",
             "travel_mm = 150",
-            "travel_mm: 150 mm do not reach -2 mm from the far end; 152 are needed",
+            "travel_mm: 150 mm do not reach -2 mm from the far end; 152 do",
         ),
         ("travel_mm = 165", "travel_mm = 500", "travel_mm: 500 mm are over 228"),
         ("zero_mm = -2", "zero_mm = 2", "zero_mm: 2 mm is above 0 mm, the lower end of the stroke"),
@@ -265,7 +267,7 @@ fn a_seat_says_of_its_motors_what_their_family_needs() {
     assert!(
         six("pulses_per_rev = 3200", "pulses_per_rev = 6400").contains("microsteps a second, over 200000")
     );
-    assert!(six("\"75%\"", "\"70%\"").contains("run: \"70%\" is none of 100%, 75%, 50%"));
+    assert!(six("\"75%\"", "\"70%\"").contains("run: \"70%\" is not one of 100%, 75%, 50%"));
     assert!(six("current = { peak = 9, run = \"75%\" }", "").contains("a SIXpack 2 needs current"));
     assert!(six("[2]", "[4]").contains("reverse: 4 is outside 1..=3"));
     assert!(six("[2]", "[2, 2]").contains("reverse: axis 2 stands there twice"));
@@ -276,12 +278,12 @@ fn a_seat_says_of_its_motors_what_their_family_needs() {
 #[test]
 fn a_link_is_a_line_of_its_own_by_its_whole_path() {
     let port = |port: &str| only(instead("/dev/ttyUSB0", port));
-    assert!(port("ttyUSB0").contains("port: \"ttyUSB0\" is no device; write its whole path"));
+    assert!(port("ttyUSB0").contains("port: \"ttyUSB0\" is not a device; write a path such as"));
     let can = LINK.replace("[link.stalls]", "[link.bus]").replace("ttyUSB0", "can0") + "wiring = \"can\"\n";
-    assert!(only(silver(&can)).contains("port: \"/dev/can0\" is no interface, as \"can0\""));
+    assert!(only(silver(&can)).contains("port: \"/dev/can0\" is not an interface like \"can0\""));
     let twin = LINK.replace("stalls", "circle");
     let fault = only(silver(&twin));
-    assert!(fault.starts_with("hall.toml:21:8: port: [link.stalls] is on it already"), "{fault}");
+    assert!(fault.starts_with("hall.toml:21:8: port: [link.stalls] uses it already"), "{fault}");
 }
 
 #[test]

@@ -49,7 +49,7 @@ fn an_empty_cell_holds_the_value_before_it() {
     assert_eq!(cue.positions(), [0.1, 0.2, 0.1, 0.3, 0.4, 0.3]);
     assert_eq!(
         faults("time_ms,a1\n0,\n,1\n"),
-        "2:3: a1: is empty, and there is no value before it to hold\n3:1: time_ms: is empty; every row needs one"
+        "2:3: a1: is empty, with no value before it to hold\n3:1: time_ms: is empty; every row needs one"
     );
 }
 
@@ -58,8 +58,8 @@ fn a_file_with_nothing_to_play_is_refused() {
     for text in ["", "\n \n", "# title: x\n"] {
         assert_eq!(faults(text), " is empty; a cue needs at least two rows", "{text:?}");
     }
-    assert_eq!(faults("time_ms,a1\n"), " 0 of the two rows that a cue needs at least");
-    assert_eq!(faults("time_ms,a1\n0,0\n"), " 1 of the two rows that a cue needs at least");
+    assert_eq!(faults("time_ms,a1\n"), " number of rows: 0; a cue needs at least two");
+    assert_eq!(faults("time_ms,a1\n0,0\n"), " number of rows: 1; a cue needs at least two");
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn positions_outside_the_stroke_are_refused_in_the_unit_of_the_file() {
     );
     assert_eq!(
         faults("# units: mm\ntime_ms,a1\n0,-200000\n1,0"),
-        "3:3: a1: -200000 is outside -100000 to 100000 mm, and no seat goes there"
+        "3:3: a1: -200000 is outside -100000 to 100000 mm, where no seat can go"
     );
 }
 
@@ -100,14 +100,14 @@ fn time_starts_at_0_and_increases() {
     assert_eq!(faults("time_ms,a1\n5,0\n6,0"), "2:1: time_ms: the first time is 5 and must be 0");
     assert_eq!(
         faults("time_ms,a1\n0,0\n2000,0\n2000,0\n1999.5,0\n2001,0"),
-        "4:1: time_ms: 2000 does not come after 00:02.000, the time before it\n\
-         5:1: time_ms: 1999.5 does not come after 00:02.000, the time before it"
+        "4:1: time_ms: 2000 is not after 00:02.000, the time before it\n\
+         5:1: time_ms: 1999.5 is not after 00:02.000, the time before it"
     );
     assert_eq!(
         faults("time_s,a1\n0,0\n86401,0"),
-        "3:1: time_s: 86401 lies after 24:00:00.000, the latest time of a cue"
+        "3:1: time_s: 86401 is after 24:00:00.000, the latest time of a cue"
     );
-    assert!(faults("time_s,a1\n0,0\n-1e308,0\n").contains("does not come after"));
+    assert!(faults("time_s,a1\n0,0\n-1e308,0\n").contains("is not after"));
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn effects_and_words_have_their_values() {
     );
     assert_eq!(
         faults("time_ms,a1,io\n0,0,0x1000\n1,0,0"),
-        "2:5: io: \"0x1000\" is no output word; 0 to 4095, or 0x0 to 0xfff, for Y01 to Y12"
+        "2:5: io: \"0x1000\" is not an output word; 0 to 4095, or 0x0 to 0xfff, for Y01 to Y12"
     );
 }
 
@@ -172,7 +172,7 @@ fn text_that_is_none_is_refused() {
     );
     assert_eq!(faults("time_ms,a1\n0,0\n1,\"0\n"), "3:3: a quote that is not closed in its line");
     let long = format!("time_ms,a1\n0,0\n1,{}\n2,7\n", "0".repeat(70_000));
-    assert_eq!(faults(long), "3:1: over 65536 bytes long, the most that is read");
+    assert_eq!(faults(long), "3:1: longer than 65536 bytes, the limit");
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn twenty_faults_are_told_and_the_rest_counted() {
 fn too_many_rows_are_refused_where_the_limit_is_met() {
     let endless = "time_ms,a1\n0,0\n1,0\n2,0\n".as_bytes().chain(std::io::repeat(b'x'));
     let faults = read_at_most(2, Path::new("t.csv"), endless).unwrap_err();
-    assert_eq!(faults.to_string(), "t.csv:4:1: over 8000000 rows, the most that a cue may have");
+    assert_eq!(faults.to_string(), "t.csv:4:1: more than 8000000 rows, the limit of a cue");
 }
 
 proptest! {

@@ -125,7 +125,7 @@ impl McapReading {
 
     /// Takes one record. An error ends the reading; faults that do not are gathered.
     fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), Problem> {
-        let broken = |what: &str| Problem::Damaged(format!("a {what} record that is too short"));
+        let broken = |what: &str| Problem::Damaged(format!("a {what} record is too short"));
         match opcode {
             op::SCHEMA => {
                 self.schemas.insert(container::schema(body).ok_or_else(|| broken("schema"))?);
@@ -149,7 +149,7 @@ impl McapReading {
                 }
             }
             // Zeros would be read as one record after another.
-            0 => return Err(Problem::Damaged("a record of opcode 0, which no record has".to_owned())),
+            0 => return Err(Problem::Damaged("a record has opcode 0, which is invalid".to_owned())),
             _ => {}
         }
         Ok(())
@@ -175,7 +175,7 @@ impl McapReading {
         }
         if topic.is_some() && schema != 0 && !self.schemas.contains(&schema) {
             return Err(Problem::Damaged(format!(
-                "{name} has schema {schema}, which does not stand before it"
+                "{name} has schema {schema}, which does not come before it"
             )));
         }
         self.channels.insert(id, topic);

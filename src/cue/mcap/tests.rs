@@ -121,11 +121,11 @@ fn faults_are_placed_by_topic_message_and_log_time() {
     );
     assert_eq!(
         faults_behind_rows(&[("/cue/axes", 10, r#"{"a":[0,0]}"#)]),
-        at(3, 10) + "00:00.000 does not come after 00:00.000, the time before it"
+        at(3, 10) + "00:00.000 is not after 00:00.000, the time before it"
     );
     assert_eq!(
         faults_behind_rows(&[("/cue/axes", 20, r#"{"a":[0]}"#)]),
-        at(3, 20) + "1 axes where the first message has 2"
+        at(3, 20) + "1 axes, but the first message has 2"
     );
     assert_eq!(
         faults_behind_rows(&[("/cue/vibration", 0, r#"{"axis":3,"hz":1,"amp":0}"#)]),
@@ -143,7 +143,7 @@ fn messages_that_are_not_what_they_should_be_are_refused() {
     for (json, expected) in [
         (
             r#"{"dac1":0.5,"dac2":1.5}"#,
-            "dac2: a level of 1.5 is outside 0 to 1; 1 is all that the output can do",
+            "dac2: a level of 1.5 is outside 0 to 1, the full range of the output",
         ),
         (r#"{"dac1":0.33777,"dac2":0.67111}"#, "dac1 and dac2 make 0x5678abcd"),
         (r#"{"dac1":0}"#, "not the JSON of its topic: missing field `dac2`"),
@@ -163,7 +163,7 @@ fn messages_that_are_not_what_they_should_be_are_refused() {
         ("/cue/io", r#"{"effects":{"air":2}}"#, "\"2\" is neither 0 nor 1"),
         ("/cue/io", r#"{"effects":{"Air":1}}"#, "an effect's name is made of"),
         ("/cue/io", r#"{"word":65536}"#, "not the JSON of its topic: invalid value"),
-        ("/cue/io", r#"{"word":4096}"#, "\"4096\" is no output word; 0 to 4095"),
+        ("/cue/io", r#"{"word":4096}"#, "\"4096\" is not an output word; 0 to 4095"),
         ("/cue/io", r#"{"word":1,"effects":{"air":1}}"#, "the raw output word and named effects exclude"),
         ("/cue/io", "{}", "not the JSON of its topic: neither effects nor word"),
     ] {
@@ -181,13 +181,10 @@ fn messages_that_are_not_what_they_should_be_are_refused() {
         "{both}"
     );
     let long = format!(r#"{{"a":[0,0{}]}}"#, " ".repeat(70_000));
-    assert!(
-        faults_behind_rows(&[("/cue/axes", 20, &long)])
-            .ends_with("over 65536 bytes long, the most that is read")
-    );
+    assert!(faults_behind_rows(&[("/cue/axes", 20, &long)]).ends_with("longer than 65536 bytes, the limit"));
     let end = faults_behind_rows(&[("/cue/axes", u64::MAX, r#"{"a":[0,0]}"#)]);
     assert!(
-        end.ends_with("18446744073709551615 ns lies after 24:00:00.000, the latest time of a cue"),
+        end.ends_with("18446744073709551615 ns is after 24:00:00.000, the latest time of a cue"),
         "{end}"
     );
 }
@@ -197,7 +194,7 @@ fn foreign_files_are_refused() {
     assert_eq!(faults(b""), "is empty; a cue needs at least two rows");
     assert_eq!(faults(b"time_ms,a1\n0,0\n1,0\n"), "not an MCAP cue: it does not begin as MCAP files do");
     assert_eq!(faults(&file(&[], &ROWS)), "not an MCAP cue: it has no metadata record \"kinocue\"");
-    assert_eq!(faults(&file(FRACTION, &[])), "0 of the two rows that a cue needs at least");
+    assert_eq!(faults(&file(FRACTION, &[])), "number of rows: 0; a cue needs at least two");
     assert_eq!(
         faults_behind_rows(&[("/cue/smell", 0, "{}")]),
         "unknown topic \"/cue/smell\"; a cue has /cue/axes, /cue/vibration, /cue/analogue, /cue/io and /cue/marker"
@@ -333,10 +330,10 @@ fn a_chunk_that_unpacks_to_more_than_any_cue_is_refused_before_it_is_unpacked() 
 #[test]
 fn records_that_are_none_are_refused_at_the_first() {
     let bytes = file_of(&[&[0; 90]], 0, 0);
-    assert!(faults(&bytes).starts_with("byte 25: damaged: a record of opcode 0"), "{}", faults(&bytes));
+    assert!(faults(&bytes).starts_with("byte 25: damaged: a record has opcode 0"), "{}", faults(&bytes));
     let zeros = chunk("", 90, &[0; 90]);
     let told = faults(&file_of(&[&zeros], 0, 0));
-    assert!(told.starts_with("byte 25: damaged: a record of opcode 0"), "{told}");
+    assert!(told.starts_with("byte 25: damaged: a record has opcode 0"), "{told}");
 }
 
 #[test]

@@ -86,5 +86,5 @@ impl<P: LinkPort + ?Sized> LinkPort for Box<P> {
 
 /// The port is gone: neither what was sent nor what is answered goes over it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the port has vanished; look at the plug and the power of the adapter")]
+#[error("the port has vanished; check the plug and the power of the adapter")]
 pub(crate) struct LinkFault;

@@ -48,7 +48,7 @@ pub(crate) enum HomeError {
     #[error(transparent)]
     Talk(#[from] TalkFault),
     /// A unit refused something.
-    #[error("unit {unit} refused {what}: {reason}; look at its own program and its firmware")]
+    #[error("unit {unit} refused {what}: {reason}; check its own program and its firmware")]
     Refused {
         /// Who.
         unit: u8,
@@ -58,7 +58,7 @@ pub(crate) enum HomeError {
         reason: NakReason,
     },
     /// Not known whether a move or a shift was taken.
-    #[error("it is not known whether unit {unit} took {what}; it was braked, home it again")]
+    #[error("it is unknown whether unit {unit} took {what}; it was braked, home it again")]
     InDoubt {
         /// Who.
         unit: u8,
@@ -67,8 +67,8 @@ pub(crate) enum HomeError {
     },
     /// A setting reads back as another.
     #[error(
-        "unit {unit}: register {number} ({name}) reads {found} where {wanted} was written; does another program change it? \
-         Then home again"
+        "unit {unit}: register {number} ({name}) reads {found} after {wanted} was written; does another program \
+         change it? Home again"
     )]
     ReadBack {
         /// Who.
@@ -84,7 +84,7 @@ pub(crate) enum HomeError {
     },
     /// The seat type counts as no such drive does.
     #[error(
-        "axis {axis}: {counts} counts a turn are none of a SilverMax; set pulses_per_rev = 4000, 8000 or 16000"
+        "axis {axis}: a SilverMax cannot have {counts} counts per turn; set pulses_per_rev = 4000, 8000 or 16000"
     )]
     Counts {
         /// The axis, from 1.
@@ -103,13 +103,13 @@ pub(crate) enum HomeError {
         counts: f64,
     },
     /// Too hot.
-    #[error("unit {unit} is too hot; let it cool, look at what loads it, then home")]
+    #[error("unit {unit} is too hot; let it cool, find out what loads it, then home")]
     Hot {
         /// Who.
         unit: u8,
     },
     /// The drive let go of its motor.
-    #[error("unit {unit} was killed by {cause} (register 211); look for what blocks or heats it, then home")]
+    #[error("unit {unit} was killed by {cause} (register 211); find out what blocks or heats it, then home")]
     Killed {
         /// Who.
         unit: u8,
@@ -118,7 +118,7 @@ pub(crate) enum HomeError {
     },
     /// The switch stays on.
     #[error(
-        "unit {unit}: input {input} is still on {travel_mm} mm away from it; check the switch and its wiring, and `active`"
+        "unit {unit}: input {input} is still on after moving {travel_mm} mm away; check the switch and its wiring, and `active`"
     )]
     SwitchStaysOn {
         /// Who.
@@ -139,7 +139,7 @@ pub(crate) enum HomeError {
         travel_mm: f64,
     },
     /// It moves on and on.
-    #[error("unit {unit} still moves after {seconds:.0} s; it was braked, look for what slows it, then home")]
+    #[error("unit {unit} still moves after {seconds:.0} s; it was braked; find out what slows it, then home")]
     TooLong {
         /// Who.
         unit: u8,
@@ -148,7 +148,7 @@ pub(crate) enum HomeError {
     },
     /// It is elsewhere than it was sent.
     #[error(
-        "unit {unit} stands at {found_mm:.2} mm where it was sent to {wanted_mm:.2}; look for what blocks it, then home"
+        "unit {unit} is at {found_mm:.2} mm instead of {wanted_mm:.2}; find out what blocks it, then home"
     )]
     Elsewhere {
         /// Who.
@@ -162,7 +162,7 @@ pub(crate) enum HomeError {
     #[error("homing was stopped; the seat is not home")]
     Aborted,
     /// 0 cannot be told from a restart.
-    #[error("the canary is 0, which is what a unit has after a restart; take another")]
+    #[error("the canary is 0, as after a restart of a unit; use another")]
     Canary,
 }
 

@@ -55,7 +55,7 @@ pub(crate) enum TalkFault {
         unit: u8,
     },
     /// Somebody else answered: which of the two has taken it is not known.
-    #[error("unit {by} answered what unit {unit} was asked; look for a bad line, or two units of one number")]
+    #[error("unit {by} answered a request to unit {unit}; is the line bad, or do two units share a number?")]
     Foreign {
         /// Who was asked.
         unit: u8,

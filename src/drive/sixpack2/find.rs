@@ -21,8 +21,8 @@ pub(crate) enum FindError {
     Link(#[from] LinkFault),
     /// It answers at neither rate.
     #[error(
-        "unit {unit} answers neither at {baud} nor at {waking} baud, with which it wakes; check its number, its power and the \
-         wiring, and whether another program has switched it"
+        "unit {unit} answers neither at {baud} nor at {waking} baud, its power-on rate; check its number, its power and the \
+         wiring, and whether another program has changed its rate"
     )]
     Nowhere {
         /// Who was asked.
@@ -34,7 +34,7 @@ pub(crate) enum FindError {
     },
     /// It answers as it woke, and not after it was switched.
     #[error(
-        "unit {unit} answers at {waking} baud, with which it wakes, but not at {baud}, to which it was switched; set a lower baud, or \
+        "unit {unit} answers at {waking} baud, its power-on rate, but not at {baud}, to which it was switched; set a lower baud, or \
          shorten the line"
     )]
     Stays {

@@ -79,8 +79,8 @@ pub(crate) enum HomeError {
     },
     /// A unit that restarts would go on being understood.
     #[error(
-        "{baud} baud is what a unit that was restarted talks at: it would follow targets without knowing its place; set another \
-         baud for a link that plays, 57600 for one"
+        "{baud} baud is the rate of a restarted unit, which would follow targets without knowing its position; set another \
+         baud for a link that plays, such as 57600"
     )]
     WakingRate {
         /// The rate of the link.
@@ -88,7 +88,7 @@ pub(crate) enum HomeError {
     },
     /// It does not stand still.
     #[error(
-        "motor {motor} of unit {unit} does not come to rest within {seconds:.0} s; it was told to stop, switch its power off and home it again"
+        "motor {motor} of unit {unit} does not come to rest within {seconds:.0} s; it was sent a stop; switch its power off and home it again"
     )]
     Moves {
         /// The unit.
@@ -100,7 +100,7 @@ pub(crate) enum HomeError {
     },
     /// It was told to search and does not.
     #[error(
-        "motor {motor} of unit {unit} does not begin to look for its zero; look for a bad line, then home it again"
+        "motor {motor} of unit {unit} does not begin its search for zero; check for a bad line, then home it again"
     )]
     NoSearch {
         /// The unit.
@@ -110,8 +110,8 @@ pub(crate) enum HomeError {
     },
     /// What was looked for is not there.
     #[error(
-        "motor {motor} of unit {unit}: {what} not found within {seconds:.0} s, {travel_mm} mm at {speed_mm_s:.1} mm/s; the search \
-         was ended, check it, its wiring, `active` and `toward`"
+        "motor {motor} of unit {unit}: {what} not found within {seconds:.0} s, {travel_mm} mm at {speed_mm_s:.1} mm/s; the search was \
+         ended; check it, its wiring, `active` and `toward`"
     )]
     NotFound {
         /// The unit.
@@ -129,7 +129,7 @@ pub(crate) enum HomeError {
     },
     /// The search ended somewhere.
     #[error(
-        "motor {motor} of unit {unit} ended its search {off_mm:.2} mm beside its zero; look for what blocks it, then home it again"
+        "motor {motor} of unit {unit} ended its search {off_mm:.2} mm off its zero; find out what blocks it, then home it again"
     )]
     BesideZero {
         /// The unit.
@@ -141,7 +141,7 @@ pub(crate) enum HomeError {
     },
     /// The counter is not what was written.
     #[error(
-        "motor {motor} of unit {unit} counts {found} where {wanted} was written; does another program talk to it? Then home it again"
+        "motor {motor} of unit {unit} counts {found} after {wanted} was written; does another program talk to it? Home it again"
     )]
     ReadBack {
         /// The unit.
@@ -155,7 +155,7 @@ pub(crate) enum HomeError {
     },
     /// It is elsewhere than it was sent.
     #[error(
-        "motor {motor} of unit {unit} stands at {found_mm:.2} mm where it was sent to {wanted_mm:.2}; look for what blocks it, \
+        "motor {motor} of unit {unit} is at {found_mm:.2} mm instead of {wanted_mm:.2}; find out what blocks it, \
          then home it again"
     )]
     Elsewhere {
@@ -169,7 +169,7 @@ pub(crate) enum HomeError {
         wanted_mm: f64,
     },
     /// It was reset meanwhile.
-    #[error("unit {unit} was restarted while it homed; look at its supply, then home it again")]
+    #[error("unit {unit} restarted while it homed; check its supply, then home it again")]
     Restarted {
         /// The unit.
         unit: u8,

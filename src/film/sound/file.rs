@@ -27,26 +27,26 @@ pub(crate) const MOST_OCTETS: u64 = 64 << 20;
 #[non_exhaustive]
 pub(crate) enum IndexFault {
     /// Something else.
-    #[error("this is no index of a film's sound; make one with `kinocue sync index FILM -o FILE.kidx`")]
+    #[error("this is not an index of a film's sound; make one with `kinocue sync index FILM -o FILE.kidx`")]
     Foreign,
     /// Made by another version.
     #[error(
-        "it is an index of version {0}, and version {VERSION} is read; make it anew with `kinocue sync index`"
+        "it is an index of version {0}, but this program reads version {VERSION}; make it again with `kinocue sync index`"
     )]
     Version(u16),
     /// Cut short, or more than that.
-    #[error("it has {found} octets and says that it has {said}; copy it again, or make it anew")]
+    #[error("it has {found} bytes instead of {said}; copy it again, or make it again")]
     Length { found: u64, said: u64 },
     /// Longer than the index of any film.
     #[error(
-        "it is longer than {MOST_OCTETS} octets, which is no film's; make an index with `kinocue sync index FILM -o FILE.kidx`"
+        "it is longer than {MOST_OCTETS} bytes, too long for a film; make an index with `kinocue sync index FILM -o FILE.kidx`"
     )]
     Long,
     /// Its sum is not that of what is in it.
-    #[error("it was damaged: its sum does not fit; copy it again, or make it anew")]
+    #[error("it is damaged: its checksum is wrong; copy it again, or make it again")]
     Sum,
     /// Its sum fits, and its content makes no sense.
-    #[error("{0}; make it anew with `kinocue sync index`")]
+    #[error("{0}; make it again with `kinocue sync index`")]
     Content(&'static str),
 }
 
@@ -102,7 +102,7 @@ impl SoundIndex {
 
     fn of_parts(name: &[u8], trace: &[u8], landmarks: &[u8]) -> Result<Self, IndexFault> {
         let name = std::str::from_utf8(name).ok().filter(|name| is_name(name));
-        let name = name.ok_or(IndexFault::Content("the name in it is none"))?.to_owned();
+        let name = name.ok_or(IndexFault::Content("it has no valid name"))?.to_owned();
         let u24 = |octets: &[u8]| u32::from_le_bytes([octets[0], octets[1], octets[2], 0]);
         let mark = |octets: &[u8]| Landmark { hash: u24(octets), frame: u24(&octets[3..]) };
         let landmarks: Vec<Landmark> = landmarks.chunks_exact(MARK).map(mark).collect();

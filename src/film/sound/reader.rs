@@ -119,14 +119,14 @@ impl SoundReader {
         let name = |film: usize| self.films.get(film).map_or("", |film| film.name.as_str());
         match self.told {
             EarState::Film(film) if film > 0 => {
-                Some(format!("{} is heard, and the film of the show is {}", name(film), name(0)))
+                Some(format!("{} is playing, but the film of the show is {}", name(film), name(0)))
             }
             EarState::Ambiguous(count) => Some(format!(
-                "what is heard is in the films {count} times or more; which it is, what comes next will say"
+                "this passage is in the films {count} times or more; the sound that follows will decide which it is"
             )),
-            EarState::Unknown if self.count - self.since > STRANGE_S * self.samples_per_s => {
-                Some("what is heard is in no index that was named; see that they are of this film".to_owned())
-            }
+            EarState::Unknown if self.count - self.since > STRANGE_S * self.samples_per_s => Some(
+                "this sound is in none of the given indexes; check that they are of this film".to_owned(),
+            ),
             _ => None,
         }
     }

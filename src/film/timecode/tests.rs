@@ -85,7 +85,7 @@ fn what_is_no_timecode_is_refused_in_words() {
     ] {
         assert_eq!(
             why(text, FrameRate::F24),
-            format!("{text} is no timecode; write HH:MM:SS:FF, as 01:00:00:00")
+            format!("{text} is not a timecode; write HH:MM:SS:FF, such as 01:00:00:00")
         );
     }
     assert_eq!(why("24:00:00:00", FrameRate::F24), "24:00:00:00: 24 hours are outside 0..=23");
@@ -100,7 +100,7 @@ fn what_is_no_timecode_is_refused_in_words() {
         "00:01:00;02 is drop frame, which there is at 29.97 frames a second alone; 25 is configured"
     );
     let rate = "26".parse::<FrameRate>().expect_err("no such rate").to_string();
-    assert_eq!(rate, "26 is no frame rate; take 23.976, 24, 25, 29.97 or 30");
+    assert_eq!(rate, "26 is not a frame rate; take 23.976, 24, 25, 29.97 or 30");
     assert_eq!("29.97".parse::<FrameRate>(), Ok(FrameRate::F29_97));
 }
 

@@ -161,5 +161,5 @@ fn registers_of_32_bits_are_an_error_in_words_and_no_position() {
     hall.health.on_wide_registers(3);
     hall.look();
     assert_eq!((hall.health.standing(2), hall.health.why(2)), (HealthState::Error, Why::Wide(3)));
-    assert!(Why::Wide(3).next().unwrap().contains("take it out"));
+    assert!(Why::Wide(3).next().unwrap().contains("disable it"));
 }

@@ -50,7 +50,7 @@ fn sample(line: &str, family: &Family, page: &mut Page) -> Result<(), String> {
     let (series, value) = line.rsplit_once(' ').ok_or("a sample without value")?;
     let value = match value {
         "+Inf" => f64::INFINITY,
-        value => value.parse().map_err(|_| "value is no number")?,
+        value => value.parse().map_err(|_| "value is not a number")?,
     };
     let (name, labels) = series.split_once('{').map_or((series, None), |(name, rest)| (name, Some(rest)));
     let suffix = name.strip_prefix(family.name.as_str()).ok_or("not of the family above")?;

@@ -107,8 +107,8 @@ fn each_trouble_of_a_unit_is_told_by_its_number() {
     let status = |word: u16| Case::new().with(|facts| facts.internal = Internal(word));
     status(0).assert_found(Check::DriveHot, "unit 17 is too hot");
     status(Io::COOL | Io::HOLDING_ERROR).assert_found(Check::DriveError, "unit 17 has had a holding error");
-    status(Io::COOL | 1 << 13).assert_found(Check::Supply, "unit 17 has met high voltage");
-    status(Io::COOL | 1 << 14).assert_found(Check::Supply, "unit 17 has met low voltage");
+    status(Io::COOL | 1 << 13).assert_found(Check::Supply, "unit 17 has had high voltage");
+    status(Io::COOL | 1 << 14).assert_found(Check::Supply, "unit 17 has had low voltage");
 }
 
 #[test]
@@ -143,22 +143,22 @@ fn who_does_not_answer_and_who_answers_for_another_is_told() {
     case.survey.units.insert(17, Err(TalkFault::Silent { unit: 17 }));
     case.assert_found(Check::NoAnswer, "unit 17 does not answer");
     case.survey.units.insert(17, Err(TalkFault::Foreign { unit: 17, by: 18 }));
-    case.assert_found(Check::DuplicateUnit, "unit 18 answered what unit 17 was asked");
+    case.assert_found(Check::DuplicateUnit, "unit 18 answered a request to unit 17");
     let mut case = Case::new();
     case.survey.counts.doubled = 3;
-    case.assert_found(Check::DuplicateUnit, "3 answers more than were asked for");
+    case.assert_found(Check::DuplicateUnit, "3 more answers than requests");
 }
 
 #[test]
 fn an_adapter_that_repeats_what_is_sent_has_to_be_known_for_it() {
     let mut case = Case::new();
     case.survey.counts.malformed = 51;
-    case.assert_found(Check::EchoDiffers, "51 lines came back beside 51 answers");
+    case.assert_found(Check::EchoDiffers, "51 lines besides 51 answers came back");
     let mut case = Case::new();
     case.hall.links.iter_mut().for_each(|link| link.has_echo = true);
     assert_eq!(case.found(), []);
     case.survey.counts.echo_differs = 40;
-    case.assert_found(Check::EchoDiffers, "40 of 51 requests did not come back");
+    case.assert_found(Check::EchoDiffers, "40 of 51 requests were not echoed");
 }
 
 #[test]
@@ -169,7 +169,8 @@ fn late_answers_are_told_with_the_rate_that_they_leave() {
         case
     };
     assert_eq!(late(310).found(), []);
-    late(2_000).assert_found(Check::SlowReplies, "take 2.0 ms, 0.3 were reckoned with: 29.98 Hz become 25.");
+    late(2_000)
+        .assert_found(Check::SlowReplies, "take 2.0 ms instead of the assumed 0.3 ms: 29.98 Hz become 25.");
     let found = late(16_000).found();
     let checks: Vec<_> = found.iter().map(|(check, _)| *check).collect();
     assert_eq!(checks, [Check::LinkTooSlow, Check::AdapterSlow], "{found:?}");
@@ -185,7 +186,7 @@ fn a_port_that_cannot_be_had_is_told_by_what_is_wrong_with_it() {
         (SerialError::Missing(port()), Check::PortMissing, "there is no such port"),
         (SerialError::Taken(port()), Check::PortTaken, "another program has it"),
         (SerialError::Forbidden(port()), Check::PortForbidden, "not allowed to open it"),
-        (SerialError::NoLine(port()), Check::PortUnfit, "it is no serial line"),
+        (SerialError::NoLine(port()), Check::PortUnfit, "it is not a serial line"),
     ] {
         let mut case = Case::new();
         case.survey = LinkSurvey::silent(error);
@@ -228,22 +229,22 @@ fn a_sixpack_is_home_where_each_of_its_motors_counts_a_place_of_the_seat() {
     };
     with(|unit| unit.was_reset = true).assert_found(Check::NotHome, "unit 1 was reset since");
     with(|unit| unit.motors[1].position = 0)
-        .assert_found(Check::NotHome, "motors 1 of unit 1 count no place");
+        .assert_found(Check::NotHome, "motors 1 of unit 1 count no position");
     with(|unit| unit.motors[2].action = action::SEARCH)
-        .assert_found(Check::DriveError, "motor 2 of unit 1 looks for its zero");
+        .assert_found(Check::DriveError, "motor 2 of unit 1 searches for its zero");
     let mut woke = sixpack();
     woke.survey.sixpacks.insert(1, Ok(None));
-    woke.assert_found(Check::NotHome, "unit 1 answers as it woke");
+    woke.assert_found(Check::NotHome, "unit 1 has its power-on settings");
     let silent = sixpack2::TalkFault::Silent { unit: 1, baud: 56_818 };
     woke.survey.sixpacks.insert(1, Err(silent));
     woke.assert_found(Check::NoAnswer, "unit 1 does not answer at 56818 baud");
     woke.survey.sixpacks.clear();
-    woke.assert_found(Check::NoAnswer, "unit 1 was not asked");
+    woke.assert_found(Check::NoAnswer, "unit 1 was not read");
 }
 
 #[test]
 fn of_a_seat_on_a_can_bus_it_is_told_that_nobody_asked() {
     let mut case = sixpack();
     case.hall.links.iter_mut().for_each(|link| link.wiring = LinkWiring::Can);
-    case.assert_found(Check::DrivesUnasked, "is a CAN bus, which is not opened yet");
+    case.assert_found(Check::DrivesUnasked, "is a CAN bus, which is not supported yet");
 }

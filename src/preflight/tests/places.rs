@@ -21,7 +21,7 @@ fn standing(places: [i32; 3], dialect: Dialect, reported: Option<[i32; 3]>) -> C
 fn a_word_order_that_the_stroke_or_a_report_refutes_is_refused() {
     let finding = only(&standing([20_000, 0, 0], Dialect::Mbox, None)).unwrap();
     assert_eq!((finding.check, finding.fails()), (Check::WordOrder, true));
-    let words = "axis 1 stands at 1310720000 pulses by the word order of smc, at 20000 by that of mbox; its stroke is \
+    let words = "axis 1 is at 1310720000 pulses in the word order of smc, at 20000 in that of mbox; its stroke is \
                  0..=300000";
     assert_eq!(finding.found, words);
     let reported = standing([1, 0, 0], Dialect::Mbox, Some([1, 0, 0]));
@@ -41,7 +41,7 @@ fn a_word_order_that_nothing_tells_is_a_warning() {
 fn a_position_outside_the_stroke_is_no_position() {
     let finding = only(&standing([0, -20_000, 0], Dialect::Smc, None)).unwrap();
     assert_eq!((finding.check, finding.fails()), (Check::Position, true));
-    assert_eq!(finding.found, "axis 2 stands at -20000 pulses, outside its stroke of 0..=300000");
+    assert_eq!(finding.found, "axis 2 is at -20000 pulses, outside its stroke of 0..=300000");
     assert!(!Check::Position.can_be_accepted());
     assert_eq!(check(&standing([-30, 300_030, 0], Dialect::Smc, None)), None, "rounding");
     let mut case = standing([0, -20_000, 0], Dialect::Smc, None);
@@ -53,7 +53,7 @@ fn a_position_outside_the_stroke_is_no_position() {
 fn a_report_of_the_same_rest_contradicts_and_one_of_a_seat_that_moves_does_not() {
     let mut case = standing([150_000, 0, 0], Dialect::Smc, Some([60_000, 0, 0]));
     let found = only(&case).unwrap().found;
-    assert_eq!(found, "axis 1 stands at 150000 pulses by its registers, at 60000 by its reports");
+    assert_eq!(found, "axis 1 is at 150000 pulses by its registers, at 60000 by its reports");
     case.survey.again.insert(Address::Dp(0x06), 7);
     assert_eq!(check(&case), None);
 }

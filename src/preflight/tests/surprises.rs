@@ -10,7 +10,7 @@ fn what_a_site_will_be_surprised_by_of_an_imax_is_told() {
     assert_eq!(mbox(&[(0x0e, 1)]).check, Check::HomesUnsearched);
     let late = mbox(&[(0x51, 4)]);
     assert_eq!((late.check, late.fails()), (Check::MotionLate, false));
-    let words = "PA51 = 4 (and PA50 = 100): by that filter motion comes 30 to 70 ms later than the film";
+    let words = "PA51 = 4 (and PA50 = 100): with this filter motion comes 30 to 70 ms later than the film";
     assert_eq!(late.found, words);
     assert_eq!(check(&Case::new(Dialect::Mbox).with(&[(0x51, 1)])), None, "1 smooths nothing");
     assert!(Case::new(Dialect::Mbox).with(&[(0x51, 65_535)]).told().len() == 1, "whatever it holds");
@@ -38,7 +38,7 @@ fn pulses_that_no_count_of_the_encoder_makes_are_refused() {
     let found = only(&case).unwrap();
     assert_eq!(found.check, Check::Encoder);
     assert!(
-        found.found.ends_with("7500 pulses a turn, so neither two nor four for each line"),
+        found.found.ends_with("7500 pulses per turn, neither two nor four for each line"),
         "{}",
         found.found
     );

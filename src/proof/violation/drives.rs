@@ -31,7 +31,7 @@ pub(crate) struct OverLimit {
 #[non_exhaustive]
 pub(crate) enum DriveBreach {
     /// Counts that no drive of the family has.
-    #[error("a SilverMax counts 4000, 8000 or 16000 a turn; pulses_per_rev of seat {seat} is {counts}")]
+    #[error("a SilverMax has 4000, 8000 or 16000 counts per turn; pulses_per_rev of seat {seat} is {counts}")]
     Counts { seat: String, counts: f64 },
     /// The course of a drive breaks a limit.
     #[error(
@@ -42,7 +42,7 @@ pub(crate) enum DriveBreach {
     Motion { on: OnDrive, quantity: Quantity, over: OverLimit },
     /// A drive would be too far beside the cue; with the level at which it fits.
     #[error(
-        "a drive of seat {} at {:.1} Hz would be {:.2} {unit} beside the cue at {}, {:.2} are allowed (max_deviation_{unit}); it fits \
+        "a drive of seat {} at {:.1} Hz would be {:.2} {unit} off the cue at {}, {:.2} are allowed (max_deviation_{unit}); it fits \
          at level {percent:.0}%, or at a higher rate of the link",
         on.seat, on.hz, over.value, on.at, over.limit, unit = on.unit.name(), percent = (100.0 * level).floor()
     )]
@@ -74,13 +74,13 @@ pub(crate) enum DriveBreach {
     /// Nothing that a motor can be told makes its speed jump so little.
     #[error(
         "at {:.1} Hz no propdiv lets a motor at {velocity} {unit}/s jump by no more than {jump:.1} {unit}/s (jump_{unit}_s of seat {}); raise \
-         the rate of the link, or the jump where the motor takes it",
+         the rate of the link, or the jump if the motor can take it",
         on.hz, on.seat, unit = on.unit.name()
     )]
     NoPropdiv { on: OnDrive, velocity: f64, jump: f64 },
     /// A vibration that a link is too slow for.
     #[error(
-        "vibration at {hz:.1} Hz at {} is too quick for drives at {:.1} Hz, which swing at {most:.1} Hz at the most; set the level of \
+        "vibration at {hz:.1} Hz at {} is too fast for drives at {:.1} Hz, which follow at most {most:.1} Hz; set the level of \
          vibration of such seats to 0, or raise the rate of the link",
         on.at, on.hz
     )]

@@ -29,7 +29,7 @@ const OCTETS: usize = 4_096;
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PtyError {
     /// Something else is there.
-    #[error("{}: something else is there; name a link that is free", plain::path(.0))]
+    #[error("{}: this already exists; give another path for the link", plain::path(.0))]
     Taken(PathBuf),
     /// The link cannot be made.
     #[error("{}: cannot make the link", plain::path(path))]
@@ -40,7 +40,7 @@ pub(crate) enum PtyError {
         source: io::Error,
     },
     /// There is no pseudo-terminal or thread to be had.
-    #[error("cannot have a pseudo-terminal")]
+    #[error("cannot get a pseudo-terminal")]
     System(#[source] io::Error),
 }
 

@@ -14,12 +14,12 @@ use crate::plain;
 pub(crate) enum SerialError {
     /// Nothing is there.
     #[error(
-        "{}: there is no such port; plug the adapter in, and name it by its link in /dev/serial/by-id",
+        "{}: there is no such port; plug the adapter in, and use its link in /dev/serial/by-id",
         plain::path(.0)
     )]
     Missing(PathBuf),
     /// Another program has it open.
-    #[error("{}: another program has it; end that, as two masters on one line garble each other", plain::path(.0))]
+    #[error("{}: another program has it; end that program: two masters on one line garble each other", plain::path(.0))]
     Taken(PathBuf),
     /// The system refuses it to this user.
     #[error(
@@ -29,14 +29,14 @@ pub(crate) enum SerialError {
     )]
     Forbidden(PathBuf),
     /// It is something else.
-    #[error("{}: it is no serial line; name the adapter by its link in /dev/serial/by-id", plain::path(.0))]
+    #[error("{}: it is not a serial line; use the adapter's link in /dev/serial/by-id", plain::path(.0))]
     NoLine(PathBuf),
     /// It was there a moment ago.
-    #[error("{}: the port has vanished; look at the plug and the power of the adapter", plain::path(.0))]
+    #[error("{}: the port has vanished; check the plug and the power of the adapter", plain::path(.0))]
     Vanished(PathBuf),
     /// The adapter makes another rate.
     #[error(
-        "{}: the adapter makes {made} baud where {wanted} are wanted, more than 2 % off; set a baud it can make, or use \
+        "{}: the adapter makes {made} baud instead of {wanted}, more than 2 % off; set a baud that it can make, or use \
          another adapter",
         plain::path(path)
     )]
@@ -58,13 +58,13 @@ pub(crate) enum SerialError {
     },
     /// The driver took RS-485 and did not keep it.
     #[error(
-        "{}: the driver does not turn the two wires of RS-485 although it takes the setting; use an adapter that turns \
-         by itself",
+        "{}: the driver does not switch the direction of RS-485 although it takes the setting; use an adapter that \
+         switches by itself",
         plain::path(.0)
     )]
     Rs485(PathBuf),
     /// Anything else that the system says.
-    #[error("{}: cannot set up the line; look at the adapter and its driver", plain::path(path))]
+    #[error("{}: cannot set up the line; check the adapter and its driver", plain::path(path))]
     System {
         /// The port.
         path: PathBuf,
@@ -94,7 +94,7 @@ pub(crate) enum PortFault {
     #[error("the port has vanished; look at the plug and the power of the adapter")]
     Vanished,
     /// What else the system says.
-    #[error("the system refuses to read or write the port ({0}); look at the adapter and its driver")]
+    #[error("the system refuses to read or write the port ({0}); check the adapter and its driver")]
     System(Errno),
 }
 

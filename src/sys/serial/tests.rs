@@ -70,7 +70,7 @@ fn what_is_no_line_is_named_with_its_remedy() {
     }
     let missing = open(&folder.path().join("none"));
     assert!(matches!(missing, SerialError::Missing(_)), "{missing:?}");
-    assert!(missing.to_string().ends_with("name it by its link in /dev/serial/by-id"), "{missing}");
+    assert!(missing.to_string().ends_with("use its link in /dev/serial/by-id"), "{missing}");
     for errno in [Errno::ACCESS, Errno::PERM] {
         let refused = SerialError::of(&file, errno).to_string();
         assert!(refused.contains("dialout") && refused.contains("kinocue-drives.conf"), "{refused}");

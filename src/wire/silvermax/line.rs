@@ -95,7 +95,7 @@ impl LineCollector {
 #[non_exhaustive]
 pub(crate) enum LineError {
     /// It opens like none.
-    #[error("it opens neither as a request (@) nor as an answer (*, # or !)")]
+    #[error("it begins neither like a request (@) nor like an answer (*, # or !)")]
     Opening,
     /// No number where one belongs.
     #[error("octet {at}: no {what}")]

@@ -232,8 +232,8 @@ fn commands_stand_in_the_order_of_their_numbers() {
 #[test]
 fn what_is_no_request_is_refused_with_its_place() {
     for (text, why) in [
-        ("", "opens neither"),
-        ("*16 0", "opens neither"),
+        ("", "begins neither"),
+        ("*16 0", "begins neither"),
         ("@", "octet 1: no unit"),
         ("@0 0", "octet 1: unit 0 is outside 1..=255"),
         ("@256 0", "octet 1: unit 256 is outside"),

@@ -59,7 +59,7 @@ export function upload(id, file) {
 
 async function inTurn(request) {
   if (changing >= CHANGES) {
-    throw new Problem({ detail: `${CHANGES} things are under way already`, remedy: 'wait until they are done' });
+    throw new Problem({ detail: `${CHANGES} requests are already under way`, remedy: 'wait until they are done' });
   }
   changing += 1;
   try {
@@ -106,17 +106,17 @@ async function request(method, path, body, more, patience) {
   if (reply.code === 'role') askForAnother();
   throw new Problem({
     status: response.status,
-    detail: `the server said ${response.status}`,
-    remedy: 'look at its log',
+    detail: `the server replied ${response.status}`,
+    remedy: 'see its log',
     ...reply,
   });
 }
 
 function unreachable(error, patience) {
   if (error.name === 'TimeoutError') {
-    return new Problem({ detail: `no reply within ${patience / 1000} s`, remedy: 'look at the seats and at the server' });
+    return new Problem({ detail: `no reply within ${patience / 1000} s`, remedy: 'check the seats and the server' });
   }
-  return new Problem({ detail: 'the server cannot be reached', remedy: 'look at the network and at the server' });
+  return new Problem({ detail: 'the server cannot be reached', remedy: 'check the network and the server' });
 }
 
 function parsed(text) {

@@ -5,25 +5,26 @@ import { change } from './api.js';
 import { ask, onPress, onTwoPresses } from './press.js';
 import { hall } from './state.js';
 import { mark, healthOf } from './marks.js';
+import { makePose, showPose } from './pose.js';
 import { ackRate, bits, micros, sentence, whole } from './words.js';
 
 const FIGURES = {
-  'Last heard': ({ heard_s: s }) => (s === null ? 'never' : s < 1 ? 'just now' : `${s.toFixed(0)} s ago`),
+  'Last answer': ({ heard_s: s }) => (s === null ? 'never' : s < 1 ? 'just now' : `${s.toFixed(0)} s ago`),
   'Acks, last second': ({ ack_rate: rate }) => ackRate(rate),
-  'Ack latency, half within': ({ ack_p50_us: us }) => micros(us),
-  '99 of 100 within': ({ ack_p99_us: us }) => micros(us),
+  'Ack latency, median': ({ ack_p50_us: us }) => micros(us),
+  'Ack latency, p99': ({ ack_p99_us: us }) => micros(us),
   'Frames sent': ({ sent }) => whole(sent),
-  'Asked for a reply': ({ asked }) => whole(asked),
+  'Acks requested': ({ asked }) => whole(asked),
   'Acked': ({ acked }) => whole(acked),
   'Refused': ({ refused }) => whole(refused),
   'Lost': ({ lost }) => whole(lost),
   'Not sent': ({ send_failed: failed }) => whole(failed),
-  'Held back by the limits': ({ clamps }) => whole(clamps),
-  'Knows its position': ({ homed }) => (homed === null ? 'never told' : homed ? 'yes' : 'no: home it'),
+  'Held back by the limiter': ({ clamps }) => whole(clamps),
+  'Knows its position': ({ homed }) => (homed === null ? 'unknown' : homed ? 'yes' : 'no: home it'),
   'Emergency stop': ({ emergency_stop: stop }) => (stop ? 'IN EFFECT' : 'no'),
-  'Error': ({ error }) => (error === null ? 'never told' : error === 0 ? 'none' : `number ${error}`),
+  'Error': ({ error }) => (error === null ? 'unknown' : error === 0 ? 'none' : `number ${error}`),
   'Drive errors': ({ servo_errors: errors }) => drives(errors),
-  'Belts open': ({ belts_open: belts }) => (belts === null ? 'no belts known' : belts.length === 0 ? 'none' : belts.map((input) => `X${String(input).padStart(2, '0')}`).join(', ')),
+  'Belts open': ({ belts_open: belts }) => (belts === null ? 'unknown' : belts.length === 0 ? 'none' : belts.map((input) => `X${String(input).padStart(2, '0')}`).join(', ')),
   'Inputs on': ({ inputs }) => bits(inputs, 'X'),
   'Outputs on': ({ outputs }) => bits(outputs, 'Y'),
   'Positions': ({ positions_mm: places, rotary_axis: rotary }) => positions(places, rotary),
@@ -74,8 +75,9 @@ export function showController(status) {
     parts.shape = health.mark;
     parts.picture.replaceChildren(mark(health.mark));
   }
+  showPose(parts.pose, controller);
   const forGood = controller.health === 'out';
-  setText(parts.word, forGood ? 'out for good' : controller.enabled ? controller.health : `taken out, ${controller.health}`);
+  setText(parts.word, forGood ? 'disabled in the configuration' : controller.enabled ? controller.health : `disabled, ${controller.health}`);
   setText(parts.why, sentence(controller.why));
   for (const [label, figure] of Object.entries(FIGURES)) setText(parts.figures[label], figure(controller));
   setProperty(parts.out, 'hidden', !controller.enabled);
@@ -96,30 +98,31 @@ function build({ name: which, row, seat, address, group }) {
   }
   const companions = hall().controllers.filter((each) => each.group === group && each.name !== which).map((each) => each.name);
   const together = companions.length > 0 ? ` with ${companions.join(', ')}` : '';
-  const out = make('button', { type: 'button', id: 'controller-disable', className: 'strong' }, `Take ${which} out${together}`);
-  const reason = make('input', { type: 'text', id: 'controller-why', maxLength: 200, placeholder: 'why, for whoever comes next', 'aria-label': `Why ${which} is taken out` });
-  const back = make('button', { type: 'button', id: 'controller-enable', className: 'strong' }, `Take ${which} in${together}`);
+  const out = make('button', { type: 'button', id: 'controller-disable', className: 'strong' }, `Disable ${which}${together}`);
+  const reason = make('input', { type: 'text', id: 'controller-why', maxLength: 200, placeholder: 'reason, for the next operator', 'aria-label': `Reason to disable ${which}` });
+  const back = make('button', { type: 'button', id: 'controller-enable', className: 'strong' }, `Enable ${which}${together}`);
   const close = make('button', { type: 'button' }, 'Close');
   onPress(out, (button) => {
     const why = reason.value.trim();
     const path = `controllers/${encodeURIComponent(which)}/disable`;
-    ask(button, `take ${which} out`, () => change('POST', path, why ? { why } : {}));
+    ask(button, `disable ${which}`, () => change('POST', path, why ? { why } : {}));
     reason.value = '';
   });
   onTwoPresses(back, {
     asks: 'It may move: press again',
     label: () => back,
-    action: (button) => ask(button, `take ${which} in`, () => change('POST', `controllers/${encodeURIComponent(which)}/enable`)),
+    action: (button) => ask(button, `enable ${which}`, () => change('POST', `controllers/${encodeURIComponent(which)}/enable`)),
   });
   onPress(close, () => select(null));
+  const pose = makePose('large');
   const title = make('h3', {}, `${which}${row ? `, row ${row}` : ''}`);
   const where = make('p', { className: 'quiet' }, `seat ${seat}, at ${address}${together ? `, one seat${together}` : ''}`);
   const buttons = make('div', { className: 'row' }, out, reason, back, close);
-  return { all: [title, where, health, why, buttons, list], health, picture, word, why, figures, out, reason, in: back, shape: '' };
+  return { all: [title, where, health, why, buttons, pose, list], pose, health, picture, word, why, figures, out, reason, in: back, shape: '' };
 }
 
 function drives(errors) {
-  if (errors === null) return 'never told';
+  if (errors === null) return 'unknown';
   const bad = errors.map((error, drive) => [drive + 1, error]).filter(([, error]) => error !== 0);
   return bad.length === 0 ? 'none' : bad.map(([drive, error]) => `drive ${drive}: ${error}`).join(', ');
 }

@@ -3,11 +3,13 @@
 
 import { byId, choice, make, setProperty, setText } from './dom.js';
 import { get } from './api.js';
+import { drawTrace, keepTrace, tracedSeat } from './trace.js';
 import { clock } from './words.js';
 
 const POINTS = 1500;
 const HEIGHT = 240;
 const AGAIN_MS = 5000;
+const REDRAW_MS = 1000;
 const NEUTRAL = '#8d99a8';
 const GRID = '#222a33';
 /** Told apart by the colour-blind, and none of them red, which is STOP's; from the seventh axis on dashed. */
@@ -44,6 +46,8 @@ export function showCurves(status) {
   }
   if (!show) return;
   lastPosition = show.position_s;
+  keepTrace(status);
+  showTrace();
   place(show.position_s);
 }
 
@@ -68,6 +72,21 @@ async function read(show, wanted) {
   }
 }
 
+let redrawn = 0;
+
+/** Draws the points of the seat that is looked at, once a second: they grow, the curves do not. */
+function showTrace() {
+  const seat = tracedSeat();
+  if (plot && (seat !== traced || (seat !== null && performance.now() - redrawn > REDRAW_MS))) {
+    traced = seat;
+    redrawn = performance.now();
+    setText(byId('curves-note'), seat === null ? '' : `The points are where ${seat} was.`);
+    plot.redraw(false, false);
+  }
+}
+
+let traced = null;
+
 const size = () => ({ width: Math.max(byId('curves').clientWidth, 200), height: HEIGHT });
 
 function build(curve) {
@@ -80,6 +99,7 @@ function build(curve) {
     series,
     bands,
     legend: { show: false },
+    hooks: { draw: [(drawn) => drawTrace(drawn, COLOURS)] },
     cursor: { show: false },
     scales: { x: { time: false, range: () => window_() } },
     axes: [

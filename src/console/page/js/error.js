@@ -43,8 +43,8 @@ function greatestOf(all) {
 function showWords(error, greatest) {
   setText(byId('error-now'), error === null ? '–' : figure(error, '+'));
   setText(byId('error-greatest'), greatest === null ? '–' : figure(greatest));
-  setText(byId('error-scale'), greatest === null ? 'Of the last minute no error is known.' : `Scale ±${end} ms; above 0 the seats are ahead of the film.`);
-  setAttribute(byId('error-curve'), 'aria-label', `Error over the last minute, at the most ${greatest === null ? 'unknown' : figure(greatest)}`);
+  setText(byId('error-scale'), greatest === null ? 'No error is known for the last minute.' : `Scale ±${end} ms; positive: the seats are ahead of the film.`);
+  setAttribute(byId('error-curve'), 'aria-label', `Error over the last minute, largest ${greatest === null ? 'unknown' : figure(greatest)}`);
 }
 
 /** With two places, so that half a millisecond is told from none. */

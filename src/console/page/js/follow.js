@@ -51,15 +51,15 @@ function showTimecode({ timecode, position_s: position }) {
   const labelled = timecode !== null;
   const known = labelled || position !== null;
   setText(byId('timecode'), labelled ? timecode : clock(position, 1, 3600));
-  const what = labelled ? 'timecode of the film' : 'film in the cue; its source has no labels';
-  setText(byId('timecode-of'), known ? what : 'where the film is, is not known');
+  const what = labelled ? 'timecode of the film' : 'position in the cue; the source has no timecode';
+  setText(byId('timecode-of'), known ? what : 'the position of the film is unknown');
   setAttribute(byId('timecode'), 'data-known', String(known));
 }
 
 function apart({ leads, disagrees }) {
   if (disagrees !== null) {
     const { source, ahead_s: ahead } = disagrees;
-    return `${source} says ${span(ahead)}: choose which is right.`;
+    return `${source} says ${span(ahead)}: select the right one.`;
   }
-  return leads ? '' : 'No show that is loaded follows it.';
+  return leads ? '' : 'The loaded show does not follow it.';
 }

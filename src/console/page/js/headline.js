@@ -18,7 +18,7 @@ export function showHeadline(status, link) {
   const root = document.documentElement;
   setAttribute(root, 'data-link', link);
   setProperty(byId('lost'), 'hidden', link !== 'lost');
-  const linkWords = { live: 'connected', lost: 'no word', connecting: 'connecting' };
+  const linkWords = { live: 'connected', lost: 'no data', connecting: 'connecting' };
   setText(byId('link'), linkWords[link]);
   for (const area of document.querySelectorAll('.live')) setProperty(area, 'inert', link === 'lost');
   if (link === 'lost') showSilence();
@@ -40,9 +40,9 @@ function showStatus(status, link) {
   setText(byId('cause'), sentence(status.cause));
   setText(byId('since'), times(status));
   setText(byId('next'), sentence(status.next));
-  badge('moving', status.moving, status.state === 'paused' ? 'seats are held' : 'seats in motion', 'frames leave for the seats');
+  badge('moving', status.moving, status.state === 'paused' ? 'seats are held' : 'seats in motion', 'frames are being sent to the seats');
   const start = status.state === 'armed' ? status.playlist?.next_start : null;
-  badge('starts', Boolean(start), `starts by itself at ${timeOfDay(start ?? '')}`, 'disarm, and it does not');
+  badge('starts', Boolean(start), `starts by itself at ${timeOfDay(start ?? '')}`, 'disarm to prevent it');
   badge('realtime', status.realtime.refusals.length > 0, 'not real-time', status.realtime.refusals.join('; '));
   setProperty(document, 'title', `${status.state} – ${status.hall} – kinocue`);
   const now = `${status.state}. ${sentence(status.cause)}. Next: ${status.next}.`;
@@ -53,7 +53,7 @@ function showStatus(status, link) {
 }
 
 function times(status) {
-  const lapses = status.lapses_s === null ? '' : `; ends by itself in ${lasting(status.lapses_s)}`;
+  const lapses = status.lapses_s === null ? '' : `; lapses in ${lasting(status.lapses_s)}`;
   return `for ${lasting(status.since_s)}${lapses}`;
 }
 

@@ -25,11 +25,11 @@ export function showHistograms(status) {
 
 function framesOf(controllers) {
   const sum = (figure) => whole(controllers.reduce((all, each) => all + each[figure], 0));
-  return `${sum('sent')} frames sent, ${sum('asked')} asked, ${sum('acked')} acked, ${sum('refused')} refused, ${sum('lost')} lost.`;
+  return `${sum('sent')} frames sent, ${sum('asked')} acks requested, ${sum('acked')} acked, ${sum('refused')} refused, ${sum('lost')} lost.`;
 }
 
 function showFigures(place, { p50_us: p50, p99_us: p99, p999_us: p999, max_us: max }) {
-  const figures = [['half within', p50], ['99 %', p99], ['99.9 %', p999], ['all', max]];
+  const figures = [['p50', p50], ['p99', p99], ['p99.9', p999], ['max', max]];
   if (place.children.length === 0) {
     place.append(...figures.map(([title]) => make('span', { className: 'figure-pair' }, make('span', { className: 'quiet' }, title), make('b'))));
   }

@@ -5,15 +5,15 @@ import { healthOf, mark } from './marks.js';
 import { micros, whole } from './words.js';
 
 const OPEN = { look: 'good', mark: 'disc', word: 'open' };
-const GONE = { look: 'bad', mark: 'cross', word: 'not there' };
+const GONE = { look: 'bad', mark: 'cross', word: 'missing' };
 
 /** What is said of a link. */
 const FIGURES = {
   'Rate': ({ rate_hz: hz }) => `${hz.toFixed(1)} Hz`,
   'Ahead of the film': ({ lead_ms: ms }) => `${Math.round(ms)} ms`,
-  'Beside this cue at most': ({ deviation_mm: mm }) => (mm === null ? 'no cue' : millimetres(mm, 2)),
-  '99 of 100 answers within': ({ delay_p99_us: us }) => micros(us),
-  'Questions answered': ({ asked, answered }) => `${whole(answered)} of ${whole(asked)}`,
+  'Off this cue at most': ({ deviation_mm: mm }) => (mm === null ? 'no cue' : millimetres(mm, 2)),
+  'Answer delay, p99': ({ delay_p99_us: us }) => micros(us),
+  'Requests answered': ({ asked, answered }) => `${whole(answered)} of ${whole(asked)}`,
   'Late answers, stray ones': ({ late, stray }) => `${whole(late)}, ${whole(stray)}`,
 };
 
@@ -22,9 +22,9 @@ const COLUMNS = {
   'Queue': ({ queued }, confirms) => (confirms ? String(queued) : '–'),
   'Dry': ({ dry }, confirms) => (confirms ? whole(dry) : '–'),
   'Error': ({ error_mm: mm }) => millimetres(mm, 2),
-  'Off course': ({ off_course_mm: mm }) => millimetres(mm, 2),
+  'Position error': ({ off_course_mm: mm }) => millimetres(mm, 2),
   'Segments': (axis, confirms) => (confirms ? segments(axis) : `${whole(axis.unconfirmed)} unconfirmed`),
-  'Heat': ({ hot }) => (hot ? 'TOO HOT' : 'fine'),
+  'Temperature': ({ hot }) => (hot ? 'TOO HOT' : 'fine'),
 };
 
 const millimetres = (mm, digits) => `${mm.toFixed(digits)} mm`;
@@ -82,7 +82,7 @@ function showLink({ state, figures, lines }, link, controllers) {
     const { state: told, cells } = lines[place];
     const seat = controllers.find(({ name }) => name === axis.controller);
     const look = seat ? healthOf(seat) : { look: 'away', mark: 'what' };
-    showMark(told, `grave look-${look.look}`, look, seat ? (seat.enabled ? seat.health : 'taken out') : 'unknown');
+    showMark(told, `grave look-${look.look}`, look, seat ? (seat.enabled ? seat.health : 'disabled') : 'unknown');
     for (const [column, figure] of Object.values(COLUMNS).entries()) setText(cells[column], figure(axis, link.dialect === 'silvermax'));
   }
 }

@@ -13,6 +13,7 @@ import { showMap, startMap } from './map.js';
 import { readLists, showPlaylist, startPlaylist } from './playlist.js';
 import { showRecordings, startRecordings } from './recordings.js';
 import { showReports, startReports } from './reports.js';
+import { startPicture } from './picture.js';
 import { startSources } from './sources.js';
 import { showTrim, startTrim } from './trim.js';
 import { showWarnings, startWarnings } from './warnings.js';
@@ -23,7 +24,7 @@ import { watch } from './state.js';
 
 const STARTS = [
   startTransport, startToken, startHeadline, startFilm, startMap, startTrim, startPlaylist, startReports, startCurves,
-  startUpload, startWarnings, startFollow, startSources, startRecordings,
+  startUpload, startWarnings, startFollow, startSources, startRecordings, startPicture,
 ];
 const SHOWS = [
   showHeadline, showTransport, showFilm, showFollow, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,

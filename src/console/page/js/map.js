@@ -5,6 +5,7 @@ import { BANDS, HEALTH, ackBand, latencyBand, mark, healthOf } from './marks.js'
 import { ackRate, micros } from './words.js';
 import { hall } from './state.js';
 import { selected, select } from './controller.js';
+import { makePose, showPose } from './pose.js';
 
 const NO_ROW = 'no row';
 /** Names of rows up to so long stand beside their seats, longer ones above them; longer names of seats need wider fields. */
@@ -58,13 +59,14 @@ function layOut(controllers) {
 function makeField({ name }) {
   const picture = make('span', { className: 'picture' });
   const letters = make('span', { className: 'letters' });
+  const pose = makePose('small');
   const figure = make('span', { className: 'field-figure' });
   const button = make('button', { type: 'button', className: 'field' },
-    make('span', { className: 'field-head' }, picture, letters),
+    make('span', { className: 'field-head' }, picture, letters, pose),
     make('span', { className: 'field-name' }, name), figure);
   button.dataset.controller = name;
   button.addEventListener('click', () => select(selected() === name ? null : name));
-  fields.set(name, { button, picture, letters, figure, shape: '' });
+  fields.set(name, { button, picture, letters, pose, figure, shape: '' });
   return button;
 }
 
@@ -77,6 +79,7 @@ function showField(field, controller) {
     field.picture.replaceChildren(mark(look.mark));
   }
   setText(field.letters, look.letters);
+  showPose(field.pose, controller);
   setText(field.figure, by === 'latency' ? micros(controller.ack_p99_us, 2) : ackRate(controller.ack_rate));
   setAttribute(field.button, 'aria-label', spoken(controller));
   setProperty(field.button, 'title', controller.why);
@@ -91,14 +94,14 @@ function lookOf(controller) {
 
 function spoken({ name, row, enabled, health, ack_rate: acks, ack_p99_us: p99 }) {
   const place = row ? `, row ${row}` : '';
-  return `${name}${place}: ${enabled ? health : health === 'out' ? 'out for good' : 'taken out'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
+  return `${name}${place}: ${enabled ? health : health === 'out' ? 'disabled in the configuration' : 'disabled'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
 }
 
 function showLegend() {
   const entry = (look, text) => make('li', { className: `look-${look.look}` }, mark(look.mark), make('b', {}, look.letters), ` ${text}`);
   const bands = {
-    acks: ['99.5 % acked and more', 'from 95 %', 'less', 'nothing asked'],
-    latency: ['99 of 100 within 2 ms', 'within 10 ms', 'longer', 'nothing acked'],
+    acks: ['99.5 % or more acked', '95 % or more', 'less', 'no acks requested'],
+    latency: ['p99 up to 2 ms', 'up to 10 ms', 'longer', 'no acks'],
   }[by];
   const entries = bands
     ? Object.values(BANDS).map((look, index) => entry(look, bands[index]))

@@ -5,15 +5,15 @@ import { draw } from './dom.js';
 /** Every health: its class of colour, its mark, its letters and what it means. */
 export const HEALTH = {
   ok: { look: 'good', mark: 'disc', letters: 'OK', means: 'answers' },
-  unwatched: { look: 'calm', mark: 'ring', letters: 'UW', means: 'not watched: acks are off' },
-  degraded: { look: 'weak', mark: 'half', letters: 'DG', means: 'answers late or not always' },
-  rejoining: { look: 'calm', mark: 'turn', letters: 'RJ', means: 'comes back' },
+  unwatched: { look: 'calm', mark: 'ring', letters: 'UW', means: 'not monitored: acks are off' },
+  degraded: { look: 'weak', mark: 'half', letters: 'DG', means: 'some answers late or missing' },
+  rejoining: { look: 'calm', mark: 'turn', letters: 'RJ', means: 'rejoins' },
   lost: { look: 'bad', mark: 'cross', letters: 'LO', means: 'does not answer' },
   error: { look: 'bad', mark: 'peak', letters: 'ER', means: 'has an error' },
   stopped: { look: 'held', mark: 'block', letters: 'ST', means: 'emergency stop' },
-  excluded: { look: 'away', mark: 'dash', letters: 'EX', means: 'taken out' },
-  out: { look: 'away', mark: 'dash', letters: 'XX', means: 'out for good' },
-  unknown: { look: 'away', mark: 'what', letters: '??', means: 'never heard' },
+  excluded: { look: 'away', mark: 'dash', letters: 'EX', means: 'disabled, or has to be homed' },
+  out: { look: 'away', mark: 'dash', letters: 'XX', means: 'disabled in the configuration' },
+  unknown: { look: 'away', mark: 'what', letters: '??', means: 'no answer yet' },
 };
 
 /** How a controller stands; one that a person took out is shown as that, however well it answers. */

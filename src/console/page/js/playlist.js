@@ -14,7 +14,7 @@ export function startPlaylist() {
     const id = byId('playlists').value;
     if (id) ask(button, `playlist ${id}`, () => change('PUT', 'playlist', { id }));
   });
-  onPress(byId('playlist-drop'), (button) => ask(button, 'drop the playlist', () => change('PUT', 'playlist', { id: null })));
+  onPress(byId('playlist-drop'), (button) => ask(button, 'unload the playlist', () => change('PUT', 'playlist', { id: null })));
   onPress(byId('cue-load'), (button) => {
     const cue = byId('cues').value;
     // Only reading a cue shows its title and length, or its faults.
@@ -66,7 +66,7 @@ function showCueNote() {
 export function showPlaylist(status) {
   if (!status) return;
   const { playlist } = status;
-  const next = playlist?.next_start ? `Next start by itself at ${timeOfDay(playlist.next_start)}, while armed` : 'Nothing starts by itself';
+  const next = playlist?.next_start ? `Next automatic start at ${timeOfDay(playlist.next_start)}, if armed` : 'No automatic start';
   setText(byId('playlist-head'), playlist ? `${playlist.title}. ${next}.` : 'No playlist is loaded.');
   setProperty(byId('playlist-drop'), 'disabled', !playlist);
   showEntries(playlist ? { entries: playlist.entries, current: playlist.current, cue: status.show?.cue } : { entries: [], current: -1 });
@@ -86,13 +86,13 @@ function entryLine(entry, index, isLoaded) {
     entry.preset,
     entry.level !== null && `level ${percent(entry.level)}`,
     entry.trim_ms !== null && `trim ${signed(entry.trim_ms)}`,
-    entry.then === 'go' ? 'then goes on by itself' : 'then waits for GO',
+    entry.then === 'go' ? 'then continues automatically' : 'then waits for GO',
   ].filter(Boolean);
   const words = make('span', { className: 'entry-words' }, make('b', {}, title), make('span', { className: 'quiet' }, facts.join(', ')));
   if (isLoaded) {
     return make('li', { className: 'entry current', 'aria-current': 'true' }, words, make('span', { className: 'now' }, 'loaded'));
   }
-  const button = make('button', { type: 'button', 'aria-label': `Make ${title} the next` }, 'Select');
+  const button = make('button', { type: 'button', 'aria-label': `Select ${title} as the next entry` }, 'Select');
   onPress(button, () => ask(button, `select ${title}`, () => change('POST', 'playlist/select', { entry: index })));
   return make('li', { className: 'entry' }, words, button);
 }

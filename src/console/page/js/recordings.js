@@ -4,7 +4,8 @@ import { byId, make, onChange, setAttribute, setProperty, setText } from './dom.
 import { change, get } from './api.js';
 import { ask, onPress } from './press.js';
 import { hall } from './state.js';
-import { clock } from './words.js';
+import { showPicture } from './picture.js';
+import { clock, whole } from './words.js';
 
 const SHOWN = 20;
 const KINDS = { show: 'show', test: 'test of seats', homing: 'homing', incident: 'incident' };
@@ -46,13 +47,23 @@ const readList = onChange(() => {
 });
 
 function showList(list) {
-  const lines = list.slice(0, SHOWN).map(({ name, bytes }) => {
-    const { when, kind, what } = parts(name);
-    return make('tr', {}, ...[when, kind, what, size(bytes), name].map((cell) => make('td', {}, cell)));
+  const lines = list.slice(0, SHOWN).map((recording) => {
+    const { when, kind, what } = parts(recording.name);
+    const look = make('button', { type: 'button', 'aria-label': `Picture of ${kind} ${what}, ${when}` }, 'Picture');
+    look.addEventListener('click', () => showPicture(recording.name, `${kind} ${what}, ${when}`));
+    const cells = [when, kind, what, outcome(recording), size(recording.bytes), look].map((cell) => make('td', {}, cell));
+    return make('tr', { title: recording.name }, ...cells);
   });
   setProperty(byId('recordings'), 'hidden', lines.length === 0);
   setText(byId('recordings-none'), lines.length === 0 ? 'Nothing was recorded yet.' : '');
   byId('recordings').tBodies[0].replaceChildren(...lines);
+}
+
+/** How a show ended; of what is no show, or was not closed, nothing is known. */
+function outcome({ result, lost, missed_ticks: missed }) {
+  if (result === undefined) return '–';
+  const faults = [lost > 0 && `${whole(lost)} lost`, missed > 0 && `${whole(missed)} ticks missed`].filter(Boolean);
+  return [result, ...(faults.length > 0 ? faults : ['nothing lost'])].join(', ');
 }
 
 /** 2026-01-31T19-00-00-show-coaster.mcap. */

@@ -24,7 +24,7 @@ function showPreflight({ preflight, controllers }) {
   setProperty(byId('preflight'), 'hidden', !preflight || preflight.findings.length === 0);
   if (!preflight) {
     setProperty(verdict, 'className', 'verdict');
-    setText(verdict, 'It was not run yet.');
+    setText(verdict, 'Not run yet.');
     return;
   }
   setProperty(verdict, 'className', `verdict ${preflight.passed ? 'look-good' : 'look-bad'}`);

@@ -68,8 +68,8 @@ function figuresOf({ rate_ppm: rate, sigma_ms: sigma, level_dbfs: level, dropout
     rate === null ? null : `${rate > 0 ? '+' : ''}${minus(rate.toFixed(0))} ppm`,
     sigma === null ? null : `sigma ${sigma.toFixed(2)} ms`,
     jumps === 0 ? null : `${whole(jumps)} jumps`,
-    rejected === 0 ? null : `${whole(rejected)} left out`,
-    state === 'locked' && !mayLead ? 'too coarse to lead' : null,
+    rejected === 0 ? null : `${whole(rejected)} rejected`,
+    state === 'locked' && !mayLead ? 'too coarse to follow' : null,
   ];
   return figures.filter((figure) => figure !== null).join(', ');
 }

@@ -38,11 +38,11 @@ async function stop() {
     try {
       await sendStop(PATIENCE_MS);
       problem = null;
-      tell('STOP was received: the seats come to rest.', 'received');
+      tell('STOP was received: the seats are coming to rest.', 'received');
       break;
     } catch (error) {
       problem = error;
-      tell(`STOP is not delivered yet: ${error.message}. Trying again … ${HARD_WIRED}`, 'failed');
+      tell(`STOP has not been delivered yet: ${error.message}. Trying again … ${HARD_WIRED}`, 'failed');
       if (error.status !== 0 && error.status < 500) break; // they heard and refused: again would be the same
       await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
     }

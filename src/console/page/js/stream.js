@@ -78,10 +78,10 @@ async function read() {
 async function refusalOf(response) {
   if (response.status === 401) {
     askForToken({ pressed: false });
-    return 'it wants a token';
+    return 'it requires a token';
   }
   const problem = await response.json().catch(() => ({}));
-  return problem.detail ?? `it said ${response.status}`;
+  return problem.detail ?? `it replied ${response.status}`;
 }
 
 /** The data of an event: its data lines, joined. Comments have none. */

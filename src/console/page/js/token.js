@@ -17,11 +17,11 @@ export const onToken = (listener) => given.push(listener);
 /** The server does not know who asks. Whoever left the dialog is asked again only when they press something. */
 export function askForToken({ pressed }) {
   if (left && !pressed) return;
-  open(token() ? 'The server does not know that token, or it was removed.' : 'This server requires a token.');
+  open(token() ? 'The server does not know this token, or it was removed.' : 'This server requires a token.');
 }
 
 /** The server knows who asks, and they may not. */
-export const askForAnother = () => open('That needs a token with more permissions.');
+export const askForAnother = () => open('This needs a token with more permissions.');
 
 /** Takes the token of the link that led here; says whether there was one. */
 function takeFromLink() {
@@ -40,7 +40,7 @@ takeFromLink();
 /** Opens the dialog. It leaves the rest of the page usable: STOP must stay in reach. */
 function open(why) {
   const form = byId('token');
-  setText(byId('token-why'), `${why} The engineer of this hall has one for you.`);
+  setText(byId('token-why'), `${why} Ask the engineer of this hall for one.`);
   if (!form.hidden) return;
   setProperty(form, 'hidden', false);
   byId('token-text').focus();

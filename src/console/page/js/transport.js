@@ -135,9 +135,9 @@ function showGoFrom(state, status) {
 }
 
 function goNote(state, status) {
-  if (state === null) return 'no word';
+  if (state === null) return 'no data';
   if (may('go', state)) return 'press twice';
-  if (may('pause', state)) return 'the show runs';
+  if (may('pause', state)) return 'the show is running';
   if (!status.show) return 'load a cue first';
   return state === 'parked' ? 'arm first' : `not while ${state}`;
 }

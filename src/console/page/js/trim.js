@@ -59,6 +59,6 @@ export function showTrim(status) {
 
 function show(ms) {
   setText(byId('trim'), signed(ms));
-  const words = ms === 0 ? 'motion with the film' : `motion ${Math.abs(ms)} ms ${ms > 0 ? 'later' : 'earlier'} than the film`;
+  const words = ms === 0 ? 'motion in sync with the film' : `motion ${Math.abs(ms)} ms ${ms > 0 ? 'later' : 'earlier'} than the film`;
   setText(byId('trim-words'), words);
 }

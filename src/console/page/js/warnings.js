@@ -42,7 +42,7 @@ export function showWarnings(status) {
   setProperty(byId('warnings-panel'), 'hidden', told.length === 0);
   setText(byId('warnings-title'), titleOf(warnings));
   setProperty(byId('warnings-more'), 'hidden', told.length <= FIRST);
-  setText(byId('warnings-more'), all ? 'Only the gravest' : `Show ${told.length - FIRST} more`);
+  setText(byId('warnings-more'), all ? 'Only the most severe' : `Show ${told.length - FIRST} more`);
   const shown = all ? told : told.slice(0, FIRST);
   layOut(shown.map(({ id, severity, controllers: [first] }) => ({ id, severity, first })));
   for (const [index, warning] of shown.entries()) {

@@ -64,7 +64,7 @@ export const timeOfDay = (rfc3339) => /T(\d\d:\d\d:\d\d)/.exec(rfc3339)?.[1] ?? 
 
 /** What the bits of a word stand for: X01, X04; `none` where no bit is set. */
 export function bits(word, letter) {
-  if (word === null || word === undefined) return 'never told';
+  if (word === null || word === undefined) return 'unknown';
   const set = Array.from({ length: 16 }, (_, bit) => bit).filter((bit) => word & (1 << bit));
   return set.length > 0 ? set.map((bit) => `${letter}${two(bit + 1)}`).join(' ') : 'none';
 }

@@ -92,7 +92,7 @@ fn a_switch_that_is_not_there_is_told_in_words_and_the_seat_is_not_home() {
 fn a_switch_that_stays_on_is_told() {
     let mut talk = talk_to(&[UnitSetup { switch: None, ..UnitSetup::new(16) }]);
     let words = home_as(&mut talk, &drive(SWITCH), &[16]).0.unwrap_err().to_string();
-    assert!(words.starts_with("unit 16: input 1 is still on 10 mm away from it"), "{words}");
+    assert!(words.starts_with("unit 16: input 1 is still on after moving 10 mm away"), "{words}");
 }
 
 #[test]

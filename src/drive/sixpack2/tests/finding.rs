@@ -113,7 +113,7 @@ fn a_unit_that_answers_only_as_it_woke_is_told_so() {
     let mut talk = Talk::new(Slow(VirtualPort::new(line, now), BAUD), terms);
     let words = find(&mut talk, &[1]).unwrap_err().to_string();
     assert!(
-        words.starts_with("unit 1 answers at 19231 baud, with which it wakes, but not at 56818"),
+        words.starts_with("unit 1 answers at 19231 baud, its power-on rate, but not at 56818"),
         "{words}"
     );
 }

@@ -114,7 +114,7 @@ fn a_switch_that_is_not_found_ends_the_search_and_is_told_in_words() {
     let words = home_as(&mut talk, &drive(SWITCH), &[0, 1]).0.unwrap_err().to_string();
     assert_eq!(
         words,
-        "motor 1 of unit 1: its switch not found within 16 s, 165 mm at 19.6 mm/s; the search was ended, check it, its wiring, \
+        "motor 1 of unit 1: its switch not found within 16 s, 165 mm at 19.6 mm/s; the search was ended; check it, its wiring, \
          `active` and `toward`"
     );
     assert!(talk.now().since(begun).as_secs_f64() < 30.0);

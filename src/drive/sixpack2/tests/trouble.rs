@@ -88,7 +88,7 @@ fn a_unit_that_restarted_is_told_and_stands_until_it_is_homed_again() {
 fn at_the_rate_of_a_unit_that_restarted_nothing_is_played() {
     let talk = talk_at(&[unit_with(1, shaft())], 19_231);
     let refused = Play::to(talk, 1).map(|_| ()).unwrap_err().to_string();
-    assert!(refused.starts_with("19231 baud is what a unit that was restarted talks at"), "{refused}");
+    assert!(refused.starts_with("19231 baud is the rate of a restarted unit"), "{refused}");
 }
 
 #[test]

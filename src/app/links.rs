@@ -1,30 +1,29 @@
-//! The serial links of a hall as surfaces show them.
+//! The serial links of a hall, or of a play, as people are told of them.
 
-use super::hall::HallContext;
-use crate::config::Link;
 use crate::config::drive::DriveFamily;
+use crate::config::{Config, Link};
 use crate::control::{LinkAxisStatus, LinkStatus};
 use crate::drive::link::AxisFigures;
+use crate::proof::LinkPlay;
 use crate::rt::LinkEnd;
 
-/// All of them, in the order of their lanes.
-pub(super) fn status(hall: &HallContext) -> Vec<LinkStatus> {
-    hall.links.iter().map(|link| one(hall, link)).collect()
+/// All of them, in the order of their lanes; `plays` is what was proved of the cue that is loaded.
+pub(super) fn status(config: &Config, links: &[LinkEnd], plays: &[LinkPlay]) -> Vec<LinkStatus> {
+    links.iter().map(|link| one(config, link, plays)).collect()
 }
 
 /// The ports that cannot be had: sentences that end with what to do.
-pub(super) fn troubles(hall: &HallContext) -> impl Iterator<Item = String> {
-    hall.links.iter().filter_map(|link| {
-        let fault = link.standing().fault?;
-        Some(format!("[link.{}]: {fault}", link.name))
-    })
+pub(super) fn troubles(links: &[LinkEnd]) -> impl Iterator<Item = String> {
+    links.iter().filter_map(|link| Some(format!("[link.{}]: {}", link.name, link.standing().fault?)))
 }
 
-fn one(hall: &HallContext, link: &LinkEnd) -> LinkStatus {
+fn one(config: &Config, link: &LinkEnd, plays: &[LinkPlay]) -> LinkStatus {
     let standing = link.standing();
     let (figures, talk) = (standing.figures, standing.figures.talk);
+    let axes = plays.iter().filter(|play| play.link == link.name).flat_map(|play| &play.axes);
+    let deviations = axes.map(|axis| axis.deviation.value);
     let of_config = |it: &&Link| it.name == link.name;
-    let port = hall.config.links.iter().find(of_config).map(|it| it.port.display().to_string());
+    let port = config.links.iter().find(of_config).map(|it| it.port.display().to_string());
     let lanes = link.controllers.iter().zip(&standing.lanes);
     LinkStatus {
         name: link.name.clone(),
@@ -32,7 +31,7 @@ fn one(hall: &HallContext, link: &LinkEnd) -> LinkStatus {
         dialect: link.family.word().to_owned(),
         rate_hz: link.terms.period.as_secs_f64().recip(),
         lead_ms: link.terms.lead(link.family).as_secs_f64() * 1e3,
-        deviation_mm: hall.cued.as_ref().and_then(|cued| cued.deviation_on(&link.name)),
+        deviation_mm: deviations.reduce(f64::max),
         fault: standing.fault.as_ref().map(ToString::to_string),
         asked: talk.asked,
         answered: talk.answered,
@@ -42,7 +41,7 @@ fn one(hall: &HallContext, link: &LinkEnd) -> LinkStatus {
         poses_skipped: figures.poses_skipped,
         axes: lanes
             .flat_map(|(lane, axes)| {
-                let name = &hall.config.controllers[*lane].name;
+                let name = &config.controllers[*lane].name;
                 (1..).zip(axes).map(|(number, axis)| of_axis(name, number, axis, link.family))
             })
             .collect(),
