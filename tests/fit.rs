@@ -95,7 +95,9 @@ fn a_cue_that_is_fitted_for_a_film_has_room_for_the_paces_that_one_may_ask_for_a
     let synced = write(
         folder.path(),
         "synced.toml",
-        format!("{simulated}\n[sync]\nsources = [\"mpv\"]\n[sync.mpv]\nsocket = \"/s\"\n"),
+        format!(
+            "{simulated}\n[sync]\nsources = [\"mpv\"]\nstart = \"00:00:00:00\"\n[sync.mpv]\nsocket = \"/s\"\n"
+        ),
     );
     assert_passes(&[&own, "--config", &hall]);
     assert_eq!(kinocue(&["check", &own, "--config", &synced]).code, Some(1), "its shows follow a film");

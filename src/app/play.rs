@@ -11,7 +11,7 @@ use super::recording::{self, PlayRecording};
 use super::refused::PlayError;
 use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeError};
 use super::script::{PlayHandle, PlayScript, off_park};
-use super::staged::{StagedShow, at_any_pace};
+use super::staged::{StagedShow, at_any_pace, chasing};
 use super::sum_up::{Played, SumUp, sum_up};
 use crate::config::{Config, Misfit};
 use crate::drive::{Lane, Manner};
@@ -93,7 +93,10 @@ impl Play {
     ) -> Result<Self, PlayError> {
         // The runtime ticks by its configuration.
         (config.show.rate_hz, config.show.timing) = (show.rate.hz(), show.timing);
-        let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        let mut staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        if let Some(rules) = film.as_ref().and_then(|film| film.rules) {
+            staged.headroom = chasing(staged.headroom, &rules);
+        }
         let purpose = Purpose::Play { silent: manner.silent, film };
         let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default())?;
         let desk = runtime.control().desk;
@@ -223,7 +226,7 @@ fn keeps_limits(
     rate: Rate,
     level: f64,
 ) -> Result<Vec<LinkPlay>, PlayError> {
-    let paced = pace.map(|pace| at_any_pace(config, pace));
+    let paced = pace.map(|pace| at_any_pace(config, pace, rate));
     let config = paced.as_ref().unwrap_or(config);
     let terms = Terms::of_hall(config, Digest::of(timeline.cue()), rate, level);
     let proof = proof::prove_in(config, timeline, terms);

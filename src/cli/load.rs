@@ -1,5 +1,6 @@
 //! What several commands read: cues and configurations, with the exit codes of their faults.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -75,8 +76,7 @@ pub(super) struct SeatArgs {
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
 
-    /// The cue follows a film, which may ask for a little more pace than 1: the limits are what that leaves of them. So they are where
-    /// the configuration has [sync].
+    /// The cue follows a film, which may ask for a slightly higher pace than 1: check against what that leaves of the limits.
     #[arg(long)]
     chase: bool,
 }
@@ -88,23 +88,16 @@ pub(super) struct Judge {
     /// The seat asked for by name.
     pub(super) seat: Option<Arc<SeatType>>,
     pub(super) rate_hz: f64,
-    /// The paces that a film may ask for, if one leads.
-    pace: Option<PaceLimits>,
+    /// The cue follows a film, whatever the configuration says.
+    chases: bool,
 }
 
 impl SeatArgs {
     /// What the arguments mean beside `hall`, the configuration they name.
     pub(super) fn judge(&self, hall: Option<Config>) -> Result<Judge, Failure> {
-        let synced = hall.as_ref().and_then(|hall| hall.sync.as_ref()).map(|sync| sync.pace);
-        let pace = synced.or_else(|| self.chase.then(PaceLimits::default));
         let seat = self.seat.as_deref().map(|name| seat(name, hall.as_ref())).transpose()?;
-        let seat = seat.map(|seat| left_of(pace, seat));
         let rate_hz = self.rate.or_else(|| hall.as_ref().map(|hall| hall.show.rate_hz)).unwrap_or(100.0);
-        let hall = match pace {
-            Some(pace) => hall.map(|hall| at_any_pace(&hall, pace)),
-            None => hall,
-        };
-        Ok(Judge { hall, seat, rate_hz, pace })
+        Ok(Judge { hall, seat, rate_hz, chases: self.chase })
     }
 
     /// What is to be given to `fit` so that a cue passes here.
@@ -129,21 +122,11 @@ fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
     })
 }
 
-/// What those paces leave of the limits of a seat.
-fn left_of(pace: Option<PaceLimits>, seat: Arc<SeatType>) -> Arc<SeatType> {
-    pace.map_or_else(|| Arc::clone(&seat), |pace| Arc::new(seat_at_any_pace(&seat, pace)))
-}
-
 impl Judge {
-    /// The seat of whoever names none.
-    fn bench(&self, axes: usize) -> Arc<SeatType> {
-        left_of(self.pace, Arc::new(SeatType::bench3(axes)))
-    }
-
     /// What each axis of a cue is on: the seat asked for, else that of the first controller that takes the axis,
     /// else the bench seat.
     pub(super) fn seats(&self, axes: usize) -> Vec<SeatAxis> {
-        let bench = self.bench(axes);
+        let bench = Arc::new(SeatType::bench3(axes));
         let seat_of = |axis| {
             let mut controllers = self.hall.iter().flat_map(|hall| &hall.controllers);
             match (&self.seat, controllers.find(|one| one.takes(axis))) {
@@ -160,21 +143,38 @@ impl Judge {
     pub(super) fn terms(&self, timeline: &Timeline, level: f64) -> Terms {
         let (cue, rate) = (Digest::of(timeline.cue()), Rate::from_hz(self.rate_hz));
         let axes = timeline.axes();
-        let of_seat = |seat: &Arc<SeatType>| Terms::of_seat(Arc::clone(seat), axes, cue, rate, level);
+        let of_seat = |seat: &Arc<SeatType>| Terms::of_seat(self.left_of(seat), axes, cue, rate, level);
         match (&self.seat, &self.hall) {
-            (None, Some(hall)) => Terms::of_hall(hall, cue, rate, level),
+            (None, Some(hall)) => Terms::of_hall(&self.led(hall), cue, rate, level),
             (Some(seat), Some(hall)) => {
                 Terms { parts: of_seat(seat).parts, ..Terms::of_hall(hall, cue, rate, level) }
             }
             (Some(seat), None) => of_seat(seat),
-            (None, None) => of_seat(&self.bench(axes)),
+            (None, None) => of_seat(&Arc::new(SeatType::bench3(axes))),
         }
+    }
+
+    /// The hall with what it leaves of its limits for every pace that a film may ask for, where one leads all its shows.
+    fn led<'a>(&self, hall: &'a Config) -> Cow<'a, Config> {
+        let sync = hall.sync.as_ref().filter(|sync| sync.leads || self.chases);
+        let pace = sync.map(|sync| sync.pace).or_else(|| self.chases.then(PaceLimits::default));
+        pace.map_or(Cow::Borrowed(hall), |pace| {
+            Cow::Owned(at_any_pace(hall, pace, Rate::from_hz(self.rate_hz)))
+        })
+    }
+
+    /// The same of a seat by itself.
+    fn left_of(&self, seat: &Arc<SeatType>) -> Arc<SeatType> {
+        if !self.chases {
+            return Arc::clone(seat);
+        }
+        Arc::new(seat_at_any_pace(seat, PaceLimits::default(), Rate::from_hz(self.rate_hz)))
     }
 
     /// Proves a cue on these terms, and what the links of the configuration make of it, unless another seat is asked for.
     pub(super) fn prove(&self, timeline: &Timeline, terms: Terms) -> Proof {
         match (&self.seat, &self.hall) {
-            (None, Some(hall)) => prove_in(hall, timeline, terms),
+            (None, Some(hall)) => prove_in(&self.led(hall), timeline, terms),
             _ => prove(timeline, terms),
         }
     }
