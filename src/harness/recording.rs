@@ -3,15 +3,16 @@
 use std::fs::File;
 use std::io::{BufWriter, Cursor, Result};
 use std::path::Path;
+use std::time::Duration;
 
 use crate::app::recording::seats;
 use crate::app::runtime::Runtime;
 use crate::record::{
-    self, About, AckRecord, AckTap, Chunk, Entry, EntryMaker, Flight, Handed, Intake, Opening, RecordedSeat,
-    Recorder, Recording, SentFrame, Tap, Taps, Wanted,
+    self, About, AckRecord, AckTap, Chunk, CutManner, Entry, EntryMaker, Flight, Handed, Intake, Opening,
+    RecordedSeat, Recorder, Recording, SentFrame, Stretch, Tap, Taps, Wanted,
 };
 use crate::replay::replay;
-use crate::time::{MonoTime, Rate};
+use crate::time::{MonoTime, Rate, ShowTime};
 use crate::tracker::{Fate, Reply};
 use crate::wire::{FrameNo, ReplyCode};
 
@@ -103,6 +104,15 @@ impl HallRecording {
     }
 }
 
+/// All of a recording without what its hall is known by, as `record cut --anonymous --whole` writes it.
+#[must_use]
+pub fn nameless(file: &[u8]) -> Vec<u8> {
+    let [from, until] = [i64::MIN, i64::MAX].map(ShowTime::from_nanos);
+    let manner = CutManner { film_time: false, anonymous: true, whole: true };
+    let cut = record::cut(file, &Stretch { from, until, seat: None }, manner, Cursor::default());
+    cut.expect("a recording in full").into_inner()
+}
+
 /// What came of judging a recording again.
 #[derive(Debug, Default)]
 pub struct Replayed {
@@ -148,11 +158,18 @@ pub fn datagrams(file: &[u8]) -> Vec<(usize, Vec<u8>, bool)> {
     all
 }
 
-/// The ack thread takes a reply to a frame of a controller, and says what it was.
-pub fn reply(tap: &mut AckTap, controller: usize, frame: FrameNo, at: MonoTime) {
-    let reply = Reply { controller, frame, code: ReplyCode::Running, error: 0, inputs: 0, at };
-    tap.take(&AckRecord::Reply(reply));
-    tap.take(&AckRecord::Fate(controller, frame, Fate::Answered(reply.code), 150_000));
+/// The ack thread takes replies to a frame of each controller, so many microseconds after it was sent, and says what they were.
+pub fn replies(tap: &mut AckTap, frame: FrameNo, sent: MonoTime, after_us: &[u32]) {
+    let code = ReplyCode::Running;
+    for (controller, us) in after_us.iter().enumerate() {
+        let at = sent + Duration::from_micros(u64::from(*us));
+        tap.take(&AckRecord::Reply(Reply { controller, frame, code, error: 0, inputs: 0, at }));
+    }
+    let last = after_us.len().saturating_sub(1);
+    tap.take(&AckRecord::Posted(u32::try_from(after_us.len()).unwrap_or(u32::MAX), last, frame));
+    for (controller, us) in after_us.iter().enumerate() {
+        tap.take(&AckRecord::Fate(controller, frame, Fate::Answered(code), us * 1_000));
+    }
 }
 
 /// A drain is over.

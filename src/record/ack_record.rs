@@ -134,6 +134,14 @@ impl<'a> AckRecord<'a> {
         }
     }
 
+    /// Reads the first of some records, and leaves the rest.
+    pub(super) fn first_of(octets: &mut &'a [u8]) -> Option<Self> {
+        let mut from = Cursor(octets);
+        let record = Self::read(&mut from)?;
+        *octets = from.0;
+        Some(record)
+    }
+
     pub(super) fn read(from: &mut Cursor<'a>) -> Option<Self> {
         let kind = from.u8()?;
         match kind {

@@ -149,6 +149,20 @@ impl<'a> AckChunk<'a> {
         Some((Self { drained: is_over.then_some(at), dropped, body: from.0 }, rest))
     }
 
+    /// Writes one with these records.
+    pub(super) fn write(
+        out: &mut Vec<u8>,
+        dropped: u32,
+        drained: Option<MonoTime>,
+        records: &[AckRecord<'_>],
+    ) {
+        let from = out.len();
+        out.resize(from + HEAD_LEN, 0);
+        records.iter().for_each(|record| record.write(out));
+        let len = out.len() - from;
+        write_head(&mut out[from..], len, dropped, drained);
+    }
+
     /// The same with other records, which `write` makes of these.
     pub(super) fn rewritten(&self, out: &mut Vec<u8>, mut write: impl FnMut(&AckRecord<'_>, &mut Vec<u8>)) {
         let from = out.len();

@@ -44,7 +44,7 @@ enum FieldKind {
     Many(&'static str),
 }
 
-const MESSAGES: [(&str, &[(&str, FieldKind)]); 4] = [
+const MESSAGES: [(&str, &[(&str, FieldKind)]); 5] = [
     (
         "Sent",
         &[
@@ -65,7 +65,24 @@ const MESSAGES: [(&str, &[(&str, FieldKind)]); 4] = [
             ("raw", FieldKind::Bytes),
         ],
     ),
-    ("Acks", &[("drains", FieldKind::Bytes)]),
+    (
+        "Acks",
+        &[
+            ("runs", FieldKind::Many("Column")),
+            ("count", FieldKind::Count),
+            ("chunks", FieldKind::Many("Column")),
+            ("controllers", FieldKind::Many("Replies")),
+            ("others", FieldKind::Bytes),
+        ],
+    ),
+    (
+        "Replies",
+        &[
+            ("controller", FieldKind::Count),
+            ("replies", FieldKind::Many("Column")),
+            ("fates", FieldKind::Many("Column")),
+        ],
+    ),
     ("Column", &[("second_differences", FieldKind::Numbers)]),
 ];
 

@@ -70,6 +70,18 @@ pub(crate) struct Column {
     second_differences: Vec<i64>,
 }
 
+impl Column {
+    /// One of these second differences.
+    pub(super) const fn of(second_differences: Vec<i64>) -> Self {
+        Self { second_differences }
+    }
+
+    /// Its second differences.
+    pub(super) fn numbers(&self) -> &[i64] {
+        &self.second_differences
+    }
+}
+
 fn column(numbers: impl IntoIterator<Item = i64>) -> Column {
     Column { second_differences: fold(numbers) }
 }
@@ -84,24 +96,6 @@ struct LaneRow {
     positions: [i64; MAX_AXES],
     asked: [i64; MAX_AXES],
     vibration: [i64; 2 * MAX_AXES],
-}
-
-/// What the ack thread took in half a second: `kinocue.Acks`.
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Acks {
-    /// The drains as they crossed to the recorder, one behind the other (docs/recordings.md).
-    #[prost(bytes = "vec", tag = "1")]
-    drains: Vec<u8>,
-}
-
-/// Drains as a message.
-pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
-    Acks { drains: drains.to_vec() }.encode_to_vec()
-}
-
-/// The drains of such a message; `None` where it is none.
-pub(super) fn drains(message: &[u8]) -> Option<Vec<u8>> {
-    Acks::decode(message).ok().map(|acks| acks.drains)
 }
 
 /// Ticks that become a block.

@@ -5,6 +5,7 @@
 //! ([`Recording`], `mcap.dev/spec`), where it is asked for with every tick as it was (`full`). It is told no time but that of the
 //! ticks. [`read()`] reads such files back.
 
+mod ack_columns;
 mod ack_inputs;
 mod ack_record;
 mod acks;

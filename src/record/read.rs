@@ -8,6 +8,7 @@ use mcap::records::op;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::ack_columns;
 use super::full;
 use super::judging::Judging;
 use super::margins::Margin;
@@ -318,7 +319,9 @@ impl Reading<'_, '_> {
                 let chunks = full::unpack(data, &contents.seats);
                 chunks.map(Told::Chunks).ok_or_else(|| "not a block of ticks".to_owned())
             }
-            RecordedTopic::Acks => full::drains(data).map(Told::Drains).ok_or_else(|| "no drains".to_owned()),
+            RecordedTopic::Acks => {
+                ack_columns::unpacked(data).map(Told::Drains).ok_or_else(|| "no drains".to_owned())
+            }
             RecordedTopic::Other(name) => Ok(Told::Other(name, data)),
         };
         match told {

@@ -8,9 +8,9 @@ use mcap::{Attachment, Compression, McapResult, WriteOptions, Writer};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::ack_columns::packed;
 use super::descriptors::descriptors;
 use super::flight::Entry;
-use super::full::packed;
 use super::judging::Judging;
 use super::notes::topics;
 use super::schemas::{schema_of_seat, schema_of_tick, state_number};

@@ -152,7 +152,7 @@ impl Bench {
         }
     }
 
-    pub(super) fn is_watched(&mut self) {
+    pub(super) fn on_watched(&mut self) {
         self.watches = true;
         if self.judging.is_hall && self.verdict.from_the_start {
             (0..self.groups.len()).for_each(|group| self.health.look_anew(group));

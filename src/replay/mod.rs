@@ -130,7 +130,7 @@ impl Replay {
     fn finish(mut self, contents: &Contents) -> Verdict {
         self.judge(true);
         let Self { mut books, mut bench, .. } = self;
-        totals::of_samples(&mut bench, &books);
+        totals::of_samples(&mut bench, &books, contents);
         // What had no fate by the end was recorded with none.
         books.finish(&mut |_: &mut Tracker| ());
         totals::of_report(&mut bench, &books, contents);

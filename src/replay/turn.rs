@@ -80,7 +80,7 @@ impl<'a> Turn<'a> {
                 bench.observer.on_look(controller, look, at);
             }
             AckRecord::Health(input) => bench.judge(input),
-            AckRecord::Watched => bench.is_watched(),
+            AckRecord::Watched => bench.on_watched(),
             AckRecord::Heard(..) | AckRecord::Code(..) | AckRecord::Look(..) => {}
             _ => return false,
         }
@@ -179,6 +179,10 @@ impl Ledger for Turn<'_> {
 
     fn on_fate(&mut self, reply: &Reply, fate: Fate, sent_at: Option<MonoTime>) {
         let Reply { controller, frame, code, error, inputs, at } = *reply;
+        // Something was missing since it came, its frame perhaps.
+        if !self.bench.knows(controller, frame) {
+            return;
+        }
         let replayed = (controller, frame, fate, latency_ns(sent_at, at));
         let recorded = self.next_fate();
         self.bench.verdict.fates += 1;

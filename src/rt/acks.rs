@@ -228,7 +228,6 @@ impl AckLoop {
             if let FromController::Reply(reply) = message {
                 observer.on_reply(controller, &reply, at);
                 let MotionReply { frame, code, error, inputs, .. } = reply;
-                // As frames have it: what is recorded is what was judged by.
                 let reply = Reply { controller, frame, code, error, inputs, at: at.whole_micros() };
                 copy(tap, &AckRecord::Reply(reply));
                 return books.on_reply(reply, &mut Records { sent, last_sent, watch, observer, live, tap });

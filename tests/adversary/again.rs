@@ -1,6 +1,6 @@
 //! Histories by chance, recorded and judged again: books, observer and health of each say what they said the first time.
 
-use kinocue::harness::recording::{Replayed, replayed};
+use kinocue::harness::recording::{Replayed, datagrams, nameless, replayed};
 
 use super::bent::Bent;
 use super::chance::{Keeps, live_through, setting};
@@ -43,4 +43,27 @@ fn a_history_that_was_recorded_is_judged_again_as_it_was() {
         differs.len(),
         differs[..differs.len().min(10)].join("\n")
     );
+}
+
+#[test]
+fn a_recording_without_names_is_judged_as_it_was_and_names_no_station_of_the_hall() {
+    let first = setting("KINOCUE_SEED").unwrap_or(FIXED);
+    let mut frames = 0;
+    for seed in first..first + 5 {
+        for file in live_through(seed, None, u64::MAX, Keeps::Recordings).recordings {
+            let cut = nameless(&file);
+            let (whole, again) = (replayed(&file), replayed(&cut));
+            assert_eq!((&again.differences[..], again.is_whole), (&[][..], true), "seed {seed}");
+            let counts = |all: &Replayed| (all.frames, all.fates, all.standings);
+            assert_eq!(counts(&again), counts(&whole), "seed {seed}");
+            for (lane, datagram, _) in datagrams(&cut) {
+                assert_eq!(datagram[8..10], [64, lane as u8 + 1], "who accepts it is made up");
+                frames += 1;
+            }
+            if let Ok(path) = std::env::var("KINOCUE_KEEP") {
+                std::fs::write(format!("{path}-{seed}-{}.mcap", cut.len()), cut).expect("there is room");
+            }
+        }
+    }
+    assert!(frames > 100, "{frames}");
 }

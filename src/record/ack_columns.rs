@@ -1,0 +1,333 @@
+//! What the ack thread took in half a second, as columns. Replies and their fates, which are nearly all of it, are a column for each number
+//! of each controller; in which order they came is told in runs over controllers that follow one another. All else stands octet by octet.
+
+use prost::Message as _;
+
+use super::columns::{fold, unfold};
+use super::full::Column;
+use super::{AckChunk, AckRecord};
+use crate::time::MonoTime;
+use crate::tracker::{Fate, Reply};
+use crate::wire::{FrameNo, ReplyCode};
+
+/// Records of a message at the most: five seconds of the largest hall. More are damage.
+const MOST: usize = 1_000_000;
+/// Controllers at the most.
+const CONTROLLERS: usize = 4_096;
+const NS: u64 = 1_000;
+
+/// What the ack thread took in half a second: `kinocue.Acks`.
+#[derive(Clone, PartialEq, prost::Message)]
+pub(super) struct Acks {
+    /// What comes one after the other: what it is (0 replies, 1 fates, 2 another record, 3 the end of a chunk), of which controller
+    /// the first is, how many there are, each of the next controller.
+    #[prost(message, repeated, tag = "1")]
+    runs: Vec<Column>,
+    /// How many runs.
+    #[prost(uint32, tag = "2")]
+    count: u32,
+    /// Of each chunk: records dropped before it, 1 where a drain is over with it, and when that began, ns.
+    #[prost(message, repeated, tag = "3")]
+    chunks: Vec<Column>,
+    /// Controllers that replied.
+    #[prost(message, repeated, tag = "4")]
+    controllers: Vec<Replies>,
+    /// Other records, one behind the other.
+    #[prost(bytes = "vec", tag = "5")]
+    others: Vec<u8>,
+}
+
+/// The replies of a controller: `kinocue.Replies`.
+#[derive(Clone, PartialEq, prost::Message)]
+pub(super) struct Replies {
+    /// Its place among the seats of the metadata.
+    #[prost(uint32, tag = "1")]
+    controller: u32,
+    /// Of each reply: frame, code, error, inputs, and when it was received, µs.
+    #[prost(message, repeated, tag = "2")]
+    replies: Vec<Column>,
+    /// Of each fate: frame; the code of an answer, else 16 for a duplicate, 17 for a stale and 18 for a stray reply; latency, µs.
+    #[prost(message, repeated, tag = "3")]
+    fates: Vec<Column>,
+}
+
+/// Kinds of runs.
+const REPLY: i64 = 0;
+const FATE: i64 = 1;
+const OTHER: i64 = 2;
+const END: i64 = 3;
+
+const FATES: [Fate; 3] = [Fate::Duplicate, Fate::Stale, Fate::Stray];
+
+/// Numbers of a controller, row by row.
+#[derive(Default)]
+struct Rows {
+    replies: Vec<[i64; 5]>,
+    fates: Vec<[i64; 3]>,
+}
+
+/// Drains, as they crossed, as a message.
+pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
+    let (mut runs, mut chunks): (Vec<[i64; 3]>, Vec<[i64; 3]>) = (Vec::new(), Vec::new());
+    let (mut rows, mut others): (Vec<Rows>, Vec<u8>) = (Vec::new(), Vec::new());
+    let mut rest = drains;
+    while let Some((chunk, behind)) = AckChunk::parse(rest) {
+        rest = behind;
+        for record in chunk.records() {
+            let (kind, controller) = take(&record, &mut rows, &mut others);
+            match runs.last_mut() {
+                // Others are of no controller.
+                Some([last, first, count])
+                    if *last == kind && (kind == OTHER || *first + *count == controller) =>
+                {
+                    *count += 1;
+                }
+                _ => runs.push([kind, controller, 1]),
+            }
+        }
+        let began = chunk.drained.unwrap_or_default().as_nanos().cast_signed();
+        chunks.push([chunk.dropped.into(), chunk.drained.is_some().into(), began]);
+        runs.push([END, 0, 1]);
+    }
+    let replies = |(controller, rows): (usize, &Rows)| {
+        let is_used = !rows.replies.is_empty() || !rows.fates.is_empty();
+        is_used.then(|| Replies {
+            controller: u32::try_from(controller).unwrap_or(u32::MAX),
+            replies: columns(&rows.replies),
+            fates: columns(&rows.fates),
+        })
+    };
+    let controllers = rows.iter().enumerate().filter_map(replies).collect();
+    let count = u32::try_from(runs.len()).unwrap_or(u32::MAX);
+    Acks { runs: columns(&runs), count, chunks: columns(&chunks), controllers, others }.encode_to_vec()
+}
+
+fn columns<const N: usize>(rows: &[[i64; N]]) -> Vec<Column> {
+    (0..N).map(|at| Column::of(fold(rows.iter().map(|row| row[at])))).collect()
+}
+
+/// Puts a record where it belongs; gives its kind and its controller.
+fn take(record: &AckRecord<'_>, rows: &mut Vec<Rows>, others: &mut Vec<u8>) -> (i64, i64) {
+    let controller = match record {
+        AckRecord::Reply(reply) if reply.at == reply.at.whole_micros() => Some(reply.controller),
+        AckRecord::Fate(controller, _, _, latency) if u64::from(*latency).is_multiple_of(NS) => {
+            Some(*controller)
+        }
+        _ => None,
+    };
+    let Some(controller) = controller.filter(|controller| *controller < CONTROLLERS) else {
+        record.write(others);
+        return (OTHER, 0);
+    };
+    if rows.len() <= controller {
+        rows.resize_with(controller + 1, Rows::default);
+    }
+    let Rows { replies, fates } = &mut rows[controller];
+    let kind = match *record {
+        AckRecord::Reply(Reply { frame, code, error, inputs, at, .. }) => {
+            let at_us = (at.as_nanos() / NS).cast_signed();
+            replies.push([frame.0.into(), code as i64, error.into(), inputs.into(), at_us]);
+            REPLY
+        }
+        AckRecord::Fate(_, frame, fate, latency) => {
+            fates.push([frame.0.into(), number(fate), i64::from(latency) / NS.cast_signed()]);
+            FATE
+        }
+        _ => OTHER,
+    };
+    (kind, i64::try_from(controller).unwrap_or_default())
+}
+
+fn number(fate: Fate) -> i64 {
+    match fate {
+        Fate::Answered(code) => code as i64,
+        Fate::Duplicate => 16,
+        Fate::Stale => 17,
+        Fate::Stray => 18,
+    }
+}
+
+type Numbers<'a> = Vec<Box<dyn Iterator<Item = i64> + 'a>>;
+
+fn numbers(columns: &[Column]) -> Numbers<'_> {
+    columns.iter().map(|one| Box::new(unfold(one.numbers())) as Box<_>).collect()
+}
+
+/// The next of each column; `None` where there are fewer columns.
+fn next<const N: usize>(columns: &mut Numbers<'_>) -> Option<[i64; N]> {
+    let mut row = [0; N];
+    (columns.len() >= N).then_some(())?;
+    row.iter_mut().zip(columns).for_each(|(to, column)| *to = column.next().unwrap_or_default());
+    Some(row)
+}
+
+/// The drains of a message, as they crossed; `None` where it is none.
+pub(super) fn unpacked(message: &[u8]) -> Option<Vec<u8>> {
+    let acks = Acks::decode(message).ok()?;
+    let (mut runs, mut chunks) = (numbers(&acks.runs), numbers(&acks.chunks));
+    let mut controllers: Vec<(i64, Numbers<'_>, Numbers<'_>)> = acks
+        .controllers
+        .iter()
+        .map(|one| (one.controller.into(), numbers(&one.replies), numbers(&one.fates)))
+        .collect();
+    controllers.sort_by_key(|one| one.0);
+    let (mut others, mut left) = (acks.others.as_slice(), MOST);
+    let (mut drains, mut records) = (Vec::new(), Vec::new());
+    for _ in 0..acks.count {
+        let [kind, first, count] = next(&mut runs)?;
+        let count = usize::try_from(count).ok().filter(|count| *count <= left)?;
+        left = left.checked_sub(count.max(1))?;
+        if kind == END {
+            let [dropped, is_over, began] = next(&mut chunks)?;
+            let began = MonoTime::from_nanos(began.cast_unsigned());
+            AckChunk::write(
+                &mut drains,
+                u32::try_from(dropped).ok()?,
+                (is_over != 0).then_some(began),
+                &records,
+            );
+            records.clear();
+            continue;
+        }
+        for controller in (first..).take(count) {
+            let place = |one: &(i64, Numbers<'_>, Numbers<'_>)| one.0.cmp(&controller);
+            match kind {
+                REPLY => {
+                    let place = controllers.binary_search_by(place).ok()?;
+                    records.push(reply(controller, next(&mut controllers[place].1)?)?);
+                }
+                FATE => {
+                    let place = controllers.binary_search_by(place).ok()?;
+                    records.push(fate(controller, next(&mut controllers[place].2)?)?);
+                }
+                OTHER => records.push(AckRecord::first_of(&mut others)?),
+                _ => return None,
+            }
+        }
+    }
+    Some(drains)
+}
+
+fn reply(controller: i64, [frame, code, error, inputs, at_us]: [i64; 5]) -> Option<AckRecord<'static>> {
+    Some(AckRecord::Reply(Reply {
+        controller: usize::try_from(controller).ok()?,
+        frame: FrameNo(u32::try_from(frame).ok()?),
+        code: ReplyCode::from_byte(u8::try_from(code).ok()?)?,
+        error: u16::try_from(error).ok()?,
+        inputs: u16::try_from(inputs).ok()?,
+        at: MonoTime::from_nanos(u64::try_from(at_us).ok()?.checked_mul(NS)?),
+    }))
+}
+
+fn fate(controller: i64, [frame, fate, latency_us]: [i64; 3]) -> Option<AckRecord<'static>> {
+    let fate = match u8::try_from(fate).ok()? {
+        other @ 16.. => *FATES.get(usize::from(other - 16))?,
+        code => Fate::Answered(ReplyCode::from_byte(code)?),
+    };
+    let latency = u32::try_from(latency_us).ok()?.checked_mul(u32::try_from(NS).ok()?)?;
+    let (controller, frame) = (usize::try_from(controller).ok()?, FrameNo(u32::try_from(frame).ok()?));
+    Some(AckRecord::Fate(controller, frame, fate, latency))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::health::HealthState;
+    use crate::net::Origin;
+    use crate::record::ack_tap;
+    use crate::time::Rate;
+
+    fn record() -> impl Strategy<Value = AckRecord<'static>> {
+        let code = prop_oneof![Just(ReplyCode::Running), Just(ReplyCode::EmergencyStop)];
+        let at = any::<u64>().prop_map(|ns| MonoTime::from_nanos(ns >> 1));
+        let whole = at.clone().prop_map(MonoTime::whole_micros);
+        let fate = prop_oneof![code.clone().prop_map(Fate::Answered), Just(Fate::Stale), Just(Fate::Stray)];
+        prop_oneof![
+            (0..6_usize, any::<u32>(), code, any::<u16>(), prop_oneof![9 => whole, 1 => at.clone()])
+                .prop_map(|(controller, frame, code, error, at)| {
+                    let frame = FrameNo(frame);
+                    AckRecord::Reply(Reply { controller, frame, code, error, inputs: error / 2, at })
+                }),
+            (
+                0..6_usize,
+                any::<u32>(),
+                fate,
+                prop_oneof![(0..1_000_u32).prop_map(|us| us * 1_000), any::<u32>()]
+            )
+                .prop_map(|(controller, frame, fate, ns)| AckRecord::Fate(
+                    controller,
+                    FrameNo(frame),
+                    fate,
+                    ns
+                )),
+            (any::<u32>(), 0..6_usize).prop_map(|(count, lane)| AckRecord::Posted(
+                count,
+                lane,
+                FrameNo(count)
+            )),
+            at.prop_map(|at| AckRecord::Heard(Origin::Controller(1), at, b"who is there")),
+            Just(AckRecord::Standing(3, HealthState::Lost)),
+        ]
+    }
+
+    fn crossed(drains: &[(u64, Vec<AckRecord<'_>>)]) -> Vec<u8> {
+        let (mut tap, mut ring) = ack_tap(6, Rate::from_hz(1_000.0));
+        for (began, records) in drains {
+            records.iter().for_each(|record| tap.take(record));
+            tap.drained(MonoTime::from_nanos(*began));
+        }
+        let mut held = vec![0; ring.slots()];
+        ring.pop_entire_slice(&mut held).expect("it is all there");
+        held
+    }
+
+    proptest! {
+        #[test]
+        fn drains_come_back_from_columns_octet_by_octet(
+            drains in prop::collection::vec((any::<u64>(), prop::collection::vec(record(), 0..20)), 0..12),
+        ) {
+            let crossed = crossed(&drains);
+            prop_assert_eq!(unpacked(&packed(&crossed)), Some(crossed));
+        }
+
+        #[test]
+        fn no_message_panics(mut message in prop::collection::vec(any::<u8>(), 0..200), at in 0..600_usize, flip: u8) {
+            unpacked(&message);
+            let record = AckRecord::Fate(1, FrameNo(7), Fate::Stale, 1_000);
+            message = packed(&crossed(&[(1, vec![record; 9]), (9, vec![record; 9])]));
+            if let Some(octet) = message.get_mut(at) {
+                *octet ^= flip;
+            }
+            unpacked(&message);
+        }
+    }
+
+    #[test]
+    fn where_all_replies_come_in_order_each_takes_a_byte_for_when_it_came_and_one_for_how_long_it_took() {
+        let jitter = |number: u64| number * 7_919 % 41;
+        let drain = |tick: u64| {
+            let at = |controller: usize| (tick * 1_000 + 180 + jitter(tick + controller as u64)) * 1_000;
+            let frame = FrameNo(u32::try_from(tick).expect("few"));
+            let reply = |controller| {
+                let (code, at) = (ReplyCode::Running, MonoTime::from_nanos(at(controller)));
+                AckRecord::Reply(Reply { controller, frame, code, error: 0, inputs: 0, at })
+            };
+            let latency =
+                |controller: usize| u32::try_from(jitter(tick + controller as u64)).expect("few") * 1_000;
+            let fate = |controller| {
+                AckRecord::Fate(
+                    controller,
+                    frame,
+                    Fate::Answered(ReplyCode::Running),
+                    150_000 + latency(controller),
+                )
+            };
+            ((tick + 1) * 1_000_000 + tick, (0..6).map(reply).chain((0..6).map(fate)).collect())
+        };
+        let drains: Vec<_> = (0..500).map(drain).collect();
+        let octets = packed(&crossed(&drains)).len();
+        assert!(octets < 500 * 6 * 5 / 2 + 500 * 14, "{octets} for {} replies", 500 * 6);
+    }
+}
