@@ -218,7 +218,7 @@ fn a_check_that_fails_takes_nothing_in() {
         let problem = upload_with(script, Duration::from_secs(60));
         assert!(problem.detail.contains("the check of the cue ended with"), "{problem}");
     }
-    let foreign = r#"echo '{"passed":true,"faults":[],"more":0,"sha256":"00","effects":[],"mcap":false}'"#;
+    let foreign = r#"echo '{"passed":true,"faults":[],"more":0,"led_faults":[],"sha256":"00","effects":[],"mcap":false}'"#;
     assert!(
         upload_with(foreign, Duration::from_secs(60)).detail.contains("changed while it was being checked")
     );
@@ -270,6 +270,44 @@ fn a_playlist_of_proved_cues_has_no_faults_and_unknown_ones_are_proved_when_it_i
     let faults = check("title = \"Day\"\n[[entry]]\ncue = \"wild\"\n[[entry]]\ncue = \"gone\"\n");
     assert!(faults[0].starts_with("day.toml:3:7: cue: wild does not pass: "), "{faults:?}");
     assert!(faults[1].starts_with("day.toml:5:7: cue: there is no cue gone"), "{faults:?}");
+}
+
+/// A ride at 239 mm/s of 240.
+fn just_within() -> String {
+    let row = |ms: u32| {
+        let t = f64::from(ms) * 1e-3;
+        let u = (t.min(12.0 - t) / 2.0).clamp(0.0, 1.0);
+        let swell = u * u * (3.0 - 2.0 * u);
+        let turn = std::f64::consts::TAU / 1.6;
+        format!("{ms},{:.9}\n", 0.5 + 239.0 / turn / 150.0 * swell * (turn * t).sin())
+    };
+    format!("time_ms,a1\n{}", (0..=12_000).step_by(20).map(row).collect::<String>())
+}
+
+#[test]
+fn a_playlist_is_checked_for_every_pace_that_the_film_of_an_entry_may_ask_for() {
+    let fixture = Fixture::new();
+    fs::write(fixture.cues().join("ride.csv"), just_within()).unwrap();
+    let path = fixture.dir.path().join("hall.toml");
+    let hall = fs::read_to_string(&path).unwrap();
+    let check = |sync: &str, film: &str| {
+        fs::write(&path, format!("{hall}{sync}")).unwrap();
+        let config = kinocue::harness::config::load(&path).unwrap();
+        let day = format!("title = \"Day\"\n[[entry]]\ncue = \"ride\"\n{film}");
+        let playlist = Playlist::parse(Path::new("day.toml"), &day).unwrap();
+        playlist.check(&fixture.library, &config).iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let film = "film = \"01:00:00:00\"\n";
+    let sync = "[sync]\nsources = [\"mpv:/s\"]\nfilm_fps = \"25\"\n";
+    assert_eq!((check("", ""), check(sync, "")), (vec![], vec![]), "no film leads it");
+    let faults = check("", film);
+    assert!(faults[0].starts_with("day.toml:4:8: film = \"01:00:00:00\", but the"), "{faults:?}");
+    let led = check(sync, film);
+    let says =
+        "day.toml:3:7: cue: ride does not pass at every pace that its film may ask for: 122:6: a1: velocity";
+    assert!(led.len() == 1 && led[0].starts_with(says), "{led:?}");
+    let all_led = check(&format!("{sync}start = \"01:00:00:00\"\n"), "");
+    assert!(all_led.len() == 1 && all_led[0].contains("cue: ride does not pass"), "{all_led:?}");
 }
 
 #[test]

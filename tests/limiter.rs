@@ -38,6 +38,19 @@ fn a_move_over_the_whole_stroke_at_the_very_limits_passes_from_200_hz_on() {
     }
 }
 
+#[test]
+fn what_was_proved_and_is_faded_back_onto_after_something_else_keeps_the_limits() {
+    let mut returned = 0;
+    for seed in 0..120 {
+        let sound = Sound::new(seed);
+        let trial = Trial::of_returns(&sound, seed);
+        assert!(!trial.is_broken(), "motion {seed}, {}: {}", sound::SORTS[sound.sort], trial.share);
+        assert_eq!(trial.counts.beyond, 0, "motion {seed}, {}", sound::SORTS[sound.sort]);
+        returned += u32::from(trial.counts.clamps > 0);
+    }
+    assert!(returned > 40, "{returned} were left");
+}
+
 fn at(position: f64) -> Pose {
     let mut pose = [0.0; MAX_AXES];
     pose[0] = position;

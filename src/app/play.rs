@@ -11,7 +11,7 @@ use super::recording::{self, PlayRecording};
 use super::refused::PlayError;
 use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeError};
 use super::script::{PlayHandle, PlayScript, off_park};
-use super::staged::{StagedShow, at_any_pace};
+use super::staged::{StagedShow, at_any_pace, chasing};
 use super::sum_up::{Played, SumUp, sum_up};
 use crate::config::{Config, Misfit};
 use crate::drive::{Lane, Manner};
@@ -60,7 +60,8 @@ impl Play {
     ) -> Result<Self, PlayError> {
         let rules = ChaseRules::until(timeline.duration());
         fit(&config, &timeline)?;
-        let links = keeps_limits(&at_any_pace(&config, rules.pace), &timeline, show.rate, manner.level)?;
+        let paced = at_any_pace(&config, rules.pace, show.rate);
+        let links = keeps_limits(&paced, &timeline, show.rate, manner.level)?;
         let film = LeadingFilm { source, rules: Some(rules) };
         Ok(Self { links, ..Self::staged(config, timeline, show, manner, Some(film))? })
     }
@@ -92,7 +93,10 @@ impl Play {
     ) -> Result<Self, PlayError> {
         // The runtime ticks by its configuration.
         (config.show.rate_hz, config.show.timing) = (show.rate.hz(), show.timing);
-        let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        let mut staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        if let Some(rules) = film.as_ref().and_then(|film| film.rules) {
+            staged.headroom = chasing(staged.headroom, &rules);
+        }
         let purpose = Purpose::Play { silent: manner.silent, film };
         let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default())?;
         let desk = runtime.control().desk;

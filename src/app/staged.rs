@@ -5,7 +5,8 @@ use std::sync::Arc;
 use crate::config::drive::SeatDrive;
 use crate::config::{Config, Connection};
 use crate::drive::{Lane, Manner, lanes};
-use crate::engine::{Engine, Headroom, Mix, Show};
+use crate::engine::{Engine, Headroom, MAX_SPEED_UP, Mix, Show, Slewing};
+use crate::film::chase::ChaseRules;
 use crate::film::follower::PaceLimits;
 use crate::motion::{SeatType, Window};
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, Scene, To};
@@ -40,18 +41,34 @@ pub fn headroom(config: &Config, timeline: &Timeline, rate: Rate) -> Headroom {
     Headroom::measure(&windows, timeline, rate)
 }
 
-/// The hall with what is left of its seats' limits at those paces.
-pub(super) fn at_any_pace(config: &Config, pace: PaceLimits) -> Config {
-    let mut config = config.clone();
+/// How a film that is followed so may have the pace changed.
+fn slewing(pace: PaceLimits) -> Slewing {
+    Slewing { most: (pace.most() - 1.0).min(MAX_SPEED_UP), change_per_s: pace.change_per_s() }
+}
+
+/// The headroom of a cue that chases a film, and was proved [`at_any_pace`] of that.
+#[must_use]
+pub fn chasing(headroom: Headroom, rules: &ChaseRules) -> Headroom {
+    headroom.led(slewing(rules.pace))
+}
+
+/// The hall with what is left of its seats' limits for a cue, whatever pace a film asks for that is followed so.
+pub(crate) fn at_any_pace(config: &Config, pace: PaceLimits, rate: Rate) -> Config {
+    let (mut config, slewing) = (config.clone(), slewing(pace));
     for controller in &mut config.controllers {
         let seat = SeatType::clone(&controller.seat).with_each(|axis| {
-            [axis.max_velocity, axis.max_acceleration, axis.max_jerk] =
-                pace.leave(axis.max_velocity, axis.max_acceleration, axis.max_jerk);
+            let [velocity, acceleration] = axis.most_shaken();
+            let most = [axis.max_velocity, axis.max_acceleration, axis.max_jerk];
+            let left = slewing.leaves(rate, most);
+            [axis.max_velocity, axis.max_acceleration, axis.max_jerk] = left;
+            // No pace makes a vibration quicker: what is over both together is what the pace adds to the motion.
+            axis.max_shaken_velocity = Some(velocity - (most[0] - left[0]));
+            axis.max_shaken_acceleration = Some(acceleration - (most[1] - left[1]));
         });
         controller.seat = Arc::new(seat);
         if let Connection::Link(drives) = &mut controller.connection {
             // What a fit misses is in proportion to the jerk of what it follows.
-            let max_deviation_mm = drives.drive.max_deviation_mm / pace.most().powi(3);
+            let max_deviation_mm = drives.drive.max_deviation_mm / (1.0 + slewing.most).powi(3);
             drives.drive = Arc::new(SeatDrive { max_deviation_mm, ..SeatDrive::clone(&drives.drive) });
         }
     }
@@ -143,5 +160,73 @@ impl StagedShow {
         let (engine, lanes, planner, timeline) = self.split();
         let planning = Some(Box::new(Planning { planner, timeline }));
         Box::new(Loaded { engine: engine.waiting(), lanes, planning, film: None })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    use super::*;
+    use crate::cue::{self, Source};
+    use crate::film::point::FilmState;
+    use crate::harness::{Event, ORIGIN, Virtual};
+    use crate::proof::{Digest, Terms, prove};
+    use crate::time::ShowTime;
+
+    /// Where a ride is that goes up and down more than three times a second, so much of the stroke to either side, from rest to rest.
+    fn place(amplitude: f64, t: f64) -> f64 {
+        let u = (t.min(30.0 - t) / 2.0).clamp(0.0, 1.0);
+        0.5 + amplitude * u * u * (3.0 - 2.0 * u) * (TAU * t / 0.3).sin()
+    }
+
+    fn ride(amplitude: f64) -> String {
+        let mut text = "time_ms,a1\n".to_owned();
+        for ms in (0..=30_000).step_by(10) {
+            writeln!(text, "{ms},{:.9}", place(amplitude, f64::from(ms) * 1e-3)).unwrap();
+        }
+        text
+    }
+
+    #[test]
+    fn a_cue_that_uses_all_that_is_left_for_a_film_is_where_that_is_at_any_of_its_paces() {
+        let rate = Rate::from_hz(100.0);
+        let paced = at_any_pace(&Virtual::new(ride(0.0)).config(), PaceLimits::default(), rate);
+        let passes = |amplitude: f64| {
+            let cue = cue::read(Path::new("ride.csv"), ride(amplitude).as_bytes(), &Source::Native);
+            let timeline = Timeline::new(cue.unwrap());
+            prove(&timeline, Terms::of_hall(&paced, Digest::of(timeline.cue()), rate, 1.0)).passed()
+        };
+        let (mut keeps, mut breaks) = (0.0, 0.1);
+        for _ in 0..10 {
+            let middle = f64::midpoint(keeps, breaks);
+            if passes(middle) { keeps = middle } else { breaks = middle }
+        }
+        for speed in [0.9985, 1.0015] {
+            let lead = |at_s: f64, ahead_s: f64| {
+                let media = ShowTime::from_secs_f64(0.5 + speed * (at_s - 0.5) + ahead_s);
+                ((at_s * 100.0) as u64, Event::Film(media, speed, FilmState::Locked))
+            };
+            // 30 ms that are slewed, in the middle of it.
+            let script = vec![lead(0.5, 0.0), lead(10.0, 0.03)];
+            let played =
+                Virtual { chases: true, at_most: 20_000, script, ..Virtual::new(ride(keeps)) }.play();
+            let worst = played.worst();
+            assert!(worst.velocity <= 1.01 && worst.acceleration <= 1.01 && worst.jerk <= 1.01, "{worst:?}");
+            assert!(worst.jerk > 0.94, "it uses what there is: {worst:?}");
+            assert_eq!(played.clamps[0].worst, None);
+            let off = played.frames.iter().zip(played.positions_mm(0, 0)).filter_map(|(frame, mm)| {
+                let end_s = frame.at.since(ORIGIN).as_secs_f64() + 0.01;
+                let ahead_s = if end_s < 10.0 { 0.0 } else { 0.03 };
+                let wanted = 150.0 * place(keeps, 0.5 + speed * (end_s - 0.5) + ahead_s);
+                let is_slewed = (5.0..9.9).contains(&end_s) || (16.0..26.0).contains(&end_s);
+                is_slewed.then_some((mm - wanted).abs())
+            });
+            let worst_mm = off.fold(0.0, f64::max);
+            // At 137 mm/s a millisecond is 0.14 mm.
+            assert!(worst_mm < 0.05, "{worst_mm} mm at {speed} of the film's speed");
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! What several commands read: cues and configurations, with the exit codes of their faults.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -7,6 +8,7 @@ use anyhow::anyhow;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use super::{Exit, Failure, OrExit as _};
+use crate::app::staged::at_any_pace;
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
 use crate::motion::{SeatAxis, SeatType};
@@ -131,7 +133,7 @@ impl Judge {
         let axes = timeline.axes();
         let of_seat = |seat: &Arc<SeatType>| Terms::of_seat(Arc::clone(seat), axes, cue, rate, level);
         match (&self.seat, &self.hall) {
-            (None, Some(hall)) => Terms::of_hall(hall, cue, rate, level),
+            (None, Some(hall)) => Terms::of_hall(&self.led(hall), cue, rate, level),
             (Some(seat), Some(hall)) => {
                 Terms { parts: of_seat(seat).parts, ..Terms::of_hall(hall, cue, rate, level) }
             }
@@ -140,10 +142,18 @@ impl Judge {
         }
     }
 
+    /// The hall with what it leaves of its limits for every pace that a film may ask for, where one leads all its shows.
+    fn led<'a>(&self, hall: &'a Config) -> Cow<'a, Config> {
+        let leads = hall.sync.as_ref().filter(|sync| sync.leads);
+        leads.map_or(Cow::Borrowed(hall), |sync| {
+            Cow::Owned(at_any_pace(hall, sync.pace, Rate::from_hz(self.rate_hz)))
+        })
+    }
+
     /// Proves a cue on these terms, and what the links of the configuration make of it, unless another seat is asked for.
     pub(super) fn prove(&self, timeline: &Timeline, terms: Terms) -> Proof {
         match (&self.seat, &self.hall) {
-            (None, Some(hall)) => prove_in(hall, timeline, terms),
+            (None, Some(hall)) => prove_in(&self.led(hall), timeline, terms),
             _ => prove(timeline, terms),
         }
     }

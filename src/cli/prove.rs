@@ -8,12 +8,13 @@ use anyhow::Context as _;
 
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::app::StagedShow;
+use crate::app::staged::at_any_pace;
 use crate::config::Config;
 use crate::cue::{self, Cue, CueFaults, Source};
 use crate::drive::Manner;
 use crate::engine::Show;
 use crate::library::{Drawing, Hashed, MAX_POINTS, Verdict, draw, needs_hall};
-use crate::proof::{Digest, Terms, prove_in};
+use crate::proof::{Digest, Proof, Terms, prove_in};
 use crate::sys::humble::{self, ProcessBounds};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -84,6 +85,7 @@ fn judge(path: &Path, config: Config) -> io::Result<Verdict> {
         passed: false,
         faults: Vec::new(),
         more: 0,
+        led_faults: Vec::new(),
         sha256,
         digest: None,
         title: None,
@@ -114,8 +116,16 @@ fn of_cue(cue: Cue, config: Config, verdict: &mut Verdict) {
     }
     config.fits_stroke(&timeline).faults.iter().for_each(|faults| note(faults, verdict));
     let rate = Rate::from_hz(config.show.rate_hz);
-    let proof = prove_in(&config, &timeline, Terms::of_hall(&config, digest, rate, 1.0));
-    verdict.faults.extend(proof.violations.iter().map(|one| one.to_string().trim_start().to_owned()));
+    let prove = |config: &Config| prove_in(config, &timeline, Terms::of_hall(config, digest, rate, 1.0));
+    let lines = |proof: &Proof| -> Vec<String> {
+        proof.violations.iter().map(|one| one.to_string().trim_start().to_owned()).collect()
+    };
+    let led = config.sync.as_ref().map(|sync| prove(&at_any_pace(&config, sync.pace, rate)));
+    verdict.led_faults = led.as_ref().map_or_else(Vec::new, lines);
+    // What keeps the limits that any pace leaves keeps them at the clock's; and where the film leads every show, no other counts.
+    let is_enough = |led: &Proof| led.passed() || config.sync.as_ref().is_some_and(|sync| sync.leads);
+    let proof = led.filter(is_enough).unwrap_or_else(|| prove(&config));
+    verdict.faults.extend(lines(&proof));
     verdict.more += proof.more;
     if verdict.faults.is_empty() {
         let show = Show { rate, timing: config.show.timing, start: ShowTime::ZERO, plays: 1 };

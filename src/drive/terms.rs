@@ -5,11 +5,14 @@ use std::time::Duration;
 use super::link::{Family as _, Lead, StreamTerms};
 use super::rates::{LinkLoad, is_usb, short};
 use super::silvermax::SilverMax;
-use super::sixpack2::Sixpack2;
+use super::sixpack2::{OrderGap, Reach, Sixpack2};
 use crate::config::drive::DriveFamily;
-use crate::config::{Config, Link};
-use crate::motion::MAX_LEAD;
+use crate::config::drive::sixpack2::Sixpack2Drive;
+use crate::config::link::LinkWiring;
+use crate::config::{Config, Controller, Link};
+use crate::motion::{AxisGeometry, MAX_LEAD, SeatType};
 use crate::time::Rate;
+use crate::wire::sixpack2::{WAKING_DIVISOR, baud_of};
 
 /// Below this a hard ride is half a millimetre beside its cue.
 const LEAST_HZ: f64 = 15.0;
@@ -63,7 +66,10 @@ pub(crate) fn in_words(config: &Config) -> (Vec<String>, Vec<String>) {
         match (load.period_for(link.rate_hz), StreamTerms::of(link, config)) {
             (Err(slow), _) => faults.push(format!("rate_hz of [link.{}]: {slow}", link.name)),
             (_, Err(why)) => faults.push(why),
-            (Ok(period), Ok(_)) => told.push(plays_at(link, &load, period)),
+            (Ok(period), Ok(_)) => {
+                told.push(plays_at(link, &load, period));
+                told.extend(damaged(link, config, &load, period));
+            }
         }
     }
     (told, faults)
@@ -72,6 +78,47 @@ pub(crate) fn in_words(config: &Config) -> (Vec<String>, Vec<String>) {
 /// What became of the baud rate that the file asks for, where that is another.
 fn other_baud(Link { name, baud, asked_baud, .. }: &Link) -> Option<String> {
     (baud != asked_baud).then(|| format!("link {name} runs at {baud} baud, the nearest rate to {asked_baud}"))
+}
+
+/// How far an order that is damaged on its way leads a motor of a SIXpack 2, where its answers are as slow as they may be. Frames on a bus have a
+/// checksum.
+fn damaged(link: &Link, config: &Config, load: &LinkLoad, period: Duration) -> Option<String> {
+    if load.wiring == LinkWiring::Can {
+        return None;
+    }
+    let octet = |baud: u32| Duration::from_secs(1) * load.octet_bits / baud.max(1);
+    let gap = |asked: u32| {
+        let (octets, delay) = ([load.baud, asked].map(octet), OrderGap::LONGEST_DELAY);
+        OrderGap { period, octets, motors: load.axes, delay }.longest()
+    };
+    // A unit that is lost may have been restarted: it is looked for as it wakes, too.
+    let gaps = [load.baud, baud_of(WAKING_DIVISOR)?].map(gap);
+    let on_it = |one: &&Controller| one.drives().is_some_and(|drives| drives.link == link.name);
+    let seats: Vec<_> = config.named().filter(on_it).filter_map(six_of).collect();
+    let reach = |(six, seat): &(&Sixpack2Drive, &SeatType)| {
+        let of_axis = |axis: &AxisGeometry| {
+            let reach = Reach::of(axis, six.clock_divider);
+            (reach.led_mm(gaps[0], axis.max_velocity), reach.stopped_mm(gaps[1]))
+        };
+        seat.own().iter().map(of_axis).collect::<Vec<_>>()
+    };
+    let reaches = seats.iter().flat_map(reach);
+    let (led, stopped) = reaches.max_by(|one, other| one.1.total_cmp(&other.1))?;
+    let mut words = format!(
+        "link {}: an order that is damaged on its way leads a motor up to {led:.0} mm beside its way, or {stopped:.0} mm where nothing \
+         leads its seat, before the next one ends it",
+        link.name
+    );
+    let slower = |(six, seat): &(&Sixpack2Drive, &SeatType)| {
+        let divider = six.slower_clock(seat)?;
+        Some(format!("; clock_divider = {divider} is enough for {}, and makes it less", seat.name))
+    };
+    words.extend(seats.iter().find_map(slower));
+    Some(words)
+}
+
+fn six_of(one: &Controller) -> Option<(&Sixpack2Drive, &SeatType)> {
+    Some((one.drives()?.drive.sixpack2.as_ref()?, &one.seat))
 }
 
 fn plays_at(link: &Link, load: &LinkLoad, period: Duration) -> String {

@@ -13,8 +13,6 @@ use crate::time::ShowTime;
 
 /// A lag beyond this, and beyond one period, is not slewed away: the lanes hold, then join.
 const LAG_HOLD: Duration = Duration::from_millis(50);
-/// In this time show time surely comes back to the pace of the clock.
-const SLOWING: Duration = Duration::from_millis(150);
 
 impl Engine {
     /// A few missed ticks leave a lag that is slewed away; after too many the lanes hold, then go on from rest.
@@ -50,11 +48,12 @@ impl Engine {
         let (now, reached) = (self.playhead.at(), self.playhead.reached());
         let is_wanted_elsewhere = self.is_wanted_elsewhere();
         let Self { phase, playhead, headroom, lanes, .. } = self;
+        let ends_within = || headroom.slewing().ends_within();
         playhead.pass(time, || match phase {
             // The planner was told that pace: its course begins with what that makes of the motion.
             Phase::Following(Following { next: Some(next), .. }) if next.pace != 1.0 => FramePace::Kept,
             // That course was planned from the clock's pace, which has to be back before it begins.
-            Phase::Following(Following { next: Some(next), .. }) if next.is_near(now + SLOWING) => {
+            Phase::Following(Following { next: Some(next), .. }) if next.is_near(now + ends_within()) => {
                 FramePace::Within(0.0)
             }
             // A join may meet a cue that leaves nothing; what the cue leaves later on says nothing of the move before.
@@ -170,7 +169,8 @@ impl Engine {
         let Some(mut scene) = self.planner.scenes.take() else { return };
         self.lanes.describe(&mut scene);
         // Given the time, the pace is brought back to the clock's; at short notice it is kept.
-        let far = at.is_none_or(|at| at > self.playhead.at() + SLOWING);
+        let slowing = self.headroom.slewing().ends_within();
+        let far = at.is_none_or(|at| at > self.playhead.at() + slowing);
         let pace = if far { 1.0 } else { self.playhead.pace() };
         let from = match (&self.phase, at) {
             (Phase::Following(Following { course, .. }), Some(at)) => {

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use super::fader::{GATHER, RATE};
-use super::slew::{CHANGE_PER_S, MAX_SPEED_UP};
+use super::slew::{MAX_SPEED_UP, Slewing};
 use crate::motion::{Limits, Slot, Spacing, Window};
 use crate::proof::{HURRY, Loads, shakes};
 use crate::time::{Rate, ShowTime};
@@ -36,6 +36,8 @@ pub struct Headroom {
     turn: f64,
     /// How many entries before and behind the present one a change meets that is made now.
     reach: [usize; 2],
+    /// What a film that leads may ask for, where the cue was proved for that.
+    led: Option<Slewing>,
 }
 
 impl Headroom {
@@ -62,12 +64,28 @@ impl Headroom {
                 }
             }
         }
-        Self { loads, greatest, turn: turn(rate), reach: reach(rate) }
+        Self { loads, greatest, turn: turn(rate), reach: reach(rate), led: None }
+    }
+
+    /// The same of a cue that was proved for what is left of its seats' limits so ([`Slewing::leaves`]).
+    #[must_use]
+    pub(crate) fn led(self, slewing: Slewing) -> Self {
+        Self { led: Some(slewing), ..self }
+    }
+
+    /// How its pace may change.
+    #[must_use]
+    pub(crate) fn slewing(&self) -> Slewing {
+        self.led.unwrap_or(Slewing::OWN)
     }
 
     /// The greatest speed-up from `at` on, with motion at `level`; `shakes` where any lane may vibrate. Never allocates.
     #[must_use]
     pub(crate) fn pace(&self, at: ShowTime, level: f64, shakes: bool) -> f64 {
+        // What it was proved for it gets: seats that were let run slower would fall behind the film, and have to join it.
+        if let Some(led) = self.led {
+            return led.most;
+        }
         let leaves = self.ahead(at, shakes).iter().map(|load| load.leaves_pace(level, self.turn));
         leaves.fold(MAX_SPEED_UP, f64::min)
     }
@@ -75,6 +93,8 @@ impl Headroom {
     /// What of the greatest rates of a level may be used from `at` on, 0 to 1; `shakes` where the lane may vibrate. Never allocates.
     #[must_use]
     pub(crate) fn fade(&self, at: ShowTime, level: f64, shakes: bool) -> f64 {
+        // A film that leads may have taken the pace that it was proved for, which no level may need as well.
+        let level = self.led.map_or(level, |led| level * (1.0 + led.most).powi(3));
         let leaves = self.ahead(at, shakes).iter().map(|load| load.leaves_fade(level, self.turn));
         leaves.fold(1.0, f64::min).max(0.0)
     }
@@ -184,10 +204,11 @@ impl Load {
     fn leaves_pace(&self, level: f64, turn: f64) -> f64 {
         // Derivatives of x(s(t)) with s' the pace (docs/limiter.md, section 6).
         let at_level = |share: f32| level * f64::from(share);
-        let added = CHANGE_PER_S * at_level(self.velocity_by_acceleration);
+        let change = Slewing::OWN.change_per_s;
+        let added = change * at_level(self.velocity_by_acceleration);
         // By the greatest pace instead of the one looked for, which would be a cubic to be solved each tick.
         let bends = 3.0 * (1.0 + MAX_SPEED_UP) * at_level(self.acceleration_by_jerk);
-        let jerk_added = CHANGE_PER_S * (turn * at_level(self.velocity_by_jerk) + bends);
+        let jerk_added = change * (turn * at_level(self.velocity_by_jerk) + bends);
         // Where the change alone takes all, nothing is left, though motion at a steady pace would take nothing.
         let left = |added: f64, share: f32| (1.0 - added).max(0.0) / at_level(share).max(f64::MIN_POSITIVE);
         let paces = [
@@ -214,6 +235,20 @@ impl Load {
         // One share for both rates, so that each sum grows in proportion to it, and what is left divides.
         let lefts = [left(self.velocity), left(self.acceleration), left(self.jerk)];
         lefts.into_iter().zip(adds).map(|(left, adds)| left / adds).fold(1.0, f64::min)
+    }
+}
+
+impl Slewing {
+    /// What of a seat's limits of velocity, acceleration and jerk, in any unit of length, is left for a cue that is to keep them at any
+    /// such pace, and at any such change of it.
+    #[must_use]
+    pub(crate) fn leaves(self, rate: Rate, [velocity, acceleration, jerk]: [f64; 3]) -> [f64; 3] {
+        // The sums of `Load::leaves_pace`, solved for what the cue may do (docs/limiter.md, section 6).
+        let (pace, change) = (1.0 + self.most, self.change_per_s);
+        let velocity = velocity / pace;
+        let acceleration = (acceleration - change * velocity) / pace.powi(2);
+        let jerk = (jerk - change * (turn(rate) * velocity + 3.0 * pace * acceleration)) / pace.powi(3);
+        [velocity, acceleration, jerk]
     }
 }
 
@@ -334,7 +369,7 @@ mod tests {
     ) -> f64 {
         let slot = window.slots()[0];
         let headroom = Headroom::measure(std::slice::from_ref(window), timeline, rate);
-        let (mut slew, mut hint) = (Slew::new(rate), Hint::default());
+        let (mut slew, mut hint) = (Slew::new(rate, Slewing::OWN), Hint::default());
         let mut measure = Measure::new(Spacing::at_rate(rate.hz()));
         let (mut playhead, mut sent, mut frame) = (ShowTime::ZERO, ShowTime::ZERO, 0);
         let mut owed = owed.into_iter();
@@ -348,7 +383,7 @@ mod tests {
             }
             let time = Duration::from_millis(rate.time_ms(frame).into());
             (frame, sent) = (frame + 1, sent + time);
-            let passed = slew.advance(time, headroom.pace(playhead, 1.0, true), owed_s);
+            let passed = slew.advance(time, headroom.pace(playhead, 1.0, true), owed_s, 0.0);
             playhead += passed;
             owed_s -= passed.as_secs_f64() - time.as_secs_f64();
             let at = slot.place(timeline.sample(playhead, &mut hint)[0]);

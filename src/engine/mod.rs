@@ -33,6 +33,7 @@ pub(crate) use lanes::LaneOrder;
 pub use mix::Mix;
 pub(crate) use phase::Rest;
 pub(crate) use playhead::Playhead;
+pub(crate) use slew::{MAX_SPEED_UP, Slewing};
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -131,7 +132,7 @@ impl Engine {
             ending: Ending::Completed,
             plays_left: show.plays.checked_sub(1),
             directive: Directive::Off,
-            playhead: Playhead::new(show.rate, show.start),
+            playhead: Playhead::new(show.rate, show.start, headroom.slewing()),
             stamps: Stamps::new(show.timing),
             show,
             timeline,

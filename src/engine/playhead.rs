@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::millis;
-use super::slew::Slew;
+use super::slew::{Slew, Slewing};
 use crate::time::{Rate, ShowTime, TRIM_MS};
 
 /// How quickly show time may run in a frame.
@@ -30,15 +30,18 @@ pub struct Playhead {
     due: ShowTime,
     /// How much of what it is behind that missed ticks have made, seconds.
     missed_s: f64,
+    /// How much further than the clock the film that is chased goes in the next frame, seconds.
+    film_s: f64,
     /// How much later than the film the motion is to be, milliseconds.
     trim_ms: i32,
     slew: Slew,
 }
 
 impl Playhead {
-    pub(super) fn new(rate: Rate, start: ShowTime) -> Self {
-        let slew = Slew::new(rate);
-        Self { rate, frames: 0, at: start, reached: start, due: start, missed_s: 0.0, trim_ms: 0, slew }
+    pub(super) fn new(rate: Rate, start: ShowTime, slewing: Slewing) -> Self {
+        let slew = Slew::new(rate, slewing);
+        let (at, reached, due) = (start, start, start);
+        Self { rate, frames: 0, at, reached, due, missed_s: 0.0, film_s: 0.0, trim_ms: 0, slew }
     }
 
     /// The show time of the next tick: where in the cue the lanes are.
@@ -119,6 +122,7 @@ impl Playhead {
 
     /// The film that is chased wants the frame to begin there: it is slewed to.
     pub(super) fn follow(&mut self, due: ShowTime) {
+        self.film_s = ShowTime::from_nanos(due.as_nanos() - self.due.as_nanos()).as_secs_f64();
         self.due = due;
         self.missed_s = self.owed_s().max(0.0);
     }
@@ -147,6 +151,7 @@ impl Playhead {
 
     /// Moves on by a frame, at a pace that is asked for where it may be another than the clock's.
     pub(super) fn pass(&mut self, time: Duration, pace: impl FnOnce() -> FramePace) {
+        let film_s = std::mem::take(&mut self.film_s);
         // In whole nanoseconds: an undisturbed show has no rounding that hours could add up.
         if self.at == self.due && self.slew.is_calm() {
             return self.run(time);
@@ -154,7 +159,7 @@ impl Playhead {
         let owed_s = self.owed_s();
         self.at += match pace() {
             FramePace::Kept => self.slew.coast(time),
-            FramePace::Within(ceiling) => self.slew.advance(time, ceiling, owed_s),
+            FramePace::Within(ceiling) => self.slew.advance(time, ceiling, owed_s, film_s),
         };
         self.due += time;
         self.close_in(owed_s - self.owed_s());
@@ -205,7 +210,7 @@ mod tests {
     #[test]
     fn an_undisturbed_grid_leaves_no_error_whatever_whole_milliseconds_make_of_the_rate() {
         for hz in [24.0, 60.0, 72.0, 333.0] {
-            let mut playhead = Playhead::new(Rate::from_hz(hz), ShowTime::from_millis(500));
+            let mut playhead = Playhead::new(Rate::from_hz(hz), ShowTime::from_millis(500), Slewing::OWN);
             for _ in 0..10_000 {
                 let time = millis(playhead.next_frame());
                 playhead.pass(time, || unreachable!("the pace is the clock's"));
@@ -216,7 +221,7 @@ mod tests {
 
     #[test]
     fn the_film_runs_on_through_missed_ticks_and_waits_while_lanes_rest() {
-        let mut playhead = Playhead::new(Rate::from_hz(100.0), ShowTime::ZERO);
+        let mut playhead = Playhead::new(Rate::from_hz(100.0), ShowTime::ZERO, Slewing::OWN);
         playhead.miss(3 * FRAME);
         assert_eq!((playhead.film(), playhead.lag()), (ShowTime::from_millis(30), 3 * FRAME));
         (0..1_000).for_each(|_| playhead.pass(FRAME, || FramePace::Within(0.01)));
@@ -228,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_trim_moves_the_motion_against_the_film_and_is_no_lag() {
-        let mut playhead = Playhead::new(Rate::from_hz(100.0), ShowTime::ZERO);
+        let mut playhead = Playhead::new(Rate::from_hz(100.0), ShowTime::ZERO, Slewing::OWN);
         assert!(playhead.trim(-40) && !playhead.trim(-40));
         assert_eq!((playhead.film(), playhead.lag()), (ShowTime::ZERO, Duration::ZERO));
         assert_eq!(playhead.owed(), 4 * FRAME, "the motion is to be sooner");

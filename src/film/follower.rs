@@ -51,21 +51,6 @@ impl PaceLimits {
         1.0 + self.band + self.slew
     }
 
-    /// What of a seat's limits is left for a cue that is to keep them at any pace that may be asked for, and at any change of it:
-    /// greatest speed, acceleration and jerk, in any unit of length.
-    ///
-    /// With the playhead p and the cue x: v = p' x', a = p'^2 x'' + p'' x', j = p'^3 x''' + 3 p' p'' x'' + p''' x'.
-    #[must_use]
-    pub(crate) fn leave(&self, velocity: f64, acceleration: f64, jerk: f64) -> [f64; 3] {
-        let (pace, change) = (self.most(), self.change_per_s());
-        let of_change = change / CHANGE_REACHED_S;
-        [
-            velocity / pace,
-            (acceleration - change * velocity) / pace.powi(2),
-            (jerk - 3.0 * pace * change * acceleration - of_change * velocity) / pace.powi(3),
-        ]
-    }
-
     /// How quickly the pace changes at the most, per second.
     #[must_use]
     pub(crate) const fn change_per_s(&self) -> f64 {

@@ -12,6 +12,7 @@ use rtrb::Producer;
 use super::shown::{Showing, ShownFilm};
 use super::{Frame, Played};
 use crate::app::StagedShow;
+use crate::app::staged::chasing;
 use crate::belief::Reading;
 use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
@@ -133,7 +134,10 @@ impl Virtual {
             lane.window = lane.window.clone().led_ahead(*lead);
         }
         let windows: Vec<Window> = lanes.iter().map(|lane| lane.window.clone()).collect();
-        let headroom = Headroom::measure(&windows, &timeline, show.rate);
+        let mut headroom = Headroom::measure(&windows, &timeline, show.rate);
+        if self.chases {
+            headroom = chasing(headroom, &ChaseRules::until(timeline.duration()));
+        }
         let level = Mix { motion: self.level, vibration: self.level, ..Mix::FULL };
         let mixes = vec![level; lanes.len()];
         StagedShow::of_lanes(lanes, &timeline, headroom, show, &mixes).expect("there is a join")

@@ -9,7 +9,7 @@ pub mod app {
         pub use crate::app::runtime::{Loops, Numbers, Purpose, Runtime, RuntimeHandle};
     }
     pub mod staged {
-        pub use crate::app::staged::headroom;
+        pub use crate::app::staged::{chasing, headroom};
     }
 }
 pub mod belief {

@@ -80,6 +80,7 @@ mod tests {
             passed: true,
             faults: Vec::new(),
             more: 0,
+            led_faults: Vec::new(),
             sha256: "00".to_owned(),
             digest: None,
             title: None,

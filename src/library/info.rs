@@ -14,6 +14,8 @@ pub(crate) struct Verdict {
     pub(crate) faults: Vec<String>,
     /// How many there are beyond those.
     pub(crate) more: u64,
+    /// What it breaks where a film leads it that may ask for any pace that `[sync]` allows; none where the hall has no `[sync]`.
+    pub(crate) led_faults: Vec<String>,
     /// SHA-256 of the file, hexadecimal.
     pub(crate) sha256: String,
     /// SHA-256 of what the cue does, hexadecimal ([`crate::proof::Digest`]); `None` if it cannot be read.
@@ -73,6 +75,9 @@ pub struct CueInfo {
     pub sha256: Option<String>,
     /// True if it keeps the limits of the hall.
     pub proof: Proved,
+    /// What it breaks where a film leads it.
+    #[serde(skip)]
+    pub(crate) led_faults: Vec<String>,
 }
 
 impl CueInfo {
@@ -93,6 +98,7 @@ impl CueInfo {
             size,
             sha256: verdict.map(|verdict| verdict.sha256.clone()),
             proof,
+            led_faults: verdict.map_or_else(Vec::new, |verdict| verdict.led_faults.clone()),
         }
     }
 }

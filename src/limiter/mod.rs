@@ -231,6 +231,8 @@ impl Limiter {
         // Apart from it it is looked at by itself, to know when it may be followed again.
         let broken = state.mode != AxisMode::Following && state.look(asked, frame.time_ms);
         let (mode, wish) = state.wish(asked, frame.seconds);
+        // A fade is on no cue that was proved, whatever it fades onto: only a way out of its own is one.
+        let by = if mode == AxisMode::Following { by } else { Provenance::Anyhow };
         let next = self.next(axis, wish, frame);
         let held = self.axes[axis].limits.hold(&next);
         // A way to rest needs no other way out: what is left of it is one.

@@ -13,11 +13,15 @@ impl Playlist {
     #[must_use]
     pub fn check(&self, library: &Library, config: &Config) -> Vec<ConfigFault> {
         let mut faults = Vec::new();
-        let mut examined: BTreeSet<&CueId> = BTreeSet::new();
+        let mut examined: BTreeSet<(&CueId, bool)> = BTreeSet::new();
         for entry in &self.entries {
             self.check_names(entry, config, &mut faults);
-            if examined.insert(&entry.cue)
-                && let Err(message) = examine(library, &entry.cue)
+            let begins = entry.film.begins(config).unwrap_or_else(|why| {
+                faults.push(self.fault(entry.places.film, why));
+                None
+            });
+            if examined.insert((&entry.cue, begins.is_some()))
+                && let Err(message) = examine(library, &entry.cue, begins.is_some())
             {
                 faults.push(self.fault(entry.places.cue, message));
             }
@@ -58,20 +62,24 @@ impl Playlist {
     }
 }
 
-/// Why a cue cannot be played, if it cannot.
-fn examine(library: &Library, cue: &CueId) -> Result<(), String> {
+/// Why a cue cannot be played, or not led by a film, if it cannot.
+fn examine(library: &Library, cue: &CueId, is_led: bool) -> Result<(), String> {
     let info =
         library.examine(cue).map_err(|problem| format!("cue: {}; {}", problem.detail, problem.remedy))?;
+    let failed = |when: &str, faults: &[String]| {
+        let first = faults.first().map_or("it does not pass", String::as_str);
+        let more = match faults.len() {
+            0 | 1 => String::new(),
+            faults => format!(" (and {} more)", faults - 1),
+        };
+        Err(format!("cue: {cue} does not pass{when}: {first}{more}"))
+    };
     match info.proof {
-        Proved::Passed => Ok(()),
-        Proved::Failed { faults } => {
-            let first = faults.first().map_or("it does not pass", String::as_str);
-            let more = match faults.len() {
-                0 | 1 => String::new(),
-                faults => format!(" (and {} more)", faults - 1),
-            };
-            Err(format!("cue: {cue} does not pass: {first}{more}"))
+        Proved::Passed if is_led && !info.led_faults.is_empty() => {
+            failed(" at every pace that its film may ask for", &info.led_faults)
         }
+        Proved::Passed => Ok(()),
+        Proved::Failed { faults } => failed("", &faults),
         Proved::Unknown => Err(format!("cue: {cue} has not been checked")),
     }
 }

@@ -26,6 +26,7 @@ use crate::control::LevelsChange;
 pub(crate) use crate::control::Then;
 use crate::film::timecode::Label;
 use crate::library::{CueId, Id};
+use crate::time::ShowTime;
 
 /// The name of a playlist.
 pub(crate) type PlaylistId = Id;
@@ -77,6 +78,23 @@ pub(crate) struct EntryFilm {
     pub(crate) movie: Option<String>,
 }
 
+impl EntryFilm {
+    /// Where the film that leads it is when the cue begins; `None` if none does.
+    ///
+    /// # Errors
+    /// Why the hall has no such film, for a person.
+    pub(crate) fn begins(&self, config: &Config) -> Result<Option<ShowTime>, String> {
+        let Some(sync) = &config.sync else {
+            let why = |label| format!("film = \"{label}\", but the configuration has no [sync]");
+            return self.begin.map_or(Ok(None), |label| Err(why(label)));
+        };
+        if self.movie.is_some() && config.film.is_some() {
+            return Ok(Some(sync.offset));
+        }
+        sync.begin(self.begin)
+    }
+}
+
 /// A time of day, on some days of the week.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct At {
@@ -92,6 +110,7 @@ pub(crate) struct EntryPlaces {
     cue: (usize, usize),
     preset: (usize, usize),
     effects: (usize, usize),
+    film: (usize, usize),
     movie: (usize, usize),
 }
 

@@ -130,6 +130,7 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<PlaylistEntry> {
             cue: place("cue"),
             preset: place("preset"),
             effects: place("effects"),
+            film: place("film"),
             movie: place("movie"),
         },
     })

@@ -253,6 +253,8 @@ impl LinkLoop {
             && !self.stream.play().is_busy()
             && let Ok(errand) = self.told.errands.try_recv()
         {
+            // Where the port is gone the errand tells.
+            let _ = self.stream.play().settle();
             errand(&mut self.stream);
         }
         let is_gone = told.and_then(|()| self.stream.play().round()).is_err();
@@ -299,6 +301,8 @@ impl LinkLoop {
                 let now = self.now();
                 let until = *until.get_or_insert(now + ENDS_WITHIN);
                 if !self.stream.play().is_busy() || now >= until {
+                    // Where the port is gone nobody can be told.
+                    let _ = self.stream.play().settle();
                     return;
                 }
             }

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use kinocue::harness::ORIGIN;
+use kinocue::harness::app::staged::chasing;
 use kinocue::harness::asked::Chance;
 use kinocue::harness::belief::Reading;
 use kinocue::harness::engine::Mix;
@@ -82,7 +83,11 @@ impl Hall<'_> {
         let mut chance = Chance::new(seed);
         let stage = &stages[chance.below(stages.len())];
         let led = chance.one_of(&[Led::Play, Led::Play, Led::Hall, Led::Film]);
-        let (staged, trim_ms) = stage.staged(&mut chance);
+        let (mut staged, trim_ms) = stage.staged(&mut chance);
+        let rules = ChaseRules::until(staged.timeline.duration());
+        if led == Led::Film {
+            staged.headroom = chasing(staged.headroom, &rules);
+        }
         let (desk, leave) = (staged.desk(), AtomicBool::new(false));
         let (mut engine, lanes, planner, timeline) = staged.split();
         engine.begin_trimmed(trim_ms);
@@ -90,7 +95,6 @@ impl Hall<'_> {
         let live = Arc::new(Live::new(stage.seats));
         let (mail, ends) = mailboxes(stage.seats, stage.rate, Arc::clone(&live));
         let MailEnds { sent, ticks: _reports, tasks, answers, commands, alarms, news } = ends;
-        let rules = ChaseRules::until(timeline.duration());
         let planning = Box::new(Planning { planner, timeline });
         let hall = Hall {
             stage,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::hall_settings::HallSettings;
 use crate::app::StagedShow;
-use crate::app::staged::{at_any_pace, headroom};
+use crate::app::staged::{at_any_pace, chasing, headroom};
 use crate::config::{Config, Misfit};
 use crate::control::{Code, Problem, ShowStatus};
 use crate::engine::{Headroom, Show};
@@ -71,7 +71,8 @@ impl ProvedShow {
         film: Option<FilmStart>,
     ) -> Result<Self, Problem> {
         let refused = |faults: Vec<String>| {
-            let detail = format!("the cue {id} does not fit this hall");
+            let when = if film.is_some() { " at every pace that its film may ask for" } else { "" };
+            let detail = format!("the cue {id} does not fit this hall{when}");
             Problem::new(Code::Check, detail, "correct it, or `kinocue fit` it, and load it again")
                 .with(faults)
         };
@@ -80,7 +81,7 @@ impl ProvedShow {
         if !faults.is_empty() {
             return Err(refused(faults));
         }
-        let paced = film.map(|film| at_any_pace(config, film.rules.pace));
+        let paced = film.map(|film| at_any_pace(config, film.rules.pace, rate));
         let paced = paced.as_ref().unwrap_or(config);
         let terms = Terms::of_hall(paced, Digest::of(timeline.cue()), rate, 1.0);
         let proof = proof::prove_in(paced, &timeline, terms);
@@ -91,9 +92,13 @@ impl ProvedShow {
             }
             return Err(refused(faults));
         }
+        let room = headroom(config, &timeline, rate);
         Ok(Self {
             title: timeline.cue().title().map(str::to_owned),
-            headroom: headroom(config, &timeline, rate),
+            headroom: match &film {
+                Some(film) => chasing(room, &film.rules),
+                None => room,
+            },
             timeline: Arc::new(timeline),
             id,
             sha256,
@@ -174,20 +179,11 @@ fn faults_of_seats(config: &Config, timeline: &Timeline) -> Vec<String> {
 fn film_of(config: &Config, of: &EntryFilm, end: ShowTime) -> Result<Option<FilmStart>, Problem> {
     let refused =
         |why: String| Problem::new(Code::Check, why, "correct the playlist, or [sync], and load it again");
-    let named = of.begin;
-    let Some(sync) = &config.sync else {
-        let why =
-            named.map(|label| refused(format!("film = \"{label}\", but the configuration has no [sync]")));
-        return why.map_or(Ok(None), Err);
-    };
-    let (pace, join_above, rejoin) = (sync.pace, sync.join_above, sync.rejoin);
-    let rules = ChaseRules { pace, join_above, rejoin, ..ChaseRules::until(end) };
-    let begin = if of.movie.is_some() && config.film.is_some() {
-        Some(sync.offset)
-    } else {
-        sync.begin(named).map_err(refused)?
-    };
-    Ok(begin.map(|begin| FilmStart { begin, rules }))
+    let begin = of.begins(config).map_err(refused)?;
+    Ok(begin.zip(config.sync.as_ref()).map(|(begin, sync)| {
+        let (pace, join_above, rejoin) = (sync.pace, sync.join_above, sync.rejoin);
+        FilmStart { begin, rules: ChaseRules { pace, join_above, rejoin, ..ChaseRules::until(end) } }
+    }))
 }
 
 pub(super) fn read(

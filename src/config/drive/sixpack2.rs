@@ -93,15 +93,23 @@ fn share_of(section: &mut Section<'_, '_, '_>, key: &'static str, usual: u8) -> 
     usual
 }
 
+/// Of the axis of a seat that makes the most microsteps: how many a second, and what that is in mm/s; none of a seat without axes.
+fn fastest(seat: &SeatType) -> Option<(f64, f64)> {
+    let steps = |axis: &AxisGeometry| axis.max_velocity / axis.lead * axis.pulses_per_rev;
+    let axes = seat.own().iter().map(|axis| (steps(axis), axis.max_velocity));
+    axes.max_by(|(one, _), (other, _)| one.total_cmp(other))
+}
+
 impl Sixpack2Drive {
+    /// The greatest clock divider that is enough for a seat, where that is another: with it a motor runs no faster than it has to, whatever
+    /// it is told.
+    pub(crate) fn slower_clock(&self, seat: &SeatType) -> Option<u8> {
+        greatest_divider(fastest(seat)?.0).filter(|enough| *enough > self.clock_divider)
+    }
+
     /// Why the clock divider is too great for the seat's greatest speed.
     pub(crate) fn too_slow_for(&self, seat: &SeatType) -> Option<String> {
-        let steps = |axis: &AxisGeometry| axis.max_velocity / axis.lead * axis.pulses_per_rev;
-        let (needed, speed) = seat
-            .own()
-            .iter()
-            .map(|axis| (steps(axis), axis.max_velocity))
-            .max_by(|(one, _), (other, _)| one.total_cmp(other))?;
+        let (needed, speed) = fastest(seat)?;
         Some(match greatest_divider(needed) {
             Some(enough) if self.clock_divider <= enough => return None,
             Some(enough) => {

@@ -80,6 +80,14 @@ pub(crate) trait Family: Debug + Sized {
     /// A [`LinkFault`] where the port is gone.
     fn stop<P: LinkPort>(stream: &mut Stream<Self, P>) -> Result<(), LinkFault>;
 
+    /// Nobody is told anything for a while, or any more: sees to it that the last that each motor was told is nothing to move by.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    fn settle<P: LinkPort>(_: &mut Stream<Self, P>) -> Result<(), LinkFault> {
+        Ok(())
+    }
+
     /// Nothing leads a lane any more.
     fn let_go(lane: &mut LedLane<Self>, now: MonoTime);
 
@@ -116,6 +124,12 @@ pub(crate) trait LinkPlay {
     /// A [`LinkFault`] where the port is gone.
     fn stop(&mut self) -> Result<(), LinkFault>;
 
+    /// Before nothing is said to any lane for a while, or any more: sees to it that none moves by what it was told last.
+    ///
+    /// # Errors
+    /// A [`LinkFault`] where the port is gone.
+    fn settle(&mut self) -> Result<(), LinkFault>;
+
     /// Has a lane's axes read as soon as there is time.
     fn locate(&mut self, lane: u16);
 
@@ -149,6 +163,10 @@ impl<F: Family, P: LinkPort> LinkPlay for Stream<F, P> {
     fn stop(&mut self) -> Result<(), LinkFault> {
         (0..self.lanes.len()).for_each(|lane| self.brake(lane, BrakeReason::Stopped));
         F::stop(self)
+    }
+
+    fn settle(&mut self) -> Result<(), LinkFault> {
+        F::settle(self)
     }
 
     fn locate(&mut self, lane: u16) {

@@ -16,15 +16,20 @@ pub(crate) struct VirtualPort<B> {
     pub(crate) sent: Vec<(MonoTime, Vec<u8>)>,
     /// What happens to the line next, and when.
     pub(crate) script: Option<(MonoTime, Happening<B>)>,
+    /// What damages the octets that are sent next, until it says that it has.
+    pub(crate) damage: Option<Damage>,
 }
 
 /// Something that happens to a line.
 pub(crate) type Happening<B> = fn(&mut SerialLine<B>, MonoTime);
 
+/// Damages octets that are sent; true if those were what it was for.
+pub(crate) type Damage = Box<dyn FnMut(&mut Vec<u8>) -> bool + Send>;
+
 impl<B: Bus> VirtualPort<B> {
     /// That of a line, from now on.
     pub(crate) fn new(line: SerialLine<B>, now: MonoTime) -> Self {
-        Self { line, now, is_gone: false, sent: Vec::new(), script: None }
+        Self { line, now, is_gone: false, sent: Vec::new(), script: None, damage: None }
     }
 
     /// Goes on in time, if that is later.
@@ -47,8 +52,10 @@ impl<B: Bus> LinkPort for VirtualPort<B> {
         if self.is_gone {
             return Err(LinkFault);
         }
-        self.sent.push((self.now, octets.to_vec()));
-        self.line.send(octets, self.now);
+        let mut octets = octets.to_vec();
+        self.damage.take_if(|damage| damage(&mut octets));
+        self.line.send(&octets, self.now);
+        self.sent.push((self.now, octets));
         Ok(())
     }
 

@@ -21,13 +21,20 @@ pub(super) const WHO: SixpackOrder = SixpackOrder::AskUnit(UnitQuery { response:
 /// Who a unit is, if it is there.
 pub(super) fn who<P: LinkPort>(talk: &mut Talk<P>, unit: u8) -> Result<Option<UnitTold>, LinkFault> {
     for _ in 0..TRIES {
-        match talk.ask(unit, WHO) {
-            Ok(SixpackReply::UnitTold(told)) => return Ok(Some(told)),
-            Err(TalkFault::Link(fault)) => return Err(fault),
-            Ok(_) | Err(TalkFault::Silent { .. }) => {}
+        if let Some(told) = who_now(talk, unit)? {
+            return Ok(Some(told));
         }
     }
     Ok(None)
+}
+
+/// The same, asked once.
+pub(super) fn who_now<P: LinkPort>(talk: &mut Talk<P>, unit: u8) -> Result<Option<UnitTold>, LinkFault> {
+    match talk.ask(unit, WHO) {
+        Ok(SixpackReply::UnitTold(told)) => Ok(Some(told)),
+        Err(TalkFault::Link(fault)) => Err(fault),
+        Ok(_) | Err(TalkFault::Silent { .. }) => Ok(None),
+    }
 }
 
 /// True where a motor that does this looks for its zero.

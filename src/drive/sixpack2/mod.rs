@@ -12,6 +12,7 @@ mod ask;
 mod find;
 mod home;
 mod look;
+mod reach;
 mod scale;
 mod set_up;
 mod stream;
@@ -26,6 +27,7 @@ pub(crate) use home::{Homing, home};
 #[cfg(test)]
 pub(crate) use look::MotorFacts;
 pub(crate) use look::{UnitFacts, look_for};
+pub(crate) use reach::{OrderGap, Reach};
 pub(crate) use set_up::{HomeError, SeatMotors};
 pub(crate) use stream::{Sixpack2, read_every};
 pub(crate) use talk::{Talk, TalkFault};

@@ -91,6 +91,16 @@ impl MotorScale {
         ((mm_s2 * self.per_mm).abs() * a_loop / self.unit()).clamp(1.0, f64::from(MOST_SPEED)) as u16
     }
 
+    /// The greatest speed of the motor, whatever it is told, mm/s.
+    pub(crate) fn full_mm_s(&self) -> f64 {
+        f64::from(MOST_SPEED) * self.unit() / self.per_mm.abs()
+    }
+
+    /// An acceleration in units a loop, in mm/s².
+    pub(crate) fn ramp_mm_s2(&self, units: u16) -> f64 {
+        self.mm_s(units) / crate::drive::LOOP.as_secs_f64()
+    }
+
     fn unit(&self) -> f64 {
         steps_of_a_unit(self.clock_divider)
     }

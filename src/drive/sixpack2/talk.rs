@@ -16,11 +16,13 @@ use crate::wire::sixpack2::{
 /// The address of answers: no unit has it, so that none takes an answer on the same wires for a question.
 pub(super) const ANSWER: u8 = 255;
 /// How long a break is, in octets: longer than one.
-const BREAK: u32 = 2;
+pub(super) const BREAK: u32 = 2;
 /// What a unit makes of a question, beyond its octets and its delay.
 const SLACK: Duration = Duration::from_millis(4);
 /// A unit holds two wires after its answer for as long as it waited before it, at power-up for so long (manual, page 44).
 const LONGEST_HOLD: Duration = Duration::from_millis(6);
+/// What a unit and its adapter may take to begin an answer.
+pub(super) const LONGEST_DELAY: Duration = Duration::from_millis(17);
 /// How often what does no harm twice is asked.
 const TRIES: u32 = 4;
 /// How long a unit is told to wait before it answers, and to hold the line, in 2 ms: what a host needs to let go of two wires.
@@ -80,6 +82,12 @@ impl<P: LinkPort> Talk<P> {
         let delay = self.state.delays.p99();
         let hold = if self.state.terms.is_two_wires { delay.min(LONGEST_HOLD) } else { Duration::ZERO };
         self.octets(BREAK + 2 * NINE) + delay + hold
+    }
+
+    /// How long an answer is waited for, from the end of its question: no longer than a slow adapter needs, since nothing else is said
+    /// meanwhile.
+    fn patience(&self) -> Duration {
+        patience(self.octets(1), self.state.delays.p99())
     }
 
     /// When a question that is asked next is over.
@@ -181,7 +189,7 @@ impl<P: LinkPort> Talk<P> {
         self.send(frames)?;
         self.state.counts.asked += 1;
         let sent = self.busy;
-        let deadline = sent + self.octets(NINE) + 2 * self.state.delays.p99() + SLACK;
+        let deadline = sent + self.patience();
         let Some((reply, begun)) = self.answer(question, deadline)? else {
             return Err(TalkFault::Silent { unit, baud: self.state.terms.baud });
         };
@@ -253,6 +261,12 @@ impl<P: LinkPort> Talk<P> {
     }
 }
 
+/// How long an answer is waited for where an octet takes so long, and nearly all answers begin so late.
+pub(super) const fn patience(octet: Duration, delay: Duration) -> Duration {
+    let delay = if delay.as_nanos() < LONGEST_DELAY.as_nanos() { delay } else { LONGEST_DELAY };
+    octet.saturating_mul(NINE).saturating_add(delay.saturating_mul(2)).saturating_add(SLACK)
+}
+
 /// Octets of a frame.
-const NINE: u32 = 9;
+pub(super) const NINE: u32 = 9;
 const _: () = assert!(NINE as usize == FRAME_LEN);

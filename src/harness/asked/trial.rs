@@ -1,5 +1,6 @@
 //! Sends sequences through a limiter of one axis, and judges what comes out.
 
+use super::chance::Chance;
 use super::judge::Judge;
 use super::sound::Sound;
 use super::wild::Wild;
@@ -48,6 +49,24 @@ impl Trial {
             sent.iter().zip(&sound.frames).all(|(sent, asked)| sent.0.to_bits() == asked.0.to_bits());
         let share = Judge::worst(sound.limits, sound.rate.hz(), sound.start, &sent).share();
         Self { share, unchanged, counts: *limiter.counts() }
+    }
+
+    /// The same, said to be proved, while which something else is asked for now and then, so that it is left and faded back onto.
+    pub fn of_returns(sound: &Sound, seed: u64) -> Self {
+        let mut chance = Chance::new(seed);
+        let mut limiter = standing(&window(sound.limits), sound.rate, first(sound.start));
+        let mut sent = sound.frames.clone();
+        // Out of the rest that it begins with, so that there is time to fade back, and while it does.
+        let elsewhere = [chance.below(sent.len() / 10), sent.len() / 5 + chance.below(sent.len() / 2)];
+        for (index, (position, _)) in (0_usize..).zip(&mut sent) {
+            let is_apart = elsewhere.iter().any(|from| (*from..from + 3).contains(&index));
+            let mut pose = first(if is_apart { chance.between(0.0, 1.0) } else { *position });
+            let asked = if is_apart { Provenance::Anyhow } else { Provenance::Proved };
+            limiter.admit(&mut pose, index as u64, asked);
+            *position = pose[0];
+        }
+        let share = Judge::worst(sound.limits, sound.rate.hz(), sound.start, &sent).share();
+        Self { share, unchanged: sent == sound.frames, counts: *limiter.counts() }
     }
 
     /// Whether a limit was broken: by more than the thousandth that the measure allows, and what rounding takes.

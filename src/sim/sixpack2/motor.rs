@@ -185,7 +185,9 @@ impl SixpackMotor {
                 self.speed = f64::from(by.clamp(-MOST_SPEED, MOST_SPEED));
             }
             Doing::Turning(speed) => {
-                self.speed_up(f64::from(speed));
+                // A unit makes no more (manual, page 28).
+                let most = f64::from(MOST_SPEED);
+                self.speed_up(f64::from(speed).clamp(-most, most));
                 if self.speed == 0.0 && speed == 0 {
                     self.doing = Doing::Nothing;
                 }

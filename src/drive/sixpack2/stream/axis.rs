@@ -30,9 +30,10 @@ pub(crate) struct Axis {
     /// Where its motor is by its targets, and until when that was reckoned.
     model: Motor,
     reckoned: MonoTime,
-    /// As it was read last while it is made ready; whether it rests there.
+    /// While it is made ready: as it was read last; whether it rests there; whether it is told to be where it was led, or was read.
     pub(super) stood_at: Option<i32>,
     pub(super) rests: bool,
+    pub(super) holds: bool,
     /// Readings that it is off its course, one after the other, and when the first was.
     pub(super) strayed: u32,
     pub(super) strays_since: MonoTime,
@@ -74,6 +75,7 @@ impl Axis {
             reckoned: now,
             stood_at: None,
             rests: false,
+            holds: false,
             strayed: 0,
             strays_since: now,
             figures: AxisFigures { clock: 1.0, ..AxisFigures::default() },
@@ -85,7 +87,8 @@ impl Axis {
         self.maker = TargetMaker::at_rest(self.lag, self.scale.reach(0.0), position.into());
         self.model = Motor::at_rest(self.lag, position.into());
         self.shaker = Shaker::default();
-        (self.target, self.reckoned, self.rests, self.strayed) = (position, now, true, 0);
+        (self.target, self.reckoned, self.strayed) = (position, now, 0);
+        (self.rests, self.holds) = (true, true);
     }
 
     /// The target that has arrived at an instant, of what the axis is to do half a slice later, in strokes; the one before where
@@ -122,13 +125,12 @@ impl Axis {
         (self.scale.mm_of(by), self.scale.mm_of(velocity).abs())
     }
 
-    /// Takes a reading of a motor that is to come to rest; true where it went on since the last other than its targets have it.
-    pub(super) fn strays(&mut self, position: i32, at: MonoTime) -> bool {
+    /// Takes a reading of a motor that is to come to rest: how far it went since the last, mm; none where there was no other.
+    pub(super) fn went(&mut self, position: i32, at: MonoTime) -> Option<f64> {
         self.run(at);
-        let (by_mm, mm_s) = self.beside(position);
-        let before = std::mem::replace(&mut self.figures.error_mm, by_mm);
-        let is_first = self.stood_at.replace(position).is_none();
-        !is_first && (by_mm - before).abs() > OFF_COURSE_MM + mm_s * READING
+        self.figures.error_mm = self.beside(position).0;
+        let before = self.stood_at.replace(position)?;
+        Some(self.scale.mm_of(f64::from(position) - f64::from(before)).abs())
     }
 
     /// How long what one wrong target did to it takes to be gone.

@@ -9,6 +9,7 @@ use crate::drive::link::{LedLane, LedPose, Stage};
 use crate::motion::{Limits, MAX_AXES};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
+use crate::wire::sixpack2::{PiTarget, SixpackFrame, SixpackOrder};
 
 /// The axes of one seat on a SIXpack 2: they share a unit, and follow one track.
 pub(super) type SixpackLane = LedLane<Sixpack2>;
@@ -20,10 +21,12 @@ pub(crate) struct LaneState {
     pub(super) track: Track,
     /// Its units were seen to be home, and have been since.
     pub(super) is_home: bool,
-    /// It is out, and not all of its motors were read at rest since.
-    pub(super) moves_on: bool,
-    /// While it is made ready: its motors are told on where they were led, as one target may have been damaged.
-    pub(super) is_told: bool,
+    /// It answered at the rate of the link, so it hears what is said there.
+    pub(super) was_heard: bool,
+    /// Slices since its motors were led, all of them.
+    pub(super) stops: u32,
+    /// Times that its unit was looked for.
+    pub(super) probes: u32,
     /// The axis that is asked next.
     pub(super) next_axis: usize,
     /// Its last question was not answered.
@@ -42,8 +45,9 @@ impl LaneState {
             unit,
             track: Track::at_rest(tick, [0.0; MAX_AXES], now),
             is_home: false,
-            moves_on: false,
-            is_told: false,
+            was_heard: false,
+            stops: 0,
+            probes: 0,
             next_axis: 0,
             is_failing: false,
             not_before: now,
@@ -57,19 +61,47 @@ impl SixpackLane {
     /// Is looked at again before it follows anything.
     pub(super) fn make_ready(&mut self) {
         let was_led = matches!(self.stage, Stage::Ready | Stage::Ends);
-        self.own.is_told = was_led && !self.axes.iter().any(Axis::moves);
+        let holds = was_led && !self.axes.iter().any(Axis::moves);
         self.stage = Stage::Readying;
         self.own.known = None;
-        self.axes.iter_mut().for_each(|axis| (axis.rests, axis.stood_at, axis.strayed) = (false, None, 0));
+        for axis in &mut self.axes {
+            (axis.rests, axis.holds, axis.stood_at, axis.strayed) = (false, holds, None, 0);
+        }
     }
 
-    /// True if its motors are told where to be.
-    pub(super) const fn is_led(&self) -> bool {
+    /// True if its motors are told where to be; any others are told to stop.
+    pub(super) fn is_led(&self) -> bool {
+        self.axes.iter().all(|axis| self.leads(axis))
+    }
+
+    /// The same of one of them.
+    pub(super) const fn leads(&self, axis: &Axis) -> bool {
         match self.stage {
             Stage::Ready | Stage::Runs | Stage::Ends => true,
-            Stage::Readying => self.own.is_told,
+            Stage::Readying => axis.holds,
             Stage::Lost | Stage::Out => false,
         }
+    }
+
+    /// What each of its motors is told in a slice. `at` is when the first of that has arrived, and `frame_time` later the next;
+    /// the slice is over as much later again as `half`.
+    pub(super) fn orders(&mut self, at: MonoTime, frame_time: Duration, half: Duration) -> Vec<SixpackFrame> {
+        let (is_led, follows) = (self.is_led(), self.stage != Stage::Readying);
+        self.own.stops = if is_led { 0 } else { self.own.stops.saturating_add(1) };
+        let led: Vec<bool> = self.axes.iter().map(|axis| self.leads(axis)).collect();
+        let mut at = at;
+        let order = |(index, (axis, is_led)): (usize, (&mut Axis, bool))| {
+            let motor = axis.motor;
+            let order = if is_led {
+                let middle = if follows { self.own.track.at(index, at + half) } else { None };
+                SixpackOrder::Target(PiTarget { motor, target: axis.aim(middle, at) })
+            } else {
+                SixpackOrder::RampedStop { motor }
+            };
+            at = at + frame_time;
+            order.frame(self.own.unit)
+        };
+        self.axes.iter_mut().zip(led).enumerate().map(order).collect()
     }
 
     /// Takes the next pose.

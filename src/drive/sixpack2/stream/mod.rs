@@ -1,14 +1,17 @@
 //! Poses of seats into targets of their motors, as long as poses come.
 //!
 //! ```text
-//!  poses --ring--> SixpackLane: Track --Axis: TargetMaker--> frames behind one break, each slice
+//!  poses --ring--> SixpackLane: Track --Axis: TargetMaker--> frames behind one break, each slice: to be there, or to stop
 //!  events <--ring-- confirmed, rests, moves, lost, ...  <---- a question in ten targets
 //! ```
 //!
 //! Each target is that of the instant at which it arrives: axes need not wait for each other, and a slice that a question made late is
-//! late in its targets, too. Lanes that stand are sent theirs as well, so that a target that was damaged on the way is
-//! followed for no longer than a slice. A unit confirms nothing: frames count as confirmed once one of its motors was read where they lead it,
+//! late in its targets, too. A unit confirms nothing: frames count as confirmed once one of its motors was read where they lead it,
 //! the motors by turns.
+//!
+//! Any order may be damaged on the way, into one that leads a motor far away at its full speed; and none says when. So each motor of a unit
+//! that ever answered is told something in each slice, whatever its lane does and whether it still answers: where to be, or to stop, which brakes
+//! and never begins a motion. No order is in force for longer than a slice, and no slice waits for more than one question.
 
 mod axis;
 mod lane;
@@ -28,7 +31,7 @@ use crate::drive::link::{
     StreamTerms, lane_number as number,
 };
 use crate::time::MonoTime;
-use crate::wire::sixpack2::{PiTarget, SixpackFrame, SixpackOrder};
+use crate::wire::sixpack2::{AbortSearch, SixpackFrame, SixpackOrder};
 
 /// A question is asked for so many targets.
 const TARGETS: u32 = 10;
@@ -36,8 +39,8 @@ const TARGETS: u32 = 10;
 const UNDERSTOOD: u32 = 5;
 /// A slice that is so many periods late is not made up for.
 const HELD_UP: u32 = 4;
-/// How often a unit that is lost is asked.
-const PROBES: Duration = Duration::from_millis(250);
+/// How often a unit that is lost is looked for, at its rate and at that with which it wakes by turns.
+const PROBES: Duration = Duration::from_millis(125);
 
 /// The longest from one reading of a seat until the next, where so many seats with so many axes in all are on a link: each has its turn
 /// once for each of them, and who it is may be asked in one.
@@ -50,9 +53,14 @@ pub(crate) fn read_every(period: Duration, seats: u32, axes: u32) -> Duration {
 #[derive(Debug)]
 pub(crate) struct Sixpack2 {
     next_slice: MonoTime,
+    /// A slice was sent right now.
+    is_fresh: bool,
     /// Targets since the last question, and the lane that is asked next.
     targets: u32,
     next_asked: usize,
+    /// The axis whose question was not answered: by one bit it is the order to search.
+    unanswered: Option<(usize, usize)>,
+    slices: usize,
 }
 
 impl Family for Sixpack2 {
@@ -71,7 +79,7 @@ impl Family for Sixpack2 {
         if baud.abs_diff(waking) * 100 <= UNDERSTOOD * waking {
             return Err(HomeError::WakingRate { baud });
         }
-        Ok(Self { next_slice: now, targets: 0, next_asked: 0 })
+        Ok(Self { next_slice: now, is_fresh: false, targets: 0, next_asked: 0, unanswered: None, slices: 0 })
     }
 
     fn lane(seat: &SeatMotors<'_>, terms: StreamTerms, now: MonoTime) -> Result<SixpackLane, HomeError> {
@@ -113,7 +121,7 @@ impl Family for Sixpack2 {
 
     fn work<P: LinkPort>(stream: &mut Stream<Self, P>, now: MonoTime) -> Result<Option<MonoTime>, LinkFault> {
         if now >= stream.own.next_slice {
-            stream.send_targets()?;
+            stream.send_slice()?;
         } else if !(stream.has_time() && stream.ask_next(now)?) {
             return Ok(Some(stream.own.next_slice.min(now + IDLE)));
         }
@@ -133,14 +141,13 @@ impl Family for Sixpack2 {
         true
     }
 
-    /// Each motor by its ramp where it is not known how it moves.
-    fn stop<P: LinkPort>(stream: &mut Stream<Self, P>) -> Result<(), LinkFault> {
-        for index in 0..stream.lanes.len() {
-            if matches!(stream.lanes[index].stage, Stage::Lost | Stage::Out) {
-                stream.stop_motors(index)?;
-            }
-        }
+    /// Those that are not led are told to in each slice.
+    fn stop<P: LinkPort>(_: &mut Stream<Self, P>) -> Result<(), LinkFault> {
         Ok(())
+    }
+
+    fn settle<P: LinkPort>(stream: &mut Stream<Self, P>) -> Result<(), LinkFault> {
+        (0..stream.lanes.len()).try_for_each(|lane| stream.settle_lane(lane))
     }
 
     fn let_go(lane: &mut SixpackLane, now: MonoTime) {
@@ -168,34 +175,51 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         }
     }
 
-    /// Sends the targets of a slice, each for when it arrives.
-    fn send_targets(&mut self) -> Result<(), LinkFault> {
+    /// Sends what each motor is told in a slice, targets each for when it arrives.
+    fn send_slice(&mut self) -> Result<(), LinkFault> {
         let now = self.talk.now();
         self.own.next_slice = self.own.next_slice + self.terms.period;
         if self.own.next_slice <= now {
             self.own.next_slice = now + self.terms.period;
         }
-        let led: usize = self.lanes.iter().filter(|lane| lane.is_led()).map(|lane| lane.axes.len()).sum();
+        let told: usize = self.told().map(|lane| lane.axes.len()).sum();
+        let told = u32::try_from(told).unwrap_or(u32::MAX);
         let (mut at, frame_time) = self.talk.arrival();
-        self.own.targets += u32::try_from(led).unwrap_or(u32::MAX);
+        (self.own.targets, self.own.is_fresh) = (self.own.targets.saturating_add(told), true);
         // A target is followed until the next, which comes later where a question comes before it.
         let asked = if self.own.targets >= TARGETS { self.talk.question() } else { Duration::ZERO };
-        let sent = at + frame_time * u32::try_from(led).unwrap_or(u32::MAX);
-        let half = self.own.next_slice.max(sent + asked).since(now) / 2;
-        let mut frames: Vec<SixpackFrame> = Vec::with_capacity(led);
-        for lane in self.lanes.iter_mut().filter(|lane| lane.is_led()) {
-            for (index, axis) in lane.axes.iter_mut().enumerate() {
-                let target = axis.aim(lane.own.track.at(index, at + half), at);
-                let order = SixpackOrder::Target(PiTarget { motor: axis.motor, target });
-                frames.push(order.frame(lane.own.unit));
-                at = at + frame_time;
-            }
+        let half = self.own.next_slice.max(at + frame_time * told + asked).since(now) / 2;
+        let mut frames = Vec::with_capacity(told as usize + 1);
+        for lane in self.lanes.iter_mut().filter(|lane| lane.own.was_heard) {
+            frames.extend(lane.orders(at, frame_time, half));
+            at = at + frame_time * u32::try_from(lane.axes.len()).unwrap_or(u32::MAX);
         }
+        frames.extend(self.end_of_search());
         if !frames.is_empty() {
             self.talk.send(&frames)?;
         }
         (0..self.lanes.len()).for_each(|lane| self.tell_motion(lane, at + half));
         Ok(())
+    }
+
+    /// Those whose units hear what is said at the rate of the link.
+    fn told(&self) -> impl Iterator<Item = &SixpackLane> {
+        self.lanes.iter().filter(|lane| lane.own.was_heard)
+    }
+
+    /// A motor that searches takes nothing but the end of that: the one whose question was not answered is told it, or else those that are
+    /// told to stop by turns.
+    fn end_of_search(&mut self) -> Option<SixpackFrame> {
+        let asked = self.own.unanswered.take().map(|(lane, axis)| (&self.lanes[lane], axis));
+        let stops = |lane: &&SixpackLane| !lane.is_led();
+        let stopped =
+            self.told().filter(stops).flat_map(|lane| (0..lane.axes.len()).map(move |axis| (lane, axis)));
+        let stopped: Vec<_> = stopped.collect();
+        let (lane, axis) = asked.or_else(|| stopped.get(self.own.slices % stopped.len().max(1)).copied())?;
+        let end = AbortSearch { motor: lane.axes[axis].motor };
+        let frame = SixpackOrder::AbortSearch(end).frame(lane.own.unit);
+        self.own.slices = self.own.slices.wrapping_add(1);
+        Some(frame)
     }
 
     /// Whether a lane that runs moves by what it has been sent.

@@ -6,28 +6,33 @@ use super::axis::{OFF_COURSE_MM, READING};
 use super::lane::SixpackLane;
 use super::{PROBES, Sixpack2, TARGETS, Track, number};
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
-use crate::drive::sixpack2::ask::{WHO, searches, waking_baud, where_is, who};
+use crate::drive::sixpack2::ask::{WHO, searches, waking_baud, where_is, who_now};
 use crate::drive::sixpack2::look::OUTSIDE_MM;
-use crate::drive::sixpack2::talk::TalkFault;
+use crate::drive::sixpack2::talk::{ANSWER, TalkFault};
 use crate::time::MonoTime;
-use crate::wire::sixpack2::{AbortSearch, PositionTold, SixpackOrder, SixpackReply, UnitTold, action};
+use crate::wire::sixpack2::{ActionsTold, PositionTold, SixpackOrder, SixpackReply, UnitTold, action};
 
 /// How often a unit is asked who it is.
 const IDENTITY: Duration = Duration::from_secs(10);
 /// From one look whether a motor still moves to the next.
 const LOOKS: Duration = Duration::from_millis(20);
-/// So many looks in a row at a motor that is led nowhere and moves put its lane out: an answer that is damaged looks like two.
+/// So many looks in a row at a motor that was told to stop long ago and moves put its lane out: an answer that is damaged looks like two.
 const STRAYS: u32 = 3;
+/// How long ago that is: longer than a ramp takes from full speed.
+const BRAKES: Duration = Duration::from_millis(250);
+/// So often motors are told to stop before nobody tells them anything, if they do not say that they do.
+const SETTLES: u32 = 20;
 /// What is so far outside the stroke is no place of the seat at all, mm.
 const LOST_ZERO_MM: f64 = 10.0;
 
 impl<P: LinkPort> Stream<Sixpack2, P> {
-    /// True if a question does not make the next slice later than it has to: there is one after each slice that leaves room for it.
-    pub(super) fn has_time(&self) -> bool {
-        let is_led = self.lanes.iter().any(|lane| lane.is_led());
-        let has_room =
-            !self.lanes.iter().any(SixpackLane::plays) || self.talk.question_over() <= self.own.next_slice;
-        !is_led || self.own.targets >= TARGETS || (self.own.targets > 0 && has_room)
+    /// True if there is time for a question: right behind a slice, which makes the next one late by no more than it takes, or later where
+    /// it is over before the next. While somebody plays one in so many targets may make a slice late.
+    pub(super) fn has_time(&mut self) -> bool {
+        let is_fresh = std::mem::take(&mut self.own.is_fresh);
+        let has_room = self.talk.question_over() <= self.own.next_slice;
+        let is_urgent = self.own.targets >= TARGETS || !self.lanes.iter().any(SixpackLane::plays);
+        has_room || is_fresh && is_urgent
     }
 
     /// Asks what is due; false where nothing is.
@@ -40,9 +45,8 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
             match lane.stage {
                 Stage::Lost if is_due => self.probe(index, now)?,
                 Stage::Out if is_due && lane.own.known.is_none() => self.probe(index, now)?,
-                Stage::Out if is_due && lane.own.moves_on => self.stop_for_good(index, now)?,
                 Stage::Readying if is_due => self.look_at(index, now)?,
-                Stage::Ready | Stage::Runs | Stage::Ends => self.ask(index, now)?,
+                Stage::Ready | Stage::Runs | Stage::Ends if targets > 0 => self.ask(index, now)?,
                 _ => {
                     self.own.targets = targets;
                     continue;
@@ -91,13 +95,8 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let (unit, motor) = (self.lanes[index].own.unit, self.lanes[index].axes[axis].motor);
         let answer = self.talk.ask(unit, where_is(motor));
         let Some(SixpackReply::PositionTold(told)) = self.heard(index, answer)? else {
-            // By one bit the question is the order to search; nothing else is ended by this. By another it is a target far away, which
-            // the next of a motor that is led ends.
-            if self.lanes[index].is_led() {
-                self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
-            } else {
-                self.stop_motor(unit, motor)?;
-            }
+            // By one bit the question is the order to search; by another a target far away, which the next slice ends.
+            self.own.unanswered = Some((index, axis));
             return Ok(None);
         };
         let a = axis_number(axis);
@@ -141,7 +140,8 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
                 return self.is_not_home(index, a);
             }
             let (lane, axis) = (number(index), axis_number(a));
-            return self.put_out_and_stop(index, StreamEvent::OffCourse { lane, axis, by_mm });
+            self.put_out(index, StreamEvent::OffCourse { lane, axis, by_mm });
+            return Ok(());
         }
         // It is asked again next.
         (self.own.next_asked, self.lanes[index].own.next_axis) = (index, a);
@@ -167,23 +167,20 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         };
         let Some(told) = self.place_of(index, a)? else { return Ok(()) };
         let lane = &mut self.lanes[index];
-        let is_led = lane.is_led();
+        let has_braked = lane.own.stops * self.terms.period > BRAKES;
         let axis = &mut lane.axes[a];
-        if !is_ordered(told.action) || axis.stood_at != Some(told.position) {
-            let strays = axis.strays(told.position, self.talk.moment().sent) || !is_ordered(told.action);
+        let went_mm = axis.went(told.position, self.talk.moment().sent);
+        // One that is told to stop turns at a speed of 0.
+        let stands = is_ordered(told.action) || !axis.holds && told.action == action::ROTATION;
+        if !stands || went_mm != Some(0.0) {
             lane.own.not_before = now + LOOKS;
-            // Nobody has it search or turn, and neither has an end by itself; nor has a way that its targets do not lead.
-            if !strays || (is_led && !searches(told.action)) {
-                axis.strayed = 0;
-                return Ok(());
+            let strays = has_braked && (!stands || went_mm.is_some_and(|mm| mm > OFF_COURSE_MM));
+            axis.strayed = if strays || searches(told.action) { axis.strayed + 1 } else { 0 };
+            if axis.strayed >= STRAYS {
+                let (lane, by_mm) = (number(index), axis.figures.error_mm);
+                self.put_out(index, StreamEvent::OffCourse { lane, axis: axis_number(a), by_mm });
             }
-            axis.strayed += 1;
-            let (lane, by_mm) = (number(index), axis.figures.error_mm);
-            return if axis.strayed < STRAYS {
-                self.stop_motors(index)
-            } else {
-                self.put_out_and_stop(index, StreamEvent::OffCourse { lane, axis: axis_number(a), by_mm })
-            };
+            return Ok(());
         }
         let (low, high) = axis.scale.reach(OUTSIDE_MM);
         if !(low..=high).contains(&f64::from(told.position)) {
@@ -218,7 +215,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let lane = &mut self.lanes[index];
         match answer {
             Ok(reply) => {
-                lane.own.is_failing = false;
+                (lane.own.is_failing, lane.own.was_heard) = (false, true);
                 Ok(Some(reply))
             }
             Err(TalkFault::Link(fault)) => Err(fault),
@@ -235,45 +232,6 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         }
     }
 
-    /// Out until a person has looked, and stopped.
-    fn put_out_and_stop(&mut self, index: usize, event: StreamEvent) -> Result<(), LinkFault> {
-        self.put_out(index, event);
-        let lane = &mut self.lanes[index];
-        lane.own.moves_on = true;
-        lane.axes.iter_mut().for_each(|axis| (axis.rests, axis.stood_at) = (false, None));
-        self.stop_motors(index)
-    }
-
-    /// Reads the motors of a lane that is out by turns, and stops each again that is not at rest: a stop that is damaged on the way is a
-    /// target far away, or a turn without end.
-    fn stop_for_good(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
-        self.own.next_asked = (index + 1) % self.lanes.len();
-        let lane = &mut self.lanes[index];
-        let (a, unit) = (lane.own.next_axis % lane.axes.len(), lane.own.unit);
-        lane.own.next_axis = a + 1;
-        let motor = lane.axes[a].motor;
-        let answer = self.talk.ask(unit, where_is(motor));
-        let lane = &mut self.lanes[index];
-        let axis = &mut lane.axes[a];
-        let SixpackReply::PositionTold(told) = (match answer {
-            Ok(reply) => reply,
-            Err(TalkFault::Link(fault)) => return Err(fault),
-            Err(TalkFault::Silent { .. }) => {
-                // The question may be damaged, and a target far away by that; a unit without power holds nobody up.
-                lane.own.not_before = now + LOOKS;
-                axis.rests = false;
-                return self.stop_motor(unit, motor);
-            }
-        }) else {
-            return Ok(());
-        };
-        let before = axis.stood_at.replace(told.position);
-        axis.rests = is_ordered(told.action) && before == Some(told.position);
-        let moves = !is_ordered(told.action) || before.is_some_and(|before| before != told.position);
-        lane.own.moves_on = lane.axes.iter().any(|axis| !axis.rests);
-        if moves { self.stop_motor(unit, motor) } else { Ok(()) }
-    }
-
     /// A unit that was restarted, or never homed: none of its motors knows its place.
     fn is_not_home(&mut self, index: usize, axis: usize) -> Result<(), LinkFault> {
         let (lane, axis) = (number(index), axis_number(axis));
@@ -283,26 +241,53 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         } else {
             StreamEvent::Homed { lane, homed: false }
         };
-        self.put_out_and_stop(index, event)
+        self.put_out(index, event);
+        Ok(())
     }
 
-    /// Ends what each motor may search, and stops it by its ramp. Nobody answers, so it is said twice.
-    pub(super) fn stop_motors(&mut self, index: usize) -> Result<(), LinkFault> {
-        let unit = self.lanes[index].own.unit;
-        let motors: Vec<u8> = self.lanes[index].axes.iter().map(|axis| axis.motor).collect();
-        [&motors, &motors].into_iter().flatten().try_for_each(|motor| self.stop_motor(unit, *motor))
+    /// Tells the motors of a lane to stop until its unit says that they do nothing. Where they are led they have to be where that was: by one
+    /// bit a stop has the counter begin anew.
+    pub(super) fn settle_lane(&mut self, index: usize) -> Result<(), LinkFault> {
+        let lane = &self.lanes[index];
+        let (unit, tries) = (lane.own.unit, if lane.own.was_heard { SETTLES } else { 0 });
+        let motors: Vec<u8> = lane.axes.iter().map(|axis| axis.motor).collect();
+        let stops: Vec<_> =
+            motors.iter().map(|motor| SixpackOrder::RampedStop { motor: *motor }.frame(unit)).collect();
+        let rests = |actions: [u8; 6]| {
+            motors.iter().all(|motor| actions.get(usize::from(*motor)) == Some(&action::IDLE))
+        };
+        for _ in 0..tries {
+            self.talk.send(&stops)?;
+            match self.talk.ask(unit, SixpackOrder::AskActions { response: ANSWER }) {
+                Ok(SixpackReply::ActionsTold(ActionsTold { actions })) if rests(actions) => {}
+                Ok(_) | Err(TalkFault::Silent { .. }) => continue,
+                Err(TalkFault::Link(fault)) => return Err(fault),
+            }
+            if !self.lanes[index].is_led() || self.is_where_it_was_led(index)? {
+                break;
+            }
+        }
+        Ok(())
     }
 
-    /// The same of one, once.
-    fn stop_motor(&mut self, unit: u8, motor: u8) -> Result<(), LinkFault> {
-        self.talk.tell(unit, SixpackOrder::AbortSearch(AbortSearch { motor }))?;
-        self.talk.tell(unit, SixpackOrder::RampedStop { motor })
+    /// Whether all motors of a lane that is led answer, and are there; one that is not puts it out.
+    fn is_where_it_was_led(&mut self, index: usize) -> Result<bool, LinkFault> {
+        for a in 0..self.lanes[index].axes.len() {
+            let Some(told) = self.place_of(index, a)? else { return Ok(false) };
+            let by_mm = self.lanes[index].axes[a].beside(told.position).0;
+            if by_mm.abs() > OFF_COURSE_MM {
+                let (lane, axis) = (number(index), axis_number(a));
+                self.put_out(index, StreamEvent::OffCourse { lane, axis, by_mm });
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Looks for the unit of a lane that is lost or out.
     fn probe(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
         self.lanes[index].own.not_before = now + PROBES;
-        let Some(told) = self.seek(self.lanes[index].own.unit)? else { return Ok(()) };
+        let Some(told) = self.seek(index)? else { return Ok(()) };
         if told.reset != 0 {
             return self.is_not_home(index, 0);
         }
@@ -316,15 +301,21 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         Ok(())
     }
 
-    /// Who a unit is, if it is there; one that woke is switched to the rate of the link, but only while nobody plays on it.
-    fn seek(&mut self, unit: u8) -> Result<Option<UnitTold>, LinkFault> {
-        let told = who(&mut self.talk, unit)?;
-        if told.is_some() || self.lanes.iter().any(SixpackLane::plays) {
+    /// Who a unit is, if it is there, asked once. At the rate with which it wakes that is asked by turns, but only while nobody plays; one
+    /// that answers there is switched to the rate of the link.
+    fn seek(&mut self, index: usize) -> Result<Option<UnitTold>, LinkFault> {
+        let nobody_plays = !self.lanes.iter().any(SixpackLane::plays);
+        let own = &mut self.lanes[index].own;
+        own.probes = own.probes.wrapping_add(1);
+        let (unit, is_waking) = (own.unit, own.probes.is_multiple_of(2) && nobody_plays);
+        if !is_waking {
+            let told = who_now(&mut self.talk, unit)?;
+            self.lanes[index].own.was_heard |= told.is_some();
             return Ok(told);
         }
         let baud = self.talk.baud();
         self.talk.set_baud(waking_baud())?;
-        let found = who(&mut self.talk, unit).and_then(|told| {
+        let found = who_now(&mut self.talk, unit).and_then(|told| {
             told.map_or(Ok(()), |_| self.talk.switch(unit, baud))?;
             Ok(told)
         });

@@ -11,4 +11,5 @@ mod finding;
 mod homing;
 mod play;
 mod playing;
+mod runaway;
 mod trouble;

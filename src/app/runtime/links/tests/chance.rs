@@ -5,6 +5,8 @@
 use std::collections::BTreeMap;
 
 use super::*;
+use crate::drive::sixpack2::{OrderGap, Reach};
+use crate::motion::AxisGeometry;
 use crate::sim::chance::Chance;
 use crate::sim::silvermax::Action;
 use crate::sim::sixpack2::{SixpackBus, SixpackFault};
@@ -176,8 +178,9 @@ pub(super) trait Rig: Bus + Send + Sized + 'static {
     const ANSWER: Option<usize>;
     /// The most of [`Done::hardest`] that a seat may do.
     const HARDEST: f64;
+
     /// How far beyond its stroke what is damaged on the way may lead it, mm.
-    const DAMAGED: f64;
+    fn damaged_mm() -> f64;
 
     /// Something happens to a unit; what, and whether it restarts one.
     fn fail(&mut self, kind: u64, fate: &mut Chance, at: MonoTime) -> (&'static str, bool);
@@ -199,8 +202,11 @@ pub(super) trait Rig: Bus + Send + Sized + 'static {
 impl Rig for SilverBus {
     const ANSWER: Option<usize> = None;
     const HARDEST: f64 = 3_030.0;
+
     /// The margin of its soft limits.
-    const DAMAGED: f64 = 1.01;
+    fn damaged_mm() -> f64 {
+        1.01
+    }
 
     fn fail(&mut self, kind: u64, chance: &mut Chance, at: MonoTime) -> (&'static str, bool) {
         let (index, number) = (chance.bits() % 3, 16 + (chance.bits() % 3) as u8);
@@ -252,8 +258,14 @@ impl Rig for SixpackBus {
     const ANSWER: Option<usize> = Some(9);
     /// What its acceleration makes in a slice, and the whole units of speed add.
     const HARDEST: f64 = 32.0;
-    /// What an axis can go until the next target comes, twice: beside the way there it overtakes that once.
-    const DAMAGED: f64 = 4.0;
+
+    /// What a motor can go by one order before the next stops it, as docs/drives.md has it; answers begin within a period.
+    fn damaged_mm() -> f64 {
+        let period = Duration::from_micros(9_505);
+        let octets = [56_818, 19_231].map(|baud| Duration::from_secs(10) / baud);
+        let gap = OrderGap { period, octets, motors: 3, delay: period }.longest();
+        Reach::of(&AxisGeometry { pulses_per_rev: 3_200.0, ..AxisGeometry::BENCH }, 3).stopped_mm(gap)
+    }
 
     fn fail(&mut self, kind: u64, chance: &mut Chance, at: MonoTime) -> (&'static str, bool) {
         let is_reset = kind == 8 && chance.bits().is_multiple_of(8);
@@ -482,7 +494,7 @@ impl Sum {
         let mut is_hard = false;
         for done in hall.line.lock().line.bus().done() {
             let what = format!("seed {seed}, {failing:?}: {done:?}");
-            let room = if failing == Failing::Digits { B::DAMAGED } else { 0.1 };
+            let room = if failing == Failing::Digits { B::damaged_mm() } else { 0.1 };
             let beyond = (-done.lowest).max(done.highest - 150.0);
             assert!(beyond < room && done.wrong == 0.0, "{what}");
             assert!(done.restarts <= fate.resets || failing == Failing::Digits, "{what}");
