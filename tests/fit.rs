@@ -79,6 +79,34 @@ fn amplitude_is_lowered_just_as_far_as_needed_and_the_outcome_passes_check() {
 }
 
 #[test]
+fn a_cue_that_is_fitted_for_a_film_has_room_for_the_paces_that_one_may_ask_for_and_check_knows() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(folder.path(), "ride.csv", ride(0.35));
+    let own = path(folder.path(), "own.csv");
+    fit(&[&cue, "-o", &own]);
+    let refused = kinocue(&["check", &own, "--chase"]);
+    assert!(refused.code == Some(1) && refused.stderr.contains("kinocue fit CUE -o OUT --chase"));
+    let film = path(folder.path(), "film.csv");
+    fit(&[&own, "-o", &film, "--chase"]);
+    assert_passes(&[&film, "--chase"]);
+
+    let simulated = include_str!("../systemd/simulated.toml");
+    let hall = write(folder.path(), "hall.toml", simulated);
+    let synced = write(
+        folder.path(),
+        "synced.toml",
+        format!(
+            "{simulated}\n[sync]\nsources = [\"mpv\"]\nstart = \"00:00:00:00\"\n[sync.mpv]\nsocket = \"/s\"\n"
+        ),
+    );
+    assert_passes(&[&own, "--config", &hall]);
+    assert_eq!(kinocue(&["check", &own, "--config", &synced]).code, Some(1), "its shows follow a film");
+    let there = path(folder.path(), "there.csv");
+    fit(&[&own, "-o", &there, "--config", &synced]);
+    assert_passes(&[&there, "--config", &synced]);
+}
+
+#[test]
 fn a_cue_that_keeps_its_limits_is_written_as_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let out = path(folder.path(), "same.csv");

@@ -83,11 +83,11 @@ def follow(args, folder, player=(), lost=0.0):
     return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, longest gap between frames {1e3 * gap:.0f} ms; {told}; {film}"
 
 
-def loaded(args, folder):
+def loaded(args, folder, measure=follow):
     busy = [multiprocessing.Process(target=spin, daemon=True) for _ in range(os.cpu_count())]
     [one.start() for one in busy]
     try:
-        return follow(args, folder)
+        return measure(args, folder)
     finally:
         [one.terminate() for one in busy]
 
@@ -101,7 +101,7 @@ def spin():
 def jack_server():
     """JACK without a sound card, under a name of its own."""
     os.environ["JACK_DEFAULT_SERVER"] = name = f"kinocue-{os.getpid()}"
-    command = ["jackd", "--no-realtime", "-n", name, "-d", "dummy", "-r", "48000", "-p", "256"]
+    command = ["jackd", "--realtime", "-n", name, "-d", "dummy", "-r", "48000", "-p", "256"]
     server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         time.sleep(2)
@@ -237,7 +237,7 @@ def seek(args, folder, sound="ac3"):
             steps = [(b[0], (b[2] - a[2]) / b[1] / usual) for a, b in zip(frames, frames[1:]) if rests and b[0] > rests[0]]
             moves = next((when for when, pace in steps if pace != 0), None)
             joined = next((when for when, pace in reversed(steps) if abs(pace - 1.0) > 0.15), None)
-            errors = show.errors(frames, at + 0.05, until)
+            errors = show.errors(frames, at + 0.05, until) if clock else []
             near = next((when for when, error in errors if all(abs(e) < 20 for w, e in errors if w >= when)), None)
             if clock and moves and joined and near:
                 took = (clock - at, moves - clock, moves - at, joined - moves, max(near - joined, 0.0))
@@ -251,6 +251,7 @@ CASES = {
     "idle": follow,
     "busy": loaded,
     "jack": jack,
+    "jack, busy": lambda args, folder: loaded(args, folder, jack),
     "artnet": artnet,
     "ltc": ltc,
     "sound": sound,

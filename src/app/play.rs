@@ -17,6 +17,7 @@ use crate::config::{Config, Misfit};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
 use crate::film::chase::ChaseRules;
+use crate::film::follower::PaceLimits;
 use crate::film::point::PublishedPoint;
 use crate::proof::{self, Digest, LinkPlay, Proof, Terms};
 use crate::record::{About as Recorded, Mode};
@@ -43,7 +44,7 @@ impl Play {
     /// Everything that [`PlayError`] names but the network.
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
-        let links = keeps_limits(&config, &timeline, show.rate, manner.level)?;
+        let links = keeps_limits(&config, None, &timeline, show.rate, manner.level)?;
         Ok(Self { links, ..Self::staged(config, timeline, show, manner, None)? })
     }
 
@@ -60,8 +61,7 @@ impl Play {
     ) -> Result<Self, PlayError> {
         let rules = ChaseRules::until(timeline.duration());
         fit(&config, &timeline)?;
-        let paced = at_any_pace(&config, rules.pace, show.rate);
-        let links = keeps_limits(&paced, &timeline, show.rate, manner.level)?;
+        let links = keeps_limits(&config, Some(rules.pace), &timeline, show.rate, manner.level)?;
         let film = LeadingFilm { source, rules: Some(rules) };
         Ok(Self { links, ..Self::staged(config, timeline, show, manner, Some(film))? })
     }
@@ -218,20 +218,28 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
     if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
 }
 
-/// What was proved of its links, where it keeps all limits.
+/// What was proved of its links, where it keeps all limits, at those paces if there are any.
 fn keeps_limits(
     config: &Config,
+    pace: Option<PaceLimits>,
     timeline: &Timeline,
     rate: Rate,
     level: f64,
 ) -> Result<Vec<LinkPlay>, PlayError> {
+    let paced = pace.map(|pace| at_any_pace(config, pace, rate));
+    let config = paced.as_ref().unwrap_or(config);
     let terms = Terms::of_hall(config, Digest::of(timeline.cue()), rate, level);
     let proof = proof::prove_in(config, timeline, terms);
     if proof.passed() {
         return Ok(proof.links);
     }
     let Proof { violations, more, .. } = proof;
-    Err(PlayError::Limits { cue: timeline.cue().path().to_path_buf(), violations, more })
+    Err(PlayError::Limits {
+        cue: timeline.cue().path().to_path_buf(),
+        violations,
+        more,
+        chases: pace.is_some(),
+    })
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ pub enum PlayError {
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Stroke(Vec<CueFaults>),
     /// The cue breaks limits of the seats, the effects or the controllers.
-    #[error("{}", broken(cue, violations, *more))]
+    #[error("{}", broken(cue, violations, *more, *chases))]
     Limits {
         /// The cue's file.
         cue: PathBuf,
@@ -33,6 +33,8 @@ pub enum PlayError {
         violations: Vec<Violation>,
         /// How many more there are.
         more: u64,
+        /// At the paces that a film may ask for.
+        chases: bool,
     },
     /// No move leads onto the cue.
     #[error(transparent)]
@@ -87,13 +89,14 @@ fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
     misfits.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-fn broken(cue: &Path, violations: &[Violation], more: u64) -> String {
+fn broken(cue: &Path, violations: &[Violation], more: u64, chases: bool) -> String {
+    let chase = if chases { " --chase" } else { "" };
     let cue = plain::path(cue);
     let mut text: String = violations.iter().map(|violation| format!("{cue}:{violation}\n")).collect();
     if more > 0 {
         text += &format!("{cue}: and {more} more\n");
     }
     text + &format!(
-        "the limits proof failed, so nothing is played; `kinocue fit {cue} -o OUT` makes a cue that keeps the limits"
+        "the limits proof failed, so nothing is played; `kinocue fit {cue} -o OUT{chase}` makes a cue that keeps the limits"
     )
 }

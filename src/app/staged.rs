@@ -52,20 +52,25 @@ pub fn chasing(headroom: Headroom, rules: &ChaseRules) -> Headroom {
     headroom.led(slewing(rules.pace))
 }
 
+/// The seat with what is left of its limits for a cue, whatever pace a film asks for that is followed so.
+pub(crate) fn seat_at_any_pace(seat: &SeatType, pace: PaceLimits, rate: Rate) -> SeatType {
+    let slewing = slewing(pace);
+    seat.clone().with_each(|axis| {
+        let [velocity, acceleration] = axis.most_shaken();
+        let most = [axis.max_velocity, axis.max_acceleration, axis.max_jerk];
+        let left = slewing.leaves(rate, most);
+        [axis.max_velocity, axis.max_acceleration, axis.max_jerk] = left;
+        // No pace makes a vibration quicker: what is over both together is what the pace adds to the motion.
+        axis.max_shaken_velocity = Some(velocity - (most[0] - left[0]));
+        axis.max_shaken_acceleration = Some(acceleration - (most[1] - left[1]));
+    })
+}
+
 /// The hall with what is left of its seats' limits for a cue, whatever pace a film asks for that is followed so.
 pub(crate) fn at_any_pace(config: &Config, pace: PaceLimits, rate: Rate) -> Config {
     let (mut config, slewing) = (config.clone(), slewing(pace));
     for controller in &mut config.controllers {
-        let seat = SeatType::clone(&controller.seat).with_each(|axis| {
-            let [velocity, acceleration] = axis.most_shaken();
-            let most = [axis.max_velocity, axis.max_acceleration, axis.max_jerk];
-            let left = slewing.leaves(rate, most);
-            [axis.max_velocity, axis.max_acceleration, axis.max_jerk] = left;
-            // No pace makes a vibration quicker: what is over both together is what the pace adds to the motion.
-            axis.max_shaken_velocity = Some(velocity - (most[0] - left[0]));
-            axis.max_shaken_acceleration = Some(acceleration - (most[1] - left[1]));
-        });
-        controller.seat = Arc::new(seat);
+        controller.seat = Arc::new(seat_at_any_pace(&controller.seat, pace, rate));
         if let Connection::Link(drives) = &mut controller.connection {
             // What a fit misses is in proportion to the jerk of what it follows.
             let max_deviation_mm = drives.drive.max_deviation_mm / (1.0 + slewing.most).powi(3);

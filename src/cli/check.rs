@@ -31,6 +31,7 @@ const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::Bad
     "kinocue check hall.toml",
     "kinocue check cues/voyage.csv --config hall.toml",
     "kinocue check ride.csv --config hall.toml --level 60%",
+    "kinocue check film.csv --config hall.toml --chase",
     "kinocue check cues/coaster.csv --config hall.toml --seat platform6 --rate 1000 --json",
     "kinocue check cues/bench-ride.csv --config hall.toml --drive silvermax --link-rate 30 --drive-vibration 0%",
     "kinocue check ride.txt --from rows --units percent",
@@ -90,7 +91,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         let notes: String = report.notes.iter().map(|note| format!("{note}\n")).collect();
         print::out(&format!("{}{notes}{}", report.text, report.tables))?;
         if !report.passed {
-            print::tell(report.in_words().trim_end());
+            print::tell(report.in_words(args.seat.remedy()).trim_end());
         }
     }
     Ok(WORST_FIRST.into_iter().find(|exit| report.exits.contains(exit)).unwrap_or(Exit::Done))
@@ -301,7 +302,7 @@ impl CheckReport {
     }
 
     /// Every fault on a line of its own, and how many there are.
-    fn in_words(&self) -> String {
+    fn in_words(&self, remedy: &str) -> String {
         let mut text = String::new();
         for fault in &self.faults {
             let place = match (fault.line, fault.column) {
@@ -319,7 +320,7 @@ impl CheckReport {
             count => format!("{count} faults\n"),
         };
         if self.unfit {
-            text += "kinocue fit CUE -o OUT makes a cue that keeps the limits\n";
+            text += &format!("{remedy} makes a cue that keeps the limits\n");
         }
         text
     }

@@ -27,6 +27,7 @@ use crate::timeline::Timeline;
     "kinocue fit ride.csv -o fitted.csv",
     "kinocue fit ride.mcap -o fitted.mcap --config hall.toml --per-axis",
     "kinocue fit bytes.csv -o smooth.csv --smooth",
+    "kinocue fit film.csv -o fitted.csv --config hall.toml --chase",
     "kinocue fit ride.txt -o ride.csv --from rows --units mm --smooth --json",
 ]))]
 pub(super) struct Args {

@@ -8,9 +8,10 @@ use anyhow::anyhow;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use super::{Exit, Failure, OrExit as _};
-use crate::app::staged::at_any_pace;
+use crate::app::staged::{at_any_pace, seat_at_any_pace};
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
+use crate::film::follower::PaceLimits;
 use crate::motion::{SeatAxis, SeatType};
 use crate::proof::{Digest, LinksProof, Proof, Terms, prove, prove_in, prove_links};
 use crate::time::Rate;
@@ -74,6 +75,10 @@ pub(super) struct SeatArgs {
     /// Frames per second [default: the configuration's, else 100].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
+
+    /// The cue follows a film, which may ask for a slightly higher pace than 1: check against what that leaves of the limits.
+    #[arg(long)]
+    chase: bool,
 }
 
 /// What a cue is judged for.
@@ -83,6 +88,8 @@ pub(super) struct Judge {
     /// The seat asked for by name.
     pub(super) seat: Option<Arc<SeatType>>,
     pub(super) rate_hz: f64,
+    /// The cue follows a film, whatever the configuration says.
+    chases: bool,
 }
 
 impl SeatArgs {
@@ -90,7 +97,12 @@ impl SeatArgs {
     pub(super) fn judge(&self, hall: Option<Config>) -> Result<Judge, Failure> {
         let seat = self.seat.as_deref().map(|name| seat(name, hall.as_ref())).transpose()?;
         let rate_hz = self.rate.or_else(|| hall.as_ref().map(|hall| hall.show.rate_hz)).unwrap_or(100.0);
-        Ok(Judge { hall, seat, rate_hz })
+        Ok(Judge { hall, seat, rate_hz, chases: self.chase })
+    }
+
+    /// What is to be given to `fit` so that a cue passes here.
+    pub(super) const fn remedy(&self) -> &'static str {
+        if self.chase { "kinocue fit CUE -o OUT --chase" } else { "kinocue fit CUE -o OUT" }
     }
 }
 
@@ -131,7 +143,7 @@ impl Judge {
     pub(super) fn terms(&self, timeline: &Timeline, level: f64) -> Terms {
         let (cue, rate) = (Digest::of(timeline.cue()), Rate::from_hz(self.rate_hz));
         let axes = timeline.axes();
-        let of_seat = |seat: &Arc<SeatType>| Terms::of_seat(Arc::clone(seat), axes, cue, rate, level);
+        let of_seat = |seat: &Arc<SeatType>| Terms::of_seat(self.left_of(seat), axes, cue, rate, level);
         match (&self.seat, &self.hall) {
             (None, Some(hall)) => Terms::of_hall(&self.led(hall), cue, rate, level),
             (Some(seat), Some(hall)) => {
@@ -144,10 +156,19 @@ impl Judge {
 
     /// The hall with what it leaves of its limits for every pace that a film may ask for, where one leads all its shows.
     fn led<'a>(&self, hall: &'a Config) -> Cow<'a, Config> {
-        let leads = hall.sync.as_ref().filter(|sync| sync.leads);
-        leads.map_or(Cow::Borrowed(hall), |sync| {
-            Cow::Owned(at_any_pace(hall, sync.pace, Rate::from_hz(self.rate_hz)))
+        let sync = hall.sync.as_ref().filter(|sync| sync.leads || self.chases);
+        let pace = sync.map(|sync| sync.pace).or_else(|| self.chases.then(PaceLimits::default));
+        pace.map_or(Cow::Borrowed(hall), |pace| {
+            Cow::Owned(at_any_pace(hall, pace, Rate::from_hz(self.rate_hz)))
         })
+    }
+
+    /// The same of a seat by itself.
+    fn left_of(&self, seat: &Arc<SeatType>) -> Arc<SeatType> {
+        if !self.chases {
+            return Arc::clone(seat);
+        }
+        Arc::new(seat_at_any_pace(seat, PaceLimits::default(), Rate::from_hz(self.rate_hz)))
     }
 
     /// Proves a cue on these terms, and what the links of the configuration make of it, unless another seat is asked for.

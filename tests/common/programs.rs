@@ -30,7 +30,7 @@ pub(crate) fn is_installed(program: &str) -> bool {
 #[allow(dead_code, reason = "each test uses its own part")]
 pub(crate) fn is_there(name: &str, there: bool, remedy: &str) -> bool {
     if !there {
-        let _ = writeln!(std::io::stderr(), "{name} is not there: {remedy}");
+        let _ = writeln!(std::io::stderr(), "skipped: {name} is not there; {remedy}");
     }
     is_wanted(name, there, &std::env::var(WITHOUT).unwrap_or_default())
 }
