@@ -361,7 +361,7 @@ mod tests {
         for (at_most, text) in [
             (
                 [[0.5, 0.0], [0.0; 2]],
-                "dac1: the level of 0.75 at 00:00.000 is over 0.5, the highest that c1 may have",
+                "dac1: the level of 0.75 at 00:00.000 is over 0.5, the highest that c1 allows",
             ),
             (
                 [[1.0; 2], [1.0; 2]],

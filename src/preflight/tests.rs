@@ -315,7 +315,7 @@ fn a_way_that_is_none_or_too_narrow_is_told() {
     assert_eq!(only(&case).unwrap().found, "the interface takes packets of 68 bytes, but 108 are sent");
     let mut case = Case::smc();
     case.route = Err("network is unreachable".to_owned());
-    assert_eq!(only(&case).unwrap().found, "no way to 192.168.15.201:7408: network is unreachable");
+    assert_eq!(only(&case).unwrap().found, "no route to 192.168.15.201:7408: network is unreachable");
 }
 
 #[test]

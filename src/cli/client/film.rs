@@ -178,15 +178,18 @@ mod tests {
         let leading = text.lines().find(|line| line.trim_start().starts_with('>')).unwrap();
         let cells: Vec<&str> = leading.split_whitespace().collect();
         assert_eq!(cells[..8], [">", "ltc:alsa:hw:2,0", "locked", "01:00:05:12", "+12", "0.03", "-18", "0"]);
-        assert!(!text.contains("no show that is loaded"), "{text}");
+        assert!(!text.contains("does not follow the film"), "{text}");
     }
 
     #[test]
     fn a_film_that_nobody_knows_yet_is_said_to_be_unknown() {
         let text = text(&FilmStatus { state: "absent".to_owned(), ..FilmStatus::default() });
-        for part in
-            ["film    absent, no source leads", "at      unknown", "error   none", "no show that is loaded"]
-        {
+        for part in [
+            "film    absent, no source leads",
+            "at      unknown",
+            "error   none",
+            "the loaded show does not follow the film",
+        ] {
             assert!(text.contains(part), "{part}\n{text}");
         }
     }

@@ -161,7 +161,7 @@ fn messages_that_are_not_what_they_should_be_are_refused() {
         ("/cue/axes", "\u{0}", "not the JSON of its topic"),
         ("/cue/vibration", r#"{"axis":1,"hz":1}"#, "not the JSON of its topic: missing field `amp`"),
         ("/cue/io", r#"{"effects":{"air":2}}"#, "\"2\" is neither 0 nor 1"),
-        ("/cue/io", r#"{"effects":{"Air":1}}"#, "an effect's name is made of"),
+        ("/cue/io", r#"{"effects":{"Air":1}}"#, "an effect's name may only have"),
         ("/cue/io", r#"{"word":65536}"#, "not the JSON of its topic: invalid value"),
         ("/cue/io", r#"{"word":4096}"#, "\"4096\" is not an output word; 0 to 4095"),
         ("/cue/io", r#"{"word":1,"effects":{"air":1}}"#, "the raw output word and named effects exclude"),

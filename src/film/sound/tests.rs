@@ -423,7 +423,7 @@ mod reader {
         assert!(when(&states, FilmState::Locked) < 4.0 && when(&states, FilmState::Lost) < 7.5, "{states:?}");
         assert!(states.last().is_some_and(|last| last.0 == FilmState::Lost), "{states:?}");
         let why = reader.refused().expect("it is another film");
-        assert!(why.contains("Trailer is heard") && why.contains("The Storm"), "{why}");
+        assert!(why.contains("Trailer is playing") && why.contains("The Storm"), "{why}");
     }
 
     #[test]
