@@ -210,12 +210,12 @@ mod tests {
             if passes(middle) { keeps = middle } else { breaks = middle }
         }
         for speed in [0.9985, 1.0015] {
-            let lead = |at_s: f64, ahead_s: f64| {
+            let lead = |tick: u64, at_s: f64, ahead_s: f64| {
                 let media = ShowTime::from_secs_f64(0.5 + speed * (at_s - 0.5) + ahead_s);
-                ((at_s * 100.0) as u64, Event::Film(media, speed, FilmState::Locked))
+                (tick, Event::Film(media, speed, FilmState::Locked))
             };
             // 30 ms that are slewed, in the middle of it.
-            let script = vec![lead(0.5, 0.0), lead(10.0, 0.03)];
+            let script = vec![lead(50, 0.5, 0.0), lead(1_000, 10.0, 0.03)];
             let played =
                 Virtual { chases: true, at_most: 20_000, script, ..Virtual::new(ride(keeps)) }.play();
             let worst = played.worst();

@@ -34,7 +34,7 @@ impl SeatPlaces {
         };
         // What was measured before it acked other places says no more where it is: most measure at rest alone.
         let holds = |measured: &Heard<_>| {
-            !state.echoed.is_some_and(|echoed| echoed.at.since(measured.at) > MEASURED_HOLDS)
+            state.echoed.is_none_or(|echoed| echoed.at.since(measured.at) <= MEASURED_HOLDS)
         };
         let measured = state.measured.filter(holds).map(of_registers);
         let places =
