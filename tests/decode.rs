@@ -205,7 +205,7 @@ line 5  malformed: byte 18: ends after 18 bytes; this message takes 20: 55aa0000
        1  0x1101 read registers
        1  0x1102 reply to read registers
        1  malformed
-       1  lines that are no hex
+       1  lines that are not hex
 "
     );
     let (_folder, path) = file("lines.txt", lines.as_bytes());

@@ -172,6 +172,7 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         errands: shared::errands(),
         reports: shared::one_at_a_time(),
         curves: shared::one_at_a_time(),
+        pictures: shared::one_at_a_time(),
         closing: closed.clone(),
         document: document.to_json().expect("a description is text").into(),
         library,

@@ -32,6 +32,8 @@ use crate::record::report_of;
 
 /// The newest that are listed, and no more.
 const MOST: usize = 500;
+/// What came of shows is looked up for so many of them: more than any page shows, and few enough for whoever waits for the disk.
+const OUTCOMES: usize = 50;
 /// Bytes of a piece, and how many wait for whoever reads them.
 const PIECE: usize = 64 << 10;
 const WAITING: usize = 2;
@@ -47,7 +49,7 @@ pub(super) struct RecordingInfo {
     bytes: u64,
     /// When it was closed, unix seconds.
     closed: u64,
-    /// What came of the show, where it is of one that is over.
+    /// What came of the show, where it is of one that is over and among the newest 50.
     #[serde(flatten)]
     outcome: Option<RecordedOutcome>,
 }
@@ -154,7 +156,7 @@ pub(super) async fn picture(
         .map_err(|_| bad_value("the query is not valid here", "send ?seat= and the name of a seat"))?;
     let path = path_of(&shared, &name)?;
     let library = shared.library.clone();
-    let turn = turn(&shared.curves, "a picture").await?;
+    let turn = turn(&shared.pictures, "a picture").await?;
     let drawn = shared.blocking(move || {
         let _turn = turn; // held until it is drawn, also where nobody waits for it any more
         library.picture(&path, query.seat.as_deref())
@@ -214,7 +216,7 @@ fn list(dir: &Path) -> Vec<RecordingInfo> {
     let mut all: Vec<_> = fs::read_dir(dir).into_iter().flatten().flatten().filter_map(info).collect();
     all.sort_unstable_by(|one, other| other.cmp(one));
     all.truncate(MOST);
-    for one in &mut all {
+    for one in all.iter_mut().take(OUTCOMES) {
         one.outcome = outcome(&dir.join(&one.name));
     }
     all

@@ -44,6 +44,8 @@ pub(super) struct Shared {
     pub(super) errands: Arc<Semaphore>,
     /// Held by the report that is being read and sent.
     pub(super) reports: Arc<Semaphore>,
+    /// Held by whoever has a recording drawn: that takes longer than a curve, which is asked for on each page.
+    pub(super) pictures: Arc<Semaphore>,
     /// Held by whoever has a curve drawn.
     pub(super) curves: Arc<Semaphore>,
     /// True if the server ends.

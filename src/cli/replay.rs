@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::record::{flaws, open, shown, wall};
 use super::{Exit, Failure, print};
 use crate::record::Contents;
-use crate::replay::{Difference, ReplayError, Verdict, replay};
+use crate::replay::{ReplayDifference, ReplayError, ReplayVerdict, replay};
 use crate::time::ShowTime;
 
 /// Differences that are printed.
@@ -35,12 +35,13 @@ struct ReplayTold<'a> {
     equal: bool,
     flaws: Vec<String>,
     #[serde(flatten)]
-    verdict: &'a Verdict,
+    verdict: &'a ReplayVerdict,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (contents, verdict) = replay(open(&args.file)?).map_err(|error| failure(error, &args.file))?;
-    let equal = verdict.differences.is_empty();
+    // A file in which nothing was judged does not pass for one that was judged well.
+    let equal = verdict.differences.is_empty() && is_judged(&verdict);
     if args.json {
         print::json(&ReplayTold { equal, flaws: flaws(&contents), verdict: &verdict })?;
     } else {
@@ -49,15 +50,23 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     Ok(if equal { Exit::Done } else { Exit::CheckFailed })
 }
 
+/// True if it has a reply, or a change of how a seat stood.
+const fn is_judged(verdict: &ReplayVerdict) -> bool {
+    verdict.fates > 0 || verdict.standings > 0
+}
+
 fn failure(error: ReplayError, path: &Path) -> Failure {
     let exit = if matches!(error, ReplayError::Read(_)) { Exit::BadCue } else { Exit::Usage };
     Failure { exit, error: anyhow!(error).context(path.display().to_string()) }
 }
 
-fn text(path: &Path, contents: &Contents, verdict: &Verdict) -> String {
-    let Verdict { drains, frames, fates, standings, from_the_start, gaps, unjudged, .. } = verdict;
+fn text(path: &Path, contents: &Contents, verdict: &ReplayVerdict) -> String {
+    let ReplayVerdict { drains, frames, fates, standings, from_the_start, gaps, unjudged, .. } = verdict;
     let count = verdict.differences.len() as u64 + verdict.more;
     let outcome = match count {
+        0 if !is_judged(verdict) => {
+            "nothing to judge: it has neither replies nor seats that came or went".to_owned()
+        }
         0 => "no difference".to_owned(),
         1 => "1 difference".to_owned(),
         count => format!("{count} differences"),
@@ -94,8 +103,8 @@ fn text(path: &Path, contents: &Contents, verdict: &Verdict) -> String {
     out
 }
 
-fn in_words(difference: &Difference) -> String {
-    let Difference { wall_ns, film_s, seat, what, recorded, replayed } = difference;
+fn in_words(difference: &ReplayDifference) -> String {
+    let ReplayDifference { wall_ns, film_s, seat, what, recorded, replayed } = difference;
     let film = ShowTime::from_secs_f64(*film_s);
     let seat = seat.as_deref().map_or_else(String::new, |seat| format!("{}: ", shown(seat)));
     let ms = wall_ns / 1_000_000 % 1_000;

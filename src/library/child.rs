@@ -30,7 +30,12 @@ struct Chore<'a> {
     remedy: &'static str,
     command: &'a [&'a str],
     file: &'a Path,
+    /// The most memory that it may take, MiB.
+    memory_mib: u64,
 }
+
+/// What a picture may take, MiB: it is read piece by piece, and may be drawn beside the check of a cue.
+const PICTURE_MIB: u64 = 384;
 
 const CHECK: &str = "the check of the cue";
 const FEWER_ROWS: &str =
@@ -53,7 +58,8 @@ pub(super) fn picture(hall: &Hall, recording: &Path, seat: Option<&str>) -> Resu
     let seat = seat.map(|seat| format!("--seat={seat}"));
     let command: Vec<&str> = ["draw-recording"].into_iter().chain(seat.as_deref()).collect();
     let name = "the picture of the recording";
-    run(hall, &Chore { name, remedy: SHORTER, command: &command, file: recording })
+    let memory_mib = hall.bounds.memory_mib.min(PICTURE_MIB);
+    run(hall, &Chore { name, remedy: SHORTER, command: &command, file: recording, memory_mib })
 }
 
 fn check<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<T, Problem> {
@@ -63,7 +69,8 @@ fn check<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<
     })?;
     let command: Vec<&str> =
         ["prove", "--json", "--config", config].into_iter().chain(more.iter().copied()).collect();
-    run(hall, &Chore { name: CHECK, remedy: FEWER_ROWS, command: &command, file: cue })
+    let memory_mib = hall.bounds.memory_mib;
+    run(hall, &Chore { name: CHECK, remedy: FEWER_ROWS, command: &command, file: cue, memory_mib })
 }
 
 /// What the process says of a file.
@@ -91,7 +98,7 @@ fn spawn(hall: &Hall, chore: &Chore<'_>) -> io::Result<Child> {
     Command::new(&hall.program)
         .arg0("kinocue")
         .args(chore.command)
-        .args(["--memory-mib", &hall.bounds.memory_mib.to_string()])
+        .args(["--memory-mib", &chore.memory_mib.to_string()])
         .args(["--seconds", &hall.bounds.time.as_secs().to_string()])
         .arg("--")
         .arg(chore.file)
@@ -158,7 +165,7 @@ fn no_verdict(chore: &Chore<'_>, status: ExitStatus, bounds: &Bounds) -> Problem
         (Some(signal), _) => format!("signal {signal}"),
         (None, code) => format!("code {}", code.unwrap_or_default()),
     };
-    let (memory, time) = (bounds.memory_mib, bounds.time.as_secs());
+    let (memory, time) = (chore.memory_mib, bounds.time.as_secs());
     let detail = format!(
         "{} ended with {how}; it may take {memory} MiB of memory and {time} s of processor time",
         chore.name

@@ -31,7 +31,7 @@ pub(super) struct Acks {
     chunks: Vec<Column>,
     /// Controllers that replied.
     #[prost(message, repeated, tag = "4")]
-    controllers: Vec<Replies>,
+    controllers: Vec<ReplyColumns>,
     /// Other records, one behind the other.
     #[prost(bytes = "vec", tag = "5")]
     others: Vec<u8>,
@@ -39,7 +39,7 @@ pub(super) struct Acks {
 
 /// The replies of a controller: `kinocue.Replies`.
 #[derive(Clone, PartialEq, prost::Message)]
-pub(super) struct Replies {
+pub(super) struct ReplyColumns {
     /// Its place among the seats of the metadata.
     #[prost(uint32, tag = "1")]
     controller: u32,
@@ -91,7 +91,7 @@ pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
     }
     let replies = |(controller, rows): (usize, &Rows)| {
         let is_used = !rows.replies.is_empty() || !rows.fates.is_empty();
-        is_used.then(|| Replies {
+        is_used.then(|| ReplyColumns {
             controller: u32::try_from(controller).unwrap_or(u32::MAX),
             replies: columns(&rows.replies),
             fates: columns(&rows.fates),
@@ -147,14 +147,14 @@ fn number(fate: Fate) -> i64 {
     }
 }
 
-type Numbers<'a> = Vec<Box<dyn Iterator<Item = i64> + 'a>>;
+type ColumnReaders<'a> = Vec<Box<dyn Iterator<Item = i64> + 'a>>;
 
-fn numbers(columns: &[Column]) -> Numbers<'_> {
+fn numbers(columns: &[Column]) -> ColumnReaders<'_> {
     columns.iter().map(|one| Box::new(unfold(one.numbers())) as Box<_>).collect()
 }
 
 /// The next of each column; `None` where there are fewer columns.
-fn next<const N: usize>(columns: &mut Numbers<'_>) -> Option<[i64; N]> {
+fn next<const N: usize>(columns: &mut ColumnReaders<'_>) -> Option<[i64; N]> {
     let mut row = [0; N];
     (columns.len() >= N).then_some(())?;
     row.iter_mut().zip(columns).for_each(|(to, column)| *to = column.next().unwrap_or_default());
@@ -165,7 +165,7 @@ fn next<const N: usize>(columns: &mut Numbers<'_>) -> Option<[i64; N]> {
 pub(super) fn unpacked(message: &[u8]) -> Option<Vec<u8>> {
     let acks = Acks::decode(message).ok()?;
     let (mut runs, mut chunks) = (numbers(&acks.runs), numbers(&acks.chunks));
-    let mut controllers: Vec<(i64, Numbers<'_>, Numbers<'_>)> = acks
+    let mut controllers: Vec<(i64, ColumnReaders<'_>, ColumnReaders<'_>)> = acks
         .controllers
         .iter()
         .map(|one| (one.controller.into(), numbers(&one.replies), numbers(&one.fates)))
@@ -189,8 +189,9 @@ pub(super) fn unpacked(message: &[u8]) -> Option<Vec<u8>> {
             records.clear();
             continue;
         }
-        for controller in (first..).take(count) {
-            let place = |one: &(i64, Numbers<'_>, Numbers<'_>)| one.0.cmp(&controller);
+        for step in 0..count {
+            let controller = first.checked_add(i64::try_from(step).ok()?)?;
+            let place = |one: &(i64, ColumnReaders<'_>, ColumnReaders<'_>)| one.0.cmp(&controller);
             match kind {
                 REPLY => {
                     let place = controllers.binary_search_by(place).ok()?;

@@ -1,6 +1,6 @@
 //! What health and observer are told beside frames and datagrams, as octets of a record: kind, controller, and what it says.
 
-use super::ack_record::{FALLS, of, place};
+use super::ack_words::{FALLS, of, place};
 use super::cursor::Cursor;
 use crate::health::HealthInput::{
     self, Alive, Ambiguous, Answered, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew, LostZero,

@@ -2,6 +2,7 @@
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
+use super::ack_words::{FALLS, of, place};
 use super::ack_inputs::{read_input, read_look, write_input, write_look};
 use super::cursor::Cursor;
 use crate::belief::Fall;
@@ -14,7 +15,6 @@ use crate::tracker::{Fate, Reply};
 use crate::wire::{FrameNo, PerAxis, ReplyCode};
 
 const FATES: [Fate; 3] = [Fate::Duplicate, Fate::Stale, Fate::Stray];
-pub(super) const FALLS: [Fall; 5] = [Fall::Gap, Fall::Astray, Fall::PutBack, Fall::Stale, Fall::Stopped];
 const STANDINGS: [HealthState; 8] = [
     HealthState::Ok,
     HealthState::Degraded,
@@ -196,12 +196,6 @@ impl<'a> AckRecord<'a> {
     }
 }
 
-/// Begins a record that is of a controller.
-pub(super) fn of(out: &mut Vec<u8>, kind: u8, controller: usize) {
-    out.push(kind);
-    out.extend_from_slice(&u16::try_from(controller).unwrap_or(u16::MAX).to_le_bytes());
-}
-
 fn write_reply(out: &mut Vec<u8>, Reply { controller, frame, code, error, inputs, at }: Reply) {
     of(out, 0, controller);
     out.extend_from_slice(&frame.0.to_le_bytes());
@@ -238,10 +232,6 @@ fn write_fate(out: &mut Vec<u8>, frame: FrameNo, fate: Fate, latency_ns: u32) {
 fn heard<'a>(origin: Origin, from: &mut Cursor<'a>) -> Option<AckRecord<'a>> {
     let (at, len) = (from.time()?, from.u16()?);
     Some(AckRecord::Heard(origin, at, from.slice(usize::from(len))?))
-}
-
-pub(super) fn place<T: PartialEq>(all: &[T], one: &T) -> u8 {
-    all.iter().position(|other| other == one).and_then(|at| u8::try_from(at).ok()).unwrap_or(u8::MAX)
 }
 
 /// How a group stands, as viewers have it: a number that the schema names.

@@ -8,6 +8,7 @@
 mod ack_columns;
 mod ack_inputs;
 mod ack_record;
+mod ack_words;
 mod acks;
 mod anonymous;
 mod chunk;

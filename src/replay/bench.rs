@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::frames::{Frames, LeftFrame};
-use super::verdict::{Difference, SeatVerdict, Verdict};
+use super::verdict::{ReplayDifference, SeatVerdict, ReplayVerdict};
 use crate::config::LossPolicy;
 use crate::control::Percentiles;
 use crate::health::{Groups, HealthInput, HealthState, HealthTable};
@@ -51,7 +51,7 @@ pub(super) struct Bench {
     pub(super) frames: Frames,
     pub(super) observer: Observer,
     pub(super) health: HealthTable,
-    pub(super) verdict: Verdict,
+    pub(super) verdict: ReplayVerdict,
     known: Vec<KnownFrames>,
     groups: Vec<GroupKnown>,
     /// Events of the observer that health has.
@@ -101,7 +101,7 @@ impl Bench {
             frames: Frames::default(),
             observer,
             health,
-            verdict: Verdict::default(),
+            verdict: ReplayVerdict::default(),
             heard: 0,
             watches: true,
             lateness: histogram(),
@@ -345,7 +345,7 @@ impl Bench {
         let seat = seat.and_then(|seat| self.seats.get(seat)).map(|seat| seat.name.clone());
         let film: ShowTime = self.frames.film(at);
         let wall_ns = self.wall_ns.saturating_add(at.as_nanos());
-        self.verdict.differs(Difference {
+        self.verdict.differs(ReplayDifference {
             wall_ns,
             film_s: film.as_secs_f64(),
             seat,
@@ -355,7 +355,7 @@ impl Bench {
         });
     }
 
-    pub(super) fn into_verdict(mut self, books: &Books) -> Verdict {
+    pub(super) fn into_verdict(mut self, books: &Books) -> ReplayVerdict {
         let tracker = books.tracker();
         let seat = |(index, seat): (usize, &RecordedSeat)| SeatVerdict {
             name: seat.name.clone(),

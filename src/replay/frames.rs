@@ -18,7 +18,7 @@ pub(super) struct LeftFrame {
 
 /// What the books take of what was posted.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Posted {
+pub(super) enum PostedFrame {
     /// These frames.
     All(Vec<LeftFrame>),
     /// These and others that are not in the file, or some of them in an order that nobody knows.
@@ -57,12 +57,12 @@ impl Frames {
     }
 
     /// Takes so many, of which the last is that one.
-    pub(super) fn post(&mut self, count: u32, lane: usize, last: FrameNo) -> Posted {
+    pub(super) fn post(&mut self, count: u32, lane: usize, last: FrameNo) -> PostedFrame {
         let place = self.frames.iter().position(|one| (one.lane, one.frame) == (lane, last));
-        let Some(place) = place else { return Posted::Some(Vec::new()) };
+        let Some(place) = place else { return PostedFrame::Some(Vec::new()) };
         let frames: Vec<LeftFrame> = self.frames.drain(..=place).collect();
         let is_all = u32::try_from(frames.len()).is_ok_and(|taken| taken == count);
-        if is_all { Posted::All(frames) } else { Posted::Some(frames) }
+        if is_all { PostedFrame::All(frames) } else { PostedFrame::Some(frames) }
     }
 
     /// The show time at an instant, as the tick before it has it; instants are asked for in their order.

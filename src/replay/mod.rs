@@ -11,7 +11,7 @@ mod verdict;
 
 use std::io::Read;
 
-pub(crate) use verdict::{Difference, Verdict};
+pub(crate) use verdict::{ReplayDifference, ReplayVerdict};
 
 use crate::record::{AckChunk, AckRecord, Chunk, Contents, ReadError, Told, Wanted, read};
 use crate::tracker::{Books, Tracker};
@@ -45,7 +45,7 @@ pub(crate) enum ReplayError {
 ///
 /// # Errors
 /// Where it cannot be read, and where it holds no replies.
-pub(crate) fn replay(input: impl Read) -> Result<(Contents, Verdict), ReplayError> {
+pub(crate) fn replay(input: impl Read) -> Result<(Contents, ReplayVerdict), ReplayError> {
     let mut replay: Option<Replay> = None;
     let mut is_judged = true;
     let contents = read(input, Wanted::ALL, &mut |contents, _, told| {
@@ -127,7 +127,7 @@ impl Replay {
         drains.drain(..drains.len() - left);
     }
 
-    fn finish(mut self, contents: &Contents) -> Verdict {
+    fn finish(mut self, contents: &Contents) -> ReplayVerdict {
         self.judge(true);
         let Self { mut books, mut bench, .. } = self;
         totals::of_samples(&mut bench, &books, contents);

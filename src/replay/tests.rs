@@ -87,7 +87,7 @@ fn well(tick: u64) -> Vec<AckRecord<'static>> {
     begin.chain(of_frame).chain(end).collect()
 }
 
-fn judged(file: &[u8]) -> Verdict {
+fn judged(file: &[u8]) -> ReplayVerdict {
     replay(file).expect("a recording").1
 }
 

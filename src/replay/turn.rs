@@ -49,7 +49,7 @@ impl<'a> Turn<'a> {
                     self.bench.begins(controller, first, books);
                     true
                 }
-                _ => self.take_told(record),
+                _ => self.hears_told(record),
             };
             if !is_taken {
                 break;
@@ -63,7 +63,7 @@ impl<'a> Turn<'a> {
     }
 
     /// What is told beside frames, replies and what they come to; false where that is something else.
-    fn take_told(&mut self, record: &AckRecord<'_>) -> bool {
+    fn hears_told(&mut self, record: &AckRecord<'_>) -> bool {
         let bench = &mut *self.bench;
         match *record {
             AckRecord::Heard(Origin::Controller(controller), at, octets) if controller < bench.stations => {
@@ -116,7 +116,7 @@ impl<'a> Turn<'a> {
                 AckRecord::Judged => self.look(),
                 AckRecord::Lost(controller, total) => self.bench.on_lost(controller, total),
                 AckRecord::Standing(controller, standing) => self.bench.on_standing(controller, standing),
-                ref other => drop(self.take_told(other)),
+                ref other => drop(self.hears_told(other)),
             }
         }
         self.look();
@@ -154,8 +154,8 @@ impl Ledger for Turn<'_> {
             let controllers = self.bench.seats.len();
             match *record {
                 AckRecord::Posted(count, lane, last) => match self.bench.frames.post(count, lane, last) {
-                    Posted::All(frames) => self.bench.on_frames(&frames, tracker),
-                    Posted::Some(frames) => self.bench.on_some_frames(&frames, tracker),
+                    PostedFrame::All(frames) => self.bench.on_frames(&frames, tracker),
+                    PostedFrame::Some(frames) => self.bench.on_some_frames(&frames, tracker),
                 },
                 AckRecord::Failed(controller, frame) if self.bench.knows(controller, frame) => {
                     tracker.on_send_failed(controller, frame);

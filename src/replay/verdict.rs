@@ -10,7 +10,7 @@ const TOLD: usize = 100;
 
 /// Something that the recording says otherwise than what was judged again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Difference {
+pub(crate) struct ReplayDifference {
     /// Wall clock, ns since 1970; of a total the end of the file.
     pub(crate) wall_ns: u64,
     /// Show time, s.
@@ -39,7 +39,7 @@ pub(crate) struct SeatVerdict {
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub(crate) struct Verdict {
+pub(crate) struct ReplayVerdict {
     /// Drains of the ack thread.
     pub(crate) drains: u64,
     /// Frames that went into the books.
@@ -59,13 +59,13 @@ pub(crate) struct Verdict {
     /// Lateness of the ticks that sent.
     pub(crate) lateness_us: Option<Percentiles>,
     /// What differs; the first of it.
-    pub(crate) differences: Vec<Difference>,
+    pub(crate) differences: Vec<ReplayDifference>,
     /// How much more does.
     pub(crate) more: u64,
 }
 
-impl Verdict {
-    pub(super) fn differs(&mut self, difference: Difference) {
+impl ReplayVerdict {
+    pub(super) fn differs(&mut self, difference: ReplayDifference) {
         if self.differences.len() < TOLD {
             self.differences.push(difference);
         } else {

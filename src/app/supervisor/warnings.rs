@@ -157,7 +157,7 @@ fn nobody(table: &[Row], state: State, takes_part: impl FnMut((usize, &Row)) -> 
         id: "no-seat".to_owned(),
         severity: Severity::Error,
         controller: None,
-        text: format!("no seat takes part: none of them is {state}"),
+        text: format!("no seat takes part: the hall is {state}, its seats are not"),
         remedy: "enable seats (`kinocue enable`), or see at each why it is out".to_owned(),
     })
 }

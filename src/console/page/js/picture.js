@@ -16,7 +16,6 @@ export function startPicture() {
 export function showPicture(name, title) {
   setText(byId('picture-title'), title);
   setProperty(byId('picture-panel'), 'hidden', false);
-  byId('picture-panel').scrollIntoView({ block: 'start' });
   byId('picture-title').focus({ preventScroll: true });
   draw(name, null);
 }
@@ -43,6 +42,8 @@ function take({ title, sentence, seat, seats, svg }) {
   forget();
   url = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }));
   const image = byId('picture');
+  // Only now is the page long enough for all of it.
+  image.onload = () => byId('picture-panel').scrollIntoView({ block: 'start' });
   image.src = url;
   image.alt = `${title}. ${sentence}`;
   image.hidden = false;
