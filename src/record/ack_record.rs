@@ -2,8 +2,8 @@
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
-use super::ack_words::{FALLS, of, place};
 use super::ack_inputs::{read_input, read_look, write_input, write_look};
+use super::ack_words::{FALLS, of, place};
 use super::cursor::Cursor;
 use crate::belief::Fall;
 use crate::health::{HealthInput, HealthState};

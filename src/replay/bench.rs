@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::frames::{Frames, LeftFrame};
-use super::verdict::{ReplayDifference, SeatVerdict, ReplayVerdict};
+use super::verdict::{ReplayDifference, ReplayVerdict, SeatVerdict};
 use crate::config::LossPolicy;
 use crate::control::Percentiles;
 use crate::health::{Groups, HealthInput, HealthState, HealthTable};

@@ -1,7 +1,7 @@
 //! One drain of the ack thread, taken again in the order in which it took it.
 
 use super::bench::Bench;
-use super::frames::Posted;
+use super::frames::PostedFrame;
 use crate::health::HealthInput;
 use crate::net::Origin;
 use crate::observe::FirstAnswer;
