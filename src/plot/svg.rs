@@ -18,7 +18,7 @@ const APART: f64 = 14.0;
 const TEXT: &str = "text{font:13px system-ui,'DejaVu Sans','Noto Sans',sans-serif;fill:var(--text)}.big{font-size:20px;font-weight:650}\
 .head{font-weight:650}.quiet{fill:var(--quiet)}.grid{stroke:var(--edge);stroke-width:1}.limit{stroke:var(--text);stroke-width:1.2}\
 .flag{stroke:var(--text);stroke-dasharray:1 3}.mark{fill:var(--ground);stroke:var(--line);stroke-width:2}.ground{fill:var(--ground)}\
-.hatch{stroke:var(--over);stroke-width:2}.name.late{text-anchor:end}";
+.hatch{stroke:var(--over);stroke-width:2}.late{text-anchor:end}";
 
 /// The picture as an SVG.
 #[must_use]
@@ -244,7 +244,7 @@ fn flags(picture: &Picture, y: f64) -> (String, f64) {
         ends[row] = begin + width;
         let down = LINE * f64::from(u8::try_from(row).unwrap_or(0) + 1);
         depth = depth.max(down);
-        let (class, x) = if begin < x { ("name late", x - 4.0) } else { ("name", x + 4.0) };
+        let (class, x) = if begin < x { ("late", x - 4.0) } else { ("", x + 4.0) };
         out += &words(x, y + down - 6.0, class, &safe(&name));
     }
     (out, depth)

@@ -1,5 +1,7 @@
 //! What is gathered of a stretch of a recording for its picture, column by column.
 
+use serde_json::Value;
+
 use super::Look;
 use crate::plot::{Band, Flag, Shade, TimeAxis};
 use crate::record::{Contents, Margins, SeatSample, TickSample, Told, each_chunk, state_word};
@@ -138,9 +140,9 @@ impl Gathered {
             Told::State(state) => self.state = Some(state_word(state)),
             Told::Chunks(chunks) => self.chunks(contents, &chunks),
             Told::Other(topic @ ("/mark" | "/event" | "/action"), data) => {
+                let seat = &contents.seats[self.look.lane].name;
                 let at_s = self.at_s();
-                let name = format!("{}: {}", &topic[1..], String::from_utf8_lossy(data));
-                self.flags.push(Flag { at_s, name });
+                self.flags.extend(flag_name(topic, data, seat).map(|name| Flag { at_s, name }));
             }
             _ => {}
         }
@@ -314,4 +316,19 @@ fn bin(us: f64) -> usize {
 #[expect(clippy::cast_precision_loss, reason = "less than an hour")]
 fn micros(ns: u64) -> f64 {
     ns as f64 / 1e3
+}
+
+/// What a note is called in the picture of a seat; none where it is of another seat.
+fn flag_name(topic: &str, data: &[u8], seat: &str) -> Option<String> {
+    let note: Value = serde_json::from_slice(data).unwrap_or_default();
+    let text = |key: &str| note[key].as_str().unwrap_or_default();
+    let of = text("seat");
+    match topic {
+        "/event" if of == seat || of.is_empty() => Some(text("text").to_owned()),
+        "/event" => None,
+        "/action" if text("result") == "done" => Some(text("what").to_owned()),
+        "/action" => Some(format!("{}: {}", text("what"), text("result"))),
+        _ if text("text").is_empty() => Some("marked".to_owned()),
+        _ => Some(text("text").to_owned()),
+    }
 }
