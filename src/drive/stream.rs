@@ -84,8 +84,8 @@ impl<P: LinkPort> LinkStream<P> {
             }
             Self::Sixpack2(stream) => {
                 let seat = motors_of(controller, terms.period).ok_or(NO_DRIVES)?;
-                let homed = sixpack2::home(&mut stream.talk, seat, sixpack2::Homing { goes_on, told });
-                homed.map(|()| stream.rejoin(lane)).map_err(|error| error.to_string())
+                let homed = stream.home_seat(lane, seat, sixpack2::Homing { goes_on, told });
+                homed.map_err(|error| error.to_string())
             }
         };
         self.play().look(lane);

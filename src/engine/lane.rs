@@ -402,9 +402,9 @@ impl LaneMotion {
         self.window.set_level(self.fader.level());
     }
 
-    /// Lets its level come to stand where it is.
-    pub(super) fn settle(&mut self, dt: f64) {
-        self.fader.settle(dt);
+    /// Lets its level come to stand where it is, or before `target`.
+    pub(super) fn settle(&mut self, dt: f64, target: f64) {
+        self.fader.settle(dt, target);
         self.window.set_level(self.fader.level());
     }
 

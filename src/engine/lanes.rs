@@ -118,7 +118,7 @@ impl Lanes {
             if free {
                 motion.fade(dt, target, headroom.fade(at, motion.fader.level(), motion.may_shake()));
             } else {
-                motion.settle(dt);
+                motion.settle(dt, target);
             }
             moved |= !motion.fader.is_still();
         }

@@ -58,6 +58,8 @@ const SILENT_FOR: Duration = Duration::from_millis(500);
 const DIRTY_FOR: Duration = Duration::from_secs(5);
 /// So many times the same place in a row is a film that stands: 125 ms of timecode.
 const FROZEN: u32 = 3;
+/// One that is asked more often has to be the same for so long: the clock of a player moves by the periods of its sound, 21 ms.
+const FROZEN_FOR: Duration = Duration::from_millis(100);
 /// No film is longer; a player that says so lies.
 const LONGEST: Duration = Duration::from_hours(100);
 
@@ -129,7 +131,9 @@ struct Newest {
     media: ShowTime,
     /// When it last differed from the one before.
     moved: MonoTime,
+    /// So often it was the same since then, which is not before it was last said to run.
     repeats: u32,
+    same_since: MonoTime,
     /// From one to the next, on the whole.
     period: Duration,
 }
@@ -208,6 +212,10 @@ impl SourceTracker {
             FilmWord::Play if self.state.may_lead() => {}
             FilmWord::Play => {
                 self.begin_anew();
+                // It may have stood where it begins.
+                if let Some(newest) = &mut self.newest {
+                    (newest.repeats, newest.same_since) = (0, at);
+                }
                 self.on_sign(SourceSign::Play, at);
             }
             FilmWord::Seek => {
@@ -296,13 +304,14 @@ impl SourceTracker {
     /// Notes the newest position. One that was told before says nothing new of a film that runs; several say that it stands.
     fn is_repeated(&mut self, at: MonoTime, media: ShowTime) -> bool {
         let Some(newest) = &mut self.newest else {
-            self.newest = Some(Newest { at, media, moved: at, repeats: 0, period: Duration::ZERO });
+            let period = Duration::ZERO;
+            self.newest = Some(Newest { at, media, moved: at, repeats: 0, same_since: at, period });
             return false;
         };
         newest.at = at;
         if newest.media == media {
             newest.repeats += 1;
-            if newest.repeats >= FROZEN {
+            if newest.repeats >= FROZEN && at.since(newest.same_since) >= FROZEN_FOR {
                 self.recent.clear();
                 self.on_sign(SourceSign::Stop, at);
             }
@@ -312,7 +321,8 @@ impl SourceTracker {
         let passed = at.since(newest.moved);
         newest.period =
             if newest.period.is_zero() { passed } else { (7 * newest.period + passed.min(WINDOW * 4)) / 8 };
-        (newest.media, newest.moved, newest.repeats) = (media, at, 0);
+        (newest.media, newest.moved) = (media, at);
+        (newest.repeats, newest.same_since) = (0, at);
         false
     }
 

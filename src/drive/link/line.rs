@@ -89,9 +89,8 @@ impl LinkPort for LinkLine {
 
     fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
         self.settings.baud = baud;
-        let Self { port, path, settings } = self;
-        let set = port.as_mut().map(|port| port.set(path, *settings));
-        set.and_then(Result::ok).ok_or(LinkFault)
+        let (path, settings) = (self.path.clone(), self.settings);
+        self.with(|port| port.set(&path, settings).ok())
     }
 
     fn mend(&mut self) -> Result<(), SerialError> {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::ask::{waking_baud, who};
 use super::talk::Talk;
-use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _};
+use crate::drive::link::{LinkFault, LinkPort};
 use crate::wire::sixpack2::UnitTold;
 
 /// How often all that are silent are looked for at either rate.
@@ -53,7 +53,7 @@ pub(crate) enum FindError {
 /// # Errors
 /// A [`FindError`] of the first that cannot be had; the line is back at its own rate.
 pub(crate) fn find<P: LinkPort>(talk: &mut Talk<P>, units: &[u8]) -> Result<Vec<UnitTold>, FindError> {
-    let (baud, waking) = (talk.baud(), waking_baud());
+    let (baud, waking) = (talk.own_baud(), waking_baud());
     let mut first: Vec<Option<UnitTold>> = vec![None; units.len()];
     let mut missing: Vec<usize> = (0..units.len()).collect();
     for _ in 0..ROUNDS {
@@ -62,10 +62,10 @@ pub(crate) fn find<P: LinkPort>(talk: &mut Talk<P>, units: &[u8]) -> Result<Vec<
             return Ok(first.into_iter().flatten().collect());
         }
         if baud != waking {
-            talk.set_baud(waking)?;
-            let done = wake(talk, units, &missing, &mut first, baud);
-            talk.set_baud(baud)?;
-            done?;
+            let set = talk.set_baud(waking);
+            let done = set.and_then(|()| wake(talk, units, &missing, &mut first, baud));
+            let back = talk.set_baud(baud);
+            done.and(back)?;
         }
     }
     let (unit, is_awake) = (units[missing[0]], first[missing[0]].is_some());

@@ -79,14 +79,16 @@ pub(crate) fn look_for<P: LinkPort>(
     motors: &[u8],
 ) -> Result<Option<UnitFacts>, TalkFault> {
     let looked = look(talk, unit, motors).map(Some);
-    let (baud, waking) = (talk.baud(), waking_baud());
+    let (baud, waking) = (talk.own_baud(), waking_baud());
     if baud == waking || !matches!(looked, Err(TalkFault::Silent { .. })) {
         return looked;
     }
-    talk.set_baud(waking)?;
-    let told = who(talk, unit);
-    talk.set_baud(baud)?;
-    if told?.is_some() { Ok(None) } else { looked }
+    let set = talk.set_baud(waking);
+    let told = set.and_then(|()| who(talk, unit));
+    let back = talk.set_baud(baud);
+    let told = told?;
+    back?;
+    if told.is_some() { Ok(None) } else { looked }
 }
 
 impl SeatMotors<'_> {

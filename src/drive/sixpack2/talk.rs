@@ -48,6 +48,8 @@ pub(crate) enum TalkFault {
 #[derive(Debug)]
 pub(crate) struct Talk<P> {
     state: TalkState<P>,
+    /// The rate of the link, whatever it talks at for a while.
+    own_baud: u32,
     /// Until when somebody drives the line.
     busy: MonoTime,
 }
@@ -68,7 +70,12 @@ impl<P: LinkPort> Talk<P> {
     /// Over a port that is open.
     pub(crate) fn new(port: P, terms: TalkTerms) -> Self {
         let busy = port.now();
-        Self { state: TalkState::over(port, terms), busy }
+        Self { state: TalkState::over(port, terms), own_baud: terms.baud, busy }
+    }
+
+    /// The rate of the link.
+    pub(super) const fn own_baud(&self) -> u32 {
+        self.own_baud
     }
 
     /// When a frame that is sent now has wholly arrived, and how long one takes.
@@ -107,9 +114,9 @@ impl<P: LinkPort> Talk<P> {
     /// A [`LinkFault`] where the port is gone.
     pub(super) fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
         self.state.port.sleep_until(self.busy);
-        self.state.port.set_baud(baud)?;
+        // A port that is gone is opened again at the rate that it was told last.
         self.state.terms.baud = baud;
-        Ok(())
+        self.state.port.set_baud(baud)
     }
 
     /// Tells a unit to talk at another rate. Nobody answers.

@@ -193,6 +193,34 @@ fn no_line_makes_the_client_panic() {
     told(&mut client, &("\n".to_owned() + &"[".repeat(60_000) + "\n"));
 }
 
+/// Its clock moves by 21 ms, and is asked each 5 ms at first: three answers and more are the same.
+#[test]
+fn a_player_whose_clock_moves_by_the_periods_of_its_sound_runs_and_stands_only_where_it_does() {
+    let film = TrueFilm::new(60.0, 1.0).rate_from(10.0, 0.0).rate_from(20.0, 1.0).rate_from(25.0, 0.0);
+    let mut client = client();
+    let mut tracker = SourceTracker::new(SourceKind::Mpv, 0.0015, mono(0.0));
+    for n in 0..5_200_u32 {
+        let t = f64::from(n) * 0.005;
+        // It is started, paused and started again; that it stands in the end it does not say.
+        let word = match n {
+            0 | 4_000 => changed("pause", "false"),
+            2_000 => changed("pause", "true"),
+            _ => String::new(),
+        };
+        client.hear(word.as_bytes(), mono(t), &mut |told| tracker.hear(&told));
+        if let Some(line) = client.poll(mono(t)) {
+            let asked: Value = serde_json::from_str(&line).expect("JSON");
+            let heard_s = (film.media_s(t) / 0.021).floor() * 0.021;
+            let answer = json!({ "request_id": asked["request_id"], "data": heard_s, "error": "success" });
+            let answer = format!("{answer}\n");
+            client.hear(answer.as_bytes(), mono(t + 0.000_3), &mut |told| tracker.hear(&told));
+        }
+        let stands = tracker.state() == FilmState::Stopped;
+        assert!(!stands || (2_000..4_000).contains(&n) || n >= 5_000, "at {t} s");
+        assert!(stands || n < 5_050, "at {t} s: {:?}", tracker.state());
+    }
+}
+
 /// A player that answers within a millisecond, and now and then much later.
 #[test]
 fn the_film_of_a_player_is_known_within_half_a_millisecond_and_its_pause_at_once() {

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use crate::time::{MonoTime, ShowTime};
 
-/// Samples that are kept: half a second of the quickest source, 120 a second. All outliers have to be among them: of a source
-/// with 100 samples a second the last four span 30 ms, and would never be old enough to be believed.
+/// Samples that are kept: half a second of 120 a second, and 0.32 s of a player that is asked every 5 ms. All outliers have to be
+/// among them: of a source with 100 samples a second the last four span 30 ms, and would never be old enough to be believed.
 const KEPT: usize = 64;
 /// Samples that have to agree on where the film is now.
 const AGREEING: usize = 4;

@@ -249,6 +249,21 @@ fn a_player_that_is_frozen_stands_and_one_that_goes_on_unasked_runs_again() {
 }
 
 #[test]
+fn a_clock_that_steps_each_21_ms_and_is_asked_each_5_ms_stands_only_once_it_does() {
+    let film = TrueFilm::new(10.0, 1.0).rate_from(10.0, 0.0);
+    let tell = |n: u32| {
+        let t = f64::from(n) * 0.005;
+        let media = (film.media_s(t) / 0.021).floor() * 0.021;
+        Observation::new(mono(t), FilmWord::Position(ShowTime::from_secs_f64(media)))
+    };
+    let all: Vec<Observation> = (1..2_400).map(tell).collect();
+    let run = Run::of(SourceKind::Mpv, &film, &all, 12.0);
+    let stopped = run.states.iter().find(|seen| seen.1 == FilmState::Stopped).expect("it stands").0;
+    assert!((10.0..=10.2).contains(&stopped), "{:?}", run.states);
+    assert_eq!(run.tracker.state(), FilmState::Stopped, "{:?}", run.states);
+}
+
+#[test]
 fn after_a_told_seek_four_samples_lock_and_what_comes_in_between_counts_for_nothing() {
     let film = TrueFilm::new(10.0, 1.0).step_at(10.005, 600.0);
     let mut all = player(&film, 12.0, &[(10.005, FilmWord::Seek), (10.02, FilmWord::Landed)]);

@@ -9,8 +9,15 @@ use crate::drive::{LOOP, Lag, Middle, Motor, Shaker, TargetMaker};
 use crate::motion::Limits;
 use crate::time::MonoTime;
 
+/// How long ago a motor was told to stop at the least where one that moves strays.
+const BRAKES: Duration = Duration::from_millis(250);
+/// The same in ramps from full speed.
+const RAMPS: f64 = 1.25;
 /// How long a motor may be off its course at the least.
 const STRAYED: Duration = Duration::from_millis(250);
+
+/// After so long a motor is where its target was.
+const ARRIVED: Duration = Duration::from_secs(2);
 
 /// How far a motor may be from where its targets lead, mm.
 pub(super) const OFF_COURSE_MM: f64 = 0.5;
@@ -24,6 +31,8 @@ pub(crate) struct Axis {
     pub(super) scale: MotorScale,
     pub(super) limits: Limits,
     pub(super) shaker: Shaker,
+    /// By then it stands that was told to stop, whatever it did: longer than its ramp takes from full speed.
+    pub(super) brakes: Duration,
     lag: Lag,
     maker: TargetMaker,
     target: i32,
@@ -63,11 +72,14 @@ impl Axis {
             jerk: of.axis.max_jerk / stroke,
         };
         let (scale, lag) = (of.scale, of.lag);
+        let ramp_mm_s2 = scale.ramp_mm_s2(scale.acceleration(of.axis.max_acceleration));
+        let brakes = Duration::try_from_secs_f64(RAMPS * scale.full_mm_s() / ramp_mm_s2);
         Self {
             motor: of.motor,
             scale,
             limits,
             shaker: Shaker::default(),
+            brakes: brakes.map_or(BRAKES, |brakes| brakes.max(BRAKES)),
             lag,
             maker: TargetMaker::at_rest(lag, scale.reach(0.0), scale.at(0.0)),
             target: scale.whole(of.axis.low),
@@ -110,6 +122,11 @@ impl Axis {
             self.model.run(self.target);
             self.reckoned = self.reckoned + LOOP;
         }
+    }
+
+    /// Nothing may have led its motor for hours: that is not reckoned loop by loop.
+    pub(super) fn skip(&mut self, now: MonoTime) {
+        self.reckoned = self.reckoned.max(now.before(ARRIVED));
     }
 
     /// True if its motor follows something.

@@ -9,7 +9,7 @@ use crate::drive::link::{LedLane, LedPose, Stage};
 use crate::motion::{Limits, MAX_AXES};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
-use crate::wire::sixpack2::{PiTarget, SixpackFrame, SixpackOrder};
+use crate::wire::sixpack2::{AbortSearch, PiTarget, SixpackFrame, SixpackOrder};
 
 /// The axes of one seat on a SIXpack 2: they share a unit, and follow one track.
 pub(super) type SixpackLane = LedLane<Sixpack2>;
@@ -59,13 +59,14 @@ impl LaneState {
 
 impl SixpackLane {
     /// Is looked at again before it follows anything.
-    pub(super) fn make_ready(&mut self) {
+    pub(super) fn make_ready(&mut self, now: MonoTime) {
         let was_led = matches!(self.stage, Stage::Ready | Stage::Ends);
         let holds = was_led && !self.axes.iter().any(Axis::moves);
         self.stage = Stage::Readying;
         self.own.known = None;
         for axis in &mut self.axes {
             (axis.rests, axis.holds, axis.stood_at, axis.strayed) = (false, holds, None, 0);
+            axis.skip(now);
         }
     }
 
@@ -81,6 +82,14 @@ impl SixpackLane {
             Stage::Readying => axis.holds,
             Stage::Lost | Stage::Out => false,
         }
+    }
+
+    /// Stops all of its motors, and then ends what they search for: one that searches takes the stop once that is over.
+    pub(super) fn stops(&self) -> Vec<SixpackFrame> {
+        let stop = |axis: &Axis| SixpackOrder::RampedStop { motor: axis.motor };
+        let end = |axis: &Axis| SixpackOrder::AbortSearch(AbortSearch { motor: axis.motor });
+        let orders = self.axes.iter().map(stop).chain(self.axes.iter().map(end));
+        orders.map(|order| order.frame(self.own.unit)).collect()
     }
 
     /// What each of its motors is told in a slice. `at` is when the first of that has arrived, and `frame_time` later the next;

@@ -24,6 +24,7 @@ use self::axis::Axis;
 use self::lane::{LaneState, SixpackLane};
 use self::track::Track;
 use super::ask::waking_baud;
+use super::home::{Homing, home};
 use super::set_up::{HomeError, SeatMotors};
 use super::talk::Talk;
 use crate::drive::link::{
@@ -103,7 +104,7 @@ impl Family for Sixpack2 {
         match lane.stage {
             // Its motors stand by now, and would make up at once for all that they were not told.
             Stage::Runs | Stage::Ends if is_held_up => {
-                lane.make_ready();
+                lane.make_ready(now);
                 stream.tell(StreamEvent::Braked { lane: number(index), why: BrakeReason::Dry });
             }
             Stage::Runs if lane.is_left_alone(now) && !lane.ends_moving() => {
@@ -114,17 +115,20 @@ impl Family for Sixpack2 {
             Stage::Runs if lane.is_behind(now) && lane.ends_moving() => {
                 stream.brake(index, BrakeReason::Behind);
             }
-            Stage::Ends if lane.has_come_to_rest(now) => lane.make_ready(),
+            Stage::Ends if lane.has_come_to_rest(now) => lane.make_ready(now),
             _ => {}
         }
     }
 
     fn work<P: LinkPort>(stream: &mut Stream<Self, P>, now: MonoTime) -> Result<Option<MonoTime>, LinkFault> {
-        if now >= stream.own.next_slice {
-            stream.send_slice()?;
-        } else if !(stream.has_time() && stream.ask_next(now)?) {
+        // Where a slice takes longer than the period the next is due at once: a question comes before that all the same, one at the most.
+        if stream.has_time() && stream.ask_next(now)? {
+            return Ok(None);
+        }
+        if now < stream.own.next_slice {
             return Ok(Some(stream.own.next_slice.min(now + IDLE)));
         }
+        stream.send_slice()?;
         Ok(None)
     }
 
@@ -135,7 +139,7 @@ impl Family for Sixpack2 {
                 lane.brake(now);
                 lane.stage = Stage::Ends;
             }
-            Stage::Ready => lane.make_ready(),
+            Stage::Ready => lane.make_ready(now),
             Stage::Readying | Stage::Ends | Stage::Lost | Stage::Out => {}
         }
         true
@@ -147,7 +151,7 @@ impl Family for Sixpack2 {
     }
 
     fn settle<P: LinkPort>(stream: &mut Stream<Self, P>) -> Result<(), LinkFault> {
-        (0..stream.lanes.len()).try_for_each(|lane| stream.settle_lane(lane))
+        stream.settle_lanes()
     }
 
     fn let_go(lane: &mut SixpackLane, now: MonoTime) {
@@ -167,11 +171,31 @@ impl Family for Sixpack2 {
 }
 
 impl<P: LinkPort> Stream<Sixpack2, P> {
-    /// A lane that was out was homed again.
-    pub(crate) fn rejoin(&mut self, lane: u16) {
+    /// Homes the seat of a lane: whatever comes of it, nothing leads it to where it stood before.
+    ///
+    /// # Errors
+    /// A [`HomeError`]; the lane is out then.
+    pub(crate) fn home_seat(
+        &mut self,
+        lane: u16,
+        seat: SeatMotors<'_>,
+        around: Homing<'_>,
+    ) -> Result<(), HomeError> {
         if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
+            lane.stage = Stage::Out;
+        }
+        home(&mut self.talk, seat, around)?;
+        self.rejoin(lane);
+        Ok(())
+    }
+
+    /// A lane was homed again: its last target is nothing to hold.
+    pub(crate) fn rejoin(&mut self, lane: u16) {
+        let now = self.talk.now();
+        if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
+            lane.stage = Stage::Out;
             lane.own.is_failing = false;
-            lane.make_ready();
+            lane.make_ready(now);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::axis::{OFF_COURSE_MM, READING};
+use super::axis::{Axis, OFF_COURSE_MM, READING};
 use super::lane::SixpackLane;
 use super::{PROBES, Sixpack2, TARGETS, Track, number};
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
@@ -18,12 +18,23 @@ const IDENTITY: Duration = Duration::from_secs(10);
 const LOOKS: Duration = Duration::from_millis(20);
 /// So many looks in a row at a motor that was told to stop long ago and moves put its lane out: an answer that is damaged looks like two.
 const STRAYS: u32 = 3;
-/// How long ago that is: longer than a ramp takes from full speed.
-const BRAKES: Duration = Duration::from_millis(250);
-/// So often motors are told to stop before nobody tells them anything, if they do not say that they do.
+/// So often at the least motors are told to stop before nobody tells them anything, if they do not say that they do.
 const SETTLES: u32 = 20;
+/// So often where their unit does not answer at all.
+const SILENT: u32 = 5;
 /// What is so far outside the stroke is no place of the seat at all, mm.
 const LOST_ZERO_MM: f64 = 10.0;
+
+/// What motors do that were told to stop.
+#[derive(Debug, Clone, Copy)]
+enum Stands {
+    /// Nothing, all of them.
+    All,
+    /// This one does something, or is elsewhere.
+    Not(usize),
+    /// Their unit does not answer.
+    Silent,
+}
 
 impl<P: LinkPort> Stream<Sixpack2, P> {
     /// True if there is time for a question: right behind a slice, which makes the next one late by no more than it takes, or later where
@@ -157,6 +168,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
 
     /// Looks whether all motors of a lane stand, and where.
     fn look_at(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
+        self.own.next_asked = (index + 1) % self.lanes.len();
         let lane = &mut self.lanes[index];
         if lane.own.known.is_none() {
             return self.ask_who(index, now);
@@ -167,7 +179,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         };
         let Some(told) = self.place_of(index, a)? else { return Ok(()) };
         let lane = &mut self.lanes[index];
-        let has_braked = lane.own.stops * self.terms.period > BRAKES;
+        let has_braked = lane.own.stops * self.terms.period > lane.axes[a].brakes;
         let axis = &mut lane.axes[a];
         let went_mm = axis.went(told.position, self.talk.moment().sent);
         // One that is told to stop turns at a speed of 0.
@@ -245,29 +257,56 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         Ok(())
     }
 
-    /// Tells the motors of a lane to stop until its unit says that they do nothing. Where they are led they have to be where that was: by one
-    /// bit a stop has the counter begin anew.
-    pub(super) fn settle_lane(&mut self, index: usize) -> Result<(), LinkFault> {
-        let lane = &self.lanes[index];
-        let (unit, tries) = (lane.own.unit, if lane.own.was_heard { SETTLES } else { 0 });
-        let motors: Vec<u8> = lane.axes.iter().map(|axis| axis.motor).collect();
-        let stops: Vec<_> =
-            motors.iter().map(|motor| SixpackOrder::RampedStop { motor: *motor }.frame(unit)).collect();
-        let rests = |actions: [u8; 6]| {
-            motors.iter().all(|motor| actions.get(usize::from(*motor)) == Some(&action::IDLE))
-        };
-        for _ in 0..tries {
+    /// Tells the motors of all lanes to stop until their units say that they do nothing. Where they are led they have to be where that was: by
+    /// one bit a stop has the counter begin anew. Those that do not come to rest are out, those that do not answer are lost.
+    pub(super) fn settle_lanes(&mut self) -> Result<(), LinkFault> {
+        let (begun, mut tries) = (self.talk.now(), 0);
+        let heard = (0..self.lanes.len()).filter(|index| self.lanes[*index].own.was_heard);
+        // Each with how often it did not answer.
+        let mut left: Vec<(usize, u32)> = heard.map(|index| (index, 0)).collect();
+        while !left.is_empty() {
+            // All are told before any is asked.
+            let stops: Vec<_> = left.iter().flat_map(|(index, _)| self.lanes[*index].stops()).collect();
             self.talk.send(&stops)?;
-            match self.talk.ask(unit, SixpackOrder::AskActions { response: ANSWER }) {
-                Ok(SixpackReply::ActionsTold(ActionsTold { actions })) if rests(actions) => {}
-                Ok(_) | Err(TalkFault::Silent { .. }) => continue,
-                Err(TalkFault::Link(fault)) => return Err(fault),
+            tries += 1;
+            let mut still = Vec::new();
+            for (index, silent) in left {
+                match self.stands(index)? {
+                    Stands::All => {}
+                    Stands::Silent if silent + 1 >= SILENT => self.lose(index, 0),
+                    Stands::Silent => still.push((index, silent + 1)),
+                    Stands::Not(a) if tries >= SETTLES && self.has_braked_since(index, begun) => {
+                        let (lane, by_mm) = (number(index), self.lanes[index].axes[a].figures.error_mm);
+                        self.put_out(index, StreamEvent::OffCourse { lane, axis: axis_number(a), by_mm });
+                    }
+                    Stands::Not(_) => still.push((index, silent)),
+                }
             }
-            if !self.lanes[index].is_led() || self.is_where_it_was_led(index)? {
-                break;
-            }
+            left = still;
         }
         Ok(())
+    }
+
+    /// True if a lane whose motors were told to stop then has to be at rest.
+    fn has_braked_since(&self, index: usize, begun: MonoTime) -> bool {
+        let told = self.talk.now().since(begun);
+        self.lanes[index].axes.iter().all(|axis| told > axis.brakes)
+    }
+
+    /// Whether the motors of a lane that were told to stop do nothing.
+    fn stands(&mut self, index: usize) -> Result<Stands, LinkFault> {
+        let lane = &self.lanes[index];
+        let actions = match self.talk.ask(lane.own.unit, SixpackOrder::AskActions { response: ANSWER }) {
+            Ok(SixpackReply::ActionsTold(ActionsTold { actions })) => actions,
+            Ok(_) | Err(TalkFault::Silent { .. }) => return Ok(Stands::Silent),
+            Err(TalkFault::Link(fault)) => return Err(fault),
+        };
+        let rests = |axis: &Axis| actions.get(usize::from(axis.motor)) == Some(&action::IDLE);
+        if let Some(a) = lane.axes.iter().position(|axis| !rests(axis)) {
+            return Ok(Stands::Not(a));
+        }
+        let is_there = !lane.is_led() || self.is_where_it_was_led(index)?;
+        Ok(if is_there { Stands::All } else { Stands::Not(0) })
     }
 
     /// Whether all motors of a lane that is led answer, and are there; one that is not puts it out.
@@ -286,6 +325,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
 
     /// Looks for the unit of a lane that is lost or out.
     fn probe(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
+        self.own.next_asked = (index + 1) % self.lanes.len();
         self.lanes[index].own.not_before = now + PROBES;
         let Some(told) = self.seek(index)? else { return Ok(()) };
         if told.reset != 0 {
@@ -294,7 +334,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let lane = &mut self.lanes[index];
         let was_lost = lane.stage == Stage::Lost;
         (lane.own.is_failing, lane.own.not_before) = (false, now);
-        lane.make_ready();
+        lane.make_ready(now);
         if was_lost {
             self.tell(StreamEvent::Back { lane: number(index) });
         }
@@ -313,14 +353,16 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
             self.lanes[index].own.was_heard |= told.is_some();
             return Ok(told);
         }
-        let baud = self.talk.baud();
-        self.talk.set_baud(waking_baud())?;
-        let found = who_now(&mut self.talk, unit).and_then(|told| {
+        let baud = self.talk.own_baud();
+        let awake = self.talk.set_baud(waking_baud()).and_then(|()| who_now(&mut self.talk, unit));
+        let found = awake.and_then(|told| {
             told.map_or(Ok(()), |_| self.talk.switch(unit, baud))?;
             Ok(told)
         });
-        self.talk.set_baud(baud)?;
-        found
+        // Also where the port is gone: it is opened again at this rate.
+        let back = self.talk.set_baud(baud);
+        let told = found?;
+        back.map(|()| told)
     }
 }
 

@@ -2,9 +2,12 @@
 
 use super::bench::*;
 use super::play::*;
+use std::cell::Cell;
 use std::time::Duration;
 
 use crate::drive::link::*;
+use crate::drive::sixpack2::{HomeError, Homing, SeatMotors, home};
+use crate::motion::SeatType;
 use crate::sim::serial::LineFaults;
 use crate::sim::sixpack2::SixpackFault;
 use crate::wire::sixpack2::{ReferenceSearch, SixpackOrder, action};
@@ -203,4 +206,82 @@ fn what_a_seat_was_not_told_while_its_thread_was_held_up_is_not_made_up_for_at_o
             play.assert_inside();
         }
     }
+}
+
+/// A seat that was ridden to 40, 50 and 60 mm and waits there.
+fn away() -> Play {
+    let mut play = Play::homed(&[wired(1, false)], BAUD);
+    play.begin(there);
+    play.play(2.5, 0);
+    play.judged = false;
+    play.wait(1.0);
+    assert!(play.stream.is_ready(0) && play.off([40.0, 50.0, 60.0]) < 0.1, "{:?}", play.rare());
+    play
+}
+
+/// Has it homed as its thread does, until this step.
+fn home_until(play: &mut Play, ends: Option<Step>) -> Result<(), HomeError> {
+    let (seat, drive) = (seat(), drive(SWITCH));
+    let sixpack2 = drive.sixpack2.clone().unwrap();
+    let motors = &[0, 1, 2];
+    let of = SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors, period: PERIOD };
+    let is_over = Cell::new(false);
+    let goes_on = || !is_over.get();
+    let mut told = |step: Step| is_over.set(is_over.get() || Some(step) == ends);
+    let homed = play.stream.home_seat(0, of, Homing { goes_on: &goes_on, told: &mut told });
+    play.stream.look(0);
+    homed
+}
+
+/// The farthest that a motor goes in so many seconds from now on, mm.
+fn goes_in(play: &mut Play, seconds: f64) -> f64 {
+    play.bus_mut().forget();
+    play.wait(seconds);
+    let motors = play.bus().units()[0].motors[..3].iter();
+    let ways = motors.map(|motor| (motor.shaft.executed().highest - motor.shaft.executed().lowest) / MM);
+    ways.fold(0.0, f64::max)
+}
+
+#[test]
+fn a_seat_that_is_homed_again_away_from_park_stays_at_park() {
+    let mut play = away();
+    assert_eq!(home_until(&mut play, None), Ok(()));
+    let mm = goes_in(&mut play, 3.0);
+    assert!(mm < 0.06 && play.off([0.0; 3]) < 0.1, "{mm} mm: it was led back to where it stood");
+    assert!(play.stream.is_ready(0), "{:?}", play.rare());
+}
+
+#[test]
+fn a_seat_whose_homing_is_ended_or_fails_away_from_park_is_not_led_back_to_where_it_stood() {
+    for ends in [Some(Step::Searching(0)), Some(Step::Searching(1)), Some(Step::Parking), None] {
+        let mut play = away();
+        if ends.is_none() {
+            suffer(&mut play.stream.talk, SixpackFault::BreakSwitch { motor: 1, is_broken: true });
+        }
+        let homed = home_until(&mut play, ends);
+        assert!(homed.is_err(), "{ends:?}");
+        // What a search brakes from.
+        let mm = goes_in(&mut play, 3.0);
+        assert!(mm < 4.0 && play.speed() == 0.0, "{ends:?} {homed:?}: {mm} mm");
+    }
+}
+
+#[test]
+fn a_seat_of_one_axis_is_looked_for_though_its_slices_take_longer_than_their_period() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    let (seat, drive) = (SeatType { axes: 1, ..seat() }, drive(SWITCH));
+    let sixpack2 = drive.sixpack2.clone().unwrap();
+    // Two orders behind a break take 3.52 ms.
+    let period = Duration::from_micros(3_160);
+    let of = SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors: &[0], period };
+    assert_eq!(home(&mut talk, of, Homing { goes_on: &|| true, told: &mut |_| {} }), Ok(()));
+    let mut play = Play::over(talk, period, &[of], |_, _| {}).unwrap();
+    play.wait(1.0);
+    assert!(play.all_ready(), "{:?}", play.rare());
+    play.line().faults.answer_lost = 1.0;
+    play.wait(2.0);
+    assert!(play.has("Lost"), "{:?}", play.rare());
+    play.line().faults.answer_lost = 0.0;
+    play.wait(2.0);
+    assert!(play.has("Back") && play.stream.is_ready(0), "{:?}", play.rare());
 }
