@@ -26,18 +26,20 @@ const ROWS: &[Row] = &[
     ("bool fields in one struct", counts::bools_of_one_struct, Less, 6.0, 3.0),
     ("enums with the words of the hall's state", counts::encodings_of_state, Less, 1.0, 1.0),
     ("compositions", counts::compositions, Less, 1.0, 1.0),
-    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 109.0, 30.0),
+    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 110.0, 30.0),
     ("uses of one type name", counts::uses_of_one_type_name, Less, 5.0, 2.0),
     // One left is the stop, which is a flag by design: whoever asks for it waits for nobody. Of the nine before, four were no
     // such flags, but said that something was due, or took a pose; they are named so now.
     ("polled said-once flags", counts::flags_told_once, Less, 2.0, 0.0),
     ("polling sleeps in the supervisor", counts::sleeps_of_the_supervisor, Less, 0.0, 0.0),
     ("circles within rooms", circles::within_rooms, Less, 0.0, 0.0),
-    ("rooms that know config", counts::rooms_that_know_config, Less, 17.0, 9.0),
+    // Two more since recordings are judged again by a hall that is made anew from what they say of it.
+    ("rooms that know config", counts::rooms_that_know_config, Less, 19.0, 9.0),
     // By this count 49 where the target of 170 was set, of what were 192 then, lists of public fields among them.
     // Two more for one more command in the list of commands.
     // Six more for two families of drives that are simulated and decoded side by side, most of them rows of tables.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 60.0, 43.0),
+    // Six more with replay and columns of acks, each of which reads what the recorder writes.
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 66.0, 43.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 8.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
@@ -53,13 +55,16 @@ const ROWS: &[Row] = &[
     // 2,510 for drives in the service and in its status, pictures of cues and recordings of plays.
     // 5,430 more for SIXpack 2 seats in plays and halls, drives in the demo and in `register`, and recordings in the service; 1,470 for the pictures,
     // cuts and comparisons of recordings, a film that is found by its sound, and motors that are stopped for good.
-    ("lines of code", counts::lines_of_code, Less, 82_550.0, 39_800.0),
+    // 2,750 more for recordings that are judged again and drawn for the page, acks in columns, motors that are told in each slice, and
+    // room for a change of pace where seats vibrate.
+    ("lines of code", counts::lines_of_code, Less, 85_300.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
-    ("public items and fields", counts::public_items, Less, 1_222.0, 400.0),
-    ("lines of the longest function", counts::longest_function, Less, 69.0, 48.0),
-    ("lines of the longest file", counts::longest_file, Less, 474.0, 390.0),
-    ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.6, 3.0),
+    // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
+    ("public items and fields", counts::public_items, Less, 1_227.0, 400.0),
+    ("lines of the longest function", counts::longest_function, Less, 59.0, 48.0),
+    ("lines of the longest file", counts::longest_file, Less, 466.0, 390.0),
+    ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 3.3, 3.0),
     ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),
 ];
 

@@ -155,7 +155,8 @@ fn octets_that_are_damaged_lead_no_axis_out_of_its_stroke() {
         play.bus_mut().forget();
         play.play(40.0, 0);
         play.assert_inside();
-        if index != 2 {
+        // What came twice or flipped may be another order, which sets a counter anew, say: such a seat is out until it is homed.
+        if index == 0 || index == 3 {
             // Two answers in a row may be lost.
             let is_loss = |event: &&String| event.starts_with("Lost") || event.starts_with("Back");
             let other = play.rare().into_iter().find(|event| !is_loss(&event));
