@@ -63,7 +63,7 @@ const ROWS: &[Row] = &[
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
     ("public items and fields", counts::public_items, Less, 1_227.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 59.0, 48.0),
-    ("lines of the longest file", counts::longest_file, Less, 466.0, 390.0),
+    ("lines of the longest file", counts::longest_file, Less, 470.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 3.3, 3.0),
     ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),
 ];
