@@ -65,3 +65,15 @@ pub(super) fn told_place(reply: SixpackReply, other: TalkFault) -> Result<Positi
         _ => Err(other),
     }
 }
+
+/// Does that at the rate with which units wake, and goes back to the link's own, also where the port is gone: it is opened again at that.
+pub(super) fn at_waking_rate<P: LinkPort, T>(
+    talk: &mut Talk<P>,
+    work: impl FnOnce(&mut Talk<P>) -> Result<T, LinkFault>,
+) -> Result<T, LinkFault> {
+    let set = talk.set_baud(waking_baud());
+    let done = set.and_then(|()| work(talk));
+    let back = talk.set_baud(talk.own_baud());
+    let done = done?;
+    back.map(|()| done)
+}

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use super::ask::{waking_baud, who};
+use super::ask::{at_waking_rate, waking_baud, who};
 use super::talk::Talk;
 use crate::drive::link::{LinkFault, LinkPort};
 use crate::wire::sixpack2::UnitTold;
@@ -62,10 +62,7 @@ pub(crate) fn find<P: LinkPort>(talk: &mut Talk<P>, units: &[u8]) -> Result<Vec<
             return Ok(first.into_iter().flatten().collect());
         }
         if baud != waking {
-            let set = talk.set_baud(waking);
-            let done = set.and_then(|()| wake(talk, units, &missing, &mut first, baud));
-            let back = talk.set_baud(baud);
-            done.and(back)?;
+            at_waking_rate(talk, |talk| wake(talk, units, &missing, &mut first, baud))?;
         }
     }
     let (unit, is_awake) = (units[missing[0]], first[missing[0]].is_some());

@@ -1,6 +1,6 @@
 //! What a unit says of itself; nothing is written and nothing moves. Asking clears its reset flag, and the stop flag of a motor.
 
-use super::ask::{WHO, position, searches, waking_baud, who};
+use super::ask::{WHO, at_waking_rate, position, searches, waking_baud, who};
 use super::set_up::{MotorAxis, SeatMotors};
 use super::talk::{ANSWER, Talk, TalkFault};
 use crate::drive::link::{LinkPort, LinkTalk as _};
@@ -79,15 +79,10 @@ pub(crate) fn look_for<P: LinkPort>(
     motors: &[u8],
 ) -> Result<Option<UnitFacts>, TalkFault> {
     let looked = look(talk, unit, motors).map(Some);
-    let (baud, waking) = (talk.own_baud(), waking_baud());
-    if baud == waking || !matches!(looked, Err(TalkFault::Silent { .. })) {
+    if talk.own_baud() == waking_baud() || !matches!(looked, Err(TalkFault::Silent { .. })) {
         return looked;
     }
-    let set = talk.set_baud(waking);
-    let told = set.and_then(|()| who(talk, unit));
-    let back = talk.set_baud(baud);
-    let told = told?;
-    back?;
+    let told = at_waking_rate(talk, |talk| who(talk, unit))?;
     if told.is_some() { Ok(None) } else { looked }
 }
 

@@ -6,7 +6,7 @@ use super::axis::{Axis, OFF_COURSE_MM, READING};
 use super::lane::SixpackLane;
 use super::{PROBES, Sixpack2, TARGETS, Track, number};
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
-use crate::drive::sixpack2::ask::{WHO, searches, waking_baud, where_is, who_now};
+use crate::drive::sixpack2::ask::{WHO, at_waking_rate, searches, where_is, who_now};
 use crate::drive::sixpack2::look::OUTSIDE_MM;
 use crate::drive::sixpack2::talk::{ANSWER, TalkFault};
 use crate::time::MonoTime;
@@ -353,16 +353,11 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
             self.lanes[index].own.was_heard |= told.is_some();
             return Ok(told);
         }
-        let baud = self.talk.own_baud();
-        let awake = self.talk.set_baud(waking_baud()).and_then(|()| who_now(&mut self.talk, unit));
-        let found = awake.and_then(|told| {
-            told.map_or(Ok(()), |_| self.talk.switch(unit, baud))?;
+        at_waking_rate(&mut self.talk, |talk| {
+            let told = who_now(talk, unit)?;
+            told.map_or(Ok(()), |_| talk.switch(unit, talk.own_baud()))?;
             Ok(told)
-        });
-        // Also where the port is gone: it is opened again at this rate.
-        let back = self.talk.set_baud(baud);
-        let told = found?;
-        back.map(|()| told)
+        })
     }
 }
 
