@@ -2,14 +2,12 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
-
+use super::bounds::BoundsArgs;
 use super::plot::RECORDING_COLUMNS;
 use super::plot_recording::{Asked, picture};
-use super::{Exit, Failure, OrExit as _, print};
+use super::{Exit, Failure, print};
 use crate::library::{RecordingPicture, Sketch};
 use crate::plot::{self, Theme};
-use crate::sys::humble::{self, ProcessBounds};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
@@ -18,18 +16,12 @@ pub(super) struct Args {
     /// The seat; without it the one that was held back farthest.
     #[arg(long, value_name = "NAME")]
     seat: Option<String>,
-    /// The most memory that it may take, MiB.
-    #[arg(long, value_name = "N", default_value_t = 4096)]
-    memory_mib: u64,
-    /// The most processor time that it may take, s.
-    #[arg(long, value_name = "N", default_value_t = 300)]
-    seconds: u64,
+    #[command(flatten)]
+    bounds: BoundsArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let bounds =
-        ProcessBounds { memory: args.memory_mib.saturating_mul(1 << 20), cpu_s: args.seconds.max(1) };
-    humble::lower(bounds).context("cannot bound the drawing").or_exit(Exit::System)?;
+    args.bounds.lower("the drawing")?;
     let asked = Asked {
         file: &args.recording,
         other: None,

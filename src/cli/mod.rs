@@ -10,6 +10,7 @@ use crate::wire::VibrationPort;
 use crate::{api, plain};
 
 mod ask;
+mod bounds;
 mod check;
 mod client;
 mod completions;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 
+use super::bounds::BoundsArgs;
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::app::StagedShow;
 use crate::app::staged::at_any_pace;
@@ -15,7 +16,6 @@ use crate::drive::Manner;
 use crate::engine::Show;
 use crate::library::{Drawing, Hashed, MAX_POINTS, Verdict, draw, needs_hall};
 use crate::proof::{Digest, Proof, Terms, prove_in};
-use crate::sys::humble::{self, ProcessBounds};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
@@ -29,21 +29,15 @@ pub(super) struct Args {
     /// Print the verdict as one JSON object.
     #[arg(long)]
     json: bool,
-    /// The most memory that it may take, MiB.
-    #[arg(long, value_name = "N", default_value_t = 4096)]
-    memory_mib: u64,
     /// Print its curves in so many stretches of time instead, as JSON; nothing is proved.
     #[arg(long, value_name = "N", value_parser = parse_points)]
     curve: Option<usize>,
-    /// The most processor time that it may take, s.
-    #[arg(long, value_name = "N", default_value_t = 300)]
-    seconds: u64,
+    #[command(flatten)]
+    bounds: BoundsArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let bounds =
-        ProcessBounds { memory: args.memory_mib.saturating_mul(1 << 20), cpu_s: args.seconds.max(1) };
-    humble::lower(bounds).context("cannot bound the check").or_exit(Exit::System)?;
+    args.bounds.lower("the check")?;
     if let Some(points) = args.curve {
         print::json(&draw_curves(&args.cue, &args.config, points)?)?;
         return Ok(Exit::Done);
