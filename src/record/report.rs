@@ -2,7 +2,8 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use mcap::parse_record;
+use mcap::MAGIC;
+use mcap::read::LinearReader;
 use mcap::records::{AttachmentIndex, Record, op};
 
 use super::recording::REPORT;
@@ -11,9 +12,8 @@ use super::recording::REPORT;
 const TAIL: u64 = 4 << 10;
 /// The longest list of attachments, and the longest report, octets.
 const LONGEST: u64 = 4 << 20;
-/// What ends each file, after a footer of 9 and 20 octets.
-const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-const FOOTER: usize = 9 + 20 + 8;
+/// What ends each file: a footer of 9 and 20 octets, and the magic.
+const FOOTER: usize = 9 + 20 + MAGIC.len();
 /// Before the data of an attachment are its head and lengths, after it a sum of 4 octets.
 const SUM: u64 = 4;
 
@@ -57,14 +57,8 @@ fn attachments(tail: &[u8], begin: u64) -> Option<(u64, u64)> {
 }
 
 /// The records of a part of a file, as far as they are whole.
-fn records(mut bytes: &[u8]) -> impl Iterator<Item = Record<'_>> {
-    std::iter::from_fn(move || {
-        let (head, rest) = bytes.split_at_checked(9)?;
-        let len = u64::from_le_bytes(head[1..].try_into().ok()?);
-        let (body, rest) = rest.split_at_checked(usize::try_from(len).ok()?)?;
-        bytes = rest;
-        parse_record(head[0], body).ok()
-    })
+fn records(bytes: &[u8]) -> impl Iterator<Item = Record<'_>> {
+    LinearReader::sans_magic(bytes).map_while(Result::ok)
 }
 
 fn part(file: &mut (impl Read + Seek), at: u64, len: u64) -> io::Result<Vec<u8>> {
