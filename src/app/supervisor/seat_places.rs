@@ -24,19 +24,17 @@ pub(super) struct SeatPlaces {
 impl SeatPlaces {
     pub(super) fn of(controller: &Controller, state: &ControllerState) -> Self {
         let axes = controller.seat.own();
-        // A frame has a slot for each axis of the cue, the registers one for each axis of the controller.
-        let commanded = state.echoed.map(|echoed| {
-            let own = echoed.value.iter().skip(controller.axis_offset);
-            axes.iter().zip(own).map(|(axis, at)| axis.fraction(*at)).collect::<Vec<f64>>()
-        });
-        let of_registers = |heard: Heard<PerAxis<Pulses>>| {
-            axes.iter().zip(heard.value.iter()).map(|(axis, at)| axis.fraction(*at)).collect::<Vec<f64>>()
+        let parts = |heard: Heard<PerAxis<Pulses>>, first: usize| {
+            let own = axes.iter().zip(heard.value.iter().skip(first));
+            own.map(|(axis, at)| axis.fraction(*at)).collect::<Vec<f64>>()
         };
+        // A frame has a slot for each axis of the cue, the registers one for each axis of the controller.
+        let commanded = state.echoed.map(|echoed| parts(echoed, controller.axis_offset));
         // What was measured before it acked other places says no more where it is: most measure at rest alone.
         let holds = |measured: &Heard<_>| {
             state.echoed.is_none_or(|echoed| echoed.at.since(measured.at) <= MEASURED_HOLDS)
         };
-        let measured = state.measured.filter(holds).map(of_registers);
+        let measured = state.measured.filter(holds).map(|measured| parts(measured, 0));
         let places =
             |parts: &Vec<f64>| axes.iter().zip(parts).map(|(axis, part)| axis.place(*part)).collect();
         let rounded = |parts: Vec<f64>| parts.iter().map(|part| (part * 1e3).round() / 1e3).collect();
