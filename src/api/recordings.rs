@@ -100,7 +100,7 @@ pub(super) async fn one(
     State(shared): State<Arc<Shared>>,
     UrlPath(name): UrlPath<String>,
 ) -> Result<Response, Problem> {
-    asker.least_engineer("deleting recordings")?;
+    asker.least_engineer("downloading recordings")?;
     let path = path_of(&shared, &name)?;
     let turn = turn(&shared.reports, "a file").await?;
     let opened = shared.blocking(move || {
