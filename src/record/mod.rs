@@ -17,6 +17,7 @@ mod compare;
 mod cursor;
 mod cut;
 mod descriptors;
+mod falls;
 mod flight;
 mod full;
 mod incidents;
@@ -48,6 +49,7 @@ pub use chunk::{Asked, TickHead};
 pub(crate) use chunk::{Handed, SentFrame};
 pub(crate) use compare::{Comparison, Places, compare, tracks};
 pub(crate) use cut::{CutError, CutManner, Piece, Stretch, cut, each_tick};
+pub(crate) use falls::Falls;
 pub(crate) use flight::{Entry, Flight, read as read_flight};
 pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
 pub(crate) use intake::{Counts, Intake, Taps};
@@ -67,4 +69,4 @@ pub(crate) use summary::{SeatTotals, Summary, each_chunk, state_word, summarize}
 pub(crate) use tap::octets_a_second;
 pub use tap::{Tap, tap};
 #[cfg(test)]
-pub(crate) use tests::recorded_as;
+pub(crate) use tests::{recorded_as, recorded_falling};

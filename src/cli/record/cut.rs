@@ -61,6 +61,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     exit::refuse_to_replace(&args.output, args.force)?;
     let (from, until) = args.film.unwrap_or((ShowTime::from_nanos(i64::MIN), ShowTime::from_nanos(i64::MAX)));
     let stretch = Stretch { from, until, seat: args.seat.clone() };
+    // Before a file is begun for it.
+    drop(open(&args.file)?);
     let part = args.output.with_extension("cutting");
     let file = File::create(&part).with_context(|| part.display().to_string()).or_exit(Exit::Io)?;
     let out = BufWriter::new(file);
