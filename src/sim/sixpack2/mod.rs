@@ -10,6 +10,8 @@ mod shaft;
 mod tests;
 mod unit;
 
+#[cfg(test)]
+pub(crate) use motor::MotorWritten;
 pub(crate) use motor::SixpackMotor;
 pub(crate) use shaft::ShaftSetup;
 pub(crate) use unit::{MOTORS, SixpackFault, SixpackSetup, SixpackUnit};

@@ -182,7 +182,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         around: Homing<'_>,
     ) -> Result<(), HomeError> {
         if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
-            lane.stage = Stage::Out;
+            (lane.stage, lane.own.is_home) = (Stage::Out, false);
         }
         home(&mut self.talk, seat, around)?;
         self.rejoin(lane);
