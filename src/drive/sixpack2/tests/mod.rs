@@ -9,6 +9,7 @@
 mod bench;
 mod finding;
 mod homing;
+mod lost;
 mod play;
 mod playing;
 mod runaway;
