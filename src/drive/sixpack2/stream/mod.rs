@@ -189,6 +189,16 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         Ok(())
     }
 
+    /// Has the motors of seats that take no part told to stand: what is damaged on its way may be an order to them.
+    pub(crate) fn stand_by<'a>(&mut self, absent: impl Iterator<Item = SeatMotors<'a>>) {
+        let (terms, now) = (self.terms, self.talk.now());
+        // Nobody can have homed one that cannot be set up.
+        for mut lane in absent.filter_map(|seat| Sixpack2::lane(&seat, terms, now).ok()) {
+            lane.own.is_absent = true;
+            self.lanes.push(lane);
+        }
+    }
+
     /// A lane was homed again: its last target is nothing to hold.
     pub(crate) fn rejoin(&mut self, lane: u16) {
         let now = self.talk.now();
@@ -214,7 +224,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let asked = if self.own.targets >= TARGETS { self.talk.question() } else { Duration::ZERO };
         let half = self.own.next_slice.max(at + frame_time * told + asked).since(now) / 2;
         let mut frames = Vec::with_capacity(told as usize + 1);
-        for lane in self.lanes.iter_mut().filter(|lane| lane.own.was_heard) {
+        for lane in self.lanes.iter_mut().filter(|lane| lane.is_told()) {
             frames.extend(lane.orders(at, frame_time, half));
             at = at + frame_time * u32::try_from(lane.axes.len()).unwrap_or(u32::MAX);
         }
@@ -226,9 +236,9 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         Ok(())
     }
 
-    /// Those whose units hear what is said at the rate of the link.
+    /// Those whose units hear what is said at the rate of the link, and those that may.
     fn told(&self) -> impl Iterator<Item = &SixpackLane> {
-        self.lanes.iter().filter(|lane| lane.own.was_heard)
+        self.lanes.iter().filter(|lane| lane.is_told())
     }
 
     /// A motor that searches takes nothing but the end of that: the one whose question was not answered is told it, or else those that are

@@ -266,7 +266,9 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let mut left: Vec<(usize, u32)> = heard.map(|index| (index, 0)).collect();
         while !left.is_empty() {
             // All are told before any is asked.
-            let stops: Vec<_> = left.iter().flat_map(|(index, _)| self.lanes[*index].stops()).collect();
+            let absent = self.lanes.iter().filter(|lane| lane.own.is_absent);
+            let told = left.iter().map(|(index, _)| &self.lanes[*index]).chain(absent);
+            let stops: Vec<_> = told.flat_map(SixpackLane::stops).collect();
             self.talk.send(&stops)?;
             tries += 1;
             let mut still = Vec::new();

@@ -61,6 +61,54 @@ fn all_motors_of_a_link_are_told_to_stop_before_a_unit_that_is_silent_is_waited_
     assert!(mm > 1.0 && mm <= most, "{mm} of {most} mm");
 }
 
+#[test]
+fn motors_of_a_seat_that_takes_no_part_go_no_farther_by_an_order_that_was_damaged() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    let (seat, drive) = (seat(), drive(SWITCH));
+    let sixpack2 = drive.sixpack2.clone().unwrap();
+    let of = |motors| SeatMotors {
+        seat: &seat,
+        drive: &drive,
+        sixpack2: &sixpack2,
+        unit: 1,
+        motors,
+        period: PERIOD,
+    };
+    for motors in [&[3, 4, 5], &[0, 1, 2]] {
+        assert_eq!(home_as(&mut talk, &drive, motors).0, Ok(()));
+    }
+    let period = 2 * PERIOD;
+    let mut play = Play::over(talk, period, &[of(&[0, 1, 2])], |_, _| {}).unwrap();
+    play.stream.stand_by(std::iter::once(of(&[3, 4, 5])));
+    play.wait(1.0);
+    let far = SixpackCommand::from(PiTarget { motor: 3, target: 261_000_910 }).frame(1).octets();
+    let mut farthest = 0.0_f64;
+    for is_last in [false, true] {
+        let from = place(&mut play.stream.talk, 3);
+        play.stream.talk.port().damage = Some(Box::new(move |sent| {
+            let target = sent.chunks_exact_mut(9).find(|frame| frame[..3] == [1, 0x24, 0]);
+            target.map(|frame| frame.copy_from_slice(&far)).is_some()
+        }));
+        while play.stream.talk.port().damage.is_some() {
+            play.stream.round().unwrap();
+        }
+        if is_last {
+            play.stream.settle().unwrap();
+            let later = play.now() + Duration::from_secs(2);
+            play.stream.talk.port().sleep_until(later);
+        } else {
+            play.wait(1.0);
+        }
+        farthest = farthest.max(place(&mut play.stream.talk, 3) - from);
+        assert_eq!(motor(&mut play.stream.talk, 3).speed(), 0);
+    }
+    let octets = [Duration::from_secs(10) / BAUD; 2];
+    let gap = OrderGap { period, octets, motors: 6, delay: play.stream.talk.delay_p99() };
+    let most = Reach::of(&seat.own()[0], 3).stopped_mm(gap.longest());
+    assert!(farthest > 1.0 && farthest <= most, "{farthest} of {most} mm");
+    assert!(play.stream.is_ready(0) && play.rare().is_empty(), "{:?}", play.rare());
+}
+
 /// A ride of a seat with so much acceleration at the most, up to where it does not answer and is told to stop.
 fn lost_in_a_ride(mm_s2: f64, seconds: f64) -> Play {
     let mut talk = talk_to(&[unit_with(1, shaft())]);
