@@ -32,6 +32,7 @@ use crate::drive::link::{
     StreamTerms, lane_number as number,
 };
 use crate::time::MonoTime;
+use crate::wire::FrameNo;
 use crate::wire::sixpack2::{AbortSearch, SixpackFrame, SixpackOrder};
 
 /// A question is asked for so many targets.
@@ -143,6 +144,11 @@ impl Family for Sixpack2 {
             Stage::Readying | Stage::Ends | Stage::Lost | Stage::Out => {}
         }
         true
+    }
+
+    /// Behind what is executed by now: that is confirmed as ever.
+    fn dropped(lane: &SixpackLane) -> FrameNo {
+        lane.own.track.newest().map_or(lane.unconfirmed, FrameNo::next)
     }
 
     /// Those that are not led are told to in each slice.
