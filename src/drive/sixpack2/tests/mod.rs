@@ -12,5 +12,6 @@ mod homing;
 mod lost;
 mod play;
 mod playing;
+mod rates;
 mod runaway;
 mod trouble;

@@ -58,6 +58,29 @@ fn a_stop_brakes_the_drives_at_once_and_no_pose_that_was_under_way_moves_them_on
     });
 }
 
+/// The tick that takes it up, the exchange that is under way, and what an answer takes to begin.
+#[expect(clippy::print_stdout, reason = "the figures are for who asks to see them")]
+#[test]
+fn a_stop_is_on_its_way_to_all_drives_within_a_tick_and_an_exchange() {
+    let mut longest = Duration::ZERO;
+    for phase in 0..8 {
+        hall(|hall, show, _| {
+            hall.go(show);
+            hall.run(6.0, |_| {});
+            hall.run(0.01 * f64::from(phase), |_| {});
+            let (asked, sent) = (NOW.get(), hall.line.lock().sent.len());
+            hall.runtime.desk.stop();
+            hall.run(0.1, |_| {});
+            let sent = hall.line.lock().sent.split_off(sent);
+            let stop = sent.iter().find(|(_, octets)| octets.starts_with(b"@255 3 "));
+            longest = longest.max(stop.expect("it is told to all").0.since(asked));
+        });
+    }
+    let exchange = Duration::from_secs(52 * 11) / BAUD + Duration::from_millis(1);
+    println!("{longest:?} of {:?}", Duration::from_millis(10) + exchange);
+    assert!(longest <= Duration::from_millis(10) + exchange, "{longest:?}");
+}
+
 #[test]
 fn a_seat_of_a_program_that_was_held_up_for_a_second_is_led_again_once_it_was_found() {
     for ms in [0, 3, 5, 8, 11] {
