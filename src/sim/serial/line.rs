@@ -21,8 +21,8 @@ pub(crate) struct SerialLine<B> {
     /// What it does to octets.
     pub(crate) faults: LineFaults,
     chance: Chance,
-    /// What the host sends, breaks as none.
-    out: Wire<Option<u8>>,
+    /// What the host sends, each at its rate; breaks as none.
+    out: Wire<Option<(u8, Option<u32>)>>,
     back: Wire<u8>,
     /// The answer that is being sent is lost.
     is_losing: bool,
@@ -92,7 +92,7 @@ impl<B: Bus> SerialLine<B> {
             }
             let (count, octet, late) = self.harm(*octet);
             for _ in 0..count {
-                self.out.put(Some(octet), now + late, takes);
+                self.out.put(Some((octet, self.host_baud)), now + late, takes);
             }
         }
     }
@@ -117,7 +117,7 @@ impl<B: Bus> SerialLine<B> {
                 && let Some((_, octet)) = self.out.octets.pop_front()
             {
                 match octet {
-                    Some(octet) => self.bus.on_octet(self.heard(octet), at),
+                    Some((octet, baud)) => self.bus.on_octet(self.heard(octet, baud), at),
                     None => self.bus.on_break(at),
                 }
             }
@@ -165,7 +165,7 @@ impl<B: Bus> SerialLine<B> {
                 self.is_losing = self.loses_answer();
             }
             let takes = self.octet_time(self.bus.baud());
-            let octet = self.heard(octet);
+            let octet = self.heard(octet, self.host_baud);
             if self.is_losing {
                 self.back.free = self.back.free.max(now) + takes;
                 continue;
@@ -187,10 +187,10 @@ impl<B: Bus> SerialLine<B> {
     }
 
     /// An octet as it is heard at the other end: as another where the two ends differ in their rate.
-    fn heard(&self, octet: u8) -> u8 {
+    fn heard(&self, octet: u8, host: Option<u32>) -> u8 {
         let bus = self.bus.baud();
         let differs = |host: u32| u64::from(host.abs_diff(bus)) * 100 > u64::from(BAUD_TOLERANCE * bus);
-        if self.host_baud.is_some_and(differs) { !octet } else { octet }
+        if host.is_some_and(differs) { !octet } else { octet }
     }
 
     /// How often an octet arrives, as what, and how much later.
