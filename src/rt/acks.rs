@@ -252,9 +252,7 @@ impl AckLoop {
             }
         });
         let mut records = Records { sent, last_sent, watch, observer, live, tap };
-        for link in links {
-            records.hear_link(books, link, withdrawn, self.ack_every, began);
-        }
+        links.iter_mut().for_each(|link| records.hear_link(books, link, withdrawn, self.ack_every, began));
         books.settle(began, &mut records);
         records.withdraw(books, withdrawn);
         if let Some(live) = live {
