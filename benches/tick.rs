@@ -1,5 +1,6 @@
 //! What one tick costs before anything is sent: sample, course and encode for 64 six-axis controllers, against 64 bare
-//! sends to loopback in the same run, tick by tick in turns; and what following a film adds to it.
+//! sends to loopback in the same run, tick by tick in turns; what following a film adds to it; and what it costs where a quarter of the
+//! seats are on serial drives, their poses handed over to the threads of links.
 //!
 //! `cargo bench --bench tick -- [--rounds N] [--quick]`
 
@@ -8,21 +9,22 @@ mod common {
 }
 
 use std::hint::black_box;
-use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 use std::time::Duration;
 
 use common::spread::{Spread, verdict};
 use kinocue::harness::belief::{LaneEvidence, Reading, Taken};
+use kinocue::harness::config::{self, Config};
 use kinocue::harness::engine::Step;
 use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
 use kinocue::harness::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::motion::MAX_AXES;
-use kinocue::harness::net::Delivery;
+use kinocue::harness::net::{Delivery, Ports};
 use kinocue::harness::rt::{Live, Places, mailboxes};
 use kinocue::harness::sys::clock::Monotonic;
 use kinocue::harness::time::{Clock as _, MonoTime, ShowTime, Tick};
-use kinocue::harness::{ride, stage};
+use kinocue::harness::{LinkOutlets, ride, stage, stage_in};
 use kinocue::wire::MAX_LEN;
 
 const CONTROLLERS: usize = 64;
@@ -31,6 +33,10 @@ const GOAL: f64 = 0.25;
 const FILM_GOAL: f64 = 100.0;
 /// A point is published anew after so many ticks, as it is ten times a second and more.
 const TOLD_EVERY: u64 = 50;
+/// How much a tick may cost with seats on drives, of what it costs without.
+const DRIVES_GOAL: f64 = 1.05;
+/// Seats of these halls that are on drives, each on a link of its own.
+const ON_DRIVES: usize = 16;
 /// Ticks of one round: the join lasts 1.5 s, the ride fills the rest.
 const TICKS: u64 = 4_500;
 const SECONDS: u32 = 6;
@@ -60,9 +66,9 @@ impl Phase {
 fn main() {
     let rounds = rounds();
     let links: Vec<Link> = (0..CONTROLLERS).map(|_| Link::open()).collect();
-    let pairs: Vec<[Round; 2]> =
-        (0..rounds).map(|_| [false, true].map(|chases| round(&links, chases))).collect();
-    let rounds: Vec<&Round> = pairs.iter().map(|[alone, _]| alone).collect();
+    let halls = [Hall::Plain, Hall::Chasing, Hall::WithDrives];
+    let triples: Vec<[Round; 3]> = (0..rounds).map(|_| halls.map(|hall| round(&links, hall))).collect();
+    let rounds: Vec<&Round> = triples.iter().map(|[alone, ..]| alone).collect();
     println!(
         "one tick for {CONTROLLERS} six-axis controllers, median of {} rounds (least..greatest)",
         rounds.len()
@@ -71,8 +77,55 @@ fn main() {
     tell("following", rounds.iter().map(|round| &round.following));
     tell("joining", rounds.iter().map(|round| &round.joining));
     let tick_ns = |round: &Round| 1e3 * round.following.figures()[0];
-    let added = Spread::of(pairs.iter().map(|[alone, chasing]| tick_ns(chasing) - tick_ns(alone)));
+    let added = Spread::of(triples.iter().map(|[alone, chasing, _]| tick_ns(chasing) - tick_ns(alone)));
     println!("a film adds {added:.0} ns  <= {FILM_GOAL}: {}", verdict(added, FILM_GOAL));
+    let sent = |round: &Round| round.following.figures()[0] + round.following.figures()[1];
+    let ratio = Spread::of(triples.iter().map(|[alone, _, drives]| sent(drives) / sent(alone)));
+    let bare = Spread::of(triples.iter().map(|[alone, _, drives]| tick_ns(drives) / tick_ns(alone)));
+    println!(
+        "with {ON_DRIVES} of the seats on drives a tick with its sends takes {ratio:.3} of that  <= {DRIVES_GOAL}: {}; without {bare:.3}",
+        verdict(ratio, DRIVES_GOAL)
+    );
+}
+
+/// Whom a tick is for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Hall {
+    /// Controllers on the network.
+    Plain,
+    /// The same, which follow a film.
+    Chasing,
+    /// As many seats, some of which are on drives.
+    WithDrives,
+}
+
+/// A hall as a file has it: seats of six axes on the network, and those on drives behind them.
+fn hall_with_drives(links: &[Link]) -> Config {
+    let mut text = String::from(
+        "[show]\nrate_hz = 1000\n[seat.s]\naxes = 6\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 4000\n\
+         max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n[seat.d]\naxes = 6\n\
+         stroke_mm = 150\nlead_mm = 5\npulses_per_rev = 4000\nmax_velocity_mm_s = 240\n\
+         max_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n[seat.d.drive]\n\
+         home = { way = \"switch\", input = 1, toward = \"down\", travel_mm = 165, zero_mm = -2 }\n\
+         torque = { hold = \"60%\", move = 1.0, full = 20000 }\n",
+    );
+    for (index, link) in links.iter().enumerate() {
+        let seat = index.checked_sub(links.len() - ON_DRIVES);
+        text += &match seat {
+            None => format!(
+                "[[controller]]\nname = \"A{index}\"\nseat = \"s\"\naddress = \"{}\"\n",
+                link.address()
+            ),
+            Some(of) => format!(
+                "[link.l{of}]\nport = \"/dev/ttyS{of}\"\nbaud = 230400\n[[controller]]\nname = \"A{index}\"\n\
+                 seat = \"d\"\naddress = \"link:l{of}\"\ndialect = \"silvermax\"\nunits = [16, 17, 18, 19, 20, 21]\n"
+            ),
+        };
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("hall.toml");
+    std::fs::write(&file, text).expect("it is written");
+    config::load(&file).expect("it is right")
 }
 
 /// `--rounds N`, `--quick`; other arguments are the bench runner's own.
@@ -115,9 +168,13 @@ impl Link {
 
 /// One play, flat out: each tick is followed by as many bare sends, which nobody counts twice because the receivers are
 /// emptied outside the measurement.
-fn round(links: &[Link], chases: bool) -> Round {
+fn round(links: &[Link], hall: Hall) -> Round {
     let addresses: Vec<SocketAddrV4> = links.iter().map(Link::address).collect();
-    let (staged, _) = stage(ride(SECONDS, 0.1, &[]), 1000.0, &addresses, false);
+    let cue = ride(SECONDS, 0.1, &[]);
+    let (staged, _) = match hall {
+        Hall::WithDrives => stage_in(&hall_with_drives(links), cue, 1000.0, false),
+        Hall::Plain | Hall::Chasing => stage(cue, 1000.0, &addresses, false),
+    };
     let settled = staged.course.settled();
     let rate = staged.show.rate;
     let (mut engine, mut lanes, _planner, _timeline) = staged.split();
@@ -126,7 +183,11 @@ fn round(links: &[Link], chases: bool) -> Round {
     let parked = Reading::at_rest([0.0; MAX_AXES], MonoTime::default());
     evidence(&live).for_each(|evidence| evidence.on_reading(&parked));
     let mut places = Places::new(&lanes, rate);
-    let mut film = chases.then(|| Film::new(engine.playhead().at()));
+    let mut film = (hall == Hall::Chasing).then(|| Film::new(engine.playhead().at()));
+    let stations = if hall == Hall::WithDrives { links.len() - ON_DRIVES } else { links.len() };
+    let ports = Ports::open(SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0), &addresses[..stations]);
+    let (sender, _receiver) = ports.expect("loopback can be reached").split();
+    let mut outlets = LinkOutlets::over(sender, stations, &lanes);
     let (mut round, mut buf) = (Round::default(), [0; MAX_LEN]);
     for tick in 0..TICKS {
         let joining = engine.playhead().at() < settled;
@@ -144,6 +205,10 @@ fn round(links: &[Link], chases: bool) -> Round {
                 let beat = places.admit(index, &mut engine, at).expect("every lane takes part");
                 let pose = engine.lane(index).pose();
                 let (stamped, bytes) = lane.encode(&beat, pose, engine.lane(index).mix(), &mut buf);
+                // What is on the network is sent below.
+                if index >= stations {
+                    outlets.send(index, bytes, at);
+                }
                 black_box(bytes);
                 let taken = Taken {
                     frame: stamped.frame,
@@ -159,8 +224,9 @@ fn round(links: &[Link], chases: bool) -> Round {
         });
         // Every frame is acked before the next tick.
         lanes.iter().zip(evidence(&live)).for_each(|(lane, evidence)| evidence.on_ack(lane.last_frame()));
-        let sends_us = timed(|| send_all(links));
+        let sends_us = timed(|| send_all(&links[..stations]));
         links.iter().for_each(|link| empty(&link.to));
+        assert_eq!(outlets.take(), links.len() - stations, "each seat on drives has its pose");
         let phase = if joining { &mut round.joining } else { &mut round.following };
         phase.tick_us.push(tick_us);
         phase.sends_us.push(sends_us);

@@ -49,7 +49,7 @@ fn show(start: &str, cue: &str, title: &str, end: Option<(&str, Ending)>) -> Sho
             events: vec!["A2 was lost at 00:12.000".to_owned()],
             ticks: 1000,
             missed_ticks: 1,
-            frames: FrameCounts { sent: 4000, asked: 4000, acked: 3999, refused: 0, lost: 1 },
+            frames: FrameCounts { sent: 4000, asked: 4000, acked: 3999, refused: 0, lost: 1, withdrawn: 0 },
             send_failed: 0,
             lateness: percentiles,
             ack: percentiles,

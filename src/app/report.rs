@@ -175,7 +175,7 @@ pub(crate) struct ControllerReport {
     pub(crate) name: String,
     /// Where it is reached.
     pub(crate) address: String,
-    /// Its frames; in the end asked is always acked + refused + lost.
+    /// Its frames; in the end asked is always acked + refused + lost + withdrawn.
     #[serde(flatten)]
     pub(crate) frames: FrameCounts,
     /// Slow frames before tick 0, which brought it to its park pose.

@@ -156,6 +156,11 @@ fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<Stri
             one.name, tally.withheld
         )
     }));
+    let withdrawn = |index: usize| run.accounts.books.tracker().counts(index).withdrawn;
+    let stopped = controllers.iter().enumerate().map(|(index, one)| (one, withdrawn(index)));
+    notes.extend(stopped.filter(|(_, count)| *count > 0).map(|(one, count)| {
+        format!("{}: {count} frames were not executed, as its drives were told to stop", one.name)
+    }));
     if run.ended.unposted > 0 {
         notes
             .push(format!("{} records did not fit and were inferred from frame numbers", run.ended.unposted));

@@ -145,7 +145,7 @@ impl<T: fmt::Display> fmt::Display for Word<T> {
 pub struct FrameCounts {
     /// Frames that the kernel took.
     pub sent: u64,
-    /// Of these: asked for a reply. Once all have met their fate, asked = acked + refused + lost.
+    /// Of these: asked for a reply. Once all have met their fate, asked = acked + refused + lost + withdrawn.
     pub asked: u64,
     /// Of these: answered with x = 2.
     pub acked: u64,
@@ -153,12 +153,20 @@ pub struct FrameCounts {
     pub refused: u64,
     /// Not answered within a second.
     pub lost: u64,
+    /// Not executed by drives on a link, as they were told to stop; left out where there are none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub withdrawn: u64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+const fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 impl From<&Counts> for FrameCounts {
     fn from(counts: &Counts) -> Self {
-        let Counts { sent, asked, acked, lost, .. } = *counts;
-        Self { sent, asked, acked, refused: counts.refused(), lost }
+        let Counts { sent, asked, acked, lost, withdrawn, .. } = *counts;
+        Self { sent, asked, acked, refused: counts.refused(), lost, withdrawn }
     }
 }
 
@@ -171,6 +179,7 @@ impl FrameCounts {
             acked: of(self.acked, other.acked),
             refused: of(self.refused, other.refused),
             lost: of(self.lost, other.lost),
+            withdrawn: of(self.withdrawn, other.withdrawn),
         }
     }
 
@@ -247,6 +256,13 @@ pub struct Times {
     pub(crate) histogram: Histogram,
 }
 
+impl Times {
+    /// True where there are none.
+    pub(crate) fn is_none(&self) -> bool {
+        self.percentiles.max_us.is_none()
+    }
+}
+
 /// Counts by size.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
@@ -282,7 +298,7 @@ mod tests {
 
     #[test]
     fn frames_of_many_are_summed_and_those_before_taken_away() {
-        let one = FrameCounts { sent: 10, asked: 8, acked: 5, refused: 1, lost: 2 };
+        let one = FrameCounts { sent: 10, asked: 8, acked: 5, refused: 1, lost: 2, withdrawn: 0 };
         let two: FrameCounts = [one, one].into_iter().sum();
         assert_eq!((two.sent, two.since(one)), (20, one));
     }

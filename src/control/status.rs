@@ -74,8 +74,11 @@ pub struct Status {
     pub rate_hz: f64,
     /// Lateness of the ticks that sent, since the program started.
     pub lateness: Times,
-    /// Latency of all acks, since the program started.
+    /// Latency of the acks of controllers on the network, since the program started.
     pub ack_latency: Times,
+    /// The same of seats on links, whose drives have a frame long before they execute it; left out where there were none.
+    #[serde(skip_serializing_if = "Times::is_none")]
+    pub link_ack_latency: Times,
     /// What the system granted the tick thread.
     pub realtime: RealTimeStatus,
     /// Every controller, in the order of the configuration.

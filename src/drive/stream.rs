@@ -23,14 +23,15 @@ pub(crate) enum LinkStream<P: LinkPort> {
 }
 
 impl<P: LinkPort> LinkStream<P> {
-    /// Over a port that is open, with lanes that are out until somebody has them looked at: the seats on that link.
+    /// Over a port that is open, with lanes that are out until somebody has them looked at: the seats on that link that take part, and those
+    /// that do not.
     ///
     /// # Errors
     /// Why its drives cannot be played to.
     pub(crate) fn new(
         port: P,
         (link, terms): (&Link, StreamTerms),
-        seats: &[&Controller],
+        (seats, absent): (&[&Controller], &[&Controller]),
         poses: Consumer<LedPose>,
         events: Producer<StreamEvent>,
     ) -> Result<Self, String> {
@@ -46,8 +47,10 @@ impl<P: LinkPort> LinkStream<P> {
                 let lanes =
                     seats.iter().map(|seat| motors_of(seat, terms.period)).collect::<Option<Vec<_>>>();
                 let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, sixpack2::Talk::new(port, talk));
-                let stream = Stream::new(talk, terms, &lanes, poses, events);
-                stream.map(Self::Sixpack2).map_err(|error| error.to_string())
+                let stream = Stream::<Sixpack2, P>::new(talk, terms, &lanes, poses, events);
+                let mut stream = stream.map_err(|error| error.to_string())?;
+                stream.stand_by(absent.iter().filter_map(|seat| motors_of(seat, terms.period)));
+                Ok(Self::Sixpack2(stream))
             }
         }
     }

@@ -9,6 +9,7 @@
 
 pub mod asked;
 mod hall;
+mod link_outlets;
 mod played;
 pub mod recording;
 mod ride;
@@ -16,7 +17,8 @@ mod rooms;
 pub(crate) mod shown;
 
 pub use hall::{Event, ORIGIN, Virtual, read_at_rest};
+pub use link_outlets::LinkOutlets;
 pub use played::{Frame, Played, Worst, worst_of_lines};
-pub use ride::{ride, stage, swell};
+pub use ride::{ride, stage, stage_in, swell};
 pub use rooms::*;
 pub use shown::{ShownFilm, TrueFilm};

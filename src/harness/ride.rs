@@ -5,7 +5,7 @@ use std::net::SocketAddrV4;
 use std::path::Path;
 
 use crate::app::StagedShow;
-use crate::config::from_to_args;
+use crate::config::{Config, from_to_args};
 use crate::cue::{Source, read};
 use crate::drive::Manner;
 use crate::engine::Show;
@@ -27,9 +27,19 @@ pub fn stage(
 ) -> (StagedShow, Vec<Watched>) {
     let tos: Vec<String> = to.iter().map(|address| format!("{address},axes={AXES}")).collect();
     let config = from_to_args(&tos, &[], timeline.axes()).expect("the addresses differ");
+    stage_in(&config, timeline, rate_hz, silent)
+}
+
+/// The same in a hall.
+pub fn stage_in(
+    config: &Config,
+    timeline: Timeline,
+    rate_hz: f64,
+    silent: bool,
+) -> (StagedShow, Vec<Watched>) {
     let show =
         Show { rate: Rate::from_hz(rate_hz), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
-    let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent });
+    let staged = StagedShow::new(config, timeline, show, Manner { level: 1.0, silent });
     let watched = config.stations().iter().map(Watched::of).collect();
     (staged.expect("the ride is gentle"), watched)
 }

@@ -62,7 +62,7 @@ fn outcome(end: &str, result: Ending) -> Outcome {
         events: vec!["A2 lost".to_owned()],
         ticks: 1000,
         missed_ticks: 1,
-        frames: FrameCounts { sent: 4000, asked: 4000, acked: 3990, refused: 1, lost: 9 },
+        frames: FrameCounts { sent: 4000, asked: 4000, acked: 3990, refused: 1, lost: 9, withdrawn: 0 },
         send_failed: 0,
         lateness: Percentiles { p50_us: Some(3.0), p99_us: Some(9.5), p999_us: None, max_us: Some(60.0) },
         ack: Percentiles::default(),

@@ -1,6 +1,7 @@
 //! Figures of each controller.
 
 use super::{Labels, MetricFamily, MetricValues, flag};
+use crate::control::model::FrameCounts;
 use crate::control::{ControllerStatus, Health};
 
 pub(super) fn families(controllers: &[ControllerStatus]) -> Vec<MetricFamily> {
@@ -34,8 +35,10 @@ fn health(all: &[ControllerStatus]) -> Vec<MetricFamily> {
 
 fn frames(all: &[ControllerStatus]) -> Vec<MetricFamily> {
     let acks = all.iter().flat_map(|one| {
-        [("acked", one.frames.acked), ("refused", one.frames.refused), ("lost", one.frames.lost)]
-            .map(|(result, count)| (and(one, "result", result), count))
+        let FrameCounts { acked, refused, lost, withdrawn, .. } = one.frames;
+        let withdrawn = (withdrawn > 0).then_some(("withdrawn", withdrawn));
+        let results = [("acked", acked), ("refused", refused), ("lost", lost)].into_iter().chain(withdrawn);
+        results.map(|(result, count)| (and(one, "result", result), count))
     });
     vec![
         counters(all, "frames_sent", "Frames handed to the kernel", |one| one.frames.sent),
@@ -43,7 +46,7 @@ fn frames(all: &[ControllerStatus]) -> Vec<MetricFamily> {
         counters(all, "frames_asked", "Frames that requested an ack", |one| one.frames.asked),
         MetricFamily {
             name: "acks",
-            help: "Results of the frames that requested an ack; lost: no reply within a second",
+            help: "Results of the frames that requested an ack; lost: no reply within a second; withdrawn: its drives were told to stop",
             values: MetricValues::Counters(acks.collect()),
         },
         counters(all, "limit_interventions", "How often the limiter held motion back", |one| one.clamps),
@@ -59,7 +62,7 @@ const fn answers(health: Health) -> Option<f64> {
     }
 }
 
-/// Percentiles, not a histogram for each: those of all controllers together are in `ack_latency_seconds`.
+/// Percentiles, not a histogram for each: those of all on the network together are in `ack_latency_seconds`.
 fn latencies(all: &[ControllerStatus]) -> MetricFamily {
     let values = all.iter().flat_map(|one| {
         [("0.5", one.ack_p50_us), ("0.99", one.ack_p99_us)]

@@ -1,9 +1,9 @@
 //! Figures of each serial link, and of each axis on it.
 
 use super::{Labels, MetricFamily, MetricValues, flag};
-use crate::control::{LinkAxisStatus, LinkStatus};
+use crate::control::{Histogram, LinkAxisStatus, LinkStatus};
 
-pub(super) fn families(links: &[LinkStatus]) -> Vec<MetricFamily> {
+pub(super) fn families(links: &[LinkStatus], ack_latency: &Histogram) -> Vec<MetricFamily> {
     if links.is_empty() {
         return Vec::new();
     }
@@ -20,6 +20,11 @@ pub(super) fn families(links: &[LinkStatus]) -> Vec<MetricFamily> {
             help: "99th percentile of the time from a request to the start of its answer",
             values: MetricValues::Gauges(delay.collect()),
         },
+        MetricFamily::histogram(
+            "link_ack_latency_seconds",
+            "Time from handing a frame to a link to when drives had it, all seats on links",
+            ack_latency,
+        ),
         MetricFamily {
             name: "link_exchanges",
             help: "Requests to drives, by result; stray: answers without a request",

@@ -38,7 +38,7 @@ pub(crate) fn render(status: &Status) -> String {
 fn families(status: &Status) -> Vec<MetricFamily> {
     let mut families = shows::families(status);
     families.extend(controllers::families(&status.controllers));
-    families.extend(links::families(&status.links));
+    families.extend(links::families(&status.links, &status.link_ack_latency.histogram));
     families.extend(record::families(&status.record));
     families.extend(status.film.iter().flat_map(film::families));
     families

@@ -80,7 +80,7 @@ fn ticks(status: &Status) -> Vec<MetricFamily> {
         ),
         MetricFamily::histogram(
             "ack_latency_seconds",
-            "Time from sending a frame to its ack, all controllers",
+            "Time from sending a frame to its ack, all controllers on the network",
             &status.ack_latency.histogram,
         ),
     ]

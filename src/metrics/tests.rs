@@ -35,7 +35,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         ack_rate: Some(1.0),
         ack_p50_us: Some(40.0),
         ack_p99_us: None,
-        frames: FrameCounts { sent: 1_000, asked: 900, acked: 890, refused: 2, lost: 8 },
+        frames: FrameCounts { sent: 1_000, asked: 900, acked: 890, refused: 2, lost: 8, withdrawn: 0 },
         send_failed: 1,
         clamps: 3,
         homed: Some(true),
@@ -140,6 +140,7 @@ fn playing() -> Status {
         rate_hz: 100.0,
         lateness: times(),
         ack_latency: times(),
+        link_ack_latency: times(),
         realtime: RealTimeStatus {
             policy: "fifo".to_owned(),
             priority: 50,
@@ -164,6 +165,7 @@ fn booting() -> Status {
         show: None,
         lateness: Times::default(),
         ack_latency: Times::default(),
+        link_ack_latency: Times::default(),
         realtime: RealTimeStatus::default(),
         controllers: vec![],
         links: vec![],
@@ -202,6 +204,7 @@ fn each_link_and_each_axis_on_it_has_its_figures() {
     for line in [
         "kinocue_link_up{link=\"stalls\"} 1.0",
         "kinocue_link_answer_delay_seconds{link=\"stalls\"} 0.0015",
+        "kinocue_link_ack_latency_seconds_count 10",
         "kinocue_link_exchanges_total{link=\"stalls\",result=\"answered\"} 690",
         "kinocue_axis_segments_total{link=\"stalls\",controller=\"L1\",axis=\"a2\",result=\"acked\"} 80",
         "kinocue_axis_queue_dry_total{link=\"stalls\",controller=\"L1\",axis=\"a2\"} 1",

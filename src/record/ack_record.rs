@@ -48,6 +48,8 @@ pub(crate) enum AckRecord<'a> {
     Unread(usize),
     /// A link confirms the frames of a controller from the one to the other.
     Confirmed(usize, FrameNo, FrameNo),
+    /// The frames of a controller from the one to the other are not executed, as it was told to stop. Stands behind the fates of its drain.
+    Withdrawn(usize, FrameNo, FrameNo),
     /// What a reply to that frame of a controller turned out to be, and how long after the frame it came, nanoseconds; 0 where that is
     /// not known.
     Fate(usize, FrameNo, Fate, u32),
@@ -94,8 +96,8 @@ impl<'a> AckRecord<'a> {
                 out.extend_from_slice(&shakes.to_le_bytes());
             }
             Self::Unread(controller) => of(out, 7, controller),
-            Self::Confirmed(controller, first, last) => {
-                of(out, 8, controller);
+            Self::Confirmed(controller, first, last) | Self::Withdrawn(controller, first, last) => {
+                of(out, if matches!(self, Self::Confirmed(..)) { 8 } else { 20 }, controller);
                 out.extend_from_slice(&first.0.to_le_bytes());
                 out.extend_from_slice(&last.0.to_le_bytes());
             }
@@ -172,6 +174,7 @@ impl<'a> AckRecord<'a> {
             6 => Self::FellOut(controller, *FALLS.get(usize::from(from.u8()?))?, from.f64()?),
             7 => Self::Unread(controller),
             8 => Self::Confirmed(controller, from.frame_no()?, from.frame_no()?),
+            20 => Self::Withdrawn(controller, from.frame_no()?, from.frame_no()?),
             9 => {
                 let (frame, fate) = (from.frame_no()?, from.u8()?);
                 let fate = match fate.checked_sub(16) {

@@ -198,7 +198,7 @@ fn a_sampled_recording_and_one_of_an_earlier_program_are_refused_in_words() {
 fn any_record() -> impl Strategy<Value = AckRecord<'static>> {
     let time = (0..4_000_u64).prop_map(at);
     let (controller, frame) = (0..3_usize, any::<u32>().prop_map(|number| FrameNo(number >> (number % 32))));
-    (controller, frame, time, 0..14_u8).prop_map(|(controller, frame, time, kind)| match kind {
+    (controller, frame, time, 0..15_u8).prop_map(|(controller, frame, time, kind)| match kind {
         0 => AckRecord::First(controller, frame),
         1 => AckRecord::Posted(frame.0, controller, frame),
         2 => AckRecord::Failed(controller, frame),
@@ -206,6 +206,7 @@ fn any_record() -> impl Strategy<Value = AckRecord<'static>> {
         4 => AckRecord::FellOut(controller, Fall::Gap, 0.0),
         5 => AckRecord::Unread(controller),
         6 => AckRecord::Confirmed(controller, FrameNo(1), frame),
+        13 => AckRecord::Withdrawn(controller, FrameNo(1), frame),
         7 => AckRecord::Fate(controller, frame, Fate::Stray, frame.0),
         8 => AckRecord::Heard(Origin::Controller(controller), time, b"\x33\xcc"),
         9 => AckRecord::Health(HealthInput::LookAnew(controller)),

@@ -57,7 +57,7 @@ impl<'a> Turn<'a> {
             self.records = rest;
         }
         books.settle(self.began, &mut self);
-        self.take_rest();
+        self.take_rest(books.tracker_mut());
         let Self { bench, began, .. } = self;
         bench.compare(books.tracker(), began);
     }
@@ -103,7 +103,7 @@ impl<'a> Turn<'a> {
     }
 
     /// What comes once the books are settled: how controllers are looked at, and how they stand.
-    fn take_rest(&mut self) {
+    fn take_rest(&mut self, tracker: &mut Tracker) {
         while let Some((record, rest)) = self.records.split_first() {
             self.records = rest;
             match *record {
@@ -114,6 +114,9 @@ impl<'a> Turn<'a> {
                 }
                 AckRecord::Events => self.pass_events(),
                 AckRecord::Judged => self.look(),
+                AckRecord::Withdrawn(controller, first, last) if controller < self.bench.seats.len() => {
+                    tracker.withdraw(controller, first, last);
+                }
                 AckRecord::Lost(controller, total) => self.bench.on_lost(controller, total),
                 AckRecord::Standing(controller, standing) => self.bench.on_standing(controller, standing),
                 ref other => drop(self.hears_told(other)),

@@ -6,6 +6,7 @@ use std::time::Duration;
 use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
+use super::withdrawn::Withdrawn;
 use super::{LinkNews, Live, Sent, TickReport, Watch};
 use crate::drive::Incoming;
 use crate::drive::link::StreamEvent;
@@ -79,6 +80,7 @@ pub struct AckLoop {
     /// What links tell, and how many frames ask for a reply.
     links: Vec<LinkNews>,
     ack_every: u32,
+    withdrawn: Withdrawn,
     /// Who judges how the controllers stand.
     watch: Option<Watch>,
     /// Whom to tell which frames were acked, and the times so far.
@@ -105,6 +107,7 @@ impl AckLoop {
             ticks,
             links: Vec::new(),
             ack_every,
+            withdrawn: Withdrawn::default(),
             watch: None,
             last_sent: MonoTime::default(),
             live: None,
@@ -123,8 +126,10 @@ impl AckLoop {
     /// The same that hears links as well, whose seats come behind those on the network.
     #[must_use]
     pub(crate) fn hearing(mut self, links: Vec<LinkNews>) -> Self {
-        self.accounts.observer.add(links.iter().map(|link| link.controllers.len()).sum());
-        Self { links, ..self }
+        let on_links = links.iter().map(|link| link.controllers.len()).sum();
+        self.accounts.observer.add(on_links);
+        self.accounts.books.tracker_mut().set_on_links(on_links);
+        Self { links, withdrawn: Withdrawn::of(on_links), ..self }
     }
 
     /// Tells `live` which frames were acked, and the times so far, again and again while it runs.
@@ -195,7 +200,7 @@ impl AckLoop {
     fn tell_times(&mut self) {
         if let Some(live) = &self.live {
             let Accounts { books, lateness, .. } = &self.accounts;
-            live.on_times(lateness, books.tracker().latency_of_all());
+            live.on_times(lateness, books.tracker().latencies());
         }
         self.tell_table();
     }
@@ -209,7 +214,7 @@ impl AckLoop {
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, Incoming<'_>) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, links, ack_every, tap, .. } =
+        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, links, tap, withdrawn, .. } =
             self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
@@ -247,10 +252,9 @@ impl AckLoop {
             }
         });
         let mut records = Records { sent, last_sent, watch, observer, live, tap };
-        for (controller, event) in links.iter_mut().flat_map(LinkNews::take) {
-            records.hear_link(books, controller, &event, *ack_every, began);
-        }
+        links.iter_mut().for_each(|link| records.hear_link(books, link, withdrawn, self.ack_every, began));
         books.settle(began, &mut records);
+        records.withdraw(books, withdrawn);
         if let Some(live) = live {
             live.on_told(began);
         }
@@ -319,30 +323,46 @@ impl Records<'_> {
         }
     }
 
-    /// Hears what a link tells of a controller: the frames that it confirms count as acked by now.
+    /// Hears what a link tells of its controllers: the frames that it confirms count as acked by now.
     fn hear_link(
         &mut self,
         books: &mut Books,
-        controller: usize,
-        event: &StreamEvent,
+        link: &mut LinkNews,
+        withdrawn: &mut Withdrawn,
         ack_every: u32,
         now: MonoTime,
     ) {
-        if let Some(live) = self.live {
-            live.on_heard(controller);
-        }
-        if let StreamEvent::Confirmed { first, last, .. } = *event {
-            copy(self.tap, &AckRecord::Confirmed(controller, first, last));
-            let next = |frame: &FrameNo| (frame.since(last) < 0).then(|| frame.next());
-            let asked = |frame: &FrameNo| frame.asks(ack_every);
-            for frame in std::iter::successors(Some(first), next).filter(asked) {
-                let code = ReplyCode::Running;
-                books.on_reply(Reply { controller, frame, code, error: 0, inputs: 0, at: now }, self);
+        for (controller, event) in link.take() {
+            if let Some(live) = self.live {
+                live.on_heard(controller);
             }
-        } else if let Some(watch) = self.watch {
-            watch.hear_link(self.observer, controller, event, now);
+            match event {
+                StreamEvent::Confirmed { first, last, .. } => {
+                    copy(self.tap, &AckRecord::Confirmed(controller, first, last));
+                    let next = |frame: &FrameNo| (frame.since(last) < 0).then(|| frame.next());
+                    let asked = |frame: &FrameNo| frame.asks(ack_every);
+                    for frame in std::iter::successors(Some(first), next).filter(asked) {
+                        let code = ReplyCode::Running;
+                        books.on_reply(Reply { controller, frame, code, error: 0, inputs: 0, at: now }, self);
+                    }
+                }
+                StreamEvent::Withdrawn { first, last, .. } => withdrawn.take(controller, first, last),
+                _ => {
+                    if let Some(watch) = self.watch {
+                        watch.hear_link(self.observer, controller, &event, now);
+                    }
+                }
+            }
+            copy_judged(self.tap, self.watch);
         }
-        copy_judged(self.tap, self.watch);
+    }
+
+    /// What was withdrawn, once the books have the records of that.
+    fn withdraw(&mut self, books: &mut Books, withdrawn: &mut Withdrawn) {
+        for (controller, first, last) in withdrawn.drain() {
+            copy(self.tap, &AckRecord::Withdrawn(controller, first, last));
+            books.tracker_mut().withdraw(controller, first, last);
+        }
     }
 }
 

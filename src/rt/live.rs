@@ -49,13 +49,15 @@ impl HallWord {
 pub struct Times {
     /// Lateness of the ticks that sent.
     pub lateness: Histogram,
-    /// Latency of the acks of all controllers.
+    /// Latency of the acks of all controllers on the network.
     pub acks: Histogram,
+    /// The same of all seats on links.
+    pub(crate) link_acks: Histogram,
 }
 
 impl Default for Times {
     fn default() -> Self {
-        Self { lateness: histogram(), acks: histogram() }
+        Self { lateness: histogram(), acks: histogram(), link_acks: histogram() }
     }
 }
 
@@ -260,11 +262,12 @@ impl Live {
     ///
     /// # Panics
     /// Where they are not made as [`histogram()`] makes them.
-    pub(crate) fn on_times(&self, lateness: &Histogram, acks: &Histogram) {
+    pub(crate) fn on_times(&self, lateness: &Histogram, [acks, link_acks]: &[Histogram; 2]) {
         let Ok(mut times) = self.times.try_lock() else { return };
         let alike = "they have the same bounds";
         times.lateness.set_to(lateness).expect(alike);
         times.acks.set_to(acks).expect(alike);
+        times.link_acks.set_to(link_acks).expect(alike);
     }
 
     /// Held for the time of a copy.

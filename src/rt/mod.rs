@@ -17,6 +17,7 @@ mod spin;
 mod standby;
 mod table;
 mod watch;
+mod withdrawn;
 
 pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;

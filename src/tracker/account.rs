@@ -75,7 +75,7 @@ impl Account {
         let NumberPlace::Kept(index) = self.ring.find(frame) else { return };
         let entry = self.ring.get_mut(index);
         match entry.state {
-            FrameState::Acked | FrameState::Refused | FrameState::Failed => return,
+            FrameState::Acked | FrameState::Refused | FrameState::Withdrawn | FrameState::Failed => return,
             FrameState::Unasked => {}
             FrameState::InFlight | FrameState::InFlightUntimed => self.counts.asked -= 1,
             FrameState::Lost => {
@@ -109,7 +109,7 @@ impl Account {
             NumberPlace::Kept(index) => match self.ring.get(index).state {
                 FrameState::Unasked | FrameState::Failed => Fate::Stray,
                 FrameState::Acked | FrameState::Refused => Fate::Duplicate,
-                FrameState::Lost => Fate::Stale,
+                FrameState::Lost | FrameState::Withdrawn => Fate::Stale,
                 FrameState::InFlight | FrameState::InFlightUntimed => {
                     self.settle(index, frame, code, at, latencies)
                 }
@@ -149,6 +149,18 @@ impl Account {
             }
         }
         Fate::Answered(code)
+    }
+
+    pub(super) fn withdraw(&mut self, first: FrameNo, last: FrameNo) {
+        let next = |frame: &FrameNo| (frame.since(last) < 0).then(|| frame.next());
+        for frame in std::iter::successors(Some(first), next).take(KEPT as usize) {
+            let NumberPlace::Kept(index) = self.ring.find(frame) else { continue };
+            let entry = self.ring.get_mut(index);
+            if entry.state.open() {
+                entry.state = FrameState::Withdrawn;
+                self.counts.withdrawn += 1;
+            }
+        }
     }
 
     pub(super) fn expire(&mut self, now: MonoTime) {

@@ -7,7 +7,7 @@ use crate::wire::ReplyCode;
 pub struct Counts {
     /// Frames that the kernel took.
     pub sent: u64,
-    /// Of these, the ones that requested a reply: acked, refused, lost, or still in flight.
+    /// Of these, the ones that requested a reply: acked, refused, lost, withdrawn, or still in flight.
     pub asked: u64,
     /// Frames answered with x = 2 in time.
     pub acked: u64,
@@ -19,6 +19,8 @@ pub struct Counts {
     pub command: u64,
     /// Frames without a reply in time.
     pub lost: u64,
+    /// Frames that drives did not execute, as they were told to stop.
+    pub(crate) withdrawn: u64,
     /// Replies to a frame that had been answered.
     pub duplicate: u64,
     /// Replies to a lost frame, or to one too old to be remembered.
@@ -41,7 +43,7 @@ impl Counts {
     /// Frames that asked and whose fate is still open.
     #[must_use]
     pub const fn in_flight(&self) -> u64 {
-        self.asked - self.acked - self.refused() - self.lost
+        self.asked - self.acked - self.refused() - self.lost - self.withdrawn
     }
 
     pub(super) const fn add_reply(&mut self, fate: Fate) {

@@ -21,6 +21,8 @@ pub(super) enum FrameState {
     Refused,
     /// Given up.
     Lost,
+    /// Whoever was to execute it was told to stop first.
+    Withdrawn,
     /// Not taken by the kernel.
     Failed,
 }

@@ -1,7 +1,7 @@
 //! The fate of every frame: from sends and replies it keeps the account of each controller and the latency of its
 //! acks. Ack thread; pure: the time is an argument, and all memory is allocated at the start.
 //!
-//! A frame that asks for a reply ends in exactly one account: acked, refused or lost. A reply ends in exactly one as
+//! A frame that asks for a reply ends in exactly one account: acked, refused, lost or withdrawn. A reply ends in exactly one as
 //! well: acked, refused, duplicate, stale or stray.
 
 mod account;
@@ -33,7 +33,10 @@ pub const ACK_TIMEOUT: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Tracker {
     accounts: Vec<Account>,
-    latency: Histogram,
+    /// Controllers below are on the network, those from there on are on links.
+    stations: usize,
+    /// Of the acks of all on the network, and of all on links.
+    latencies: [Histogram; 2],
 }
 
 impl Tracker {
@@ -49,8 +52,15 @@ impl Tracker {
     pub fn starting_at(first: &[FrameNo], ack_every: u32) -> Self {
         Self {
             accounts: first.iter().map(|&first| Account::new(first, ack_every)).collect(),
-            latency: histogram(),
+            stations: first.len(),
+            latencies: [histogram(), histogram()],
         }
+    }
+
+    /// The last of the controllers, so many, are seats on links: their acks say that drives have what a frame leads to, which is much later
+    /// than that it was received.
+    pub(crate) fn set_on_links(&mut self, controllers: usize) {
+        self.stations = self.accounts.len().saturating_sub(controllers);
     }
 
     /// What was before a frame of a controller is not known, and its accounts begin with it.
@@ -87,7 +97,13 @@ impl Tracker {
     /// A reply later than [`ACK_TIMEOUT`] after its frame is stale, and the frame lost, whenever this is told; one in
     /// time counts, however late it is told, unless [`Tracker::expire`] came first.
     pub fn on_reply(&mut self, controller: usize, frame: FrameNo, code: ReplyCode, at: MonoTime) -> Fate {
-        self.accounts[controller].on_reply(frame, code, at, &mut self.latency)
+        let latencies = &mut self.latencies[usize::from(controller >= self.stations)];
+        self.accounts[controller].on_reply(frame, code, at, latencies)
+    }
+
+    /// A seat was told to stop and does not execute the frames from the one to the other, as far as nothing is known of them: they are not lost.
+    pub(crate) fn withdraw(&mut self, controller: usize, first: FrameNo, last: FrameNo) {
+        self.accounts[controller].withdraw(first, last);
     }
 
     /// A reply that was there before the record of its frame: it is to one that this program sent before it was started anew, unless the
@@ -150,10 +166,10 @@ impl Tracker {
         &self.accounts[controller].latency
     }
 
-    /// The same of all controllers together.
+    /// The same of all controllers on the network together, and of all seats on links.
     #[must_use]
-    pub(crate) const fn latency_of_all(&self) -> &Histogram {
-        &self.latency
+    pub(crate) const fn latencies(&self) -> &[Histogram; 2] {
+        &self.latencies
     }
 
     /// The newest frame that was acked, and when its ack was received.

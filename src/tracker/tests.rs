@@ -17,7 +17,7 @@ fn sent(count: u32) -> Tracker {
 #[track_caller]
 fn assert_balanced(tracker: &Tracker) {
     let counts = tracker.counts(0);
-    assert_eq!(counts.asked, counts.acked + counts.refused() + counts.lost, "{counts:?}");
+    assert_eq!(counts.asked, counts.acked + counts.refused() + counts.lost + counts.withdrawn, "{counts:?}");
 }
 
 #[test]
@@ -33,6 +33,32 @@ fn each_frame_ends_acked_refused_or_lost() {
     assert_eq!((counts.sent, counts.asked, counts.acked, counts.lost), (5, 5, 1, 1));
     assert_eq!((counts.fault, counts.emergency_stop, counts.command, counts.refused()), (1, 1, 1, 3));
     assert_balanced(&tracker);
+}
+
+#[test]
+fn frames_that_are_withdrawn_are_not_lost_whatever_else_is_told_of_them() {
+    let mut tracker = sent(6);
+    tracker.on_reply(0, FrameNo(3), Running, ms(9));
+    tracker.withdraw(0, FrameNo(2), FrameNo(8));
+    tracker.withdraw(0, FrameNo(4), FrameNo(4));
+    assert_eq!(tracker.on_reply(0, FrameNo(5), Running, ms(10)), Fate::Stale);
+    tracker.expire(ms(5_000));
+    let counts = tracker.counts(0);
+    assert_eq!((counts.acked, counts.withdrawn, counts.lost, counts.in_flight()), (1, 4, 1, 0));
+    assert_balanced(&tracker);
+}
+
+#[test]
+fn acks_of_seats_on_links_have_a_latency_of_their_own() {
+    let mut tracker = Tracker::new(3, 1);
+    tracker.set_on_links(1);
+    for controller in 0..3 {
+        tracker.on_sent(controller, FrameNo(1), true, ms(1));
+        tracker.on_reply(controller, FrameNo(1), Running, ms(1 + 100 * controller as u64));
+    }
+    let [on_network, on_links] = tracker.latencies();
+    assert_eq!((on_network.len(), on_links.len()), (2, 1));
+    assert!(on_network.max() < 101_000_000 && on_links.min() > 199_000_000);
 }
 
 #[test]

@@ -80,6 +80,7 @@ impl StatusParts<'_> {
             rate_hz: hall.config.show.rate_hz,
             lateness: counted(&times.lateness),
             ack_latency: counted(&times.acks),
+            link_ack_latency: counted(&times.link_acks),
             realtime: RealTimeStatus {
                 policy: hall.granted.policy.to_string(),
                 priority: hall.granted.priority,

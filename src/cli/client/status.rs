@@ -5,7 +5,7 @@ use super::server::ServerArgs;
 use super::table::table;
 use super::view::{percent, time, us};
 use crate::cli::{Exit, Failure, print};
-use crate::control::{ControllerStatus, FilmStatus, PlaylistStatus, ShowStatus, Status};
+use crate::control::{ControllerStatus, FilmStatus, Percentiles, PlaylistStatus, ShowStatus, Status, Times};
 
 /// Shows the hall's status.
 ///
@@ -92,16 +92,14 @@ fn playlist(list: &PlaylistStatus) -> String {
 
 fn ticks(status: &Status) -> String {
     let Status { ticks, missed_ticks, rate_hz, .. } = status;
-    let [lateness, ack_latency] = [&status.lateness, &status.ack_latency].map(|times| times.percentiles);
-    format!(
-        "{ticks} at {rate_hz} Hz, {missed_ticks} missed; lateness p50 {} p99 {} max {} µs; acks p50 {} p99 {} max {} µs",
-        us(lateness.p50_us),
-        us(lateness.p99_us),
-        us(lateness.max_us),
-        us(ack_latency.p50_us),
-        us(ack_latency.p99_us),
-        us(ack_latency.max_us),
-    )
+    let told = |times: &Times| {
+        let Percentiles { p50_us, p99_us, max_us, .. } = times.percentiles;
+        format!("p50 {} p99 {} max {} µs", us(p50_us), us(p99_us), us(max_us))
+    };
+    let (lateness, acks, on_links) = (&status.lateness, &status.ack_latency, &status.link_ack_latency);
+    let on_links = if on_links.is_none() { String::new() } else { format!("; on links {}", told(on_links)) };
+    let (lateness, acks) = (told(lateness), told(acks));
+    format!("{ticks} at {rate_hz} Hz, {missed_ticks} missed; lateness {lateness}; acks {acks}{on_links}")
 }
 
 fn controllers(all: &[ControllerStatus]) -> String {

@@ -185,7 +185,7 @@ fn line(diary: &Diary, missed: u64) -> String {
             _ => format!("p50 {}, p99 {}, max {}", at(0.5), at(0.99), us(times.max())),
         }
     };
-    let Times { lateness, acks } = &diary.times;
+    let Times { lateness, acks, .. } = &diary.times;
     let second = diary.until.since(diary.begun).as_secs();
     format!("{second} s: lateness {}; acks {}; {missed} missed", figures(lateness), figures(acks))
 }

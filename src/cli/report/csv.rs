@@ -51,7 +51,7 @@ fn show(show: &ReportShown) -> Vec<String> {
         record.out_of_hours.to_string(),
     ];
     let counts = outcome.map(|one| {
-        let FrameCounts { sent, asked, acked, refused, lost } = one.frames;
+        let FrameCounts { sent, asked, acked, refused, lost, .. } = one.frames;
         [one.ticks, one.missed_ticks, sent, asked, acked, refused, lost, one.send_failed]
     });
     cells.extend((0..8).map(|index| counts.map_or_else(String::new, |counts| counts[index].to_string())));

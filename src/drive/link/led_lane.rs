@@ -31,6 +31,8 @@ pub(crate) struct LedLane<F: Family> {
     pub(crate) terms: StreamTerms,
     /// Told last.
     pub(crate) moves: bool,
+    /// Told to stop since it followed poses.
+    pub(super) was_stopped: bool,
     /// The first frame of which it is not known that its drives have it, or have executed it.
     pub(crate) unconfirmed: FrameNo,
     pub(crate) own: F::LaneState,
@@ -43,12 +45,13 @@ impl<F: Family> LedLane<F> {
     /// Out until somebody has it looked at.
     pub(crate) fn new(axes: Vec<F::Axis>, terms: StreamTerms, own: F::LaneState, now: MonoTime) -> Self {
         let (stage, unconfirmed) = (Stage::Out, FrameNo::FIRST);
-        Self { axes, stage, terms, moves: true, unconfirmed, own, last: None, heard: now }
+        Self { axes, stage, terms, moves: true, was_stopped: false, unconfirmed, own, last: None, heard: now }
     }
 
     /// Begins to follow poses; the first is that frame.
     pub(super) const fn start(&mut self, first: FrameNo) {
-        (self.stage, self.moves, self.unconfirmed, self.last) = (Stage::Runs, false, first, None);
+        (self.stage, self.moves, self.was_stopped) = (Stage::Runs, false, false);
+        (self.unconfirmed, self.last) = (first, None);
     }
 
     /// Takes the next pose that it follows.

@@ -12,6 +12,8 @@ use crate::time::{Clock as _, MonoTime};
 
 /// How long the driver may take for a message: its buffer holds more than any.
 const HAND_OVER: Duration = Duration::from_millis(50);
+/// How often it is asked whether it has sent what it was given, where it is late with that.
+const LOOKS: Duration = Duration::from_micros(200);
 
 /// A line. One that fails is closed, so that its name is free for what is plugged in next, and can be opened again.
 #[derive(Debug)]
@@ -43,6 +45,19 @@ impl LinkLine {
     fn open_again(&mut self) -> Result<(), SerialError> {
         if self.port.is_none() {
             self.port = Some(SerialPort::open(&self.path, self.settings)?);
+        }
+        Ok(())
+    }
+
+    /// All that was sent has left the driver: a break or another rate would make other orders of what is late.
+    fn drain(&mut self) -> Result<(), LinkFault> {
+        let deadline = self.now() + HAND_OVER;
+        while self.with(|port| port.line().unsent().ok())? > 0 {
+            if self.now() >= deadline {
+                self.port = None;
+                return Err(LinkFault);
+            }
+            self.sleep_until(self.now() + LOOKS);
         }
         Ok(())
     }
@@ -84,11 +99,13 @@ impl LinkPort for LinkLine {
     }
 
     fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
+        self.drain()?;
         self.with(|port| port.send_break(span).ok())
     }
 
     fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
         self.settings.baud = baud;
+        self.drain()?;
         let (path, settings) = (self.path.clone(), self.settings);
         self.with(|port| port.set(&path, settings).ok())
     }

@@ -110,7 +110,10 @@ impl LinkPeer {
     /// Takes what the thread of its link tells at an instant: puts into `out` of what it is evidence.
     pub(crate) fn hear(&mut self, event: &StreamEvent, now: MonoTime, out: &mut EvidenceList) {
         match *event {
-            StreamEvent::Confirmed { .. } | StreamEvent::Rests { .. } | StreamEvent::Moves { .. } => {}
+            StreamEvent::Confirmed { .. }
+            | StreamEvent::Withdrawn { .. }
+            | StreamEvent::Rests { .. }
+            | StreamEvent::Moves { .. } => {}
             StreamEvent::Read { axis, position, at, .. } => {
                 out.extend([Evidence::Answered, Evidence::Alive]);
                 if self.homed {

@@ -18,6 +18,7 @@ use super::{
     StreamTerms, axis_number, lane_number,
 };
 use crate::time::MonoTime;
+use crate::wire::FrameNo;
 
 /// How far a first pose may be from where the seat stands, mm.
 const NEAR_MM: f64 = 0.5;
@@ -73,6 +74,11 @@ pub(crate) trait Family: Debug + Sized {
 
     /// Ends what a lane does, by a brake where it moves; false where nobody has to be told.
     fn brake(lane: &mut LedLane<Self>, now: MonoTime) -> bool;
+
+    /// The first frame that a lane which brakes does not follow any more.
+    fn dropped(lane: &LedLane<Self>) -> FrameNo {
+        lane.unconfirmed
+    }
 
     /// All lanes were asked to brake: what is sent at once.
     ///
@@ -161,7 +167,15 @@ impl<F: Family, P: LinkPort> LinkPlay for Stream<F, P> {
     }
 
     fn stop(&mut self) -> Result<(), LinkFault> {
-        (0..self.lanes.len()).for_each(|lane| self.brake(lane, BrakeReason::Stopped));
+        for index in 0..self.lanes.len() {
+            self.brake(index, BrakeReason::Stopped);
+            let lane = &mut self.lanes[index];
+            lane.was_stopped = true;
+            if let Some(last) = lane.last {
+                let first = F::dropped(lane);
+                self.withdraw(index, first, last.frame);
+            }
+        }
         F::stop(self)
     }
 
@@ -251,6 +265,16 @@ impl<F: Family, P: LinkPort> Stream<F, P> {
     fn skip(&mut self, index: usize, led: &LedPose, now: MonoTime) {
         self.figures.poses_skipped += 1;
         self.lanes[index].hear(led.pose, now);
+        if self.lanes[index].was_stopped {
+            self.withdraw(index, led.pose.frame, led.pose.frame);
+        }
+    }
+
+    /// A lane that was told to stop does not follow these, if there are any.
+    fn withdraw(&mut self, index: usize, first: FrameNo, last: FrameNo) {
+        if last.since(first) >= 0 {
+            self.tell(StreamEvent::Withdrawn { lane: lane_number(index), first, last });
+        }
     }
 
     /// Ends what a lane does, and brakes it.

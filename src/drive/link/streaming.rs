@@ -64,6 +64,15 @@ pub(crate) enum StreamEvent {
         /// The last that is covered.
         last: FrameNo,
     },
+    /// Frames that it does not follow, since it was told to stop.
+    Withdrawn {
+        /// The lane.
+        lane: u16,
+        /// The first.
+        first: FrameNo,
+        /// The last.
+        last: FrameNo,
+    },
     /// An axis of a seat that is home was read.
     Read {
         /// The lane.
@@ -165,6 +174,7 @@ impl StreamEvent {
     pub(crate) const fn lane(&self) -> u16 {
         match *self {
             Self::Confirmed { lane, .. }
+            | Self::Withdrawn { lane, .. }
             | Self::Read { lane, .. }
             | Self::Homed { lane, .. }
             | Self::Rests { lane, .. }

@@ -149,6 +149,7 @@ impl<F: Family, B: Bus> VirtualPlay<F, B> {
             !matches!(
                 event.1,
                 StreamEvent::Confirmed { .. }
+                    | StreamEvent::Withdrawn { .. }
                     | StreamEvent::Read { .. }
                     | StreamEvent::Homed { homed: true, .. }
                     | StreamEvent::Moves { .. }

@@ -89,8 +89,9 @@ impl<B: Bus> LinkPort for VirtualPort<B> {
     }
 
     fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
+        // What is plugged in again is opened at the rate that it was told last.
         self.line.set_host_baud(Some(baud));
-        Ok(())
+        if self.is_gone { Err(LinkFault) } else { Ok(()) }
     }
 
     fn sleep_until(&mut self, at: MonoTime) {

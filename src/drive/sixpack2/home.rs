@@ -1,7 +1,10 @@
 //! A seat finds its zero, and is then set up for shows. Nobody sits on it, and a person watches.
 //!
 //! Each motor in turn searches by itself, and knows no end of that: whoever leads it ends a search that takes too long. Then its counter is
-//! set, so that the lower end of the stroke is at 1,000,000, and all go slowly to park.
+//! set, so that the lower end of the stroke is at 0, and all go slowly to park.
+//!
+//! What a unit is set to cannot be read, its counters can: so they lose their places before anything else is set, and that end becomes 1,000,000
+//! last of all. Whatever cuts a homing off, counters that have places of the seat are those of motors that are set up for shows.
 
 use std::time::Duration;
 
@@ -42,7 +45,7 @@ pub(crate) struct Homing<'a> {
 /// Finds the unit of a seat and homes it; all of its axes are at park afterwards.
 ///
 /// # Errors
-/// A [`HomeError`]; by then all of its motors were told to stop, and it is not home.
+/// A [`HomeError`]; by then all of its motors were told to stop, and it is not home. They brake as in a show again, as far as they answer.
 pub(crate) fn home<P: LinkPort>(
     talk: &mut Talk<P>,
     seat: SeatMotors<'_>,
@@ -52,12 +55,33 @@ pub(crate) fn home<P: LinkPort>(
     find(talk, &[seat.unit])?;
     let done = run(talk, seat, &axes, &mut around);
     if done.is_err() {
-        for axis in &axes {
-            // What is wrong already is told; that the line is gone, too, is no news.
-            let _ = axis.stop(talk);
-        }
+        // What is wrong already is told; that the line is gone, too, is no news.
+        let around = &mut Homing { goes_on: &|| true, told: &mut |_| {} };
+        let _ = set_aside(talk, seat, &axes, Purpose::Show, around);
     }
     done
+}
+
+/// Brings all of its motors to rest, has them forget where they are, and sets them up.
+fn set_aside<P: LinkPort>(
+    talk: &mut Talk<P>,
+    seat: SeatMotors<'_>,
+    axes: &[MotorAxis<'_>],
+    purpose: Purpose,
+    around: &mut Homing<'_>,
+) -> Result<(), HomeError> {
+    // All are told, whichever does not answer, before any is waited for.
+    axes.iter().map(|axis| axis.stop(talk)).fold(Ok(()), Result::and)?;
+    axes.iter().try_for_each(|axis| axis.await_rest(talk, around))?;
+    axes.iter().try_for_each(|axis| axis.forget_zero(talk))?;
+    let (unit, divider) = (seat.unit, seat.sixpack2.clock_divider);
+    talk.confirm(unit, SixpackOrder::Timeout(PacketTimeout { timeout: PACKET_TIMEOUT }), WHO)?;
+    talk.confirm(unit, SixpackOrder::Clock(ClockDivider { divider }), WHO)?;
+    for (index, axis) in axes.iter().enumerate() {
+        axis.set_up(talk, purpose)?;
+        (around.told)(Step::Held(index));
+    }
+    Ok(())
 }
 
 fn run<P: LinkPort>(
@@ -67,16 +91,7 @@ fn run<P: LinkPort>(
     around: &mut Homing<'_>,
 ) -> Result<(), HomeError> {
     let unit = seat.unit;
-    for axis in axes {
-        axis.stop(talk)?;
-        axis.await_rest(talk, around)?;
-    }
-    talk.confirm(unit, SixpackOrder::Timeout(PacketTimeout { timeout: PACKET_TIMEOUT }), WHO)?;
-    talk.confirm(unit, SixpackOrder::Clock(ClockDivider { divider: seat.sixpack2.clock_divider }), WHO)?;
-    for (index, axis) in axes.iter().enumerate() {
-        axis.set_up(talk, Purpose::Homing)?;
-        (around.told)(Step::Held(index));
-    }
+    set_aside(talk, seat, axes, Purpose::Homing, around)?;
     for (index, axis) in axes.iter().enumerate() {
         axis.find_zero(talk, index, around)?;
         (around.told)(Step::Found(index));
@@ -86,6 +101,9 @@ fn run<P: LinkPort>(
         axis.set_up(talk, Purpose::Show)?;
         (around.told)(Step::Set(index));
     }
+    has_its_settings(talk, unit)?;
+    axes.iter().try_for_each(|axis| axis.prove(talk))?;
+    // A unit that was reset meanwhile took that for its place.
     has_its_settings(talk, unit)
 }
 
@@ -108,9 +126,9 @@ fn park<P: LinkPort>(
     (around.told)(Step::Parking);
     let (mut farthest, mut mask) = (0.0_f64, 0);
     for axis in axes {
-        let target = axis.scale.whole(axis.park_mm());
+        let target = axis.unproved(axis.park_mm());
         let here = axis.write(talk, SixpackOrder::JointTarget(JointTarget { motor: axis.motor, target }))?;
-        let way = (axis.park_mm() - axis.scale.mm(here.position.into())).abs();
+        let way = (axis.park_mm() - axis.unproved_mm(here)).abs();
         farthest = farthest.max(way / axis.search_mm_s());
         mask |= 1 << axis.motor;
     }
@@ -121,7 +139,7 @@ fn park<P: LinkPort>(
     for axis in axes {
         let seconds = farthest * MOVE.0 + MOVE.1;
         let there = axis.await_idle(talk, seconds, around)?.ok_or_else(|| axis.moves(seconds))?;
-        let (found_mm, wanted_mm) = (axis.scale.mm(there.position.into()), axis.park_mm());
+        let (found_mm, wanted_mm) = (axis.unproved_mm(there), axis.park_mm());
         if (found_mm - wanted_mm).abs() > PARKED_MM {
             let (unit, motor) = (seat.unit, axis.motor);
             return Err(HomeError::Elsewhere { unit, motor, found_mm, wanted_mm });
@@ -142,6 +160,47 @@ impl MotorAxis<'_> {
     /// The speed of its search as it makes it.
     fn search_mm_s(&self) -> f64 {
         self.scale.mm_s(self.scale.speed(self.homing().speed_mm_s))
+    }
+
+    /// What the counter has at the lower end of the stroke once the seat is home; until then it has 0.
+    fn base(&self) -> i32 {
+        self.scale.whole(self.axis.low)
+    }
+
+    /// The counter at a place as long as the seat is not home.
+    fn unproved(&self, mm: f64) -> i32 {
+        self.scale.whole(mm) - self.base()
+    }
+
+    /// The place of such a counter.
+    fn unproved_mm(&self, told: PositionTold) -> f64 {
+        self.scale.mm(f64::from(told.position) + f64::from(self.base()))
+    }
+
+    /// Its counter has no place of the seat any more.
+    fn forget_zero<P: LinkPort>(&self, talk: &mut Talk<P>) -> Result<(), HomeError> {
+        // By settings of others that may begin a search (manual, page 42).
+        self.write(talk, self.kind())?;
+        self.count_as(talk, 0)
+    }
+
+    /// Its counter has the place of the seat where it stands.
+    fn prove<P: LinkPort>(&self, talk: &mut Talk<P>) -> Result<(), HomeError> {
+        let stands = position(talk, self.of.unit, self.motor)?.position;
+        self.count_as(talk, self.base().saturating_add(stands))?;
+        // Where a joint move leads that nobody asked for.
+        let target = self.scale.whole(self.park_mm());
+        Ok(self
+            .write(talk, SixpackOrder::JointTarget(JointTarget { motor: self.motor, target }))
+            .map(drop)?)
+    }
+
+    /// Sets its counter.
+    fn count_as<P: LinkPort>(&self, talk: &mut Talk<P>, wanted: i32) -> Result<(), HomeError> {
+        let (unit, motor) = (self.of.unit, self.motor);
+        let preset = SixpackOrder::Preset(PositionPreset { motor, position: wanted });
+        let found = self.write(talk, preset)?.position;
+        if found == wanted { Ok(()) } else { Err(HomeError::ReadBack { unit, motor, found, wanted }) }
     }
 
     fn moves(&self, seconds: f64) -> HomeError {
@@ -206,10 +265,7 @@ impl MotorAxis<'_> {
         if off_mm.abs() > BESIDE_MM {
             return Err(HomeError::BesideZero { unit, motor, off_mm });
         }
-        let wanted = self.scale.whole(homing.zero_mm).saturating_add(beside);
-        let preset = SixpackOrder::Preset(PositionPreset { motor, position: wanted });
-        let found = self.write(talk, preset)?.position;
-        if found == wanted { Ok(()) } else { Err(HomeError::ReadBack { unit, motor, found, wanted }) }
+        self.count_as(talk, self.unproved(homing.zero_mm).saturating_add(beside))
     }
 
     /// Has its motor search; how far beside its zero that ended, microsteps.

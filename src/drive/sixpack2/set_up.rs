@@ -304,7 +304,7 @@ impl MotorAxis<'_> {
     }
 
     /// Where its zero is and what tells it; the order keeps it from searching by itself.
-    fn kind(&self) -> SixpackOrder {
+    pub(super) fn kind(&self) -> SixpackOrder {
         let homing = self.homing();
         let is_left = (homing.toward == Side::Down) != self.is_reversed;
         let way = match homing.way {

@@ -21,24 +21,29 @@ pub(crate) struct SerialLine<B> {
     /// What it does to octets.
     pub(crate) faults: LineFaults,
     chance: Chance,
-    out: Wire,
-    back: Wire,
+    /// What the host sends, each at its rate; breaks as none.
+    out: Wire<Option<(u8, Option<u32>)>>,
+    back: Wire<u8>,
     /// The answer that is being sent is lost.
     is_losing: bool,
 }
 
 /// One direction.
-#[derive(Debug, Default)]
-struct Wire {
+#[derive(Debug)]
+struct Wire<T> {
     /// When each octet has wholly arrived, in their order.
-    octets: VecDeque<(MonoTime, u8)>,
+    octets: VecDeque<(MonoTime, T)>,
     /// When the last one had.
     free: MonoTime,
 }
 
-impl Wire {
+impl<T> Wire<T> {
+    const fn empty() -> Self {
+        Self { octets: VecDeque::new(), free: MonoTime::from_nanos(0) }
+    }
+
     /// Puts an octet on the wire once that is free.
-    fn put(&mut self, octet: u8, now: MonoTime, takes: Duration) {
+    fn put(&mut self, octet: T, now: MonoTime, takes: Duration) {
         self.free = self.free.max(now) + takes;
         self.octets.push_back((self.free, octet));
     }
@@ -53,8 +58,8 @@ impl<B: Bus> SerialLine<B> {
             host_baud: None,
             faults,
             chance: Chance::new(seed, 0),
-            out: Wire::default(),
-            back: Wire::default(),
+            out: Wire::empty(),
+            back: Wire::empty(),
             is_losing: false,
         }
     }
@@ -87,15 +92,18 @@ impl<B: Bus> SerialLine<B> {
             }
             let (count, octet, late) = self.harm(*octet);
             for _ in 0..count {
-                self.out.put(octet, now + late, takes);
+                self.out.put(Some((octet, self.host_baud)), now + late, takes);
             }
         }
     }
 
-    /// The host sends a break, which takes effect at once.
+    /// The host begins a break, which takes effect behind what is on its way.
     pub(crate) fn send_break(&mut self, now: MonoTime) {
         self.advance(now);
-        self.bus.on_break(now);
+        if !self.faults.unplugged {
+            self.out.put(None, now, Duration::ZERO);
+        }
+        self.advance(now);
     }
 
     /// All that happens up to now, in its order.
@@ -108,8 +116,10 @@ impl<B: Bus> SerialLine<B> {
             if arrival == Some(at)
                 && let Some((_, octet)) = self.out.octets.pop_front()
             {
-                let octet = self.heard(octet);
-                self.bus.on_octet(octet, at);
+                match octet {
+                    Some((octet, baud)) => self.bus.on_octet(self.heard(octet, baud), at),
+                    None => self.bus.on_break(at),
+                }
             }
             let is_stuck = self.take_answers(at) == 0 && arrival != Some(at) && self.bus.next() == Some(at);
             debug_assert!(!is_stuck, "a bus that asked for {at:?} and did nothing then");
@@ -155,7 +165,7 @@ impl<B: Bus> SerialLine<B> {
                 self.is_losing = self.loses_answer();
             }
             let takes = self.octet_time(self.bus.baud());
-            let octet = self.heard(octet);
+            let octet = self.heard(octet, self.host_baud);
             if self.is_losing {
                 self.back.free = self.back.free.max(now) + takes;
                 continue;
@@ -177,10 +187,10 @@ impl<B: Bus> SerialLine<B> {
     }
 
     /// An octet as it is heard at the other end: as another where the two ends differ in their rate.
-    fn heard(&self, octet: u8) -> u8 {
+    fn heard(&self, octet: u8, host: Option<u32>) -> u8 {
         let bus = self.bus.baud();
         let differs = |host: u32| u64::from(host.abs_diff(bus)) * 100 > u64::from(BAUD_TOLERANCE * bus);
-        if self.host_baud.is_some_and(differs) { !octet } else { octet }
+        if host.is_some_and(differs) { !octet } else { octet }
     }
 
     /// How often an octet arrives, as what, and how much later.

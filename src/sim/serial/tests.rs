@@ -143,6 +143,21 @@ fn at_another_baud_rate_nothing_is_understood_and_within_four_parts_in_a_hundred
     assert_eq!(line.bus().breaks, 1);
 }
 
+#[test]
+fn octets_that_are_late_come_before_a_break_and_at_the_rate_at_which_they_were_sent() {
+    let late_by = Duration::from_millis(5);
+    let mut line = line(LineFaults { late: 1.0, late_by, ..LineFaults::default() });
+    line.set_host_baud(Some(57_600));
+    line.send(b"ab", at(0));
+    line.send_break(at(1_000));
+    line.set_host_baud(Some(19_200));
+    line.advance(at(4_900));
+    assert_eq!((line.bus().waiting.len(), line.bus().breaks), (0, 0));
+    line.advance(at(5_900));
+    let heard: Vec<u8> = line.bus().waiting.iter().map(|(_, octet)| *octet).collect();
+    assert_eq!((heard.as_slice(), line.bus().breaks), (b"ab".as_slice(), 1));
+}
+
 const SETTINGS: SerialSettings = SerialSettings { baud: 57_600, stop_bits: StopBits::Two, is_rs485: false };
 
 fn exchange(port: &SerialPort, sent: &[u8]) -> Vec<u8> {

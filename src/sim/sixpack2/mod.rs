@@ -10,6 +10,8 @@ mod shaft;
 mod tests;
 mod unit;
 
+#[cfg(test)]
+pub(crate) use motor::MotorWritten;
 pub(crate) use motor::SixpackMotor;
 pub(crate) use shaft::ShaftSetup;
 pub(crate) use unit::{MOTORS, SixpackFault, SixpackSetup, SixpackUnit};
@@ -71,8 +73,9 @@ impl Bus for SixpackBus {
         self.units.iter().filter_map(SixpackUnit::next).min()
     }
 
-    /// That of the slowest: where each is switched alone, a line is switched with the last.
+    /// That of the slowest that is alive: where each is switched alone, a line is switched with the last.
     fn baud(&self) -> u32 {
-        self.units.iter().map(SixpackUnit::baud).min().unwrap_or(1)
+        let slowest = self.units.iter().min_by_key(|unit| (unit.is_dead(), unit.baud()));
+        slowest.map_or(1, SixpackUnit::baud)
     }
 }

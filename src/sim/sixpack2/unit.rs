@@ -135,6 +135,11 @@ impl SixpackUnit {
         self.setup.unit
     }
 
+    /// True while it neither hears nor moves nor answers.
+    pub(super) const fn is_dead(&self) -> bool {
+        self.is_dead
+    }
+
     /// Octets that never became a frame.
     pub(crate) const fn strays(&self) -> u64 {
         self.collector.strays()

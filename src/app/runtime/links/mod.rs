@@ -54,7 +54,11 @@ fn used(config: &Config) -> impl Iterator<Item = &Link> {
 /// The seats on a link, each with its lane.
 fn seats<'c>(config: &'c Config, link: &Link) -> impl Iterator<Item = (usize, &'c Controller)> {
     let all = config.controllers.iter().enumerate();
-    all.filter(|(_, one)| one.drives().is_some_and(|drives| drives.link == link.name))
+    all.filter(|(_, one)| is_on(one, link))
+}
+
+fn is_on(one: &Controller, link: &Link) -> bool {
+    one.drives().is_some_and(|drives| drives.link == link.name)
 }
 
 impl Links {
@@ -95,7 +99,9 @@ impl Links {
         let seats: Vec<&Controller> = on_it.iter().map(|(_, controller)| *controller).collect();
         let (poses, from_tick) = RingBuffer::new(POSES * on_it.len());
         let (to_acks, events) = RingBuffer::new(EVENTS);
-        let stream = LinkStream::new(port, (link, terms), &seats, from_tick, to_acks);
+        let absent = config.named().skip(config.controllers.len()).filter(|one| is_on(one, link));
+        let all = (&*seats, &*absent.collect::<Vec<_>>());
+        let stream = LinkStream::new(port, (link, terms), all, from_tick, to_acks);
         let stream = stream.map_err(|error| format!("[link.{}]: {error}", link.name))?;
         let wants = on_it.iter().filter_map(|(lane, ..)| watch.wants(*lane)).collect();
         self.poses.push(poses);

@@ -3,6 +3,7 @@
 #![expect(clippy::cast_possible_truncation, reason = "numbers of ticks")]
 
 mod chance;
+mod silvermax;
 mod sixpack;
 
 use std::cell::Cell;
@@ -177,6 +178,15 @@ impl<B: Bus> Hall<'_, '_, B> {
         NOW.set(until);
     }
 
+    /// That each frame that was handed over had its fate, and none is lost; some were withdrawn.
+    fn assert_withdrawn(&self) {
+        let counts = self.runtime.live.table()[0].counts;
+        assert!(counts.acked > 300 && counts.withdrawn > 0, "{counts:?}");
+        assert_eq!((counts.lost, counts.in_flight()), (0, 0), "{counts:?}");
+        let times = self.runtime.live.times();
+        assert_eq!((times.acks.len(), times.link_acks.len()), (0, counts.acked));
+    }
+
     fn is_led(&self) -> bool {
         self.loops.ticks.engine.lane(0).gets_a_frame()
     }
@@ -315,85 +325,4 @@ fn assert_gentle(hall: &Hall<'_, '_>) {
         assert!(mm(unit.acceleration) < 3_030.0, "{} mm/s2", mm(unit.acceleration));
         assert_eq!(unit.jumps, 0);
     }
-}
-
-#[test]
-fn a_cue_is_executed_within_an_eighth_of_a_millimetre_its_lead_after_the_ticks() {
-    hall(|hall, show, cue| {
-        let lead = show.lanes[0].window.lead();
-        hall.go(show);
-        let (mut worst, mut rode) = (0.0_f64, false);
-        let mut begun = None;
-        hall.run(25.0, |hall| {
-            // Frame 0 is reached a lead and a tick after it was sent.
-            if hall.runtime.live.ticks() == 1 && begun.is_none() {
-                begun = Some(NOW.get());
-            }
-            let Some(begun) = begun else { return };
-            // The line is ahead of the ticks by up to an exchange.
-            let show_ns = hall.line.lock().now().since(begun).as_nanos() as i64 - lead.as_nanos() as i64;
-            let at = ShowTime::from_nanos(show_ns);
-            if hall.state().may_send_motion() && show_ns > 0 && at < cue.duration() {
-                let wanted = cue.sample(at, &mut crate::timeline::Hint::default());
-                for (place, wanted) in hall.places_mm().iter().zip(wanted) {
-                    rode |= wanted > 0.5;
-                    worst = worst.max((place - 150.0 * wanted).abs());
-                }
-            }
-            if rode && hall.state() == State::Parked {
-                assert!(hall.places_mm().iter().all(|place| place.abs() < 0.05), "{:?}", hall.places_mm());
-            }
-        });
-        assert_eq!(hall.state(), State::Parked);
-        assert!(rode && worst < 0.12, "{worst} mm");
-        assert_gentle(hall);
-        for place in hall.places_mm() {
-            assert!(place.abs() < 0.02, "{place} mm off park");
-        }
-    });
-}
-
-#[test]
-fn a_stop_brakes_the_drives_at_once_and_no_pose_that_was_under_way_moves_them_on() {
-    hall(|hall, show, _| {
-        hall.go(show);
-        hall.run(6.0, |_| {});
-        assert!(hall.units(Unit::is_moving).contains(&true));
-        hall.runtime.desk.stop();
-        // 203 mm/s and 3000 mm/s²: at rest after 68 ms, and a tick and an exchange for each unit.
-        hall.run(0.2, |_| {});
-        let places = hall.places_mm();
-        hall.run(2.0, |_| {});
-        assert_eq!(hall.places_mm(), places);
-        assert_eq!(hall.state(), State::Stopped);
-        let reading = hall.reading().expect("it is read where it stands");
-        assert!(reading.rests && (150.0 * reading.pose[0] - places[0]).abs() < 0.1, "{reading:?} {places:?}");
-        assert_gentle(hall);
-    });
-}
-
-#[test]
-fn a_seat_of_a_program_that_was_held_up_for_a_second_is_led_again_once_it_was_found() {
-    for ms in [0, 3, 5, 8, 11] {
-        hall(|hall, show, _| {
-            hall.comes_back_after_a_second(show, Duration::from_millis(ms));
-            assert_gentle(hall);
-        });
-    }
-}
-
-#[test]
-fn a_line_that_is_cut_brings_the_seat_to_rest_within_the_lead_and_puts_its_lane_out() {
-    hall(|hall, show, _| {
-        let lead = show.lanes[0].window.lead();
-        hall.go(show);
-        hall.run(6.0, |_| {});
-        hall.line.lock().is_gone = true;
-        hall.run(lead.as_secs_f64() + 0.1, |_| {});
-        let places = hall.places_mm();
-        hall.run(1.0, |_| {});
-        assert_eq!(hall.places_mm(), places);
-        assert!(!hall.is_led(), "no pose goes to it");
-        assert_gentle(hall);
-    });
 }

@@ -129,6 +129,12 @@ impl Axis {
         self.reckoned = self.reckoned.max(now.before(ARRIVED));
     }
 
+    /// For how long where its motor is was not reckoned.
+    #[cfg(test)]
+    pub(in super::super) fn owes(&self, now: MonoTime) -> Duration {
+        now.since(self.reckoned)
+    }
+
     /// True if its motor follows something.
     pub(super) fn moves(&self) -> bool {
         self.model.velocity() != 0.0

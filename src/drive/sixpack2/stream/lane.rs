@@ -23,6 +23,8 @@ pub(crate) struct LaneState {
     pub(super) is_home: bool,
     /// It answered at the rate of the link, so it hears what is said there.
     pub(super) was_heard: bool,
+    /// Its seat takes no part: its motors are told to stand, and nothing is asked of it.
+    pub(super) is_absent: bool,
     /// Slices since its motors were led, all of them.
     pub(super) stops: u32,
     /// Times that its unit was looked for.
@@ -46,6 +48,7 @@ impl LaneState {
             track: Track::at_rest(tick, [0.0; MAX_AXES], now),
             is_home: false,
             was_heard: false,
+            is_absent: false,
             stops: 0,
             probes: 0,
             next_axis: 0,
@@ -68,6 +71,11 @@ impl SixpackLane {
             (axis.rests, axis.holds, axis.stood_at, axis.strayed) = (false, holds, None, 0);
             axis.skip(now);
         }
+    }
+
+    /// True if its motors are told something in each slice.
+    pub(super) const fn is_told(&self) -> bool {
+        self.own.was_heard || self.own.is_absent
     }
 
     /// True if its motors are told where to be; any others are told to stop.

@@ -32,6 +32,7 @@ use crate::drive::link::{
     StreamTerms, lane_number as number,
 };
 use crate::time::MonoTime;
+use crate::wire::FrameNo;
 use crate::wire::sixpack2::{AbortSearch, SixpackFrame, SixpackOrder};
 
 /// A question is asked for so many targets.
@@ -145,6 +146,11 @@ impl Family for Sixpack2 {
         true
     }
 
+    /// Behind what is executed by now: that is confirmed as ever.
+    fn dropped(lane: &SixpackLane) -> FrameNo {
+        lane.own.track.newest().map_or(lane.unconfirmed, FrameNo::next)
+    }
+
     /// Those that are not led are told to in each slice.
     fn stop<P: LinkPort>(_: &mut Stream<Self, P>) -> Result<(), LinkFault> {
         Ok(())
@@ -182,11 +188,21 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         around: Homing<'_>,
     ) -> Result<(), HomeError> {
         if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
-            lane.stage = Stage::Out;
+            (lane.stage, lane.own.is_home) = (Stage::Out, false);
         }
         home(&mut self.talk, seat, around)?;
         self.rejoin(lane);
         Ok(())
+    }
+
+    /// Has the motors of seats that take no part told to stand: what is damaged on its way may be an order to them.
+    pub(crate) fn stand_by<'a>(&mut self, absent: impl Iterator<Item = SeatMotors<'a>>) {
+        let (terms, now) = (self.terms, self.talk.now());
+        // Nobody can have homed one that cannot be set up.
+        for mut lane in absent.filter_map(|seat| Sixpack2::lane(&seat, terms, now).ok()) {
+            lane.own.is_absent = true;
+            self.lanes.push(lane);
+        }
     }
 
     /// A lane was homed again: its last target is nothing to hold.
@@ -214,7 +230,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let asked = if self.own.targets >= TARGETS { self.talk.question() } else { Duration::ZERO };
         let half = self.own.next_slice.max(at + frame_time * told + asked).since(now) / 2;
         let mut frames = Vec::with_capacity(told as usize + 1);
-        for lane in self.lanes.iter_mut().filter(|lane| lane.own.was_heard) {
+        for lane in self.lanes.iter_mut().filter(|lane| lane.is_told()) {
             frames.extend(lane.orders(at, frame_time, half));
             at = at + frame_time * u32::try_from(lane.axes.len()).unwrap_or(u32::MAX);
         }
@@ -226,9 +242,9 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         Ok(())
     }
 
-    /// Those whose units hear what is said at the rate of the link.
+    /// Those whose units hear what is said at the rate of the link, and those that may.
     fn told(&self) -> impl Iterator<Item = &SixpackLane> {
-        self.lanes.iter().filter(|lane| lane.own.was_heard)
+        self.lanes.iter().filter(|lane| lane.is_told())
     }
 
     /// A motor that searches takes nothing but the end of that: the one whose question was not answered is told it, or else those that are

@@ -96,6 +96,11 @@ impl Track {
         self.knots.iter().rev().find(|knot| knot.at <= at)?.frame
     }
 
+    /// The last frame that leads it anywhere.
+    pub(super) fn newest(&self) -> Option<FrameNo> {
+        self.knots.back()?.frame
+    }
+
     /// What an axis does at an instant, in strokes; none where the poses do not reach.
     pub(super) fn at(&self, axis: usize, at: MonoTime) -> Option<Middle> {
         let place = |index: usize| self.knots[index].places[axis];
@@ -144,12 +149,13 @@ impl Track {
         let late = from.since(self.knots[index].at);
         self.knots.iter_mut().for_each(|knot| knot.at = knot.at + late);
         let longest = halts.iter().map(Halt::seconds).fold(0.0, f64::max);
-        let Knot { mut at, mut places, .. } = self.knots[index];
+        // What it brakes from is executed with that: whoever is where the brake leads confirms it.
+        let Knot { mut at, mut places, frame } = self.knots[index];
         let mut after = 0.0;
         while after <= longest + tick {
             (after, at) = (after + tick, at + self.tick);
             places.iter_mut().zip(&halts).for_each(|(place, halt)| *place = halt.position(after));
-            self.knots.push_back(Knot { at, places, frame: None });
+            self.knots.push_back(Knot { at, places, frame });
         }
     }
 }

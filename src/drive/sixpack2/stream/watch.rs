@@ -30,7 +30,7 @@ const LOST_ZERO_MM: f64 = 10.0;
 enum Stands {
     /// Nothing, all of them.
     All,
-    /// This one does something, or is elsewhere.
+    /// This one does something.
     Not(usize),
     /// Their unit does not answer.
     Silent,
@@ -266,7 +266,9 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let mut left: Vec<(usize, u32)> = heard.map(|index| (index, 0)).collect();
         while !left.is_empty() {
             // All are told before any is asked.
-            let stops: Vec<_> = left.iter().flat_map(|(index, _)| self.lanes[*index].stops()).collect();
+            let absent = self.lanes.iter().filter(|lane| lane.own.is_absent);
+            let told = left.iter().map(|(index, _)| &self.lanes[*index]).chain(absent);
+            let stops: Vec<_> = told.flat_map(SixpackLane::stops).collect();
             self.talk.send(&stops)?;
             tries += 1;
             let mut still = Vec::new();
@@ -293,7 +295,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         self.lanes[index].axes.iter().all(|axis| told > axis.brakes)
     }
 
-    /// Whether the motors of a lane that were told to stop do nothing.
+    /// Whether the motors of a lane that were told to stop do nothing. One that is led and stands elsewhere is out.
     fn stands(&mut self, index: usize) -> Result<Stands, LinkFault> {
         let lane = &self.lanes[index];
         let actions = match self.talk.ask(lane.own.unit, SixpackOrder::AskActions { response: ANSWER }) {
@@ -305,22 +307,17 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         if let Some(a) = lane.axes.iter().position(|axis| !rests(axis)) {
             return Ok(Stands::Not(a));
         }
-        let is_there = !lane.is_led() || self.is_where_it_was_led(index)?;
-        Ok(if is_there { Stands::All } else { Stands::Not(0) })
-    }
-
-    /// Whether all motors of a lane that is led answer, and are there; one that is not puts it out.
-    fn is_where_it_was_led(&mut self, index: usize) -> Result<bool, LinkFault> {
-        for a in 0..self.lanes[index].axes.len() {
-            let Some(told) = self.place_of(index, a)? else { return Ok(false) };
+        let axes = if lane.is_led() { lane.axes.len() } else { 0 };
+        for a in 0..axes {
+            let Some(told) = self.place_of(index, a)? else { return Ok(Stands::Silent) };
             let by_mm = self.lanes[index].axes[a].beside(told.position).0;
             if by_mm.abs() > OFF_COURSE_MM {
                 let (lane, axis) = (number(index), axis_number(a));
                 self.put_out(index, StreamEvent::OffCourse { lane, axis, by_mm });
-                return Ok(false);
+                break;
             }
         }
-        Ok(true)
+        Ok(Stands::All)
     }
 
     /// Looks for the unit of a lane that is lost or out.

@@ -10,7 +10,7 @@ use crate::drive::link::{LinkTalk as _, Step, TalkTerms};
 use crate::motion::{AxisGeometry, MAX_AXES, SeatType};
 use crate::sim::serial::{LineFaults, SerialLine};
 use crate::sim::sixpack2::{
-    MOTORS, ShaftSetup, SixpackBus, SixpackFault, SixpackMotor, SixpackSetup, SixpackUnit,
+    MOTORS, MotorWritten, ShaftSetup, SixpackBus, SixpackFault, SixpackMotor, SixpackSetup, SixpackUnit,
 };
 use crate::time::MonoTime;
 
@@ -113,6 +113,13 @@ pub(super) fn unit(talk: &mut Talk<VirtualPort>) -> &SixpackUnit {
 
 pub(super) fn motor(talk: &mut Talk<VirtualPort>, motor: usize) -> &SixpackMotor {
     &unit(talk).motors[motor]
+}
+
+/// True if a motor brakes and runs as a show needs it.
+pub(super) fn is_set_up_for_shows(motor: &SixpackMotor) -> bool {
+    let MotorWritten { ramp, currents, pi, .. } = motor.written;
+    (ramp.amax, ramp.vmax, pi.propdiv) == (12, 503, 25)
+        && currents.is_some_and(|it| (it.run, it.ramp) == (1, 0))
 }
 
 /// Where an axis really is, mm.

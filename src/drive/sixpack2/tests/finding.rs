@@ -66,20 +66,46 @@ fn a_unit_that_is_not_there_is_told_by_number_and_rates_and_the_line_is_back_at_
     assert_eq!(find(&mut talk, &[1]), Err(FindError::Link(LinkFault)));
 }
 
-/// A line on which nothing of the greater rate comes back.
-struct Slow(VirtualPort, u32);
+/// A line that has something against a rate, at the rate that it was told last.
+struct Bad(VirtualPort, Against, u32);
 
-impl LinkPort for Slow {
+#[derive(Clone, Copy, PartialEq)]
+enum Against {
+    /// Nothing of the greater comes back.
+    Greater,
+    /// Somebody pulls the adapter as soon as something is said at that with which units wake.
+    Waking,
+}
+
+impl Bad {
+    /// A conversation over one, at the rate of the link.
+    fn talk(against: Against) -> Talk<Self> {
+        let bus = talk_to(&[unit_with(1, shaft())]).port().line.bus().clone();
+        let now = MonoTime::from_nanos(3_000_000_000);
+        let line = SerialLine::new(bus, 10, LineFaults::default(), 7);
+        let terms = TalkTerms { baud: BAUD, octet_bits: 10, has_echo: false, is_two_wires: false };
+        let mut port = VirtualPort::new(line, now);
+        port.line.set_host_baud(Some(BAUD));
+        Talk::new(Self(port, against, BAUD), terms)
+    }
+
+    const fn is_slow(&self) -> bool {
+        self.2 < 20_000
+    }
+}
+
+impl LinkPort for Bad {
     fn now(&self) -> MonoTime {
         self.0.now()
     }
 
     fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
+        self.0.is_gone |= self.1 == Against::Waking && self.is_slow();
         self.0.send(octets)
     }
 
     fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault> {
-        if self.1 < 20_000 {
+        if self.1 == Against::Waking || self.is_slow() {
             return self.0.receive(buf, deadline);
         }
         self.0.sleep_until(deadline);
@@ -95,7 +121,7 @@ impl LinkPort for Slow {
     }
 
     fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
-        self.1 = baud;
+        self.2 = baud;
         self.0.set_baud(baud)
     }
 
@@ -106,16 +132,23 @@ impl LinkPort for Slow {
 
 #[test]
 fn a_unit_that_answers_only_as_it_woke_is_told_so() {
-    let bus = talk_to(&[unit_with(1, shaft())]).port().line.bus().clone();
-    let now = MonoTime::from_nanos(3_000_000_000);
-    let line = SerialLine::new(bus, 10, LineFaults::default(), 7);
-    let terms = TalkTerms { baud: BAUD, octet_bits: 10, has_echo: false, is_two_wires: false };
-    let mut talk = Talk::new(Slow(VirtualPort::new(line, now), BAUD), terms);
+    let mut talk = Bad::talk(Against::Greater);
     let words = find(&mut talk, &[1]).unwrap_err().to_string();
     assert!(
         words.starts_with("unit 1 answers at 19231 baud, its power-on rate, but not at 56818"),
         "{words}"
     );
+}
+
+#[test]
+fn an_adapter_that_is_pulled_while_a_unit_is_looked_for_as_it_woke_is_opened_again_at_the_rate_of_its_link() {
+    let finds = |talk: &mut Talk<Bad>| find(talk, &[1]) == Err(FindError::Link(LinkFault));
+    let looks = |talk: &mut Talk<Bad>| look_for(talk, 1, &[0]) == Err(TalkFault::Link(LinkFault));
+    for is_told in [finds as fn(&mut Talk<Bad>) -> bool, looks] {
+        let mut talk = Bad::talk(Against::Waking);
+        assert!(is_told(&mut talk));
+        assert_eq!((talk.baud(), talk.port().2), (BAUD, BAUD));
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::drive::link::{LinkTalk as _, Step};
 use crate::drive::sixpack2::*;
 use crate::motion::SeatType;
 use crate::sim::serial::LineFaults;
-use crate::sim::sixpack2::{ShaftSetup, SixpackFault};
+use crate::sim::sixpack2::{ShaftSetup, SixpackFault, SixpackMotor};
 
 /// What the counter of a motor reads.
 fn counts(talk: &mut Talk<VirtualPort>, index: usize) -> i32 {
@@ -30,7 +30,7 @@ fn a_seat_is_homed_by_the_edges_of_its_switches_and_stands_at_park_with_its_sett
         assert_eq!(counts(&mut talk, index), 1_000_000);
         let motor = motor(&mut talk, index);
         let (written, executed) = (motor.written, motor.shaft.executed());
-        assert_eq!((written.ramp.amax, written.ramp.vmax, written.pi.propdiv), (12, 503, 25));
+        assert!(is_set_up_for_shows(motor), "{written:?}");
         assert_eq!((written.kind.p5, written.kind.p6, written.start.div), (0x90, 0x72, 0));
         assert_eq!(written.currents.map(|it| [it.power_down, it.stand, it.run, it.ramp]), Some([2, 2, 1, 0]));
         assert_eq!(written.peak.map(|it| it.value), Some(238));
@@ -92,14 +92,28 @@ fn a_search_is_made_with_less_current_and_a_show_with_all_of_it() {
     let sixpack2 = drive.sixpack2.clone().unwrap();
     let of =
         SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors: &[0], period: PERIOD };
+    // It searches by then.
+    let at = talk.now() + Duration::from_secs(2);
+    talk.port().script = Some((at, |line, _| {
+        let SixpackMotor { written, .. } = &line.bus().units()[0].motors[0];
+        assert_eq!(written.currents.map(|it| [it.stand, it.run, it.ramp]), Some([2, 3, 3]));
+        assert_eq!(written.ramp.vmax, 41);
+    }));
+    let ready = home(&mut talk, of, Homing { goes_on: &|| true, told: &mut |_| {} });
+    assert!(ready == Ok(()) && talk.port().script.is_none() && is_set_up_for_shows(motor(&mut talk, 0)));
+}
+
+#[test]
+fn a_search_that_is_ended_stops_where_it_is() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    let (seat, drive) = (SeatType { axes: 1, ..seat() }, drive(SWITCH));
+    let sixpack2 = drive.sixpack2.clone().unwrap();
+    let of =
+        SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors: &[0], period: PERIOD };
     let abort = AtomicBool::new(false);
     let mut told = |step| abort.store(matches!(step, Step::Searching(_)), Ordering::Relaxed);
     let homed = home(&mut talk, of, Homing { goes_on: &|| !abort.load(Ordering::Relaxed), told: &mut told });
     assert_eq!(homed, Err(HomeError::Aborted));
-    let written = motor(&mut talk, 0).written;
-    assert_eq!(written.currents.map(|it| [it.stand, it.run, it.ramp]), Some([2, 3, 3]));
-    assert_eq!(written.ramp.vmax, 41);
-    talk.pause(Duration::from_secs(1));
     let stood = place(&mut talk, 0);
     assert!(stood > 79.0, "it had hardly begun to move: {stood}");
     talk.pause(Duration::from_secs(9));
@@ -141,6 +155,35 @@ fn a_unit_that_restarts_while_it_homes_is_not_home() {
         talk.pause(Duration::from_secs(1));
         assert_eq!(motor(&mut talk, 0).speed(), 0);
     }
+}
+
+/// Whoever looks next, a day later, has nothing but the counters.
+#[test]
+fn wherever_a_homing_is_cut_off_counters_that_have_places_of_the_seat_are_of_motors_set_up_for_shows() {
+    let begins = |talk: &mut Talk<VirtualPort>| {
+        assert_eq!(home_as(talk, &drive(SWITCH), &[0, 1]).0, Ok(()));
+        talk.now()
+    };
+    let mut whole = talk_to(&[unit_with(1, shaft())]);
+    let (begun, ends) = (begins(&mut whole), begins(&mut whole));
+    let (mut known, mut unknown) = (0, 0);
+    // In steps of less than an exchange, where there is one after the other.
+    let lasts = ends.since(begun);
+    let early = (0..120).map(|step| Duration::from_millis(4 * step));
+    let late = (0..180).map(|step| lasts.saturating_sub(Duration::from_millis(4 * step)));
+    for after in early.chain(late) {
+        let mut talk = talk_to(&[unit_with(1, shaft())]);
+        let at = begins(&mut talk) + after;
+        talk.port().script = Some((at, |line, _| line.faults.unplugged = true));
+        let (homed, _) = home_as(&mut talk, &drive(SWITCH), &[0, 1]);
+        for index in 0..2 {
+            let motor = motor(&mut talk, index);
+            let is_known = (999_000..1_100_000).contains(&motor.position());
+            assert!(!is_known || is_set_up_for_shows(motor), "{after:?} {homed:?}: {:?}", motor.written);
+            *if is_known { &mut known } else { &mut unknown } += 1;
+        }
+    }
+    assert!(known > 20 && unknown > 400, "{known} {unknown}");
 }
 
 #[test]

@@ -9,7 +9,9 @@
 mod bench;
 mod finding;
 mod homing;
+mod lost;
 mod play;
 mod playing;
+mod rates;
 mod runaway;
 mod trouble;

@@ -17,7 +17,8 @@ pub(super) type Play = VirtualPlay<Sixpack2, SixpackBus>;
 impl Play {
     /// A play to a seat on each of so many units, home or not.
     pub(super) fn to(talk: Talk<VirtualPort>, units: u8) -> Result<Self, HomeError> {
-        let period = if units > 1 { Duration::from_micros(11_900) } else { PERIOD };
+        // Of two at 113,636 baud.
+        let period = if units > 1 { Duration::from_micros(5_950) * u32::from(units) } else { PERIOD };
         let (seat, drive) = (seat(), drive(SWITCH));
         let sixpack2 = drive.sixpack2.clone().unwrap();
         let of = |unit| SeatMotors {
@@ -41,7 +42,7 @@ impl Play {
         }
         talk.port().line.bus_mut().forget();
         let mut play = Self::to(talk, setups.len() as u8).unwrap();
-        play.wait(1.0);
+        play.wait(setups.len() as f64);
         assert!(play.all_ready(), "{:?}", play.rare());
         play
     }

@@ -215,6 +215,8 @@ fn a_stop_that_has_a_counter_begin_anew_before_nobody_is_told_anything_is_found_
     // Its motor holds a place, and that is elsewhere by its counter now.
     let (from, most) = (place(&mut play.stream.talk, 0), Scene { holds: false, ..scene }.most(&play));
     play.stream.settle().unwrap();
+    let last = play.stream.talk.port().sent.last().map(|(_, octets)| octets[1]);
+    assert_eq!(last, Some(0x20), "the reading that says so is the last that it is asked");
     play.wait(1.0);
     assert!(play.has("OffCourse") && !play.stream.is_ready(0), "{:?}", play.rare());
     let mm = (place(&mut play.stream.talk, 0) - from).abs();

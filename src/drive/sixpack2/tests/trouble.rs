@@ -264,6 +264,11 @@ fn a_seat_whose_homing_is_ended_or_fails_away_from_park_is_not_led_back_to_where
         // What a search brakes from.
         let mm = goes_in(&mut play, 3.0);
         assert!(mm < 4.0 && play.speed() == 0.0, "{ends:?} {homed:?}: {mm} mm");
+        assert!(play.has("Homed { lane: 0, homed: false }") && !play.stream.is_ready(0), "{:?}", play.rare());
+        assert!(
+            play.bus().units()[0].motors[..3].iter().all(is_set_up_for_shows),
+            "{ends:?}: its stops are slow"
+        );
     }
 }
 

@@ -128,6 +128,7 @@ fn a_stop_brakes_the_motors_at_once_and_no_pose_that_was_under_way_moves_them_on
         let (reading, places) = (hall.reading().expect("it is read where it stands"), hall.mm());
         assert!(reading.rests && (150.0 * reading.pose[0] - places[0]).abs() < 0.1, "{reading:?} {places:?}");
         hall.assert_gentle();
+        hall.assert_withdrawn();
     });
 }
 
