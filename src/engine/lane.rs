@@ -124,6 +124,11 @@ impl LaneMotion {
         !matches!(self.mode, LaneMode::Unseen | LaneMode::Away)
     }
 
+    /// Whether it follows the cue, as that lane of the course.
+    pub(super) fn is_on_cue(&self, course: &Course, lane: usize, at: ShowTime) -> bool {
+        self.mode == LaneMode::Following && course.is_on_cue(lane, at)
+    }
+
     /// Another tick begins, after so many that were missed.
     pub(super) fn pass(&mut self, missed: u64) {
         let ticks = u32::try_from(missed + 1).unwrap_or(u32::MAX);

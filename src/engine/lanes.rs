@@ -110,7 +110,7 @@ impl Lanes {
         let dt = time.as_secs_f64();
         let mut moved = false;
         for (lane, motion) in self.all.iter_mut().enumerate() {
-            let follows = motion.mode == LaneMode::Following && course.is_on_cue(lane, at);
+            let follows = motion.is_on_cue(course, lane, at);
             let target = motion.wanted.motion.min(self.greatest_level);
             if !follows || (motion.fader.is_still() && (!free || motion.fader.is_at(target))) {
                 continue;
@@ -158,6 +158,11 @@ impl Lanes {
                 self.events.push(EngineEvent::Joined(lane));
             }
         }
+    }
+
+    /// Whether any of them is on the cue: none may be though the show goes on, where all are out or away.
+    pub(super) fn is_any_on_cue(&self, course: &Course, at: ShowTime) -> bool {
+        self.all.iter().enumerate().any(|(lane, motion)| motion.is_on_cue(course, lane, at))
     }
 
     /// The greatest level there is.

@@ -175,6 +175,12 @@ impl Engine {
         }
     }
 
+    /// Whether any seat is on the cue.
+    pub(crate) fn is_any_on_cue(&self) -> bool {
+        let at = self.playhead.reached();
+        matches!(&self.phase, Phase::Following(Following { course, .. }) if self.lanes.is_any_on_cue(course, at))
+    }
+
     /// What happened, to be taken every tick.
     pub(crate) fn events(&mut self) -> &mut EngineEvents {
         self.lanes.note_arrivals(self.phase.course(), self.playhead.reached());

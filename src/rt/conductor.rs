@@ -164,7 +164,8 @@ impl Conductor {
         // The pose that was sent a tick ago is reached now.
         let reached = engine.playhead().reached();
         // At the tick that loses the film the point falls back to its last sample: that is no error of the seats.
-        let follows = self.machine.state() == State::Playing(PlayMode::Following) && film.leads();
+        let is_led = self.machine.state() == State::Playing(PlayMode::Following) && film.leads();
+        let follows = is_led && engine.is_any_on_cue();
         self.film_error_ns = film.error_ns(reached, tick.deadline, trim_ms).filter(|_| follows);
         if rides {
             self.machine.event(event, now);

@@ -67,6 +67,15 @@ fn a_show_follows_the_film_of_its_hall_once_a_person_has_let_it_go_and_moves_nob
         .wait(|status| status["state"] == "playing" && status["show"]["position_s"].as_f64() > Some(29.0));
     assert_eq!(again["film"]["joins"], 2, "{}", again["film"]);
     assert!(again["film"]["sources"][0]["freewheel_s"].as_f64() > Some(1.0), "{}", again["film"]);
+    let follows = |status: &serde_json::Value| status["film"]["error_ms"].is_number();
+    hall.wait(follows);
+    for seat in ["A1", "A2"] {
+        hall.done(&["disable", seat]);
+    }
+    let alone = hall.wait(|status| !follows(status));
+    assert_eq!(alone["state"], "playing", "the show goes on without a seat whose error there could be");
+    hall.done(&["enable", "A1"]);
+    hall.wait(follows);
     drop(reel);
     let _trailer = film(0, "02:00:00:00");
     let parked = hall.wait(|status| status["state"] == "parked");
