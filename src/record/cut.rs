@@ -6,8 +6,9 @@ use std::io::{Read, Seek, Write};
 use mcap::McapError;
 
 use super::anonymous::Anonymous;
-use super::full::Block;
+use super::block::Block;
 use super::read::{Contents, ReadError, Told, Wanted, read};
+use super::summary::each_chunk;
 use super::{About, AckChunk, Chunk, EntryMaker, Message, Mode, Opening, RecordedSeat, Recording, Sampled};
 use crate::time::{MonoTime, ShowTime};
 
@@ -69,8 +70,8 @@ pub(crate) enum CutError {
 /// What is in a stretch.
 #[derive(Debug)]
 pub(crate) enum Piece<'a> {
-    /// A tick with all its frames, and its octets.
-    Tick(Chunk<'a>, &'a [u8]),
+    /// A tick with all its frames.
+    Tick(Chunk<'a>),
     /// Some of what the ack thread took after a tick and before the next, and its octets.
     Drain(AckChunk<'a>, &'a [u8]),
 }
@@ -114,17 +115,14 @@ pub(crate) fn each_tick(
             _ => return,
         };
         is_whole = true;
-        let mut rest = chunks.as_slice();
-        while let Some((chunk, behind)) = Chunk::parse(rest) {
-            let octets = &rest[..rest.len() - behind.len()];
-            rest = behind;
+        each_chunk(&chunks, |chunk| {
             let is_in = stretch.holds(chunk.head.film);
             held.ticks.push_back((chunk.head.deadline, is_in));
             if is_in {
                 ticks += 1;
-                take(contents, Piece::Tick(chunk, octets));
+                take(contents, Piece::Tick(*chunk));
             }
-        }
+        });
     })?;
     if let Some(name) = stretch.seat.as_ref().filter(|name| contents.seat(name).is_none()) {
         let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
@@ -232,10 +230,10 @@ impl<W: Write + Seek> Cutting<W> {
 
     fn take(&mut self, piece: &Piece<'_>) -> Result<(), McapError> {
         match (piece, &self.anonymous) {
-            (Piece::Tick(chunk, octets), None) => self.tick(chunk, octets),
-            (Piece::Tick(chunk, _), Some(anonymous)) => {
+            (Piece::Tick(chunk), None) => self.tick(chunk),
+            (Piece::Tick(chunk), Some(anonymous)) => {
                 let octets = anonymous.tick(chunk).unwrap_or_default();
-                Chunk::parse(&octets).map_or(Ok(()), |(chunk, _)| self.tick(&chunk, &octets))
+                Chunk::parse(&octets).map_or(Ok(()), |(chunk, _)| self.tick(&chunk))
             }
             (Piece::Drain(..), _) if self.block.is_none() => Ok(()),
             (Piece::Drain(_, octets), None) => {
@@ -249,13 +247,13 @@ impl<W: Write + Seek> Cutting<W> {
         }
     }
 
-    fn tick(&mut self, chunk: &Chunk<'_>, octets: &[u8]) -> Result<(), McapError> {
+    fn tick(&mut self, chunk: &Chunk<'_>) -> Result<(), McapError> {
         let Self { file, fold, seats, taken, block, drains, film_time, ticks, .. } = self;
         *ticks += 1;
         let mut result = Ok(());
         fold.take(chunk, &mut writer(file, taken, *film_time, &mut result));
         result?;
-        match block.as_mut().and_then(|block| block.add(chunk, octets, seats)) {
+        match block.as_mut().and_then(|block| block.add(chunk, seats)) {
             Some((at, block)) => {
                 file.write(at, &Message::Ticks(block))?;
                 file.write(at, &Message::Drains(std::mem::take(drains)))
@@ -268,7 +266,7 @@ impl<W: Write + Seek> Cutting<W> {
         let mut result = Ok(());
         self.fold.close(&mut writer(&mut self.file, &self.taken, self.film_time, &mut result));
         result?;
-        if let Some((at, block)) = self.block.as_mut().and_then(|block| block.close(&self.seats)) {
+        if let Some((at, block)) = self.block.as_mut().and_then(Block::close) {
             self.file.write(at, &Message::Ticks(block))?;
             self.file.write(at, &Message::Drains(std::mem::take(&mut self.drains)))?;
         }

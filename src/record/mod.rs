@@ -11,6 +11,7 @@ mod ack_record;
 mod ack_words;
 mod acks;
 mod anonymous;
+mod block;
 mod chunk;
 mod columns;
 mod compare;
@@ -64,7 +65,7 @@ pub(crate) use schemas::state_number;
 pub(crate) use seat::RecordedAxis;
 pub use seat::{FrameKind, RecordedSeat};
 pub(crate) use summary::{SeatTotals, Summary, each_chunk, state_word, summarize};
-pub(crate) use tap::octets_a_second;
 pub use tap::{Tap, tap};
+pub(crate) use tap::octets_a_second;
 #[cfg(test)]
 pub(crate) use tests::recorded_as;

@@ -4,8 +4,9 @@ use std::io::Cursor;
 
 use proptest::prelude::*;
 
+use super::block::Block;
 use super::chunk::{ChunkWriter, Handed, SentFrame};
-use super::full::{Block, unpack};
+use super::full::unpack;
 use super::tests::{MS, about, asked, frame, head, recorded_as, seat, window};
 use super::*;
 use crate::motion::Pulses;
@@ -158,16 +159,12 @@ proptest! {
             octets.extend_from_slice(writer.close(&head, *dropped).unwrap());
         }
         let mut packed = Vec::new();
-        let mut rest = octets.as_slice();
-        while let Some((chunk, behind)) = Chunk::parse(rest) {
-            packed.extend(block.add(&chunk, &rest[..rest.len() - behind.len()], &seats));
-            rest = behind;
-        }
-        packed.extend(block.close(&seats));
+        each_chunk(&octets, |chunk| packed.extend(block.add(chunk, &seats)));
+        packed.extend(block.close());
         let back: Vec<u8> = packed.iter().flat_map(|(_, block)| unpack(block, &seats).expect("it is ours")).collect();
         prop_assert_eq!(told(&back), told(&octets));
         let mut places = (Vec::new(), Vec::new());
-        let places_of = |chunk: &Chunk<'_>, to: &mut Vec<f64>| chunk.frames().for_each(|one| to.extend(seats[one.lane].asked(&one.asked)));
+        let places_of = |chunk: &Chunk<'_>, to: &mut Vec<f64>| chunk.frames().for_each(|one| to.extend_from_slice(&seats[one.lane].asked(&one.asked)));
         each_chunk(&octets, |chunk| places_of(chunk, &mut places.0));
         each_chunk(&back, |chunk| places_of(chunk, &mut places.1));
         prop_assert!(places.0.iter().zip(&places.1).all(|(one, other)| (one - other).abs() <= 0.5001 * seats[0].axes()[0].pulse));
@@ -186,10 +183,10 @@ proptest! {
         for tick in 0..40 {
             writer.frame(&SentFrame { lane: 0, at: MonoTime::from_nanos(tick), handed: Handed::Taken, asked: asked(0.3), datagram: frame(0.3, &mut [0; MAX_LEN]) });
             let octets = writer.close(&head(tick * 10), 0).unwrap().to_vec();
-            block.add(&Chunk::parse(&octets).unwrap().0, &octets, &[seat()]);
+            block.add(&Chunk::parse(&octets).unwrap().0, &[seat()]);
             writer.clear();
         }
-        let (_, mut packed) = block.close(&[seat()]).unwrap();
+        let (_, mut packed) = block.close().unwrap();
         let at = at.index(packed.len());
         packed[at] = octet;
         let _ = unpack(&packed, &[seat()]);

@@ -18,7 +18,7 @@ use super::{Message, RecordedSeat};
 use crate::time::{MonoTime, Rate};
 
 /// The version of topics, messages and metadata.
-pub(super) const VERSION: &str = "1";
+pub(super) const VERSION: &str = "2";
 /// The topic of whole ticks.
 pub(super) const SENT: &str = "/full/sent";
 /// That of what the ack thread took.

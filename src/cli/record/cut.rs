@@ -103,7 +103,7 @@ fn each<W: Write>(
 ) -> Result<W, Failure> {
     let mut result = Ok(());
     each_tick(open(path)?, stretch, &mut |contents, piece| {
-        let Piece::Tick(chunk, _) = piece else { return };
+        let Piece::Tick(chunk) = piece else { return };
         let chunk = &chunk;
         if result.is_ok() {
             result = row(&mut out, contents, chunk);
