@@ -73,6 +73,8 @@ pub(super) struct Worker {
     show: Option<OpenRecording>,
     incidents: Incidents,
     incident: Option<OpenFile>,
+    flush_at: MonoTime,
+    sync_at: MonoTime,
     closes: bool,
 }
 
@@ -102,6 +104,8 @@ impl Worker {
             show: None,
             incidents: Incidents::default(),
             incident: None,
+            flush_at: MonoTime::default(),
+            sync_at: MonoTime::default(),
             closes: false,
         }
     }
@@ -143,27 +147,30 @@ impl Worker {
 
     /// Records until the taps are gone.
     pub(super) fn run(mut self, clock: &impl Clock) {
-        let mut flush_at = clock.now() + FLUSH;
-        let mut sync_at = clock.now();
         loop {
             // Asked before they are emptied: what was pushed before the end is taken.
             let is_over = self.intake.is_over();
             let now = clock.now();
-            self.take_asks(now);
-            self.take_taps();
-            self.mind_ends(now);
-            if now >= flush_at {
-                self.flush(now);
-                flush_at = now + FLUSH;
-            }
-            if now >= sync_at {
-                self.sync(now);
-                sync_at = now + SYNC;
-            }
+            self.look(now);
             if is_over && self.closes {
                 return self.end(now);
             }
             clock.sleep_until(now + LOOK);
+        }
+    }
+
+    /// Takes what is there, and minds what is due.
+    fn look(&mut self, now: MonoTime) {
+        self.take_asks(now);
+        self.take_taps();
+        self.mind_ends(now);
+        if now >= self.flush_at {
+            self.flush(now);
+            self.flush_at = now + FLUSH;
+        }
+        if now >= self.sync_at {
+            self.sync(now);
+            self.sync_at = now + SYNC;
         }
     }
 
@@ -459,3 +466,6 @@ impl Worker {
         self.link.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
     }
 }
+
+#[cfg(test)]
+mod tests;
