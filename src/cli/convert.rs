@@ -11,7 +11,7 @@ use super::load::cue_exit;
 use super::record::{open, unread};
 use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
-use crate::record::{Places, RecordedAxis, tracks};
+use crate::record::{Places, RecordedAxis, Tracks, tracks};
 
 /// Converts a cue to another format, or the motion of a seat in a recording into a cue.
 #[derive(Debug, clap::Args)]
@@ -147,11 +147,12 @@ fn of_recording(
     take: Take,
 ) -> Result<Result<(Cue, Option<Problem>), CueFaults>, Failure> {
     let from = if take == Take::Sent { Places::Sent } else { Places::Measured };
-    let (contents, mut tracks, _) = tracks(open(path)?, from).map_err(|error| unread(error, path))?;
+    let Tracks { contents, mut seats, .. } =
+        tracks(open(path)?, from).map_err(|error| unread(error, path))?;
     let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
     let error = || anyhow!("--seat {name}: the seats are {}", names.join(", "));
     let lane = contents.seat(name).ok_or_else(error).or_exit(Exit::Usage)?;
-    let track = tracks.remove(name).unwrap_or_default();
+    let track = seats.remove(name).unwrap_or_default();
     let (Some((first, places)), axes) = (track.first(), contents.seats[lane].axes()) else {
         let error = anyhow!("{}: nothing of {name} was recorded while the film ran", path.display());
         return Err(error).or_exit(Exit::BadCue);

@@ -47,7 +47,7 @@ pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
 #[cfg(feature = "harness")]
 pub(crate) use chunk::{Handed, SentFrame};
-pub(crate) use compare::{Comparison, Places, compare, tracks};
+pub(crate) use compare::{Comparison, Places, Tracks, compare, tracks};
 pub(crate) use cut::{CutError, CutManner, Piece, Stretch, cut, each_tick};
 pub(crate) use flight::{Entry, Flight, read as read_flight};
 pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
