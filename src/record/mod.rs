@@ -68,4 +68,4 @@ pub(crate) use summary::{SeatTotals, Summary, each_chunk, state_word, summarize}
 pub use tap::{Tap, tap};
 pub(crate) use tap::octets_a_second;
 #[cfg(test)]
-pub(crate) use tests::recorded_as;
+pub(crate) use tests::{recorded_as, recorded_measured};

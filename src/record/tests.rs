@@ -13,7 +13,7 @@ use crate::net::{Delivery, SendFault};
 use crate::state::{PlayMode, State};
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::tracker::Fate;
-use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, ReplyCode, Timing, VibrationPort};
+use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, PerAxis, ReplyCode, Timing, VibrationPort};
 
 pub(super) const MS: u64 = 1_000_000;
 const PLAYING: State = State::Playing(PlayMode::Following);
@@ -73,6 +73,15 @@ fn recorded(ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
 }
 
 pub(crate) fn recorded_as(mode: Mode, ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
+    recorded_of(mode, ticks.map(|(wanted, sent)| (wanted, sent, None)))
+}
+
+/// The same of ticks of places sent, at which the seat was measured to be elsewhere.
+pub(crate) fn recorded_measured(ticks: impl Iterator<Item = (f64, Option<f64>)>) -> Vec<u8> {
+    recorded_of(Mode::Sampled, ticks.map(|(sent, measured)| (sent, sent, measured)))
+}
+
+fn recorded_of(mode: Mode, ticks: impl Iterator<Item = (f64, f64, Option<f64>)>) -> Vec<u8> {
     let seats = [seat()];
     let (Taps { ticks: mut tap, mut acks }, intake) =
         Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);
@@ -80,7 +89,7 @@ pub(crate) fn recorded_as(mode: Mode, ticks: impl Iterator<Item = (f64, f64)>) -
     let about = About { mode, ..about() };
     let file = Recording::begin(Cursor::new(Vec::new()), &about, &seats).unwrap();
     let mut recorder = Recorder::new(intake, file);
-    for (tick, (wanted, sent)) in (0_u64..).zip(ticks) {
+    for (tick, (wanted, sent, measured)) in (0_u64..).zip(ticks) {
         let mut buf = [0; MAX_LEN];
         tap.asked(asked(wanted));
         tap.frame(0, frame(sent, &mut buf), MonoTime::from_nanos(tick * 10 * MS), Delivery::Sent);
@@ -89,6 +98,11 @@ pub(crate) fn recorded_as(mode: Mode, ticks: impl Iterator<Item = (f64, f64)>) -
         if tick % 2 == 0 {
             let fate = Fate::Answered(ReplyCode::Running);
             acks.take(&AckRecord::Fate(0, FrameNo(u32::try_from(tick).unwrap()), fate, 2_000_000));
+        }
+        if let Some(place) = measured {
+            let at = MonoTime::from_nanos((tick * 10 + 3) * MS);
+            let pulses = PerAxis::from_fn(3, |slot| window().slots()[slot].pulses(place));
+            acks.take(&AckRecord::Measured(0, at, pulses));
         }
         acks.drained(MonoTime::from_nanos((tick * 10 + 5) * MS));
         recorder.take().unwrap();
