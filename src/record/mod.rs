@@ -66,6 +66,6 @@ pub(crate) use seat::RecordedAxis;
 pub use seat::{FrameKind, RecordedSeat};
 pub(crate) use summary::{SeatTotals, Summary, each_chunk, state_word, summarize};
 pub use tap::{Tap, tap};
-pub(crate) use tap::octets_a_second;
+pub(crate) use tap::{file_octets_a_second, octets_a_second};
 #[cfg(test)]
 pub(crate) use tests::{recorded_as, recorded_measured};

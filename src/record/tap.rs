@@ -45,6 +45,18 @@ pub(crate) fn octets_a_second(seats: &[RecordedSeat], rate: Rate, sample_hz: u32
     ticks * tick as u64 + SAMPLE * u64::from(sample_hz) * (1 + seats.len() as u64)
 }
 
+/// The same of a file: samples are a quarter as long once they are packed, and whole ticks are there only where everything is kept.
+pub(crate) fn file_octets_a_second(
+    seats: &[RecordedSeat],
+    rate: Rate,
+    sample_hz: u32,
+    keeps_ticks: bool,
+) -> u64 {
+    let samples = SAMPLE * u64::from(sample_hz) * (1 + seats.len() as u64);
+    let ticks = octets_a_second(seats, rate, sample_hz) - samples;
+    samples / 4 + if keeps_ticks { ticks } else { 0 }
+}
+
 impl Tap {
     /// The next frame comes of that.
     #[inline]

@@ -452,6 +452,9 @@ impl Worker {
         if let Ok(free) = &free {
             self.link.tell(|status| status.free_bytes = *free);
         }
+        if let Ok(room) = self.disk.room() {
+            self.link.has_room(room.max(1));
+        }
         let file = self.show.as_ref().and_then(|show| show.file.as_ref());
         let Some(open) = file else { return };
         let kept = open.disk.sync().and_then(|()| self.disk.clear_out_for_more());
