@@ -8,6 +8,7 @@ use mcap::McapError;
 use super::anonymous::Anonymous;
 use super::block::Block;
 use super::read::{Contents, ReadError, Told, Wanted, read};
+use super::scene::Scene;
 use super::summary::each_chunk;
 use super::{About, AckChunk, Chunk, EntryMaker, Message, Mode, Opening, RecordedSeat, Recording, Sampled};
 use crate::time::{MonoTime, ShowTime};
@@ -44,6 +45,8 @@ pub(crate) struct CutManner {
     pub(crate) anonymous: bool,
     /// With whole ticks as well.
     pub(crate) whole: bool,
+    /// With seats in space as well.
+    pub(crate) scene: bool,
 }
 
 /// Why nothing was cut.
@@ -192,6 +195,8 @@ struct Cutting<W: Write + Seek> {
     seats: Vec<RecordedSeat>,
     /// Which seats are taken.
     taken: Vec<bool>,
+    maker: EntryMaker,
+    scene: Option<Scene>,
     block: Option<Block>,
     /// Drains of the block that is not over.
     drains: Vec<u8>,
@@ -215,17 +220,24 @@ impl<W: Write + Seek> Cutting<W> {
             mode: if manner.whole { Mode::Full } else { Mode::Sampled },
             clocks: (MonoTime::default(), if manner.film_time { 0 } else { origin }),
         };
-        let taken = contents.seats.iter().map(|seat| stretch.has(seat)).collect();
+        let taken: Vec<bool> = contents.seats.iter().map(|seat| stretch.has(seat)).collect();
         let own = contents.judging();
         let judging = anonymous.as_ref().map_or(own.as_ref(), Anonymous::judging);
         let opening = Opening::new(&about, &seats);
         let opening = judging.into_iter().fold(opening, Opening::judged);
-        let file = Recording::open(out, &opening, EntryMaker::new(seats.len(), about.clocks))?;
+        let maker = EntryMaker::new(seats.len(), about.clocks);
+        let (scene, opening) = if manner.scene {
+            let (scene, opening) = Scene::of(opening, &taken);
+            (Some(scene), opening)
+        } else {
+            (None, opening)
+        };
+        let file = Recording::open(out, &opening, maker)?;
         // A window for each tick, whatever the rate.
         let fold = Sampled::new(seats.clone(), 1_000_000);
         let block = manner.whole.then(Block::default);
         let (film_time, drains, ticks) = (manner.film_time, Vec::new(), 0);
-        Ok(Self { file, fold, seats, taken, block, drains, anonymous, film_time, ticks })
+        Ok(Self { file, fold, seats, taken, maker, scene, block, drains, anonymous, film_time, ticks })
     }
 
     fn take(&mut self, piece: &Piece<'_>) -> Result<(), McapError> {
@@ -248,11 +260,15 @@ impl<W: Write + Seek> Cutting<W> {
     }
 
     fn tick(&mut self, chunk: &Chunk<'_>) -> Result<(), McapError> {
-        let Self { file, fold, seats, taken, block, drains, film_time, ticks, .. } = self;
+        let Self { file, fold, seats, taken, maker, scene, block, drains, film_time, ticks, .. } = self;
         *ticks += 1;
         let mut result = Ok(());
         fold.take(chunk, &mut writer(file, taken, *film_time, &mut result));
         result?;
+        let film = MonoTime::from_nanos(chunk.head.film.as_nanos().max(0).cast_unsigned());
+        let at = if *film_time { film } else { chunk.head.deadline };
+        let of_scene = scene.iter_mut().flat_map(|scene| scene.take(chunk, seats, at, *maker));
+        of_scene.into_iter().try_for_each(|entry| file.put(&entry))?;
         match block.as_mut().and_then(|block| block.add(chunk, seats)) {
             Some((at, block)) => {
                 file.write(at, &Message::Ticks(block))?;

@@ -33,6 +33,7 @@ mod recording;
 mod recover;
 mod report;
 mod sampled;
+mod scene;
 mod schemas;
 mod seat;
 mod summary;

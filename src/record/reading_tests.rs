@@ -111,6 +111,34 @@ fn of_a_cut_file_all_that_is_complete_is_written_anew_with_an_index() {
     assert_eq!(names, ["kinocue", "kinocue.recovered"]);
 }
 
+#[test]
+fn a_cut_with_its_scene_has_a_cube_for_each_seat_once_and_where_it_is_twenty_times_a_second() {
+    let whole = recorded_as(Mode::Full, swing(300));
+    let stretch = Stretch { from: ShowTime::ZERO, until: ShowTime::from_millis(1_999), seat: None };
+    let manner = CutManner { scene: true, ..CutManner::default() };
+    let file = cut(whole.as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().into_inner();
+    let all = |topic: &str| -> Vec<serde_json::Value> {
+        let messages = mcap::MessageStream::new(&file).unwrap().map(Result::unwrap);
+        let of_topic = messages.filter(|one| one.channel.topic == topic);
+        of_topic.map(|one| serde_json::from_slice(&one.data).unwrap()).collect()
+    };
+    let [scene] = &all("/scene")[..] else { panic!("once") };
+    assert_eq!(
+        (&scene["entities"][0]["id"], &scene["entities"][0]["frame_locked"]),
+        (&"A1".into(), &true.into())
+    );
+    let transforms = all("/tf");
+    assert_eq!(transforms.len(), 40, "two seconds");
+    for (tick, (place, _)) in (0..40).zip(swing(200).step_by(5)) {
+        let one = &transforms[tick]["transforms"][0];
+        assert_eq!(one["child_frame_id"], scene["entities"][0]["frame_id"]);
+        // Metres of a stroke of 150 mm, to the pulse.
+        assert!((one["translation"]["z"].as_f64().unwrap() - place * 0.150).abs() < 1e-5, "{one}");
+    }
+    let contents = read(file.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
+    assert!(contents.faults.is_empty() && contents.trouble.is_none(), "{contents:?}");
+}
+
 fn motion(
     window: &crate::motion::Window,
     place: f64,

@@ -110,6 +110,16 @@ impl Opening {
         opening
     }
 
+    /// The same with more topics of JSON, each with its schema; and the channel of the first.
+    pub(super) fn with_topics(mut self, topics: &[(&str, Value)]) -> (Self, u16) {
+        let first = u16::try_from(self.channels.len()).unwrap_or(u16::MAX);
+        for (topic, schema) in topics {
+            let schema = self.schema(schema);
+            self.channels.push(((*topic).to_owned(), schema, "json".to_owned()));
+        }
+        (self, first)
+    }
+
     fn schema(&mut self, schema: &Value) -> usize {
         let name = schema["title"].as_str().unwrap_or_default().to_owned();
         self.schemas.push((name, "jsonschema".to_owned(), schema.to_string().into_bytes()));

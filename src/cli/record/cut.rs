@@ -32,10 +32,10 @@ pub(in super::super) struct Args {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Write CSV, one row per frame.
-    #[arg(long, conflicts_with_all = ["pcap", "film_time", "anonymous", "whole"])]
+    #[arg(long, conflicts_with_all = ["pcap", "film_time", "anonymous", "whole", "scene"])]
     csv: bool,
     /// Write the datagrams as a pcap capture.
-    #[arg(long, conflicts_with_all = ["film_time", "anonymous", "whole"])]
+    #[arg(long, conflicts_with_all = ["film_time", "anonymous", "whole", "scene"])]
     pcap: bool,
     /// Time messages by the film rather than by the clock.
     #[arg(long)]
@@ -46,6 +46,9 @@ pub(in super::super) struct Args {
     /// Also keep the original ticks and replies, so that the cut is itself a full recording.
     #[arg(long, conflicts_with = "film_time")]
     whole: bool,
+    /// Also add each seat as a cube that moves, for viewers that draw scenes in space.
+    #[arg(long)]
+    scene: bool,
     /// Overwrite OUT if it exists.
     #[arg(long)]
     force: bool,
@@ -69,7 +72,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     } else if args.pcap {
         pcap(&args.file, &stretch, out)
     } else {
-        let manner = CutManner { film_time: args.film_time, anonymous: args.anonymous, whole: args.whole };
+        let Args { film_time, anonymous, whole, scene, .. } = *args;
+        let manner = CutManner { film_time, anonymous, whole, scene };
         cut(open(&args.file)?, &stretch, manner, out).map_err(|error| failure(error, &args.file))
     };
     let written = result.and_then(|out| {
