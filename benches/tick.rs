@@ -15,7 +15,7 @@ use std::time::Duration;
 use common::spread::{Spread, verdict};
 use kinocue::harness::belief::{LaneEvidence, Reading, Taken};
 use kinocue::harness::engine::Step;
-use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
+use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict, FilmLeave};
 use kinocue::harness::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::motion::MAX_AXES;
 use kinocue::harness::net::Delivery;
@@ -198,7 +198,7 @@ impl Film {
     fn target(&mut self, tick: &Tick) -> Option<ShowTime> {
         let point = self.clock.at(tick);
         let frame = Duration::from_millis(1);
-        let input = ChaseInput { tick, frame, point, trim_ms: 0, may_lead: true };
+        let input = ChaseInput { tick, frame, point, trim_ms: 0, leave: FilmLeave::Lead };
         match self.chase.tick(&input) {
             ChaseVerdict::Follow { playhead, .. } => Some(playhead),
             _ => None,

@@ -24,15 +24,20 @@ MOTION = (0x1301, 0x1401)
 
 
 class Ramp:
-    """A cue whose position says which instant of the film it is."""
+    """A cue whose position says which instant of the film it is. Of a long film a pulse would be too many milliseconds: its ramp goes
+    up and down, `times` in all."""
 
-    def __init__(self, seconds):
-        self.seconds, self.per_s = seconds, 1.0 / (seconds - EASE_S)
+    def __init__(self, seconds, times=1):
+        self.seconds, self.times, self.per_s = seconds, times, 1.0 / (seconds - EASE_S)
 
     def write(self, path):
-        rows = (f"{20 * n},{self.at(n / 50):.9f}\n" for n in range(int(self.seconds * 50) + 1))
+        rows = (f"{20 * n},{self.of_film(n / 50):.9f}\n" for n in range(int(self.seconds * self.times * 50) + 1))
         path.write_text("time_ms,a1\n" + "".join(rows))
         return path
+
+    def of_film(self, t):
+        turn, within = divmod(t, self.seconds)
+        return self.at(within) if turn % 2 == 0 else self.at(self.seconds - within)
 
     def at(self, t):
         if t < EASE_S:
@@ -41,10 +46,12 @@ class Ramp:
             return 1.0 - self.per_s * (self.seconds - t) ** 2 / (2 * EASE_S)
         return self.per_s * (t - EASE_S / 2)
 
-    def media(self, pulses):
-        """The instant of the film; None where the ramp is not straight."""
+    def media(self, pulses, turn=0):
+        """The instant of the film in the ramp's so many-th turn; None where the ramp is not straight."""
         media = pulses / STROKE / self.per_s + EASE_S / 2
-        return media if EASE_S < media < self.seconds - EASE_S else None
+        if not EASE_S < media < self.seconds - EASE_S:
+            return None
+        return turn * self.seconds + (media if turn % 2 == 0 else self.seconds - media)
 
 
 def wall_to_mono():

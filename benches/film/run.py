@@ -3,7 +3,7 @@
 one ramp, so that each frame's position says for which instant of the film it was made, and the kernel's stamp when it left. Where
 the film is, mpv is asked on a connection of the judge's own. Prints the table of benches/README.md; shown, not gated.
 
-    cargo build --release && benches/film/run.py [--seconds 120] [--only "idle"] [--rate 100]
+    cargo build --release && benches/film/run.py [--seconds 120] [--only "idle"] [--only "two hours"] [--rate 100]
 
 Loopback only, in a folder of its own. Needs mpv; for "jack" also jackd, for "ltc" and "sound" jack_capture as well. Python 3.10 or later, nothing besides.
 """
@@ -34,8 +34,8 @@ def spread(values):
 class Show:
     """One play of one film."""
 
-    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0, until="playing: ", source=None, film=None, more=(), shown=None, ask_every=0.02):
-        self.ramp = Ramp(seconds)
+    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0, until="playing: ", source=None, film=None, more=(), shown=None, ask_every=0.02, ramp=None):
+        self.ramp = ramp or Ramp(seconds)
         self.seat = Seat(args.program, folder)
         self.player = shown or Player(folder, film or args.film, player, ask_every)
         self.between = Between(folder, self.player, lost) if lost or between else None
@@ -81,6 +81,28 @@ def follow(args, folder, player=(), lost=0.0):
     told = "; ".join(" ".join(line.split()) for line in show.play.lines if line.startswith(("ticks", "lateness")))
     film = f"film {1e6 * (show.film_rate - 1):+.0f} ppm, its answers within {1e3 * show.film_left:.2f} ms of a line"
     return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, longest gap between frames {1e3 * gap:.0f} ms; {told}; {film}"
+
+
+def two_hours(args, folder):
+    """A player that is 300 ppm fast, each four minutes of it held to a straight line of their own: in two hours this machine's clock bends."""
+    turn_s, turns = 240.0, 30
+    player, film_of = ["--ao-null-speed=1.0003"], film(folder, turn_s * turns + 60)
+    with Show(args, folder, player, film=film_of, ramp=Ramp(turn_s, turns)) as show:
+        medians, errors = [], []
+        time.sleep(SETTLED_S)
+        for _ in range(turns - 1):
+            since, said = time.monotonic(), len(show.play.lines)
+            time.sleep(turn_s)
+            place, _, _ = show.player.clock(since, since + turn_s)
+            ends = ((place(at + lasts), pulses) for at, lasts, pulses in show.seat.frames() if since <= at <= since + turn_s)
+            there = ((film_s, show.ramp.media(pulses, int(film_s // turn_s))) for film_s, pulses in ends)
+            those = [(film_s - media) * 1e3 for film_s, media in there if media is not None]
+            assert those, show.play.lines[said:]
+            medians.append(statistics.median(those))
+            errors += map(abs, those)
+            print(f"  {len(medians) * turn_s / 60:.0f} min: median {medians[-1]:+.3f} ms, {spread(map(abs, those))}, holds {show.holds()}", flush=True)
+            print(*(f"    {line}" for line in show.play.lines[said:]), sep="", end="", flush=True)
+    return f"|error| {spread(errors)}; medians of four minutes {min(medians):+.3f} to {max(medians):+.3f}, first {medians[0]:+.3f}, last {medians[-1]:+.3f} ms"
 
 
 def loaded(args, folder, measure=follow):
@@ -256,6 +278,7 @@ CASES = {
     "ltc": ltc,
     "sound": sound,
     "300 ppm": lambda args, folder: follow(args, folder, ["--ao-null-speed=1.0003"]),
+    "two hours": two_hours,
     "losses": lambda args, folder: follow(args, folder, lost=0.2),
     "step": step,
     "pause": pause,
@@ -276,7 +299,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
         folder = pathlib.Path(folder)
         args.film = film(folder, max(args.seconds + 60, 220))
-        for name in args.only or CASES:
+        for name in args.only or (name for name in CASES if name != "two hours"):
             print(f"{name:11} {CASES[name](args, folder)}", flush=True)
 
 

@@ -70,7 +70,7 @@ struct RecordedOutcome {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PictureQuery {
-    /// The seat; the one that was held back farthest where it is left out.
+    /// The seat; where it is left out one that fell out, else the one that was held back farthest.
     seat: Option<String>,
 }
 
@@ -100,7 +100,7 @@ pub(super) async fn one(
     State(shared): State<Arc<Shared>>,
     UrlPath(name): UrlPath<String>,
 ) -> Result<Response, Problem> {
-    asker.least_engineer("deleting recordings")?;
+    asker.least_engineer("downloading recordings")?;
     let path = path_of(&shared, &name)?;
     let turn = turn(&shared.reports, "a file").await?;
     let opened = shared.blocking(move || {

@@ -50,13 +50,16 @@ fn one(config: &Config, link: &LinkEnd, plays: &[LinkPlay]) -> LinkStatus {
 
 fn of_axis(controller: &str, axis: usize, figures: &AxisFigures, family: DriveFamily) -> LinkAxisStatus {
     let account = figures.account;
-    let confirms = family == DriveFamily::SilverMax;
+    let unconfirmed = match family {
+        DriveFamily::SilverMax => 0,
+        DriveFamily::Sixpack2 => account.sent,
+    };
     LinkAxisStatus {
         controller: controller.to_owned(),
         axis,
         made: account.made,
         acked: account.acked,
-        unconfirmed: if confirms { 0 } else { account.sent },
+        unconfirmed,
         refused: account.refused,
         in_doubt: account.in_doubt,
         skipped: account.skipped,

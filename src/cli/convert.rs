@@ -11,7 +11,7 @@ use super::load::cue_exit;
 use super::record::{open, unread};
 use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
-use crate::record::{Places, RecordedAxis, Tracks, tracks};
+use crate::record::{FilmTracks, Places, RecordedAxis, tracks};
 
 /// Converts a cue to another format, or the motion of a seat in a recording into a cue.
 #[derive(Debug, clap::Args)]
@@ -147,7 +147,7 @@ fn of_recording(
     take: Take,
 ) -> Result<Result<(Cue, Option<Problem>), CueFaults>, Failure> {
     let from = if take == Take::Sent { Places::Sent } else { Places::Measured };
-    let Tracks { contents, mut seats, .. } =
+    let FilmTracks { contents, mut seats, .. } =
         tracks(open(path)?, from).map_err(|error| unread(error, path))?;
     let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
     let error = || anyhow!("--seat {name}: the seats are {}", names.join(", "));

@@ -28,8 +28,8 @@ const WIDEST: u16 = 240;
 /// Draws a cue, where it goes and what that asks of a seat; or a recording, what a seat was asked and sent, and what went wrong.
 ///
 /// Draws in braille on a terminal; with -o writes a self-contained HTML page or SVG. Speed, acceleration and jerk are those of
-/// `kinocue info` and `kinocue check`, as fractions of their limits. For a recording, --seat is the name of a seat; without it, the
-/// seat that the limiter held back farthest is drawn.
+/// `kinocue info` and `kinocue check`, as fractions of their limits. For a recording, --seat is the name of a seat; without it, one
+/// that fell out is drawn, else the one that the limiter held back farthest.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue plot cues/coaster.csv",

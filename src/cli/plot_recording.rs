@@ -90,12 +90,12 @@ fn lane(asked: &Asked<'_>, contents: &Contents, summary: &Summary) -> Result<usi
         let error = || anyhow!("--seat {name}: the seats are {}", names.join(", "));
         return contents.seat(name).ok_or_else(error).or_exit(Exit::Usage);
     }
-    let farthest = summary
-        .seats
-        .iter()
-        .enumerate()
-        .max_by(|one, other| one.1.apart.total_cmp(&other.1.apart).then(other.0.cmp(&one.0)));
-    farthest
+    // One that fell out before one that was held back.
+    let gravest = summary.seats.iter().enumerate().max_by(|(one_lane, one), (other_lane, other)| {
+        let fell = (one.falls.count > 0).cmp(&(other.falls.count > 0));
+        fell.then(one.apart.total_cmp(&other.apart)).then(other_lane.cmp(one_lane))
+    });
+    gravest
         .map(|(lane, _)| lane)
         .ok_or_else(|| anyhow!("{}: it has no samples", asked.file.display()))
         .or_exit(Exit::BadCue)

@@ -162,7 +162,10 @@ impl LinkEntry<'_> {
             (_, Some(DriveFamily::Sixpack2)) => sixpack2_baud(asked_baud),
         };
         let baud = made.map_err(|reason| faults.note(baud_at, format!("baud: {reason}"))).ok();
-        let usual_stop = if family == Some(DriveFamily::Sixpack2) { 1 } else { 2 };
+        let usual_stop = match family {
+            Some(DriveFamily::Sixpack2) => 1,
+            Some(DriveFamily::SilverMax) | None => 2,
+        };
         Some(Link {
             name: self.name.to_owned(),
             port: self.port?.into(),

@@ -61,18 +61,40 @@ pub(crate) fn each<E: From<Trouble>>(
     most: u64,
     take: impl FnMut(u8, &[u8]) -> Result<(), E>,
 ) -> Result<(), (u64, E)> {
-    let mut walk = Walk::new(most);
-    each_of(input, &mut walk, most, take).map_err(|error| (walk.record(), error))
+    each_of(input, most, LinearReaderOptions::default().with_validate_chunk_crcs(true), take)
+}
+
+/// The same for whoever uses what comes before the fault: nothing is handed out of a chunk before its sum is right. Chunks are held
+/// whole, at most 64 MiB.
+///
+/// # Errors
+/// As [`each`]; where a chunk is longer, too.
+pub(crate) fn each_sound<E: From<Trouble>>(
+    input: impl Read,
+    most: u64,
+    take: impl FnMut(u8, &[u8]) -> Result<(), E>,
+) -> Result<(), (u64, E)> {
+    each_of(input, most, LinearReaderOptions::default().with_prevalidate_chunk_crcs(true), take)
 }
 
 fn each_of<E: From<Trouble>>(
     input: impl Read,
+    most: u64,
+    chunks: LinearReaderOptions,
+    take: impl FnMut(u8, &[u8]) -> Result<(), E>,
+) -> Result<(), (u64, E)> {
+    let mut walk = Walk::new(most);
+    walk_on(input, &mut walk, most, chunks, take).map_err(|error| (walk.record(), error))
+}
+
+fn walk_on<E: From<Trouble>>(
+    input: impl Read,
     walk: &mut Walk,
     most: u64,
+    chunks: LinearReaderOptions,
     mut take: impl FnMut(u8, &[u8]) -> Result<(), E>,
 ) -> Result<(), E> {
-    let options = LinearReaderOptions::default()
-        .with_validate_chunk_crcs(true)
+    let options = chunks
         .with_validate_data_section_crc(true)
         .with_validate_summary_section_crc(true)
         .with_check_finishes_after_end_magic(true)

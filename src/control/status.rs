@@ -167,8 +167,8 @@ pub struct RecordStatus {
     pub(crate) marks: u64,
     /// How often something could not be written.
     pub(crate) errors: u64,
-    /// What is wrong, and what to do; null if all is well.
-    pub(crate) trouble: Option<String>,
+    /// What is wrong, and what to do, by what it is of: `show`, `incident`, `flight`, `earlier`; empty if all is well.
+    pub(crate) troubles: BTreeMap<String, String>,
 }
 
 impl RecordStatus {

@@ -35,16 +35,21 @@ impl<P: LinkPort> LinkStream<P> {
         events: Producer<StreamEvent>,
     ) -> Result<Self, String> {
         let talk = TalkTerms::of(link);
-        if link.family == Some(DriveFamily::Sixpack2) {
-            let lanes = seats.iter().map(|seat| motors_of(seat, terms.period)).collect::<Option<Vec<_>>>();
-            let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, sixpack2::Talk::new(port, talk));
-            let stream = Stream::new(talk, terms, &lanes, poses, events);
-            return stream.map(Self::Sixpack2).map_err(|error| error.to_string());
+        match link.family.ok_or(NO_DRIVES)? {
+            DriveFamily::SilverMax => {
+                let lanes = seats.iter().map(|seat| units_of(seat)).collect::<Option<Vec<_>>>();
+                let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, silvermax::Talk::new(port, talk));
+                let stream = Stream::new(talk, terms, &lanes, poses, events);
+                stream.map(Self::SilverMax).map_err(|error| error.to_string())
+            }
+            DriveFamily::Sixpack2 => {
+                let lanes =
+                    seats.iter().map(|seat| motors_of(seat, terms.period)).collect::<Option<Vec<_>>>();
+                let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, sixpack2::Talk::new(port, talk));
+                let stream = Stream::new(talk, terms, &lanes, poses, events);
+                stream.map(Self::Sixpack2).map_err(|error| error.to_string())
+            }
         }
-        let lanes = seats.iter().map(|seat| units_of(seat)).collect::<Option<Vec<_>>>();
-        let (lanes, talk) = (lanes.ok_or(NO_DRIVES)?, silvermax::Talk::new(port, talk));
-        let stream = Stream::new(talk, terms, &lanes, poses, events);
-        stream.map(Self::SilverMax).map_err(|error| error.to_string())
     }
 
     /// What is asked of either.

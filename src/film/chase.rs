@@ -23,6 +23,8 @@ const HELD_AFTER: Duration = Duration::from_mins(5);
 /// The next join waits for a person if so many came within [`UNSTABLE_WITHIN`].
 const UNSTABLE_JOINS: usize = 5;
 const UNSTABLE_WITHIN: Duration = Duration::from_mins(1);
+/// A person who lets seats join means the film of now; the player may need a moment to run again.
+const LET_FOR: Duration = Duration::from_secs(10);
 /// Of so many parts of a cue, so many have to be led for it to have been played: whoever joins within the first tenth, or leaves in
 /// the last, has seen it.
 const PARTS: i64 = 32;
@@ -131,8 +133,19 @@ pub struct ChaseInput<'a> {
     pub point: Option<FilmPoint>,
     /// How much later than the film the motion is to be, milliseconds.
     pub trim_ms: i32,
-    /// Whether the hall is armed and lets the film lead: nothing in here makes it so.
-    pub may_lead: bool,
+    /// What the hall lets it do: nothing in here makes it more.
+    pub leave: FilmLeave,
+}
+
+/// What the hall lets the film do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FilmLeave {
+    /// Nothing: seats are parked, stopped, or on their way there.
+    Nothing,
+    /// Nothing, until a person resumes: seats rest where they are.
+    Paused,
+    /// To lead.
+    Lead,
 }
 
 /// What the point of a tick means for the seats.
@@ -140,6 +153,8 @@ pub struct ChaseInput<'a> {
 enum ChaseSign {
     /// The hall does not let the film lead.
     Barred,
+    /// Nor while it is paused.
+    Paused,
     /// There is nothing more to follow.
     Over(ParkCause),
     /// It cannot be followed.
@@ -156,6 +171,9 @@ impl ChaseState {
         use ChaseState::{Following, Holding, Leaving, Waiting};
         match (sign, self) {
             (ChaseSign::Barred, Waiting | Following | Holding | Leaving) => Waiting,
+            (ChaseSign::Paused, Waiting) => Waiting,
+            (ChaseSign::Paused, Following | Holding) => Holding, // they are up, and have to come down some day
+            (ChaseSign::Paused, Leaving) => Leaving,
             (ChaseSign::Over(_), Waiting) => Waiting, // nothing has moved
             (ChaseSign::Over(_), Following | Holding | Leaving) => Leaving,
             (ChaseSign::Unready(_), Waiting) => Waiting,
@@ -179,8 +197,10 @@ pub struct Chase {
     /// How often seats have joined, and when they did last.
     joins: u32,
     joined: [MonoTime; UNSTABLE_JOINS],
-    /// A person lets them join once.
-    let_join: bool,
+    /// Until when a person lets them join, once.
+    let_join: Option<MonoTime>,
+    /// They joined too often, and no person has let them since.
+    is_unstable: bool,
     ready_since: Option<MonoTime>,
     outside_since: Option<MonoTime>,
     /// The parts of the cue in which seats have followed, a bit each.
@@ -200,7 +220,8 @@ impl Chase {
             follower: Follower::new(rules.pace),
             joins: 0,
             joined: [MonoTime::from_nanos(0); UNSTABLE_JOINS],
-            let_join: false,
+            let_join: None,
+            is_unstable: false,
             ready_since: None,
             outside_since: None,
             led: 0,
@@ -215,9 +236,9 @@ impl Chase {
         self.state
     }
 
-    /// A person lets seats that hold join, once.
-    pub(crate) const fn let_join(&mut self) {
-        self.let_join = true;
+    /// A person lets seats that hold join, once, and soon.
+    pub(crate) fn let_join(&mut self, now: MonoTime) {
+        self.let_join = Some(now + LET_FOR);
     }
 
     /// What the seats are to do.
@@ -228,7 +249,7 @@ impl Chase {
         let sign = self.sign(input, now, end);
         let from = self.state;
         self.state = from.next(sign);
-        if self.state != from {
+        if self.state != from || sign == ChaseSign::Paused {
             self.since = now;
         }
         match (sign, input.point) {
@@ -242,7 +263,7 @@ impl Chase {
                 }
                 self.led |= self.part();
             }
-            (ChaseSign::Barred | ChaseSign::Brief | ChaseSign::Ready, _) => {}
+            (ChaseSign::Barred | ChaseSign::Paused | ChaseSign::Brief | ChaseSign::Ready, _) => {}
         }
         self.verdict()
     }
@@ -251,7 +272,7 @@ impl Chase {
         self.follower.join(point, end, trim_ms);
         self.joined[self.joins as usize % UNSTABLE_JOINS] = now;
         self.joins = self.joins.wrapping_add(1);
-        self.let_join = false;
+        (self.let_join, self.is_unstable) = (None, false);
         let at = self.follower.playhead();
         if at <= JOINS_WITHIN && at.as_nanos() <= self.rules.cue_end.as_nanos() / 2 {
             // Nobody has missed what was before so early a join: those parts count as led.
@@ -279,10 +300,10 @@ impl Chase {
     }
 
     fn sign(&mut self, input: &ChaseInput<'_>, now: MonoTime, end: MonoTime) -> ChaseSign {
-        if !input.may_lead {
+        if input.leave != FilmLeave::Lead {
             // What could be followed while the hall did not let it lead has to be so anew.
             (self.ready_since, self.outside_since) = (None, None);
-            return ChaseSign::Barred;
+            return if input.leave == FilmLeave::Paused { ChaseSign::Paused } else { ChaseSign::Barred };
         }
         let state = input.point.map_or(FilmState::Absent, |point| point.state);
         // A film that stands or runs back has no pace that a playhead may take, whatever its state says.
@@ -340,18 +361,19 @@ impl Chase {
     }
 
     /// Why seats that hold may not join by themselves, if they may not.
-    fn waits_for_a_person(&self, now: MonoTime) -> Option<HoldCause> {
-        if self.state != ChaseState::Holding || self.let_join {
+    fn waits_for_a_person(&mut self, now: MonoTime) -> Option<HoldCause> {
+        if self.state != ChaseState::Holding {
             return None;
         }
         let oldest = self.joined[self.joins as usize % UNSTABLE_JOINS];
         // Of the last five the oldest: its place in the ring is the next that is written.
         let many = self.joins as usize >= UNSTABLE_JOINS && now.since(oldest) < UNSTABLE_WITHIN;
+        // Said once, it stays so, whatever becomes of the film meanwhile: time alone makes no source stable.
+        self.is_unstable |= many;
         match self.rules.rejoin {
+            _ if self.let_join.is_some_and(|until| now <= until) => None,
             Rejoin::Ask => Some(HoldCause::Asks),
-            // Said once, it stays so: time alone makes no source stable.
-            Rejoin::Auto if many || self.why == HoldCause::Unstable => Some(HoldCause::Unstable),
-            Rejoin::Auto => None,
+            Rejoin::Auto => self.is_unstable.then_some(HoldCause::Unstable),
         }
     }
 }

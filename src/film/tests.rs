@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict};
+use super::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict, FilmLeave};
 use super::chooser::{Chooser, SourceView};
 use super::follower::PaceLimits;
 use super::follower::tests::tries;
@@ -71,7 +71,8 @@ impl Chain {
         self.published.publish(&self.chooser.choose(&views, None, now).point);
         let tick = Tick { index: self.ticks, deadline: now, late: Duration::ZERO, missed: 0 };
         let point = self.clock.at(&tick);
-        let verdict = self.chase.tick(&ChaseInput { tick: &tick, frame: FRAME, point, trim_ms: 0, may_lead });
+        let leave = if may_lead { FilmLeave::Lead } else { FilmLeave::Nothing };
+        let verdict = self.chase.tick(&ChaseInput { tick: &tick, frame: FRAME, point, trim_ms: 0, leave });
         if let ChaseVerdict::Follow { .. } = verdict {
             let state = point.expect("somebody has told").state;
             assert!(may_lead && state.may_lead(), "followed what is {state:?}");
@@ -188,7 +189,8 @@ fn whatever_is_wrong_with_the_sources_seats_follow_only_what_leads_and_as_gently
                 }
             }
             if luck.is(0.3) {
-                chain.chase.let_join();
+                let now = mono(chain.now_s());
+                chain.chase.let_join(now);
             }
         }
     }

@@ -41,7 +41,7 @@ pub mod engine {
 }
 pub mod film {
     pub mod chase {
-        pub use crate::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
+        pub use crate::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict, FilmLeave};
     }
     pub mod point {
         pub use crate::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};

@@ -26,6 +26,7 @@ function ticks() {
       if (box.classList.contains('times')) tick.append(Object.assign(document.createElement('span'), { textContent: clock(n * step, step) }));
       all.push(tick);
     }
+    box.classList.add('fitted'); // as many as there is room for: none has to give way
     box.replaceChildren(...all);
   }
 }

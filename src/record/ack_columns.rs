@@ -3,7 +3,7 @@
 
 use prost::Message as _;
 
-use super::columns::{Column, ColumnReaders, Columns};
+use super::columns::{Column, ColumnReaders, ColumnSet};
 use super::{AckChunk, AckRecord};
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply};
@@ -62,8 +62,8 @@ const FATES: [Fate; 3] = [Fate::Duplicate, Fate::Stale, Fate::Stray];
 /// What a controller replied, on its way.
 #[derive(Default)]
 struct ReplyWriter {
-    replies: Columns,
-    fates: Columns,
+    replies: ColumnSet,
+    fates: ColumnSet,
     /// How many there are of each.
     counts: [usize; 2],
     /// When the last reply was received, µs.
@@ -73,7 +73,7 @@ struct ReplyWriter {
 /// Drains, as they crossed, as a message.
 pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
     let mut runs = Vec::<[i64; 3]>::new();
-    let (mut chunks, mut ends) = (Columns::default(), 0);
+    let (mut chunks, mut ends) = (ColumnSet::default(), 0);
     let (mut writers, mut others) = (Vec::<ReplyWriter>::new(), Vec::new());
     let mut rest = drains;
     while let Some((chunk, behind)) = AckChunk::parse(rest) {
@@ -104,7 +104,7 @@ pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
     };
     let controllers = writers.into_iter().enumerate().filter_map(replies).collect();
     let count = u32::try_from(runs.len()).unwrap_or(u32::MAX);
-    let mut columns = Columns::default();
+    let mut columns = ColumnSet::default();
     runs.into_iter().enumerate().for_each(|(row, run)| columns.push(row, run));
     Acks { runs: columns.take(), count, chunks: chunks.take(), controllers, others }.encode_to_vec()
 }

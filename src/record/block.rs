@@ -3,7 +3,7 @@
 use prost::Message as _;
 
 use super::chunk::{Chunk, SentFrame, TickHead};
-use super::columns::Columns;
+use super::columns::ColumnSet;
 use super::full::{Lane, Sent};
 use super::seat::{FrameKind, RecordedAxis, RecordedSeat};
 use crate::state::State;
@@ -15,17 +15,17 @@ use crate::wire::{MAX_LEN, MotionRequest, Timing};
 pub(crate) struct Block {
     first: Option<MonoTime>,
     ticks: usize,
-    columns: Columns,
+    columns: ColumnSet,
     lanes: Vec<LaneWriter>,
 }
 
 #[derive(Debug, Default)]
 struct LaneWriter {
     frames: usize,
-    fields: Columns,
-    positions: Columns,
-    asked: Columns,
-    vibration: Columns,
+    fields: ColumnSet,
+    positions: ColumnSet,
+    asked: ColumnSet,
+    vibration: ColumnSet,
     raw: Vec<u8>,
 }
 

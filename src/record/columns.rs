@@ -70,11 +70,11 @@ impl ColumnWriter {
     }
 }
 
-/// Columns side by side, on their way.
+/// ColumnSet side by side, on their way.
 #[derive(Debug, Default)]
-pub(super) struct Columns(Vec<ColumnWriter>);
+pub(super) struct ColumnSet(Vec<ColumnWriter>);
 
-impl Columns {
+impl ColumnSet {
     /// The numbers of a row, which may be of fewer columns than there are.
     #[inline]
     pub(super) fn push(&mut self, row: usize, numbers: impl IntoIterator<Item = i64>) {
@@ -95,7 +95,7 @@ impl Columns {
     }
 }
 
-/// Columns that are read, row by row; without end: they go on as they were.
+/// ColumnSet that are read, row by row; without end: they go on as they were.
 pub(super) struct ColumnReaders<'a>(Vec<ColumnReader<'a>>);
 
 impl<'a> ColumnReaders<'a> {
@@ -177,7 +177,7 @@ mod tests {
         fn any_numbers_come_back_and_rows_that_are_left_out_go_on_as_before(
             rows in prop::collection::vec(prop::option::weighted(0.9, number()), 0..200),
         ) {
-            let mut columns = Columns::default();
+            let mut columns = ColumnSet::default();
             for _ in 0..2 {
                 for (row, number) in rows.iter().enumerate() {
                     columns.push(row, *number);
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn what_moves_evenly_takes_a_few_octets_and_what_trembles_by_a_pulse_two_bits() {
-        let mut columns = Columns::default();
+        let mut columns = ColumnSet::default();
         (0..500).for_each(|row| columns.push(row, [7 + 3 * i64::try_from(row).expect("few"), 0]));
         assert!(columns.take()[0].packed.len() < 40);
         // Second differences of -1, 0 and 1.

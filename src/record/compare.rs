@@ -83,7 +83,7 @@ pub(crate) struct FilmEvent {
 
 /// What seats did while the film ran.
 #[derive(Debug, Default)]
-pub(crate) struct Tracks {
+pub(crate) struct FilmTracks {
     /// What the recording says of itself.
     pub(crate) contents: Contents,
     /// The seats, by their names.
@@ -97,7 +97,7 @@ pub(crate) struct Tracks {
 ///
 /// # Errors
 /// Where it is none.
-pub(crate) fn tracks(input: impl Read, places: Places) -> Result<Tracks, ReadError> {
+pub(crate) fn tracks(input: impl Read, places: Places) -> Result<FilmTracks, ReadError> {
     let (mut whole, mut samples) = (BTreeMap::<usize, Track>::new(), BTreeMap::<usize, Track>::new());
     let (mut events, mut film_s) = (Vec::new(), 0.0);
     let mut happened = |film_s, topic: &str, text: &str| {
@@ -127,7 +127,7 @@ pub(crate) fn tracks(input: impl Read, places: Places) -> Result<Tracks, ReadErr
     let is_whole = !whole.is_empty();
     let tracks = if is_whole { whole } else { samples };
     let named = tracks.into_iter().map(|(lane, track)| (contents.seats[lane].name.clone(), track)).collect();
-    Ok(Tracks { contents, seats: named, is_whole, events })
+    Ok(FilmTracks { contents, seats: named, is_whole, events })
 }
 
 /// The texts of a message, without when it was.

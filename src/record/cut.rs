@@ -8,7 +8,7 @@ use mcap::McapError;
 use super::anonymous::Anonymous;
 use super::block::Block;
 use super::read::{Contents, ReadError, Told, Wanted, read};
-use super::scene::Scene;
+use super::scene::SeatScene;
 use super::summary::each_chunk;
 use super::{About, AckChunk, Chunk, EntryMaker, Message, Mode, Opening, RecordedSeat, Recording, Sampled};
 use crate::time::{MonoTime, ShowTime};
@@ -36,16 +36,20 @@ impl Stretch {
     }
 }
 
-/// How it is written.
-#[derive(Debug, Clone, Copy, Default)]
+/// How it is written: arguments of `record cut`.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
 pub(crate) struct CutManner {
-    /// Times are those of the film, and not of the clock.
+    /// Time messages by the film rather than by the clock.
+    #[arg(long)]
     pub(crate) film_time: bool,
-    /// Without names of seats, hall and cue, and without addresses.
+    /// Omit the names of seats, hall and cue, and addresses, also those in frames and replies.
+    #[arg(long)]
     pub(crate) anonymous: bool,
-    /// With whole ticks as well.
+    /// Also keep the original ticks and replies, so that the cut is itself a full recording.
+    #[arg(long, conflicts_with = "film_time")]
     pub(crate) whole: bool,
-    /// With seats in space as well.
+    /// Also add each seat as a cube that moves, for viewers that draw scenes in space.
+    #[arg(long)]
     pub(crate) scene: bool,
 }
 
@@ -196,7 +200,7 @@ struct Cutting<W: Write + Seek> {
     /// Which seats are taken.
     taken: Vec<bool>,
     maker: EntryMaker,
-    scene: Option<Scene>,
+    scene: Option<SeatScene>,
     block: Option<Block>,
     /// Drains of the block that is not over.
     drains: Vec<u8>,
@@ -227,7 +231,7 @@ impl<W: Write + Seek> Cutting<W> {
         let opening = judging.into_iter().fold(opening, Opening::judged);
         let maker = EntryMaker::new(seats.len(), about.clocks);
         let (scene, opening) = if manner.scene {
-            let (scene, opening) = Scene::of(opening, &taken);
+            let (scene, opening) = SeatScene::of(opening, &taken);
             (Some(scene), opening)
         } else {
             (None, opening)

@@ -189,6 +189,11 @@ impl Incidents {
         IncidentStep::Begin
     }
 
+    /// Nothing is under way: its file failed. What happens next begins another.
+    pub(crate) const fn give_up(&mut self) {
+        self.open = None;
+    }
+
     /// True once the one that is under way is over.
     pub(crate) fn take_over(&mut self, now: MonoTime) -> bool {
         let is_over = self.open.is_some_and(|(_, until)| now >= until);
@@ -215,6 +220,14 @@ mod tests {
         assert!(!incidents.take_over(s(117)));
         assert!(incidents.take_over(s(118)));
         assert!(!incidents.take_over(s(119)), "it is over once");
+    }
+
+    #[test]
+    fn what_happens_after_a_file_has_failed_gets_another() {
+        let mut incidents = Incidents::default();
+        assert_eq!(incidents.on(IncidentCause::Mark, s(100)), IncidentStep::Begin);
+        incidents.give_up();
+        assert_eq!(incidents.on(IncidentCause::Mark, s(103)), IncidentStep::Begin);
     }
 
     #[test]

@@ -18,6 +18,7 @@ mod compare;
 mod cursor;
 mod cut;
 mod descriptors;
+mod falls;
 mod flight;
 mod full;
 mod incidents;
@@ -48,8 +49,9 @@ pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
 #[cfg(feature = "harness")]
 pub(crate) use chunk::{Handed, SentFrame};
-pub(crate) use compare::{Comparison, Places, Tracks, compare, tracks};
+pub(crate) use compare::{Comparison, FilmTracks, Places, compare, tracks};
 pub(crate) use cut::{CutError, CutManner, Piece, Stretch, cut, each_tick};
+pub(crate) use falls::Falls;
 pub(crate) use flight::{Entry, Flight, read as read_flight};
 pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
 pub(crate) use intake::{Counts, Intake, Taps};
@@ -69,4 +71,4 @@ pub(crate) use summary::{SeatTotals, Summary, each_chunk, state_word, summarize}
 pub use tap::{Tap, tap};
 pub(crate) use tap::{file_octets_a_second, octets_a_second};
 #[cfg(test)]
-pub(crate) use tests::{recorded_as, recorded_measured};
+pub(crate) use tests::{recorded_as, recorded_falling, recorded_measured};

@@ -208,7 +208,7 @@ pub(crate) fn read(
     take: &mut dyn FnMut(&Contents, MonoTime, Told<'_>),
 ) -> Result<Contents, ReadError> {
     let mut reading = Reading { contents: Contents::default(), topics: BTreeMap::new(), wanted, take };
-    let read = container::each(input, MOST, |opcode, body| reading.record(opcode, body));
+    let read = container::each_sound(input, MOST, |opcode, body| reading.record(opcode, body));
     let mut contents = reading.contents;
     match read {
         Err((_, ReadError::File(trouble))) if !contents.begin.is_empty() => contents.trouble = Some(trouble),
@@ -227,7 +227,7 @@ pub(crate) fn beginning(input: impl Read) -> Result<BTreeMap<String, String>, Re
     /// Records before it at the most.
     const BEFORE: u32 = 100;
     let (mut contents, mut records) = (Contents::default(), 0);
-    let read = container::each(input, MOST, |opcode, body| {
+    let read = container::each_sound(input, MOST, |opcode, body| {
         records += 1;
         if let (op::METADATA, Some(("kinocue", entries))) = (opcode, container::metadata(body)) {
             contents.begun(entries)?;

@@ -65,6 +65,32 @@ fn what_came_nearest_to_its_limit_is_the_same_measured_again() {
 }
 
 #[test]
+fn nothing_is_told_of_a_chunk_that_was_changed_on_the_disk() {
+    let file = recorded_as(Mode::Full, swing(333));
+    let told = |file: &[u8]| {
+        let mut all = Vec::new();
+        let contents =
+            read(file, Wanted::ALL, &mut |_, at, told| all.push((at, format!("{told:?}")))).unwrap();
+        (all, contents.trouble)
+    };
+    let (whole, _) = told(&file);
+    for chunk in mcap::Summary::read(&file).unwrap().unwrap().chunk_indexes {
+        let (since, len) = (chunk.compressed_data_offset().unwrap(), chunk.compressed_size);
+        for at in (since..since + len).step_by(41) {
+            let mut changed = file.clone();
+            changed[usize::try_from(at).unwrap()] ^= 4;
+            let (some, trouble) = told(&changed);
+            assert!(
+                trouble.is_some() && whole.starts_with(&some),
+                "octet {at}: {} of {}",
+                some.len(),
+                whole.len()
+            );
+        }
+    }
+}
+
+#[test]
 fn a_file_that_is_no_recording_is_refused() {
     assert!(matches!(read(&b""[..], Wanted::ALL, &mut |_, _, _| ()), Err(ReadError::File(_))));
     let cue = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/cues/storm.mcap")).unwrap();

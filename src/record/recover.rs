@@ -58,7 +58,7 @@ pub(crate) fn recover<W: Write + Seek>(input: impl Read, out: W) -> Result<(Reco
         messages: BTreeMap::new(),
         is_recording: false,
     };
-    let trouble = match container::each(input, MOST, |opcode, body| copy.record(opcode, body)) {
+    let trouble = match container::each_sound(input, MOST, |opcode, body| copy.record(opcode, body)) {
         Ok(()) => None,
         Err((_, RecoverError::Read(ReadError::File(trouble)))) if copy.is_recording => Some(trouble),
         Err((_, error)) => return Err(error),

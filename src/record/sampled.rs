@@ -16,7 +16,7 @@ use crate::wire::{PerAxis, ReplyCode};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct SeatSample {
-    /// Show time of that frame, seconds.
+    /// Show time of that frame, seconds; that of the last tick where there was none.
     pub(crate) film_s: f64,
     /// Where each axis was asked to be, mm, or degrees where it turns.
     pub(crate) asked_mm: Vec<f64>,
@@ -116,8 +116,8 @@ pub(crate) struct Sampled {
     hz: u32,
     /// The last tick, of the window that is not over.
     last: Option<TickHead>,
-    /// When the last tick of a window that is over was due.
-    closed_at: MonoTime,
+    /// When the last tick of a window that is over was due, and its show time, seconds.
+    closed: (MonoTime, f64),
 }
 
 impl Sampled {
@@ -131,7 +131,7 @@ impl Sampled {
             state: None,
             hz,
             last: None,
-            closed_at: MonoTime::default(),
+            closed: (MonoTime::default(), 0.0),
         }
     }
 
@@ -161,16 +161,19 @@ impl Sampled {
     /// Tells of the window that is not over, and of acks that came since there was one.
     pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
         if let Some(last) = self.last.take() {
-            self.closed_at = last.deadline;
+            self.closed = (last.deadline, last.film.as_secs_f64());
             tell(last.deadline, Message::Tick(std::mem::take(&mut self.tick)));
         }
-        let closed_at = self.closed_at;
+        let (closed_at, closed_s) = self.closed;
         for (lane, window) in self.windows.iter_mut().enumerate() {
             let mut sample = std::mem::take(&mut window.sample);
             let worst = window.worst.take();
             let is_heard = sample.acked > 0 || sample.refused > 0 || sample.lost > 0;
-            if let Some((_, _, [asked, sent])) = &worst {
-                (sample.asked_mm, sample.sent_mm) = (round(asked), round(sent));
+            match &worst {
+                Some((_, _, [asked, sent])) => {
+                    (sample.asked_mm, sample.sent_mm) = (round(asked), round(sent));
+                }
+                None => sample.film_s = closed_s,
             }
             if let Some(at) = worst.map(|(at, ..)| at).or_else(|| is_heard.then_some(closed_at)) {
                 (sample.standing, sample.measured_mm) = (window.standing, window.measured_mm.clone());

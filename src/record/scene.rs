@@ -21,7 +21,7 @@ const APART_M: f64 = 1.0;
 
 /// A scene that is being told.
 #[derive(Debug)]
-pub(super) struct Scene {
+pub(super) struct SeatScene {
     /// The channel of its cubes; that of transforms is the next.
     channel: u16,
     /// What is said again of a seat that has no frame: how high it is, m, and how far it is turned, radians.
@@ -30,7 +30,7 @@ pub(super) struct Scene {
     last: Option<MonoTime>,
 }
 
-impl Scene {
+impl SeatScene {
     /// One of the seats that are taken, and the opening of its file.
     pub(super) fn of(opening: Opening, taken: &[bool]) -> (Self, Opening) {
         let [array, object] =

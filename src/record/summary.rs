@@ -5,7 +5,7 @@ use std::io::Read;
 use serde::Serialize;
 
 use super::read::{Contents, ReadError, Told, Wanted, read};
-use super::{Chunk, Margin, Margins};
+use super::{Chunk, Falls, Margin, Margins};
 use crate::plain::escaped;
 use crate::state::State;
 use crate::time::{MonoTime, Rate};
@@ -30,6 +30,9 @@ pub(crate) struct SeatTotals {
     pub(crate) apart: f64,
     /// The show time of that, s.
     pub(crate) apart_film_s: f64,
+    /// When it fell out, and came back.
+    #[serde(skip)]
+    pub(crate) falls: Falls,
 }
 
 /// Something that happened.
@@ -104,6 +107,7 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
         match told {
             Told::Seat(lane, sample) => {
                 let seat = &mut summary.seats[lane];
+                seat.falls.take(&sample);
                 seat.sent += u64::from(sample.sent);
                 seat.unsent += u64::from(sample.unsent);
                 seat.clamps = seat.clamps.saturating_add(sample.clamps);

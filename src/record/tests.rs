@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::chunk::{ChunkWriter, Handed, SentFrame};
 use super::*;
+use crate::health::HealthState;
 use crate::motion::{MAX_AXES, SeatType, Slot, Window};
 use crate::net::{Delivery, SendFault};
 use crate::state::{PlayMode, State};
@@ -73,15 +74,28 @@ fn recorded(ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
 }
 
 pub(crate) fn recorded_as(mode: Mode, ticks: impl Iterator<Item = (f64, f64)>) -> Vec<u8> {
-    recorded_of(mode, ticks.map(|(wanted, sent)| (wanted, sent, None)))
+    recorded_falling(mode, ticks, |_| None)
+}
+
+/// The same of a seat whose group stands otherwise from some ticks on, and gets no frame where it may not move.
+pub(crate) fn recorded_falling(
+    mode: Mode,
+    ticks: impl Iterator<Item = (f64, f64)>,
+    standing: impl Fn(u64) -> Option<HealthState>,
+) -> Vec<u8> {
+    recorded_of(mode, ticks.map(|(wanted, sent)| (wanted, sent, None)), standing)
 }
 
 /// The same of ticks of places sent, at which the seat was measured to be elsewhere.
 pub(crate) fn recorded_measured(ticks: impl Iterator<Item = (f64, Option<f64>)>) -> Vec<u8> {
-    recorded_of(Mode::Sampled, ticks.map(|(sent, measured)| (sent, sent, measured)))
+    recorded_of(Mode::Sampled, ticks.map(|(sent, measured)| (sent, sent, measured)), |_| None)
 }
 
-fn recorded_of(mode: Mode, ticks: impl Iterator<Item = (f64, f64, Option<f64>)>) -> Vec<u8> {
+fn recorded_of(
+    mode: Mode,
+    ticks: impl Iterator<Item = (f64, f64, Option<f64>)>,
+    standing: impl Fn(u64) -> Option<HealthState>,
+) -> Vec<u8> {
     let seats = [seat()];
     let (Taps { ticks: mut tap, mut acks }, intake) =
         Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);
@@ -89,10 +103,17 @@ fn recorded_of(mode: Mode, ticks: impl Iterator<Item = (f64, f64, Option<f64>)>)
     let about = About { mode, ..about() };
     let file = Recording::begin(Cursor::new(Vec::new()), &about, &seats).unwrap();
     let mut recorder = Recorder::new(intake, file);
+    let mut may_move = true;
     for (tick, (wanted, sent, measured)) in (0_u64..).zip(ticks) {
         let mut buf = [0; MAX_LEN];
-        tap.asked(asked(wanted));
-        tap.frame(0, frame(sent, &mut buf), MonoTime::from_nanos(tick * 10 * MS), Delivery::Sent);
+        if let Some(standing) = standing(tick) {
+            may_move = standing.may_move();
+            acks.take(&AckRecord::Standing(0, standing));
+        }
+        if may_move {
+            tap.asked(asked(wanted));
+            tap.frame(0, frame(sent, &mut buf), MonoTime::from_nanos(tick * 10 * MS), Delivery::Sent);
+        }
         tap.tick(&head(tick * 10));
         // Every second frame is acked, 2 ms after it was sent.
         if tick % 2 == 0 {
@@ -116,6 +137,23 @@ fn messages(file: &[u8]) -> Vec<(String, u64, Value)> {
         (message.channel.topic.clone(), message.log_time, value)
     };
     MessageStream::new(file).unwrap().map(|one| message(one.unwrap())).collect()
+}
+
+#[test]
+fn what_is_heard_of_a_seat_without_frames_is_told_of_the_show_time_then() {
+    let ticks = (0..200).map(|_| (0.5, 0.5));
+    let file = recorded_falling(Mode::Sampled, ticks, |tick| match tick {
+        0 => Some(HealthState::Ok),
+        100 => Some(HealthState::Lost),
+        _ => None,
+    });
+    let seats = messages(&file).into_iter().filter(|(topic, ..)| topic == "/seat/A1");
+    let late: Vec<_> = seats.filter(|(.., sample)| sample["sent"] == 0).collect();
+    assert!(!late.is_empty(), "acks went on");
+    for (_, at, sample) in late {
+        let film_s = sample["film_s"].as_f64().unwrap();
+        assert!((1.0..2.0).contains(&film_s), "at {at}: {sample}");
+    }
 }
 
 #[test]

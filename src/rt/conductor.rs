@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::film::{FilmLead, FilmStart};
 use super::mail::{Alarm, News};
 use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, PlayProgress, Rest};
-use crate::film::chase::ParkCause;
+use crate::film::chase::{FilmLeave, ParkCause};
 use crate::state::{
     Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
 };
@@ -154,8 +154,13 @@ impl Conductor {
     ) -> Option<ShowTime> {
         self.film_error_ns = None;
         let film = self.film.as_mut().filter(|film| film.is_followed())?;
-        let rides = matches!(self.machine.state(), State::Playing(_));
-        let (event, target) = film.tick(tick, engine.playhead().frame_time(), trim_ms, rides);
+        let leave = match self.machine.state() {
+            State::Playing(_) => FilmLeave::Lead,
+            State::Paused => FilmLeave::Paused,
+            _ => FilmLeave::Nothing,
+        };
+        let rides = leave == FilmLeave::Lead;
+        let (event, target) = film.tick(tick, engine.playhead().frame_time(), trim_ms, leave);
         // The pose that was sent a tick ago is reached now.
         let reached = engine.playhead().reached();
         // At the tick that loses the film the point falls back to its last sample: that is no error of the seats.
@@ -198,7 +203,7 @@ impl Conductor {
         self.look_for_stray(engine, now);
         self.machine.request(request, now)?;
         if let (Transition::Resume, Some(film)) = (request, &mut self.film) {
-            film.let_join();
+            film.let_join(now);
         }
         self.steer(engine);
         Ok(())

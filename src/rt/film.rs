@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::film::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict, HoldCause};
+use crate::film::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict, FilmLeave, HoldCause};
 use crate::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
 use crate::state::Event;
 use crate::time::{MonoTime, ShowTime, Tick};
@@ -75,9 +75,9 @@ impl FilmLead {
     }
 
     /// A person lets seats join that hold until one does.
-    pub(super) const fn let_join(&mut self) {
-        if matches!(self.chase.state(), ChaseState::Holding) {
-            self.chase.let_join();
+    pub(super) fn let_join(&mut self, now: MonoTime) {
+        if self.chase.state() == ChaseState::Holding {
+            self.chase.let_join(now);
         }
     }
 
@@ -103,14 +103,14 @@ impl FilmLead {
         tick: &Tick,
         frame: Duration,
         trim_ms: i32,
-        may_lead: bool,
+        leave: FilmLeave,
     ) -> (Event, Option<ShowTime>) {
         let begin = self.begin;
         let point = self.clock.at(tick).map(|point| FilmPoint { media: point.media.since(begin), ..point });
         self.point = point;
         let state = point.map_or(FilmState::Absent, |point| point.state);
         let led = self.leads();
-        let verdict = self.chase.tick(&ChaseInput { tick, frame, point, trim_ms, may_lead });
+        let verdict = self.chase.tick(&ChaseInput { tick, frame, point, trim_ms, leave });
         self.joins += u64::from(!led && self.leads());
         match verdict {
             ChaseVerdict::Wait => (Event::FilmAwaited(HoldCause::Film(state)), None),

@@ -88,7 +88,7 @@ plain::displayed!(Next {
     Self::Go => "go, or disarm",
     Self::Watch => "nothing; pause, park or stop as needed",
     Self::AwaitJoin => "nothing; the seats rejoin by themselves",
-    Self::AwaitFilm => "check the film; the seats join it by themselves",
+    Self::AwaitFilm => "check the film; the seats join it then, by themselves or when a person resumes (rejoin)",
     Self::LetJoin => "check the film, then resume; or park",
     Self::Resume => "resume, or park",
     Self::Release =>

@@ -192,8 +192,8 @@ fn where_nothing_can_be_written_the_show_goes_on_and_it_is_said_what_to_do() {
         format!("{config}[record]\ndir = \"{dir}hall.toml\"\n")
     });
     hall.play("ride");
-    let told = hall.wait(|status| status["record"]["trouble"].is_string());
-    let trouble = told["record"]["trouble"].as_str().unwrap();
+    let told = hall.wait(|status| status["record"]["troubles"]["show"].is_string());
+    let trouble = told["record"]["troubles"]["show"].as_str().unwrap();
     assert!(trouble.contains("hall.toml") && trouble.contains("[record] dir"), "{trouble}");
     let warnings = told["warnings"].as_array().unwrap();
     assert!(warnings.iter().any(|one| one["id"] == "record"), "{warnings:?}");

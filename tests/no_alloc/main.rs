@@ -12,7 +12,7 @@ use std::time::Duration;
 use counting::Calls;
 use kinocue::harness::config::LossPolicy;
 use kinocue::harness::engine::{Ending, Mix};
-use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
+use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict, FilmLeave};
 use kinocue::harness::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::health::{Groups, HealthTable, Notice};
 use kinocue::harness::motion::MAX_AXES;
@@ -208,7 +208,7 @@ fn what_leads_seats_by_a_film_allocates_nothing() {
         published.publish(&FilmPoint { at: deadline, media, rate: 1.000_3, epoch: index / 2_000, state });
         let tick = Tick { index: index.into(), deadline, late: Duration::ZERO, missed: 0 };
         let point = clock.at(&tick);
-        match chase.tick(&ChaseInput { tick: &tick, frame, point, trim_ms: 40, may_lead: true }) {
+        match chase.tick(&ChaseInput { tick: &tick, frame, point, trim_ms: 40, leave: FilmLeave::Lead }) {
             ChaseVerdict::Follow { .. } => followed += 1,
             ChaseVerdict::Hold(_) => held += 1,
             ChaseVerdict::Wait | ChaseVerdict::Park(_) => {}

@@ -202,6 +202,27 @@ fn a_play_that_was_recorded_is_judged_again_as_its_report_says_and_so_is_a_cut_o
     drop(sim.end());
 }
 
+/// What a reader of others, run by this program on a script beside this file, finds in a recording.
+fn read_by(program: &Path, script: &str, path: &Path) -> Value {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/play").join(script);
+    let run = Command::new(program).args([&script, path]).output().expect("it runs");
+    assert!(run.status.success(), "{run:?}");
+    serde_json::from_slice(&run.stdout).expect("JSON")
+}
+
+/// That a reader of others finds as many messages, the same metadata and the same attachments as we tell; gives what we tell.
+fn told_as_by(theirs: &Value, path: &Path) -> Value {
+    let ours = kinocue(&["record", "info", text(path), "--json"]);
+    let ours: Value = serde_json::from_str(&ours.stdout).expect("JSON");
+    assert_eq!(theirs["messages"], ours["messages"]);
+    let all: u64 = ours["messages"].as_object().expect("topics").values().filter_map(Value::as_u64).sum();
+    assert_eq!(theirs["statistics"], Value::from(all));
+    assert_eq!(theirs["metadata"]["kinocue"], ours["metadata"]);
+    assert_eq!(theirs["metadata"]["kinocue.end"], ours["end"]);
+    assert_eq!(theirs["attachments"], ours["attachments"]);
+    ours
+}
+
 #[test]
 fn the_official_python_reader_reads_a_recording_with_the_counts_that_we_tell() {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers/bin/python");
@@ -210,22 +231,31 @@ fn the_official_python_reader_reads_a_recording_with_the_counts_that_we_tell() {
     }
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
     let (path, report) = recorded_in_full(&folder, &sim.addresses[0], &[]);
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/play/read_recording.py");
-    let run = Command::new(python).args([script, text(&path)]).output().expect("it runs");
-    assert!(run.status.success(), "{run:?}");
-    let theirs: Value = serde_json::from_slice(&run.stdout).expect("JSON");
-    let ours = kinocue(&["record", "info", text(&path), "--json"]);
-    let ours: Value = serde_json::from_str(&ours.stdout).expect("JSON");
-    assert_eq!(theirs["messages"], ours["messages"]);
-    let all: u64 = ours["messages"].as_object().expect("topics").values().filter_map(Value::as_u64).sum();
-    assert_eq!(theirs["statistics"], Value::from(all));
-    assert_eq!(theirs["metadata"]["kinocue"], ours["metadata"]);
-    assert_eq!(theirs["metadata"]["kinocue.end"], ours["end"]);
-    assert_eq!(theirs["attachments"], ours["attachments"]);
+    let theirs = read_by(&python, "read_recording.py", &path);
+    let ours = told_as_by(&theirs, &path);
     assert_eq!(theirs["ticks"], ours["ticks"]);
     assert_eq!(theirs["frames"]["0"], report["controllers"][0]["sent"]);
     let numbers: Vec<i64> =
         theirs["numbers"].as_array().expect("of frames").iter().filter_map(Value::as_i64).collect();
     assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "two running sums give frame numbers");
+    drop(sim.end());
+}
+
+#[test]
+fn the_official_typescript_reader_reads_a_recording_with_the_counts_of_its_report() {
+    let reader = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers/node_modules/@mcap/core");
+    if !programs::is_there("node-mcap", reader.is_dir(), "tests/readers.sh installs it, by npm") {
+        return;
+    }
+    let (folder, sim) = (Folder::new(), Sim::one(&["--loss", "0.05", "--seed", "7"]));
+    let (path, report) = recorded_in_full(&folder, &sim.addresses[0], &[]);
+    let theirs = read_by(Path::new("node"), "read_recording.mjs", &path);
+    told_as_by(&theirs, &path);
+    let (seat, reported) = (&theirs["seats"]["F4"], &report["controllers"][0]);
+    assert_eq!(seat["unsent"], reported["send_failed"]);
+    for key in ["sent", "acked", "refused", "lost"] {
+        assert_eq!(seat[key], reported[key], "{key}");
+    }
+    assert!(seat["lost"].as_u64() > Some(0), "some were lost: {seat}");
     drop(sim.end());
 }

@@ -226,11 +226,14 @@ impl Disk {
         Ok(all)
     }
 
-    /// Files that were cut short.
+    /// Recordings of this folder that were cut short; what has another name is somebody else's, who may be writing it.
     pub(super) fn cut_short(&self) -> Vec<PathBuf> {
         let Ok(files) = fs::read_dir(&self.dir) else { return Vec::new() };
         let path = |entry: io::Result<fs::DirEntry>| Some(entry.ok()?.path());
-        let is_cut = |path: &PathBuf| path.to_string_lossy().ends_with(PART);
+        let is_cut = |path: &PathBuf| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            name.strip_suffix(PART).is_some_and(|stem| is_recording(&format!("{stem}{WHOLE}")))
+        };
         files.filter_map(path).filter(is_cut).collect()
     }
 
@@ -313,6 +316,8 @@ mod tests {
         assert!(is_recording(&first.name()) && is_recording(&second.name()), "{}", first.name());
         assert_eq!(disk.cut_short().len(), 2);
         first.close().unwrap();
+        // Somebody records a play of his own into the same folder.
+        fs::write(disk.dir().join(format!("tuesday{PART}")), b"").unwrap();
         assert_eq!(disk.cut_short().len(), 1);
     }
 }

@@ -8,13 +8,18 @@ use std::thread;
 use std::time::Duration;
 
 use super::disk::{Disk, PART};
-use super::link::RecordLink;
+use super::link::{RecordLink, RecordPart};
 use crate::app::recording::in_io;
-use crate::record::{self, Entry, EntryMaker, IncidentCause, Opening, Recording, Wanted, read_flight};
+use crate::container::Trouble;
+use crate::record::{
+    self, Entry, EntryMaker, IncidentCause, Opening, Recording, RecoverError, Wanted, read_flight,
+};
 use crate::time::MonoTime;
 
 /// How often it is asked whether it may go on.
 const PATIENCE: Duration = Duration::from_millis(100);
+/// What failed is tried again after so long.
+const AGAIN: Duration = Duration::from_secs(30);
 
 /// What a flight recorder held.
 pub(super) type Leftover = (Opening, Vec<Entry>);
@@ -27,34 +32,58 @@ pub(super) fn flight(path: &Path) -> Option<Leftover> {
     (!entries.is_empty()).then_some((opening, entries))
 }
 
-/// Writes all of it anew, while it may.
+/// Writes all of it anew, while it may. What fails for want of room, or of a disk, is tried again until it is there.
 pub(super) fn clear_up(
     disk: &Disk,
     link: &RecordLink,
-    leftover: Option<Leftover>,
-    cut_short: &[PathBuf],
+    mut leftover: Option<Leftover>,
+    mut cut_short: Vec<PathBuf>,
     may: &impl Fn() -> bool,
 ) {
-    let told = |what: &str, result: io::Result<()>| {
-        if let Err(error) = result {
-            link.trouble(Some(format!("{what} from before the start could not be recovered: {error}")));
-        }
-    };
-    if let Some(leftover) = leftover {
-        told("the flight recorder", incident(disk, &leftover, may));
-        link.tell(|status| {
-            *status.incidents.entry(IncidentCause::Crash.word().to_owned()).or_default() += 1;
+    loop {
+        let mut trouble = None;
+        let mut failed = |what: &str, error: &io::Error| {
+            let why = format!("{what} from before the start is not recovered: {error}");
+            trouble = Some(format!("{why}; free space on that disk; it is tried again every 30 s"));
+        };
+        leftover = leftover.filter(|leftover| match incident(disk, leftover, may) {
+            Err(error) => {
+                failed("the flight recorder", &error);
+                true
+            }
+            Ok(()) => {
+                link.tell(|status| {
+                    *status.incidents.entry(IncidentCause::Crash.word().to_owned()).or_default() += 1;
+                });
+                false
+            }
         });
-    }
-    for path in cut_short {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let recovered = recover(path, may);
-        if recovered.is_err() {
-            // It stays, and is not tried at each start again.
-            let _ = fs::rename(path, path.with_extension("unreadable"));
+        cut_short.retain(|path| match recover(path, may) {
+            Ok(()) => false,
+            Err(error) if is_its_own(&error) => {
+                // It stays, and is not tried at each start again.
+                let _ = fs::rename(path, path.with_extension("unreadable"));
+                false
+            }
+            Err(error) => {
+                failed(&path.file_name().unwrap_or_default().to_string_lossy(), &error);
+                true
+            }
+        });
+        link.trouble(RecordPart::Earlier, trouble);
+        if leftover.is_none() && cut_short.is_empty() {
+            return;
         }
-        told(&name, recovered);
+        thread::park_timeout(AGAIN);
     }
+}
+
+/// Whether a file itself is why it cannot be recovered.
+fn is_its_own(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::InvalidData | io::ErrorKind::AlreadyExists | io::ErrorKind::NotFound
+    )
 }
 
 fn wait_for(may: &impl Fn() -> bool) {
@@ -67,6 +96,7 @@ fn wait_for(may: &impl Fn() -> bool) {
 fn incident(disk: &Disk, (opening, entries): &Leftover, may: &impl Fn() -> bool) -> io::Result<()> {
     disk.clear_out_for_more()?;
     let (part, out) = disk.create_incident(IncidentCause::Crash)?;
+    let part = part.until_begun();
     let opening = opening.clone().with("cause", IncidentCause::Crash.word());
     let mut file =
         Recording::open(out, &opening, EntryMaker::new(0, (MonoTime::default(), 0))).map_err(in_io)?;
@@ -78,7 +108,7 @@ fn incident(disk: &Disk, (opening, entries): &Leftover, may: &impl Fn() -> bool)
     let end = [("messages", entries.len().to_string())];
     let out = file.finish(&end, None).map_err(in_io)?;
     out.into_inner().map_err(io::IntoInnerError::into_error)?;
-    part.close().map(drop)
+    part.begun().close().map(drop)
 }
 
 /// Writes a file anew that was cut short.
@@ -107,9 +137,15 @@ fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
 fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     let input = Patient { file: BufReader::new(File::open(from)?), may };
     let (recovered, out) =
-        record::recover(input, BufWriter::new(File::create(to)?)).map_err(io::Error::other)?;
+        record::recover(input, BufWriter::new(File::create(to)?)).map_err(|error| match error {
+            RecoverError::Write(error) => error,
+            RecoverError::Read(error) => io::Error::new(io::ErrorKind::InvalidData, error),
+        })?;
+    if let Some(Trouble::Unread(why)) = recovered.trouble {
+        return Err(io::Error::other(why));
+    }
     if recovered.messages.is_empty() {
-        return Err(io::Error::other("it has no complete message"));
+        return Err(io::Error::new(io::ErrorKind::InvalidData, "it has no complete message"));
     }
     out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
     let again = Patient { file: BufReader::new(File::open(to)?), may };
@@ -164,17 +200,8 @@ mod tests {
     fn a_recording_that_was_cut_short_is_whole_after_the_next_start() {
         let folder = tempfile::tempdir().unwrap();
         let part = folder.path().join("2026-01-01T10-00-00-show-one.part.mcap");
-        let out = BufWriter::new(File::create(&part).unwrap());
-        let maker = EntryMaker::new(0, (MonoTime::default(), 0));
-        let mut file = Recording::open(out, &opening(), maker).unwrap();
-        file.attach("configuration.toml", "application/toml", b"[show]").unwrap();
-        for number in 0..100 {
-            file.put(&entry(number)).unwrap();
-            file.flush().unwrap();
-        }
+        let octets = octets_of_a_show();
         // Killed in the middle of a record.
-        let octets = fs::read(&part).unwrap();
-        std::mem::forget(file);
         fs::write(&part, &octets[..octets.len() - 60]).unwrap();
         recover(&part, &|| true).unwrap();
         assert!(!part.exists());
@@ -188,15 +215,43 @@ mod tests {
     }
 
     #[test]
+    fn a_recording_for_which_the_disk_has_no_room_is_tried_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let part = folder.path().join("2026-01-01T10-00-00-show-one.part.mcap");
+        fs::write(&part, octets_of_a_show()).unwrap();
+        // Whatever is written there meets a disk that is full.
+        std::os::unix::fs::symlink("/dev/full", part.with_extension("recovering")).unwrap();
+        let full = recover(&part, &|| true).unwrap_err();
+        assert!(!is_its_own(&full), "{full}");
+        assert!(part.exists());
+        recover(&part, &|| true).unwrap();
+        assert!(!part.exists());
+    }
+
+    #[test]
     fn what_cannot_be_recovered_stays_as_it_is() {
         let folder = tempfile::tempdir().unwrap();
         let part = folder.path().join("2026-01-01T10-00-00-show-one.part.mcap");
         for octets in [&b""[..], b"no recording at all", &octets_of_a_start()[..40]] {
             fs::write(&part, octets).unwrap();
-            assert!(recover(&part, &|| true).is_err());
+            assert!(is_its_own(&recover(&part, &|| true).unwrap_err()));
             assert_eq!(fs::read(&part).unwrap(), octets);
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         }
+    }
+
+    /// Of a show that was killed behind its hundredth message.
+    fn octets_of_a_show() -> Vec<u8> {
+        let mut octets = Vec::new();
+        let maker = EntryMaker::new(0, (MonoTime::default(), 0));
+        let mut file = Recording::open(io::Cursor::new(&mut octets), &opening(), maker).unwrap();
+        file.attach("configuration.toml", "application/toml", b"[show]").unwrap();
+        for number in 0..100 {
+            file.put(&entry(number)).unwrap();
+            file.flush().unwrap();
+        }
+        std::mem::forget(file);
+        octets
     }
 
     fn octets_of_a_start() -> Vec<u8> {

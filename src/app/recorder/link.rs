@@ -27,6 +27,31 @@ pub(crate) struct ShowStart {
     pub(crate) attached: Option<std::path::PathBuf>,
 }
 
+/// What of recordings can be in trouble.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum RecordPart {
+    /// The recording of a show, or the recorder on the whole.
+    Show,
+    /// That of an incident.
+    Incident,
+    /// The flight recorder.
+    Flight,
+    /// What an earlier program left.
+    Earlier,
+}
+
+impl RecordPart {
+    /// The word for it in the status.
+    const fn word(self) -> &'static str {
+        match self {
+            Self::Show => "show",
+            Self::Incident => "incident",
+            Self::Flight => "flight",
+            Self::Earlier => "earlier",
+        }
+    }
+}
+
 /// What a recorder is told.
 #[derive(Debug)]
 pub(crate) enum RecordAsk {
@@ -114,11 +139,15 @@ impl RecordLink {
         change(&mut self.shared.status.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Says what is wrong; none for nothing.
-    pub(super) fn trouble(&self, trouble: Option<String>) {
+    /// Says what is wrong with a part; none for nothing.
+    pub(super) fn trouble(&self, part: RecordPart, trouble: Option<String>) {
         self.tell(|status| {
-            status.errors += u64::from(trouble.is_some() && status.trouble != trouble);
-            status.trouble = trouble;
+            status.errors +=
+                u64::from(trouble.is_some() && status.troubles.get(part.word()) != trouble.as_ref());
+            match trouble {
+                Some(trouble) => status.troubles.insert(part.word().to_owned(), trouble),
+                None => status.troubles.remove(part.word()),
+            };
         });
     }
 }

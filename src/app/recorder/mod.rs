@@ -5,6 +5,7 @@ mod beginning;
 mod disk;
 mod leftovers;
 mod link;
+mod open;
 mod worker;
 
 use std::fs;
@@ -24,6 +25,7 @@ use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
 use disk::Disk;
+use link::RecordPart;
 use worker::Worker;
 
 /// The flight recorder's file in the runtime folder.
@@ -95,7 +97,10 @@ impl HallRecorder {
             worker.run(&Monotonic);
         });
         if let Err(error) = &thread {
-            link.trouble(Some(format!("nothing is recorded: no thread could be started: {error}")));
+            link.trouble(
+                RecordPart::Show,
+                Some(format!("nothing is recorded: no thread could be started: {error}")),
+            );
         } else {
             runtime.record(taps);
         }
@@ -126,10 +131,8 @@ impl Drop for TellsOfPanic {
     fn drop(&mut self) {
         if thread::panicking() {
             self.0.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
-            self.0.trouble(Some(
-                "recording has stopped: the recorder failed; restart the service between two shows"
-                    .to_owned(),
-            ));
+            let text = "recording has stopped: the recorder failed; restart the service between two shows";
+            self.0.trouble(RecordPart::Show, Some(text.to_owned()));
         }
     }
 }

@@ -2,22 +2,22 @@
 //! incident. What cannot be written is told, and tried again; it never holds up whoever it comes from.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io;
 use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::thread::Builder;
 use std::time::Duration;
 
 use super::beginning::{begun, small_file};
-use super::disk::{Disk, PartFile};
+use super::disk::Disk;
 use super::leftovers::{Leftover, clear_up};
-use super::link::{RecordAsk, RecordLink, ShowStart};
+use super::link::{RecordAsk, RecordLink, RecordPart, ShowStart};
+use super::open::{OpenFile, OpenRecording};
 use crate::app::recording::in_io;
 use crate::config::{Record, RecordMode};
 use crate::record::{
     Counts, Entry, EntryMaker, EventNote, Flight, IncidentCause, IncidentStep, Incidents, Intake, Message,
-    Note, Opening, Recording,
+    Note, Opening,
 };
 use crate::sys::realtime;
 use crate::time::{Clock, MonoTime};
@@ -35,25 +35,6 @@ const BEFORE: Duration = Duration::from_secs(10);
 const AFTER: Duration = Duration::from_secs(5);
 /// Asks that are taken in one look; more wait for the next.
 const ASKS: usize = 256;
-
-/// A recording that is being written.
-struct OpenFile {
-    file: Recording<BufWriter<File>>,
-    disk: PartFile,
-    counts: Counts,
-}
-
-/// A show that is recorded, whether a file of it is open or not.
-struct OpenRecording {
-    start: ShowStart,
-    part: u32,
-    file: Option<OpenFile>,
-    /// When the next file is tried, where the last has failed.
-    again_at: Option<MonoTime>,
-    /// Until when it goes on, once it is over.
-    until: Option<MonoTime>,
-    report: Option<Vec<u8>>,
-}
 
 /// What the thread has.
 pub(super) struct Worker {
@@ -125,7 +106,8 @@ impl Worker {
             Err(error) => {
                 let path = path.display();
                 let remedy = "give the service a runtime folder (RuntimeDirectory= in the unit)";
-                self.link.trouble(Some(format!("there is no flight recorder: {path}: {error}; {remedy}")));
+                let trouble = format!("there is no flight recorder: {path}: {error}; {remedy}");
+                self.link.trouble(RecordPart::Flight, Some(trouble));
             }
         }
         self
@@ -141,7 +123,7 @@ impl Worker {
         // Where there is no thread for it, it stays for the next start.
         let _ = Builder::new().name("recover".to_owned()).spawn(move || {
             realtime::stand_back();
-            clear_up(&disk, &link, leftover, &cut_short, &may);
+            clear_up(&disk, &link, leftover, cut_short, &may);
         });
     }
 
@@ -212,8 +194,10 @@ impl Worker {
         for (cause, at) in self.intake.take_found() {
             self.on_incident(cause, at, at);
         }
-        if let Some(Err(error)) = self.flight.as_mut().map(Flight::write) {
-            self.link.trouble(Some(format!("the flight recorder cannot be written: {error}")));
+        if let Some(written) = self.flight.as_mut().map(Flight::write) {
+            let trouble =
+                |error| format!("the flight recorder cannot be written: {error}; free space on its disk");
+            self.link.trouble(RecordPart::Flight, written.err().map(trouble));
         }
     }
 
@@ -295,7 +279,7 @@ impl Worker {
             Ok((number, open)) => {
                 let name = open.disk.name();
                 self.link.tell(|status| status.recording = Some(name));
-                self.link.trouble(None);
+                self.link.trouble(RecordPart::Show, None);
                 (show.part, show.file, show.again_at) = (number, Some(open), None);
             }
             Err(error) => self.fail_show(&error, now),
@@ -310,17 +294,19 @@ impl Worker {
         }
         self.link.tell(|status| status.recording = None);
         let remedy = "free space on that disk, or set [record] dir to a folder that the service may write to";
-        self.link.trouble(Some(format!(
+        let trouble = format!(
             "the show is not recorded: {dir}: {error}; {remedy}; the show goes on, and a new file is tried every 30 s"
-        )));
+        );
+        self.link.trouble(RecordPart::Show, Some(trouble));
     }
 
     fn fail_incident(&mut self, error: &io::Error) {
         self.incident = None;
+        self.incidents.give_up();
         let dir = self.disk.dir().display();
-        self.link.trouble(Some(format!(
-            "an incident is not kept: {dir}: {error}; free space on that disk, or set [record] dir"
-        )));
+        let trouble =
+            format!("an incident is not kept: {dir}: {error}; free space on that disk, or set [record] dir");
+        self.link.trouble(RecordPart::Incident, Some(trouble));
     }
 
     /// Something is worth an incident.
@@ -331,12 +317,10 @@ impl Worker {
         match self.incidents.on(cause, at) {
             IncidentStep::TooMany => {}
             IncidentStep::Join => self.say_incident(cause, now),
-            IncidentStep::Begin => {
-                if let Err(error) = self.begin_incident(cause, at) {
-                    self.fail_incident(&error);
-                }
-                self.say_incident(cause, now);
-            }
+            IncidentStep::Begin => match self.begin_incident(cause, at) {
+                Ok(()) => self.say_incident(cause, now),
+                Err(error) => self.fail_incident(&error),
+            },
         }
     }
 
@@ -360,6 +344,7 @@ impl Worker {
         let mut file = begun(out, &opening, self.maker, self.safe.as_deref(), entries)?;
         file.flush().map_err(in_io)?;
         self.incident = Some(OpenFile { file, disk: disk.begun(), counts: Counts::default() });
+        self.link.trouble(RecordPart::Incident, None);
         Ok(())
     }
 
@@ -383,7 +368,8 @@ impl Worker {
             let before = self.show.as_mut().and_then(|show| show.file.take());
             self.open_part(now);
             if let Some(Err(error)) = before.map(|open| self.close_file(open, None)) {
-                self.link.trouble(Some(format!("a part of a recording is incomplete: {error}")));
+                let trouble = format!("a part of a recording is incomplete: {error}; look at that disk");
+                self.link.trouble(RecordPart::Show, Some(trouble));
             }
         }
     }
@@ -403,8 +389,10 @@ impl Worker {
         }
         let Some(OpenRecording { file, report, .. }) = self.show.take() else { return };
         self.link.tell(|status| status.recording = None);
-        if let Some(Err(error)) = file.map(|open| self.close_file(open, report.as_deref())) {
-            self.fail_show(&error, now);
+        match file.map(|open| self.close_file(open, report.as_deref())) {
+            Some(Err(error)) => self.fail_show(&error, now),
+            // What was wrong with it is over, as the log and its files say.
+            _ => self.link.trouble(RecordPart::Show, None),
         }
     }
 

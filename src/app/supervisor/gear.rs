@@ -5,16 +5,19 @@ use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::{HallContext, ShowChange};
 use super::hall_settings::HallSettings;
 use crate::control::{Code, Command, Desired, Levels, LevelsChange, Problem};
-use crate::state::State;
+use crate::state::{PlayMode, State};
 use crate::time::MonoTime;
+
+/// Seats wait for the film, or for a person who lets them join it.
+const WAITING: State = State::Playing(PlayMode::Waiting);
 
 /// What has to be known of gear, to tell its doing from that of people.
 #[derive(Debug, Default)]
 pub(super) struct GearLimits {
     /// Since when the hall is paused by gear, and by no person; where that is not the pause of now, it is an old one.
     paused: Option<MonoTime>,
-    /// True if the hall was paused when what is done now was asked.
-    was_paused: bool,
+    /// The state of the hall when what is done now was asked.
+    before: Option<State>,
 }
 
 impl GearLimits {
@@ -36,6 +39,9 @@ impl GearLimits {
             return refused("it did not pause the hall", "let a person resume it");
         }
         match ask {
+            Command::Resume if mirror.state == WAITING => {
+                refused("a person lets seats join a film", "let a person resume")
+            }
             Command::Resume if !hall.is_on_cue() => {
                 refused("nothing is paused", "let a person check the hall first")
             }
@@ -52,11 +58,12 @@ impl GearLimits {
 impl Feature for GearLimits {
     fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext, _out: &mut Vec<Act>) {
         match event {
-            SupervisorEvent::Asked(_) => self.was_paused = hall.mirror.state == State::Paused,
+            SupervisorEvent::Asked(_) => self.before = Some(hall.mirror.state),
             SupervisorEvent::Done(Desired { ask: Command::Pause, who }) => {
-                if !who.surface.is_gear() {
+                // To resume is to let seats join, which is not for gear where they waited for that.
+                if !who.surface.is_gear() || self.before == Some(WAITING) {
                     self.paused = None;
-                } else if !self.was_paused {
+                } else if self.before != Some(State::Paused) {
                     self.paused = Some(hall.mirror.since);
                 }
             }
@@ -155,6 +162,18 @@ mod tests {
         role(rig.ask_as(Surface::Osc, Command::Resume));
         rig.ask(Command::Stop).unwrap();
         role(rig.ask_as(Surface::Osc, Command::Resume));
+    }
+
+    #[test]
+    fn gear_lets_no_seats_join_a_film_not_even_by_a_pause_of_its_own() {
+        let mut rig = Rig::playing();
+        rig.supervisor.hall.mirror.state = WAITING;
+        let limits = |rig: &Rig, ask| {
+            let desired = crate::app::supervisor::testing::desired(Surface::Osc, ask);
+            GearLimits::default().may_ask(&desired, &rig.supervisor.hall)
+        };
+        assert!(limits(&rig, Command::Resume).is_err());
+        assert!(limits(&rig, Command::Pause).is_ok());
     }
 
     #[test]

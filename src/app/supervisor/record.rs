@@ -228,6 +228,9 @@ impl ShowRecords {
             film: film.map(|(proof, _)| proof),
         });
         self.journal.show(&record);
+        if !hall.config.record.names {
+            record.operator.clear();
+        }
         if let Ok(report) = serde_json::to_vec(&record) {
             hall.recorder.put(RecordAsk::Report(report));
         }

@@ -167,7 +167,7 @@ fn records(hall: &HallContext) -> Result<(), Problem> {
     if status.flight_s > 0.0 || status.recording.is_some() {
         return Ok(());
     }
-    let why = status.trouble.unwrap_or_else(|| "nothing is recorded here".to_owned());
+    let why = status.troubles.into_values().next().unwrap_or_else(|| "nothing is recorded here".to_owned());
     Err(Problem::new(Code::State, why, "set flight_s and mode in [record], and reload"))
 }
 

@@ -52,7 +52,8 @@ impl StatusParts<'_> {
         warnings.extend(player::warnings(hall).iter().map(|trouble| in_two("player", trouble)));
         warnings.extend(links::troubles(&hall.links).map(|trouble| in_two("link", &trouble)));
         warnings.extend(features.lasting.warnings(hall));
-        warnings.extend(hall.recorder.status().trouble.map(|trouble: String| in_two("record", &trouble)));
+        let troubles = hall.recorder.status().troubles;
+        warnings.extend(troubles.iter().map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));
         warnings.extend(recorded::lacks_room(hall).map(|trouble| in_two("record-room", &trouble)));
         warnings.extend(settings_file.map(|trouble| in_two("settings", &trouble)));
         warnings.extend(features.records.trouble().map(|trouble| Warning {

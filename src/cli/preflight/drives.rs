@@ -37,10 +37,11 @@ fn look_at(link: &Link, motors: &[&Motors]) -> LinkSurvey {
         Ok(line) => (line, TalkTerms::of(link)),
         Err(error) => return LinkSurvey::silent(error),
     };
-    if link.family == Some(DriveFamily::Sixpack2) {
-        LinkSurvey::of_sixpacks(&mut sixpack2::Talk::new(line, terms), motors)
-    } else {
-        LinkSurvey::of_units(&mut silvermax::Talk::new(line, terms), motors)
+    match link.family {
+        Some(DriveFamily::Sixpack2) => LinkSurvey::of_sixpacks(&mut sixpack2::Talk::new(line, terms), motors),
+        Some(DriveFamily::SilverMax) | None => {
+            LinkSurvey::of_units(&mut silvermax::Talk::new(line, terms), motors)
+        }
     }
 }
 

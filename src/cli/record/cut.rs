@@ -37,18 +37,8 @@ pub(in super::super) struct Args {
     /// Write the datagrams as a pcap capture.
     #[arg(long, conflicts_with_all = ["film_time", "anonymous", "whole", "scene"])]
     pcap: bool,
-    /// Time messages by the film rather than by the clock.
-    #[arg(long)]
-    film_time: bool,
-    /// Omit the names of seats, hall and cue, and addresses, also those in frames and replies.
-    #[arg(long)]
-    anonymous: bool,
-    /// Also keep the original ticks and replies, so that the cut is itself a full recording.
-    #[arg(long, conflicts_with = "film_time")]
-    whole: bool,
-    /// Also add each seat as a cube that moves, for viewers that draw scenes in space.
-    #[arg(long)]
-    scene: bool,
+    #[command(flatten)]
+    manner: CutManner,
     /// Overwrite OUT if it exists.
     #[arg(long)]
     force: bool,
@@ -64,6 +54,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     exit::refuse_to_replace(&args.output, args.force)?;
     let (from, until) = args.film.unwrap_or((ShowTime::from_nanos(i64::MIN), ShowTime::from_nanos(i64::MAX)));
     let stretch = Stretch { from, until, seat: args.seat.clone() };
+    // Before a file is begun for it.
+    drop(open(&args.file)?);
     let part = args.output.with_extension("cutting");
     let file = File::create(&part).with_context(|| part.display().to_string()).or_exit(Exit::Io)?;
     let out = BufWriter::new(file);
@@ -72,9 +64,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     } else if args.pcap {
         pcap(&args.file, &stretch, out)
     } else {
-        let Args { film_time, anonymous, whole, scene, .. } = *args;
-        let manner = CutManner { film_time, anonymous, whole, scene };
-        cut(open(&args.file)?, &stretch, manner, out).map_err(|error| failure(error, &args.file))
+        cut(open(&args.file)?, &stretch, args.manner, out).map_err(|error| failure(error, &args.file))
     };
     let written = result.and_then(|out| {
         let file = out.into_inner().map_err(std::io::IntoInnerError::into_error).or_exit(Exit::Io)?;

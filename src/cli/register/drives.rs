@@ -235,7 +235,7 @@ impl RegisterReader {
         let terms = TalkTerms::of(link);
         match link.family {
             Some(DriveFamily::Sixpack2) => Self::Sixpack2(sixpack2::Talk::new(line, terms)),
-            _ => Self::SilverMax(silvermax::Talk::new(line, terms)),
+            Some(DriveFamily::SilverMax) | None => Self::SilverMax(silvermax::Talk::new(line, terms)),
         }
     }
 

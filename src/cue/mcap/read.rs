@@ -30,7 +30,8 @@ const REASON_TOLD: usize = 200;
 /// Reads an MCAP cue; `path` names it in faults.
 pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
     let mut reading = McapReading::new(path);
-    if let Err((place, problem)) = each(input, &mut reading) {
+    let read = container::each(input, MAX_FILE, |opcode, body| reading.take(opcode, body));
+    if let Err((place, problem)) = read.map_err(placed) {
         reading.faults.add(place, None, problem);
     }
     reading.finish()
@@ -43,7 +44,8 @@ pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaul
 /// Where what is complete makes no cue.
 pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), CueFaults> {
     let mut reading = McapReading::new(path);
-    let lost = match each(input, &mut reading) {
+    let read = container::each_sound(input, MAX_FILE, |opcode, body| reading.take(opcode, body));
+    let lost = match read.map_err(placed) {
         Ok(()) => None,
         Err((_, problem @ (Problem::CutShort | Problem::Damaged(_)))) => Some(problem),
         Err((place, problem)) => {
@@ -56,12 +58,10 @@ pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), 
     Ok((cue, lost))
 }
 
-/// Hands it every record, until one is wrong; says then where that is.
-fn each(input: impl Read, reading: &mut McapReading) -> Result<(), (Place, Problem)> {
-    container::each(input, MAX_FILE, |opcode, body| reading.take(opcode, body)).map_err(|(at, problem)| {
-        let place = if matches!(problem, Problem::Damaged(_)) { Place::Byte(at) } else { Place::File };
-        (place, problem)
-    })
+/// What is wrong with the file, and where.
+fn placed((at, problem): (u64, Problem)) -> (Place, Problem) {
+    let place = if matches!(problem, Problem::Damaged(_)) { Place::Byte(at) } else { Place::File };
+    (place, problem)
 }
 
 impl From<Trouble> for Problem {

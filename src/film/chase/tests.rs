@@ -12,7 +12,7 @@ fn rules() -> ChaseRules {
 struct Stand {
     chase: Chase,
     index: u64,
-    may_lead: bool,
+    leave: FilmLeave,
     state: FilmState,
     ahead_s: f64,
     trim_ms: i32,
@@ -21,7 +21,7 @@ struct Stand {
 impl Stand {
     fn new(rules: ChaseRules) -> Self {
         let chase = Chase::new(rules, mono(0.0));
-        Self { chase, index: 0, may_lead: true, state: FilmState::Locked, ahead_s: 10.0, trim_ms: 0 }
+        Self { chase, index: 0, leave: FilmLeave::Lead, state: FilmState::Locked, ahead_s: 10.0, trim_ms: 0 }
     }
 
     /// One whose seats follow.
@@ -42,8 +42,8 @@ impl Stand {
         let tick = Tick { index: self.index, deadline: at, late: Duration::ZERO, missed: 0 };
         let media = ShowTime::from_secs_f64(self.ahead_s + self.now_s());
         let point = FilmPoint { at, media, rate: 1.0, epoch: 0, state: self.state };
-        let (trim_ms, may_lead) = (self.trim_ms, self.may_lead);
-        self.chase.tick(&ChaseInput { tick: &tick, frame: FRAME, point: Some(point), trim_ms, may_lead })
+        let (trim_ms, leave) = (self.trim_ms, self.leave);
+        self.chase.tick(&ChaseInput { tick: &tick, frame: FRAME, point: Some(point), trim_ms, leave })
     }
 
     /// The verdict after so many seconds.
@@ -55,14 +55,14 @@ impl Stand {
 #[test]
 fn seats_join_a_film_that_could_be_followed_for_half_a_second_and_only_if_the_hall_lets_them() {
     let mut stand = Stand::new(rules());
-    stand.may_lead = false;
+    stand.leave = FilmLeave::Nothing;
     assert_eq!(stand.run(10.0), ChaseVerdict::Wait);
-    stand.may_lead = true;
+    stand.leave = FilmLeave::Lead;
     assert_eq!(stand.run(0.5), ChaseVerdict::Wait);
     let ChaseVerdict::Follow { join: 1, playhead, pace } = stand.run(0.02) else { panic!("it joins") };
     let film = stand.ahead_s + stand.now_s() + 0.01;
     assert!((playhead.as_secs_f64() - film).abs() < 1e-6 && pace == 1.0, "{playhead} at {pace}");
-    stand.may_lead = false;
+    stand.leave = FilmLeave::Nothing;
     assert_eq!(stand.tick(), ChaseVerdict::Wait);
 }
 
@@ -193,8 +193,83 @@ fn after_five_joins_in_a_minute_the_next_waits_for_a_person() {
     }
     assert_eq!(joins, 5);
     assert_eq!(stand.run(120.0), ChaseVerdict::Hold(HoldCause::Unstable), "time alone makes it no better");
-    stand.chase.let_join();
+    stand.chase.let_join(mono(stand.now_s()));
     assert!(matches!(stand.tick(), ChaseVerdict::Follow { join: 6, .. }));
+}
+
+#[test]
+fn seats_that_were_paused_up_come_down_by_the_rules_of_seats_that_hold() {
+    let paused = || {
+        let mut stand = Stand::following(rules());
+        stand.leave = FilmLeave::Paused;
+        assert!(matches!(stand.run(200.0), ChaseVerdict::Hold(_)));
+        stand
+    };
+    for (ended_first, state) in [true, false]
+        .into_iter()
+        .flat_map(|first| [FilmState::Ended, FilmState::Stopped].map(|state| (first, state)))
+    {
+        let mut stand = paused();
+        if ended_first {
+            stand.state = state;
+            stand.run(1.0);
+        }
+        stand.leave = FilmLeave::Lead;
+        stand.state = state;
+        let cause = if state == FilmState::Ended { ParkCause::FilmCutShort } else { ParkCause::HeldTooLong };
+        if state == FilmState::Stopped {
+            assert_eq!(
+                stand.run(299.0),
+                ChaseVerdict::Hold(HoldCause::Film(state)),
+                "a pause does not count"
+            );
+        }
+        assert_eq!(stand.run(3.0), ChaseVerdict::Park(cause));
+        stand.state = FilmState::Locked;
+        assert_eq!(stand.run(10.0), ChaseVerdict::Park(cause), "no other film moves them");
+    }
+    let mut stand = paused();
+    stand.ahead_s = 700.0;
+    stand.leave = FilmLeave::Lead;
+    stand.run(2.1);
+    assert_eq!(stand.tick(), ChaseVerdict::Park(ParkCause::CueLeft));
+    let mut stand = paused();
+    stand.leave = FilmLeave::Lead;
+    assert!(matches!(stand.tick(), ChaseVerdict::Follow { join: 2, .. }));
+    let mut waiting = Stand::new(rules());
+    waiting.leave = FilmLeave::Paused;
+    assert_eq!(waiting.run(1.0), ChaseVerdict::Wait, "they are parked");
+}
+
+#[test]
+fn a_source_that_was_unstable_stays_so_while_the_film_stands_or_its_player_is_gone() {
+    for state in [FilmState::Stopped, FilmState::Lost] {
+        let mut stand = Stand::following(rules());
+        for _ in 0..20 {
+            stand.ahead_s += 5.0;
+            stand.run(1.0);
+        }
+        stand.state = state;
+        assert_eq!(stand.run(65.0), ChaseVerdict::Hold(HoldCause::Film(state)));
+        stand.state = FilmState::Locked;
+        assert_eq!(stand.run(120.0), ChaseVerdict::Hold(HoldCause::Unstable));
+        stand.chase.let_join(mono(stand.now_s()));
+        assert!(matches!(stand.tick(), ChaseVerdict::Follow { join: 6, .. }));
+        stand.ahead_s += 5.0;
+        stand.tick();
+        assert!(matches!(stand.tick(), ChaseVerdict::Follow { join: 7, .. }), "a person has said so");
+    }
+}
+
+#[test]
+fn whoever_lets_seats_join_means_the_film_of_now() {
+    let mut stand = Stand::following(ChaseRules { rejoin: Rejoin::Ask, ..rules() });
+    stand.state = FilmState::Stopped;
+    stand.run(1.0);
+    stand.chase.let_join(mono(stand.now_s()));
+    stand.run(11.0);
+    stand.state = FilmState::Locked;
+    assert_eq!(stand.run(5.0), ChaseVerdict::Hold(HoldCause::Asks));
 }
 
 #[test]
@@ -204,7 +279,7 @@ fn seats_that_are_to_ask_join_only_when_a_person_lets_them() {
     stand.run(1.0);
     stand.state = FilmState::Locked;
     assert_eq!(stand.run(5.0), ChaseVerdict::Hold(HoldCause::Asks));
-    stand.chase.let_join();
+    stand.chase.let_join(mono(stand.now_s()));
     assert!(matches!(stand.tick(), ChaseVerdict::Follow { join: 2, .. }));
     stand.ahead_s += 1.0;
     stand.tick();
@@ -215,6 +290,7 @@ fn seats_that_are_to_ask_join_only_when_a_person_lets_them() {
 fn no_sign_leads_from_parking_to_motion_but_the_hall() {
     let signs = [
         ChaseSign::Barred,
+        ChaseSign::Paused,
         ChaseSign::Over(ParkCause::FilmEnded),
         ChaseSign::Unready(HoldCause::Apart),
         ChaseSign::Brief,
@@ -241,11 +317,16 @@ fn whatever_the_points_say_seats_follow_only_what_may_lead_and_never_in_a_jump()
                     [0.0, luck.between(-0.1, 0.1), luck.between(-1e6, 1e6), 1e300][luck.below(4)];
                 stand.ahead_s = if stand.ahead_s.abs() > 1e9 { 10.0 } else { stand.ahead_s };
                 stand.trim_ms = [0, 500, -500][luck.below(3)];
-                stand.may_lead = !luck.is(0.1);
+                let leaves = [FilmLeave::Nothing, FilmLeave::Paused];
+                stand.leave = if luck.is(0.1) { leaves[luck.below(2)] } else { FilmLeave::Lead };
             }
             let verdict = stand.tick();
             if let ChaseVerdict::Follow { join, playhead, pace } = verdict {
-                assert!(stand.may_lead && stand.state.may_lead(), "{verdict:?} by {:?}", stand.state);
+                assert!(
+                    stand.leave == FilmLeave::Lead && stand.state.may_lead(),
+                    "{verdict:?} by {:?}",
+                    stand.state
+                );
                 if let ChaseVerdict::Follow { join: joined, playhead: last, .. } = before
                     && joined == join
                 {

@@ -211,6 +211,27 @@ fn what_is_wound_or_runs_backwards_leads_nobody_and_is_locked_again_after() {
     }
 }
 
+#[test]
+fn a_film_that_was_a_little_off_its_speed_leads_again_once_it_is_known_to_keep_it_and_not_before() {
+    for (name, told) in SOURCES {
+        for (rate, seconds) in [(1.004, 6.0), (0.996, 6.0), (1.003, 8.0), (1.02, 3.0)] {
+            for seed in 0..3 {
+                let film = TrueFilm::new(500.0, 1.0).rate_from(15.0, rate).rate_from(15.0 + seconds, 1.0);
+                let all = told.of(&film, (0.1, 45.0), &[], &mut Luck::new(seed));
+                let run = Run::of(told.kind, &film, &all, 45.0);
+                assert!(run.tracker.state().may_lead(), "{name}, {rate}: {:?}", run.states);
+                let stays = TrueFilm::new(500.0, 1.0).rate_from(15.0, rate);
+                let all = told.of(&stays, (0.1, 75.0), &[], &mut Luck::new(seed));
+                let run = Run::of(told.kind, &stays, &all, 75.0);
+                let led =
+                    run.states.iter().filter(|seen| seen.0 > 15.0 && seen.1 == FilmState::Locked).count();
+                assert!(led <= 1, "{name}, {rate}: it leads and is stopped by turns: {:?}", run.states);
+                println!("{name:<12} at {rate}, seed {seed}: {:?}", &run.states[1..]);
+            }
+        }
+    }
+}
+
 /// A player that answers 20 times a second, with these words besides.
 fn player(film: &TrueFilm, until: f64, words: &[(f64, FilmWord)]) -> Vec<Observation> {
     let told = SOURCES[1].1;

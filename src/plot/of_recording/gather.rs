@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::Look;
 use crate::plot::{Band, Flag, Shade, TimeAxis};
-use crate::record::{Contents, Margins, SeatSample, TickSample, Told, each_chunk, state_word};
+use crate::record::{Contents, Falls, Margins, SeatSample, TickSample, Told, each_chunk, state_word};
 use crate::time::{MonoTime, Rate, ShowTime};
 
 /// Asked and sent are apart where they differ by more, mm or degrees: more than pulses and rounding make.
@@ -12,6 +12,10 @@ pub(super) const APART: f64 = 0.02;
 /// Upper ends of a histogram's bins, µs; the last has no end.
 pub(super) const BINS_US: [f64; 12] =
     [10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4, 1e5, f64::INFINITY];
+/// The lane of a seat that is out.
+const OUT: usize = 6;
+/// Flags of a picture; more are counted in one.
+const FLAGS: usize = 100;
 /// Lateness of a column is kept of so many ticks at the most.
 const KEPT: usize = 20_000;
 
@@ -71,11 +75,14 @@ pub(crate) struct Gathered {
     pub(super) lateness: Vec<u64>,
     pub(super) latency: Vec<u64>,
     pub(super) counts: SeatCounts,
+    pub(super) falls: Falls,
     /// What is on.
     pub(super) lanes: Vec<CountedLane>,
     pub(super) state: Option<&'static str>,
     pub(super) states: Vec<(&'static str, Vec<Shade>)>,
     pub(super) flags: Vec<Flag>,
+    /// Marks, events and requests that have no flag.
+    pub(super) more_flags: u64,
     pub(super) column: usize,
     /// Ticks are taken from whole ones, and not from samples.
     pub(super) is_whole: bool,
@@ -123,10 +130,12 @@ impl Gathered {
             lateness: vec![0; BINS_US.len()],
             latency: vec![0; BINS_US.len()],
             counts: SeatCounts::default(),
-            lanes: ["held", "missed", "lost", "refused", "untaken", "gaps"].map(lane).into(),
+            falls: Falls::default(),
+            lanes: ["held", "missed", "lost", "refused", "untaken", "gaps", "out"].map(lane).into(),
             state: None,
             states: Vec::new(),
             flags: Vec::new(),
+            more_flags: 0,
             column: 0,
             is_whole,
         }
@@ -142,7 +151,12 @@ impl Gathered {
             Told::Other(topic @ ("/mark" | "/event" | "/action"), data) => {
                 let seat = &contents.seats[self.look.lane].name;
                 let at_s = self.at_s();
-                self.flags.extend(flag_name(topic, data, seat).map(|name| Flag { at_s, name }));
+                let Some(name) = flag_name(topic, data, seat) else { return };
+                if self.flags.len() < FLAGS {
+                    self.flags.push(Flag { at_s, name });
+                } else {
+                    self.more_flags += 1;
+                }
             }
             _ => {}
         }
@@ -170,6 +184,9 @@ impl Gathered {
 
     fn seat(&mut self, at: MonoTime, sample: &SeatSample) {
         let Some(column) = self.place(sample.film_s) else { return };
+        let falls = self.falls.count;
+        self.falls.take(sample);
+        self.on(OUT, column, self.falls.count - falls);
         self.measured.take(column, sample.measured_mm.iter().copied());
         let counts = &mut self.counts;
         counts.acked += u64::from(sample.acked);
@@ -217,6 +234,10 @@ impl Gathered {
         self.counts.dropped += sample.dropped;
         self.on(1, column, sample.missed);
         self.on(5, column, sample.dropped);
+        if self.falls.is_out() {
+            // Nothing more is told of a seat that is out.
+            self.lanes[OUT].1[column] = Shade { height: 1.0, tone: 1.0 };
+        }
         if !self.is_whole {
             self.late(column, sample.film_s, sample.late_max_us);
         }

@@ -39,7 +39,7 @@ pub(crate) fn of_recording(
     Picture {
         title: title(contents, &seat.name),
         sentence: sentence(&seat.name, &gathered, contents.rate_hz()),
-        facts: facts(contents, summary),
+        facts: facts(contents, summary, gathered.more_flags),
         time: gathered.look.time,
         lanes: strips(take(&mut gathered.lanes), take(&mut gathered.states)),
         flags: take(&mut gathered.flags),
@@ -78,18 +78,21 @@ mod tests {
 
     use super::super::{Theme, braille, page, svg};
     use super::*;
-    use crate::record::{Mode, Wanted, read, recorded_as, summarize};
+    use crate::health::HealthState;
+    use crate::record::{Mode, Wanted, read, recorded_as, recorded_falling, summarize};
 
     /// What a seat at rest in the middle, that was asked for a tenth of the stroke more in some ticks, looks like.
     fn drawn(mode: Mode, asked: std::ops::Range<u32>, columns: usize) -> Picture {
         let ticks = (0..300).map(|tick| (if asked.contains(&tick) { 0.6 } else { 0.5 }, 0.5));
-        let file = recorded_as(mode, ticks);
-        let (contents, summary) = summarize(file.as_slice()).unwrap();
+        drawn_of(mode, &recorded_as(mode, ticks), columns)
+    }
+
+    fn drawn_of(mode: Mode, file: &[u8], columns: usize) -> Picture {
+        let (contents, summary) = summarize(file).unwrap();
         let time = TimeAxis { from_s: 0.0, until_s: 2.99, columns };
         let mut gathered =
             Gathered::new(&contents, Look { lane: 0, time, is_detailed: true }, mode == Mode::Full);
-        read(file.as_slice(), Wanted::ALL, &mut |contents, at, told| gathered.take(contents, at, told))
-            .unwrap();
+        read(file, Wanted::ALL, &mut |contents, at, told| gathered.take(contents, at, told)).unwrap();
         of_recording(&contents, &summary, gathered, None)
     }
 
@@ -105,6 +108,31 @@ mod tests {
         assert!(quiet.sentence.starts_with("A1: sent as it was asked for; "), "{}", quiet.sentence);
         for drawn in [braille(&picture), svg(&picture, Theme::Auto), page(&picture, Theme::Auto)] {
             assert!(drawn.contains("held back by the limiter for 80 ms") && drawn.len() < 500_000);
+        }
+    }
+
+    #[test]
+    fn a_seat_that_fell_out_is_what_the_sentence_says_first() {
+        let stays = |tick| match tick {
+            0 => Some(HealthState::Ok),
+            150 => Some(HealthState::Lost),
+            _ => None,
+        };
+        let comes_back = |tick| if tick == 200 { Some(HealthState::Rejoining) } else { stays(tick) };
+        for mode in [Mode::Full, Mode::Sampled] {
+            let ticks = || (0..300).map(|_| (0.5, 0.5));
+            let gone = drawn_of(mode, &recorded_falling(mode, ticks(), stays), 300);
+            assert!(gone.sentence.starts_with("A1 at 00:01.5"), "{}", gone.sentence);
+            assert!(
+                gone.sentence.contains(": fell out (lost), not back in what is shown. "),
+                "{}",
+                gone.sentence
+            );
+            assert!(gone.facts.contains(&"Fell out: A1.".to_owned()), "{:?}", gone.facts);
+            let out = gone.lanes.iter().find(|lane| lane.name == "out").expect("it is drawn");
+            assert!(out.columns[299].height > 0.0 && out.columns[100].height == 0.0);
+            let back = drawn_of(mode, &recorded_falling(mode, ticks(), comes_back), 300);
+            assert!(back.sentence.contains("fell out (lost), back in play at 00:02.0"), "{}", back.sentence);
         }
     }
 

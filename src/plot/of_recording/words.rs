@@ -3,7 +3,7 @@
 use super::gather::{APART, Gathered};
 use crate::plot::Table;
 use crate::plot::text::number;
-use crate::record::{Contents, Summary};
+use crate::record::{Contents, Falls, Summary};
 use crate::time::ShowTime;
 
 /// A tick is late from here on, µs.
@@ -16,17 +16,24 @@ pub(super) fn places(value: f64) -> String {
 
 pub(super) fn title(contents: &Contents, seat: &str) -> String {
     let title = contents.entry("title");
-    format!("{}, {seat}", if title.is_empty() { contents.entry("cue") } else { title })
+    format!("{}, {seat}", if title.is_empty() { what(contents) } else { title })
+}
+
+/// What it is a recording of: a cue, or else an incident, a test, a homing.
+fn what(contents: &Contents) -> &str {
+    let cue = contents.entry("cue");
+    if cue.is_empty() { contents.entry("of") } else { cue }
 }
 
 /// What happened to a seat, for whoever asks why it jerked.
 pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String {
     let counts = &gathered.counts;
-    if counts.sent + counts.unsent == 0 {
+    if counts.sent + counts.unsent == 0 && gathered.falls.count == 0 {
         return format!("{name}: nothing was sent in what is shown.");
     }
     let held = counts.apart > APART || counts.clamps > 0;
-    let mut words = if held {
+    let mut words = fallen(name, &gathered.falls);
+    words += &if held {
         let at = ShowTime::from_secs_f64(counts.apart_s);
         // From tick to tick it is one period longer than from the first instant to the last.
         let ms = 1_000.0 * (counts.held + if gathered.is_whole { 1.0 / rate_hz } else { 0.05 });
@@ -59,7 +66,20 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
     words + "."
 }
 
-pub(super) fn facts(contents: &Contents, summary: &Summary) -> Vec<String> {
+/// That a seat fell out, which is graver than all else; empty where it did not.
+fn fallen(name: &str, falls: &Falls) -> String {
+    let Some((at, standing)) = falls.first else { return String::new() };
+    let time = ShowTime::from_secs_f64;
+    let back = match falls.back_s {
+        Some(back) => format!("back in play at {}", time(back)),
+        None => "not back in what is shown".to_owned(),
+    };
+    let times =
+        if falls.count > 1 { format!(" for the first of {} times", falls.count) } else { String::new() };
+    format!("{name} at {}: fell out{times} ({standing}), {back}. ", time(at))
+}
+
+pub(super) fn facts(contents: &Contents, summary: &Summary, more_flags: u64) -> Vec<String> {
     let entry = |key| contents.entry(key);
     let nearest =
         summary.nearest().map(|margin| format!("Nearest to its limit in all of it: {}.", margin.in_words()));
@@ -67,7 +87,7 @@ pub(super) fn facts(contents: &Contents, summary: &Summary) -> Vec<String> {
         format!(
             "{} recording of {}, hall {}, {} Hz",
             entry("mode"),
-            entry("cue"),
+            what(contents),
             entry("hall"),
             entry("rate_hz")
         ),
@@ -79,6 +99,16 @@ pub(super) fn facts(contents: &Contents, summary: &Summary) -> Vec<String> {
         ),
     ];
     facts.extend(nearest);
+    let mut fell =
+        summary.seats.iter().filter(|seat| seat.falls.count > 0).map(|seat| seat.name.as_str()).peekable();
+    if fell.peek().is_some() {
+        facts.push(format!("Fell out: {}.", fell.collect::<Vec<_>>().join(", ")));
+    }
+    if more_flags > 0 {
+        facts.push(format!(
+            "{more_flags} more marks, events and requests have no flag; record info lists them."
+        ));
+    }
     if summary.dropped > 0 {
         facts.push(format!("{} ticks were not recorded.", summary.dropped));
     }

@@ -1,13 +1,15 @@
 //! The thread behind the taps in virtual time, at a folder that is there.
 
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::PathBuf;
 
 use super::*;
 use crate::motion::{MAX_AXES, Pulses, SeatType, Slot, Window};
 use crate::net::Delivery;
 use crate::record::{
-    About, AckRecord, Asked, Contents, FrameKind, HallNote, Judging, RecordedSeat, Taps, TickHead, Told,
-    Wanted, each_chunk, read, summarize,
+    About, AckRecord, Asked, Contents, FrameKind, HallNote, Judging, RecordedSeat, Recording, Taps, TickHead,
+    Told, Wanted, each_chunk, read, summarize,
 };
 use crate::replay::replay;
 use crate::time::{Rate, ShowTime};
@@ -207,17 +209,17 @@ fn a_disk_that_takes_no_more_is_told_within_five_seconds_and_tried_again_after_t
     });
     worker.show.as_mut().and_then(|show| show.file.as_mut()).expect("it is recorded").file = file;
     let broken = bench.tick;
-    while bench.worker.link.status().trouble.is_none() {
+    while bench.worker.link.status().troubles.is_empty() {
         assert!(bench.tick - broken < 5_000, "nothing is said in five seconds");
         bench.ticks(20);
     }
-    let trouble = bench.worker.link.status().trouble.expect("it was told");
+    let trouble = bench.worker.link.status().troubles.remove("show").expect("it was told");
     assert!(trouble.contains("not permitted") && trouble.contains("[record] dir"), "{trouble}");
     assert!(!is_recording(&bench.worker));
     bench.ticks(1_000);
     let again = bench.until(is_recording) + Duration::from_secs(1);
     assert!((29..=31).contains(&again.as_secs()), "another after {again:?}");
-    assert_eq!(bench.worker.link.status().trouble, None, "all is well again");
+    assert!(bench.worker.link.status().troubles.is_empty(), "all is well again");
     bench.ticks(100);
     bench.worker.close_show(at(bench.tick));
     assert_eq!(bench.worker.intake.counts().dropped, 0, "the show did not notice");
@@ -235,7 +237,7 @@ fn a_folder_that_takes_no_files_is_told_at_once_and_tried_until_it_does() {
     let record = bench.worker.record.clone();
     let good = std::mem::replace(&mut bench.worker.disk, Disk::new(&record, Path::new("/proc/self")));
     bench.begin();
-    let trouble = bench.worker.link.status().trouble.expect("it was told");
+    let trouble = bench.worker.link.status().troubles.remove("show").expect("it was told");
     assert!(trouble.contains("/proc/self") && trouble.contains("every 30 s"), "{trouble}");
     let tried_until = at(bench.tick + 31_000);
     bench.until(|worker| worker.flush_at > tried_until);
@@ -243,6 +245,6 @@ fn a_folder_that_takes_no_files_is_told_at_once_and_tried_until_it_does() {
     bench.worker.disk = good;
     let again = bench.until(is_recording);
     assert!(again <= Duration::from_secs(30), "{again:?}");
-    assert_eq!(bench.worker.link.status().trouble, None);
+    assert!(bench.worker.link.status().troubles.is_empty());
     assert_eq!(bench.worker.intake.counts().dropped, 0);
 }

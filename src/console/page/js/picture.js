@@ -12,7 +12,7 @@ export function startPicture() {
   byId('picture-close').addEventListener('click', close);
 }
 
-/** Shows the recording of that file; of its seats the one that was held back farthest. */
+/** Shows the recording of that file; of its seats one that fell out, else the one that was held back farthest. */
 export function showPicture(name, title) {
   setText(byId('picture-title'), title);
   setProperty(byId('picture-panel'), 'hidden', false);

@@ -31,8 +31,9 @@ function mark(button) {
 /** Shows whether anything is recorded, and what was. */
 export function showRecordings(status, link) {
   if (!status?.record) return;
-  const { mode, recording, flight_s: flight, trouble } = status.record;
+  const { mode, recording, flight_s: flight, troubles } = status.record;
   const badge = byId('record-badge');
+  const trouble = troubles.show;
   const words = trouble ? 'not recorded' : recording ? `recording, ${mode}` : flight > 0 ? `last ${Math.round(flight)} s kept` : '';
   setProperty(badge, 'hidden', words === '');
   setText(badge, words);
