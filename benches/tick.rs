@@ -17,7 +17,7 @@ use common::spread::{Spread, verdict};
 use kinocue::harness::belief::{LaneEvidence, Reading, Taken};
 use kinocue::harness::config::{self, Config};
 use kinocue::harness::engine::Step;
-use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
+use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict, FilmLeave};
 use kinocue::harness::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::motion::MAX_AXES;
 use kinocue::harness::net::{Delivery, Ports};
@@ -264,7 +264,7 @@ impl Film {
     fn target(&mut self, tick: &Tick) -> Option<ShowTime> {
         let point = self.clock.at(tick);
         let frame = Duration::from_millis(1);
-        let input = ChaseInput { tick, frame, point, trim_ms: 0, may_lead: true };
+        let input = ChaseInput { tick, frame, point, trim_ms: 0, leave: FilmLeave::Lead };
         match self.chase.tick(&input) {
             ChaseVerdict::Follow { playhead, .. } => Some(playhead),
             _ => None,

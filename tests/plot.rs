@@ -74,7 +74,8 @@ fn the_examples_of_the_help_run_and_a_file_is_replaced_only_if_asked() {
     );
     let braille = kinocue(&["cues/coaster.csv"]);
     let told = String::from_utf8(braille.stdout).expect("text");
-    let sentence = "Speed comes nearest to its limit: a3 at 00:31.499, 207 of 240 mm/s, 14 % left.";
+    let sentence =
+        "Speed comes nearest to its limit: a3 at 00:31.499 (coaster.csv:1264), 207 of 240 mm/s, 14 % left.";
     assert_eq!(told.lines().nth(1), Some(sentence));
     let curves = told.lines().filter(|line| line.contains(['\u{2800}', '⣀', '▬']));
     assert!(

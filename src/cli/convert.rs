@@ -11,7 +11,7 @@ use super::load::cue_exit;
 use super::record::{open, unread};
 use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
-use crate::record::{Places, RecordedAxis, tracks};
+use crate::record::{FilmTracks, Places, RecordedAxis, tracks};
 
 /// Converts a cue to another format, or the motion of a seat in a recording into a cue.
 #[derive(Debug, clap::Args)]
@@ -147,11 +147,12 @@ fn of_recording(
     take: Take,
 ) -> Result<Result<(Cue, Option<Problem>), CueFaults>, Failure> {
     let from = if take == Take::Sent { Places::Sent } else { Places::Measured };
-    let (contents, mut tracks, _) = tracks(open(path)?, from).map_err(|error| unread(error, path))?;
+    let FilmTracks { contents, mut seats, .. } =
+        tracks(open(path)?, from).map_err(|error| unread(error, path))?;
     let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
     let error = || anyhow!("--seat {name}: the seats are {}", names.join(", "));
     let lane = contents.seat(name).ok_or_else(error).or_exit(Exit::Usage)?;
-    let track = tracks.remove(name).unwrap_or_default();
+    let track = seats.remove(name).unwrap_or_default();
     let (Some((first, places)), axes) = (track.first(), contents.seats[lane].axes()) else {
         let error = anyhow!("{}: nothing of {name} was recorded while the film ran", path.display());
         return Err(error).or_exit(Exit::BadCue);
@@ -253,5 +254,49 @@ impl Drop for ConvertPart {
     fn drop(&mut self) {
         // After the rename there is nothing left under this name, which is no error here.
         let _ = fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Args as _, FromArgMatches as _};
+
+    use super::*;
+    use crate::record::recorded_measured;
+
+    /// `kinocue convert` with these arguments, in a folder with a recording of a seat that was sent up and down, and was measured where
+    /// `measured` says.
+    fn converted(measured: impl Fn(f64) -> Option<f64>) -> (tempfile::TempDir, Result<Exit, Failure>) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [from, to] = ["ride.mcap", "again.csv"].map(|name| folder.path().join(name));
+        let ticks = (0..300).map(|tick| 0.5 + 0.2 * (f64::from(tick) * 0.04).sin());
+        fs::write(&from, recorded_measured(ticks.map(|sent| (sent, measured(sent))))).expect("there is room");
+        let words = ["convert".as_ref(), from.as_os_str(), to.as_os_str()];
+        let words = words.into_iter().chain(["--seat", "A1", "--take", "measured"].map(AsRef::as_ref));
+        let matches = Args::augment_args(clap::Command::new("convert")).get_matches_from(words);
+        let run = run(&Args::from_arg_matches(&matches).expect("they are right"));
+        (folder, run)
+    }
+
+    #[test]
+    fn where_a_seat_was_measured_to_be_becomes_a_cue_that_is_read_like_any_other() {
+        let (folder, run) = converted(|sent| Some(sent * 0.9));
+        assert_eq!(run.expect("it is a cue"), Exit::Done);
+        let path = folder.path().join("again.csv");
+        let read = cue::read(&path, File::open(&path).expect("it is there"), &Source::Native).expect("a cue");
+        assert_eq!(read.axes(), 3);
+        assert!((2.8..3.0).contains(&read.duration().as_secs_f64()), "{}", read.duration());
+        let text = fs::read_to_string(&path).expect("it is there");
+        let places: Vec<f64> = text.lines().filter_map(|line| line.split(',').nth(1)?.parse().ok()).collect();
+        let most = places.iter().copied().fold(f64::MIN, f64::max);
+        // 0.9 of 0.7 of a stroke of 150 mm, to the pulse.
+        assert!(places.len() > 40 && (most - 94.5).abs() < 0.1, "{most} in {} rows", places.len());
+    }
+
+    #[test]
+    fn a_seat_that_nobody_measured_makes_no_cue() {
+        let (folder, run) = converted(|_| None);
+        assert!(run.is_err_and(|failure| failure.error.to_string().contains("nothing of A1 was recorded")));
+        assert!(!folder.path().join("again.csv").exists());
     }
 }

@@ -108,7 +108,7 @@ impl HallRecording {
 #[must_use]
 pub fn nameless(file: &[u8]) -> Vec<u8> {
     let [from, until] = [i64::MIN, i64::MAX].map(ShowTime::from_nanos);
-    let manner = CutManner { film_time: false, anonymous: true, whole: true };
+    let manner = CutManner { anonymous: true, whole: true, ..CutManner::default() };
     let cut = record::cut(file, &Stretch { from, until, seat: None }, manner, Cursor::default());
     cut.expect("a recording in full").into_inner()
 }

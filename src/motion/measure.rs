@@ -62,6 +62,8 @@ pub struct Readings {
 pub struct Measure {
     spacing: Spacing,
     seen: usize,
+    /// Where the newest pose stands.
+    newest: usize,
     last_velocity: f64,
     times: [i64; HISTORY],
     positions: [f64; HISTORY],
@@ -71,14 +73,21 @@ impl Measure {
     /// A measure that has seen no pose yet.
     #[must_use]
     pub const fn new(spacing: Spacing) -> Self {
-        Self { spacing, seen: 0, last_velocity: 0.0, times: [0; HISTORY], positions: [0.0; HISTORY] }
+        Self {
+            spacing,
+            seen: 0,
+            newest: HISTORY - 1,
+            last_velocity: 0.0,
+            times: [0; HISTORY],
+            positions: [0.0; HISTORY],
+        }
     }
 
     /// Takes the next pose, at a show time after the one before, and says what it showed.
     pub fn push(&mut self, at: ShowTime, position: f64) -> Readings {
-        let slot = self.seen % HISTORY;
-        self.times[slot] = at.as_nanos();
-        self.positions[slot] = position;
+        self.newest = if self.newest + 1 < HISTORY { self.newest + 1 } else { 0 };
+        self.times[self.newest] = at.as_nanos();
+        self.positions[self.newest] = position;
         self.seen += 1;
         let mut readings = Readings::default();
         if self.seen >= 2 {
@@ -99,22 +108,18 @@ impl Measure {
         if self.seen <= 2 * apart {
             return;
         }
-        let newest = self.second(0, apart);
+        // Neighbours share the slope between them.
+        let slope = self.slope(apart, apart).0;
+        let newest = (self.slope(0, apart).0 - slope) / self.seconds(0, 2 * apart);
         keep_larger(&mut readings.acceleration, 2.0 * newest, self.time(apart));
         if self.seen <= 3 * apart {
             return;
         }
         let span = self.seconds(0, 3 * apart);
-        let third = (newest - self.second(apart, apart)) / span;
+        let older = (slope - self.slope(2 * apart, apart).0) / self.seconds(apart, 2 * apart);
+        let third = (newest - older) / span;
         let middle = self.time(apart).as_nanos().midpoint(self.time(2 * apart).as_nanos());
         keep_larger(&mut readings.jerk, 6.0 * third, ShowTime::from_nanos(middle));
-    }
-
-    /// The second divided difference of the poses `back`, `back + apart` and `back + 2 apart` before the newest.
-    fn second(&self, back: usize, apart: usize) -> f64 {
-        let newer = self.slope(back, apart).0;
-        let older = self.slope(back + apart, apart).0;
-        (newer - older) / self.seconds(back, 2 * apart)
     }
 
     fn slope(&self, back: usize, apart: usize) -> (f64, i64) {
@@ -133,7 +138,7 @@ impl Measure {
     }
 
     fn slot(&self, back: usize) -> usize {
-        (self.seen - 1 - back) % HISTORY
+        if back <= self.newest { self.newest - back } else { self.newest + HISTORY - back }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::cue::{Effects, Place, TrackStep, Vibration};
 use crate::motion::{AxisGeometry, SeatAxis};
 use crate::proof::{AxisStrain, Quantity, SLACK, strains};
 use crate::time::{Rate, ShowTime};
-use crate::timeline::{Stretches, Timeline};
+use crate::timeline::{Figure, Stretches, Timeline};
 
 /// The shortest column, ns: frames are whole milliseconds apart.
 const LEAST_SPAN: i64 = 1_000_000;
@@ -128,7 +128,8 @@ impl View<'_> {
         };
         let (value, limit) = (number(figure.value), number(limit));
         let outside = self.time.part(figure.at.as_secs_f64()).map_or(", outside of what is shown", |_| "");
-        format!("{name} {comes}: a{} at {}, {value} of {limit} {unit}, {left}{outside}.", axis + 1, figure.at)
+        let (axis, at, place) = (axis + 1, figure.at, self.place(figure));
+        format!("{name} {comes}: a{axis} at {at} ({place}), {value} of {limit} {unit}, {left}{outside}.")
     }
 
     fn unit(&self, axis: usize, order: usize) -> &'static str {
@@ -184,7 +185,7 @@ impl View<'_> {
         Panel {
             name: name_of(order).to_owned(),
             note: format!("{:.0} % of {} {}", 100.0 * part, number(limit), self.unit(worst, order)),
-            place: format!("a{} {}, {}", worst + 1, figure.at, self.place(figure.line)),
+            place: format!("a{} {}, {}", worst + 1, figure.at, self.line(figure)),
             unit: "%",
             scale: Scale::Limit,
             low: 0.0,
@@ -198,16 +199,29 @@ impl View<'_> {
         let (figure, limit) = self.strains[axis].worst()[order];
         let at_s = figure.at.as_secs_f64();
         self.time.part(at_s).filter(|_| figure.value > 0.0)?;
-        let (value, place) = (100.0 * figure.value / limit, self.place(figure.line));
+        let (value, place) = (100.0 * figure.value / limit, self.place(figure));
         let words = format!("a{}: {value:.0} % at {}, {place}", axis + 1, figure.at);
         Some(Mark { at_s, value, style: axis, words })
     }
 
-    /// A line of the file, or a message of it where that has no lines.
-    fn place(&self, line: u64) -> String {
+    /// The file and the line that a figure comes from, or the time of the message where that has no lines.
+    fn place(&self, figure: Figure) -> String {
         let cue = self.timeline.cue();
-        let word = if matches!(cue.place(0, 0), Place::Message { .. }) { "message" } else { "line" };
-        format!("{word} {line}")
+        let file = cue.path().file_name().unwrap_or_default().to_string_lossy();
+        if !self.has_messages() {
+            return format!("{file}:{}", figure.line);
+        }
+        let at = cue.times().get(self.timeline.row_before(figure.at)).copied().unwrap_or_default();
+        format!("{file}, message at {at}")
+    }
+
+    /// The same where there is little room.
+    fn line(&self, figure: Figure) -> String {
+        format!("{} {}", if self.has_messages() { "message" } else { "line" }, figure.line)
+    }
+
+    fn has_messages(&self) -> bool {
+        matches!(self.timeline.cue().place(0, 0), Place::Message { .. })
     }
 
     /// Each kind of vibration, with the axes that have it.
@@ -306,7 +320,7 @@ impl View<'_> {
                 format!("{} of {} {}", number(figure.value), number(limit), self.unit(axis, order)),
                 format!("{:.0} %", 100.0 * figure.value / limit),
                 figure.at.to_string(),
-                self.place(figure.line),
+                self.place(figure),
             ]
         };
         (0..self.strains.len())

@@ -90,6 +90,22 @@ fn an_effect_that_is_on_for_a_moment_has_its_column_and_no_other() {
 }
 
 #[test]
+fn each_worst_instant_is_marked_with_the_file_and_the_line_that_it_comes_from_or_the_time_of_its_message() {
+    let cue = timeline(&rows(1, 60, "", |row, _| if row >= 30 { 0.6 } else { 0.5 }));
+    let picture = drawn(&cue, 0, 1_200, 60);
+    // The header is the first line, and row 29 begins the move.
+    let speed = picture.panels.iter().find(|panel| panel.name == "Speed").unwrap();
+    assert!(speed.marks[0].words.ends_with("t.csv:31"), "{}", speed.marks[0].words);
+    assert!(speed.place.ends_with("line 31") && picture.sentence.contains("(t.csv:"), "{}", picture.sentence);
+    let mut out = std::io::Cursor::new(Vec::new());
+    cue::write_mcap(cue.cue(), &mut out).unwrap();
+    let again = cue::read(Path::new("t.mcap"), out.get_ref().as_slice(), &Source::Native).unwrap();
+    let picture = drawn(&Timeline::new(again), 0, 1_200, 60);
+    let speed = picture.panels.iter().find(|panel| panel.name == "Speed").unwrap();
+    assert!(speed.marks[0].words.ends_with("t.mcap, message at 00:00.580"), "{}", speed.marks[0].words);
+}
+
+#[test]
 fn what_a_file_says_is_text_wherever_it_is_drawn_and_nothing_is_loaded() {
     let picture = drawn(&timeline(&rows(2, 5, &format!("# title: {}\n", &HOSTILE[..48]), noise)), 0, 80, 40);
     let picture = Picture { flags: vec![Flag { at_s: 0.04, name: HOSTILE.to_owned() }], ..picture };

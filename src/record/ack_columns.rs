@@ -3,8 +3,7 @@
 
 use prost::Message as _;
 
-use super::columns::{fold, unfold};
-use super::full::Column;
+use super::columns::{Column, ColumnReaders, ColumnSet};
 use super::{AckChunk, AckRecord};
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply};
@@ -46,7 +45,8 @@ pub(super) struct ReplyColumns {
     /// Of each reply: frame, code, error, inputs, and when it was received, µs.
     #[prost(message, repeated, tag = "2")]
     replies: Vec<Column>,
-    /// Of each fate: frame; the code of an answer, else 16 for a duplicate, 17 for a stale and 18 for a stray reply; latency, µs.
+    /// Of each fate: frame; the code of an answer, else 16 for a duplicate, 17 for a stale and 18 for a stray reply; and when its frame left, µs: when the last
+    /// reply was received, less the latency.
     #[prost(message, repeated, tag = "3")]
     fates: Vec<Column>,
 }
@@ -59,22 +59,27 @@ const END: i64 = 3;
 
 const FATES: [Fate; 3] = [Fate::Duplicate, Fate::Stale, Fate::Stray];
 
-/// Numbers of a controller, row by row.
+/// What a controller replied, on its way.
 #[derive(Default)]
-struct Rows {
-    replies: Vec<[i64; 5]>,
-    fates: Vec<[i64; 3]>,
+struct ReplyWriter {
+    replies: ColumnSet,
+    fates: ColumnSet,
+    /// How many there are of each.
+    counts: [usize; 2],
+    /// When the last reply was received, µs.
+    at_us: i64,
 }
 
 /// Drains, as they crossed, as a message.
 pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
-    let (mut runs, mut chunks): (Vec<[i64; 3]>, Vec<[i64; 3]>) = (Vec::new(), Vec::new());
-    let (mut rows, mut others): (Vec<Rows>, Vec<u8>) = (Vec::new(), Vec::new());
+    let mut runs = Vec::<[i64; 3]>::new();
+    let (mut chunks, mut ends) = (ColumnSet::default(), 0);
+    let (mut writers, mut others) = (Vec::<ReplyWriter>::new(), Vec::new());
     let mut rest = drains;
     while let Some((chunk, behind)) = AckChunk::parse(rest) {
         rest = behind;
         for record in chunk.records() {
-            let (kind, controller) = take(&record, &mut rows, &mut others);
+            let (kind, controller) = take(&record, &mut writers, &mut others);
             match runs.last_mut() {
                 // Others are of no controller.
                 Some([last, first, count])
@@ -86,28 +91,26 @@ pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
             }
         }
         let began = chunk.drained.unwrap_or_default().as_nanos().cast_signed();
-        chunks.push([chunk.dropped.into(), chunk.drained.is_some().into(), began]);
+        chunks.push(ends, [chunk.dropped.into(), chunk.drained.is_some().into(), began]);
+        ends += 1;
         runs.push([END, 0, 1]);
     }
-    let replies = |(controller, rows): (usize, &Rows)| {
-        let is_used = !rows.replies.is_empty() || !rows.fates.is_empty();
-        is_used.then(|| ReplyColumns {
+    let replies = |(controller, mut writer): (usize, ReplyWriter)| {
+        (writer.counts != [0; 2]).then(|| ReplyColumns {
             controller: u32::try_from(controller).unwrap_or(u32::MAX),
-            replies: columns(&rows.replies),
-            fates: columns(&rows.fates),
+            replies: writer.replies.take(),
+            fates: writer.fates.take(),
         })
     };
-    let controllers = rows.iter().enumerate().filter_map(replies).collect();
+    let controllers = writers.into_iter().enumerate().filter_map(replies).collect();
     let count = u32::try_from(runs.len()).unwrap_or(u32::MAX);
-    Acks { runs: columns(&runs), count, chunks: columns(&chunks), controllers, others }.encode_to_vec()
-}
-
-fn columns<const N: usize>(rows: &[[i64; N]]) -> Vec<Column> {
-    (0..N).map(|at| Column::of(fold(rows.iter().map(|row| row[at])))).collect()
+    let mut columns = ColumnSet::default();
+    runs.into_iter().enumerate().for_each(|(row, run)| columns.push(row, run));
+    Acks { runs: columns.take(), count, chunks: chunks.take(), controllers, others }.encode_to_vec()
 }
 
 /// Puts a record where it belongs; gives its kind and its controller.
-fn take(record: &AckRecord<'_>, rows: &mut Vec<Rows>, others: &mut Vec<u8>) -> (i64, i64) {
+fn take(record: &AckRecord<'_>, writers: &mut Vec<ReplyWriter>, others: &mut Vec<u8>) -> (i64, i64) {
     let controller = match record {
         AckRecord::Reply(reply) if reply.at == reply.at.whole_micros() => Some(reply.controller),
         AckRecord::Fate(controller, _, _, latency) if u64::from(*latency).is_multiple_of(NS) => {
@@ -119,18 +122,21 @@ fn take(record: &AckRecord<'_>, rows: &mut Vec<Rows>, others: &mut Vec<u8>) -> (
         record.write(others);
         return (OTHER, 0);
     };
-    if rows.len() <= controller {
-        rows.resize_with(controller + 1, Rows::default);
+    if writers.len() <= controller {
+        writers.resize_with(controller + 1, ReplyWriter::default);
     }
-    let Rows { replies, fates } = &mut rows[controller];
+    let ReplyWriter { replies, fates, counts: [replied, fated], at_us } = &mut writers[controller];
     let kind = match *record {
         AckRecord::Reply(Reply { frame, code, error, inputs, at, .. }) => {
-            let at_us = (at.as_nanos() / NS).cast_signed();
-            replies.push([frame.0.into(), code as i64, error.into(), inputs.into(), at_us]);
+            *at_us = (at.as_nanos() / NS).cast_signed();
+            replies.push(*replied, [frame.0.into(), code as i64, error.into(), inputs.into(), *at_us]);
+            *replied += 1;
             REPLY
         }
         AckRecord::Fate(_, frame, fate, latency) => {
-            fates.push([frame.0.into(), number(fate), i64::from(latency) / NS.cast_signed()]);
+            let left_us = at_us.wrapping_sub(i64::from(latency) / NS.cast_signed());
+            fates.push(*fated, [frame.0.into(), number(fate), left_us]);
+            *fated += 1;
             FATE
         }
         _ => OTHER,
@@ -147,38 +153,29 @@ fn number(fate: Fate) -> i64 {
     }
 }
 
-type ColumnReaders<'a> = Vec<Box<dyn Iterator<Item = i64> + 'a>>;
-
-fn numbers(columns: &[Column]) -> ColumnReaders<'_> {
-    columns.iter().map(|one| Box::new(unfold(one.numbers())) as Box<_>).collect()
-}
-
-/// The next of each column; `None` where there are fewer columns.
-fn next<const N: usize>(columns: &mut ColumnReaders<'_>) -> Option<[i64; N]> {
-    let mut row = [0; N];
-    (columns.len() >= N).then_some(())?;
-    row.iter_mut().zip(columns).for_each(|(to, column)| *to = column.next().unwrap_or_default());
-    Some(row)
+/// The replies of a controller as they are read.
+struct ReplyReader<'a> {
+    controller: i64,
+    replies: ColumnReaders<'a>,
+    fates: ColumnReaders<'a>,
+    /// When the last reply was received, µs.
+    at_us: i64,
 }
 
 /// The drains of a message, as they crossed; `None` where it is none.
 pub(super) fn unpacked(message: &[u8]) -> Option<Vec<u8>> {
     let acks = Acks::decode(message).ok()?;
-    let (mut runs, mut chunks) = (numbers(&acks.runs), numbers(&acks.chunks));
-    let mut controllers: Vec<(i64, ColumnReaders<'_>, ColumnReaders<'_>)> = acks
-        .controllers
-        .iter()
-        .map(|one| (one.controller.into(), numbers(&one.replies), numbers(&one.fates)))
-        .collect();
-    controllers.sort_by_key(|one| one.0);
+    let (mut runs, mut chunks) = (ColumnReaders::new(&acks.runs), ColumnReaders::new(&acks.chunks));
+    let mut controllers: Vec<ReplyReader<'_>> = acks.controllers.iter().map(ReplyReader::new).collect();
+    controllers.sort_by_key(|one| one.controller);
     let (mut others, mut left) = (acks.others.as_slice(), MOST);
     let (mut drains, mut records) = (Vec::new(), Vec::new());
     for _ in 0..acks.count {
-        let [kind, first, count] = next(&mut runs)?;
+        let [kind, first, count] = runs.next();
         let count = usize::try_from(count).ok().filter(|count| *count <= left)?;
         left = left.checked_sub(count.max(1))?;
         if kind == END {
-            let [dropped, is_over, began] = next(&mut chunks)?;
+            let [dropped, is_over, began] = chunks.next();
             let began = MonoTime::from_nanos(began.cast_unsigned());
             AckChunk::write(
                 &mut drains,
@@ -191,43 +188,48 @@ pub(super) fn unpacked(message: &[u8]) -> Option<Vec<u8>> {
         }
         for step in 0..count {
             let controller = first.checked_add(i64::try_from(step).ok()?)?;
-            let place = |one: &(i64, ColumnReaders<'_>, ColumnReaders<'_>)| one.0.cmp(&controller);
-            match kind {
-                REPLY => {
-                    let place = controllers.binary_search_by(place).ok()?;
-                    records.push(reply(controller, next(&mut controllers[place].1)?)?);
+            records.push(match kind {
+                OTHER => AckRecord::first_of(&mut others)?,
+                REPLY | FATE => {
+                    let place = controllers.binary_search_by_key(&controller, |one| one.controller).ok()?;
+                    controllers[place].next(kind)?
                 }
-                FATE => {
-                    let place = controllers.binary_search_by(place).ok()?;
-                    records.push(fate(controller, next(&mut controllers[place].2)?)?);
-                }
-                OTHER => records.push(AckRecord::first_of(&mut others)?),
                 _ => return None,
-            }
+            });
         }
     }
     Some(drains)
 }
 
-fn reply(controller: i64, [frame, code, error, inputs, at_us]: [i64; 5]) -> Option<AckRecord<'static>> {
-    Some(AckRecord::Reply(Reply {
-        controller: usize::try_from(controller).ok()?,
-        frame: FrameNo(u32::try_from(frame).ok()?),
-        code: ReplyCode::from_byte(u8::try_from(code).ok()?)?,
-        error: u16::try_from(error).ok()?,
-        inputs: u16::try_from(inputs).ok()?,
-        at: MonoTime::from_nanos(u64::try_from(at_us).ok()?.checked_mul(NS)?),
-    }))
-}
+impl<'a> ReplyReader<'a> {
+    fn new(columns: &'a ReplyColumns) -> Self {
+        let [replies, fates] = [&columns.replies, &columns.fates].map(|one| ColumnReaders::new(one));
+        Self { controller: columns.controller.into(), replies, fates, at_us: 0 }
+    }
 
-fn fate(controller: i64, [frame, fate, latency_us]: [i64; 3]) -> Option<AckRecord<'static>> {
-    let fate = match u8::try_from(fate).ok()? {
-        other @ 16.. => *FATES.get(usize::from(other - 16))?,
-        code => Fate::Answered(ReplyCode::from_byte(code)?),
-    };
-    let latency = u32::try_from(latency_us).ok()?.checked_mul(u32::try_from(NS).ok()?)?;
-    let (controller, frame) = (usize::try_from(controller).ok()?, FrameNo(u32::try_from(frame).ok()?));
-    Some(AckRecord::Fate(controller, frame, fate, latency))
+    fn next(&mut self, kind: i64) -> Option<AckRecord<'static>> {
+        let controller = usize::try_from(self.controller).ok()?;
+        if kind == FATE {
+            let [frame, fate, left_us] = self.fates.next();
+            let fate = match u8::try_from(fate).ok()? {
+                other @ 16.. => *FATES.get(usize::from(other - 16))?,
+                code => Fate::Answered(ReplyCode::from_byte(code)?),
+            };
+            let latency = u32::try_from(self.at_us.wrapping_sub(left_us)).ok()?;
+            let latency = latency.checked_mul(u32::try_from(NS).ok()?)?;
+            return Some(AckRecord::Fate(controller, FrameNo(u32::try_from(frame).ok()?), fate, latency));
+        }
+        let [frame, code, error, inputs, at_us] = self.replies.next();
+        self.at_us = at_us;
+        Some(AckRecord::Reply(Reply {
+            controller,
+            frame: FrameNo(u32::try_from(frame).ok()?),
+            code: ReplyCode::from_byte(u8::try_from(code).ok()?)?,
+            error: u16::try_from(error).ok()?,
+            inputs: u16::try_from(inputs).ok()?,
+            at: MonoTime::from_nanos(u64::try_from(at_us).ok()?.checked_mul(NS)?),
+        }))
+    }
 }
 
 #[cfg(test)]

@@ -6,8 +6,10 @@ use std::io::{Read, Seek, Write};
 use mcap::McapError;
 
 use super::anonymous::Anonymous;
-use super::full::Block;
+use super::block::Block;
 use super::read::{Contents, ReadError, Told, Wanted, read};
+use super::scene::SeatScene;
+use super::summary::each_chunk;
 use super::{About, AckChunk, Chunk, EntryMaker, Message, Mode, Opening, RecordedSeat, Recording, Sampled};
 use crate::time::{MonoTime, ShowTime};
 
@@ -34,15 +36,21 @@ impl Stretch {
     }
 }
 
-/// How it is written.
-#[derive(Debug, Clone, Copy, Default)]
+/// How it is written: arguments of `record cut`.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
 pub(crate) struct CutManner {
-    /// Times are those of the film, and not of the clock.
+    /// Time messages by the film rather than by the clock.
+    #[arg(long)]
     pub(crate) film_time: bool,
-    /// Without names of seats, hall and cue, and without addresses.
+    /// Omit the names of seats, hall and cue, and addresses, also those in frames and replies.
+    #[arg(long)]
     pub(crate) anonymous: bool,
-    /// With whole ticks as well.
+    /// Also keep the original ticks and replies, so that the cut is itself a full recording.
+    #[arg(long, conflicts_with = "film_time")]
     pub(crate) whole: bool,
+    /// Also add each seat as a cube that moves, for viewers that draw scenes in space.
+    #[arg(long)]
+    pub(crate) scene: bool,
 }
 
 /// Why nothing was cut.
@@ -69,8 +77,8 @@ pub(crate) enum CutError {
 /// What is in a stretch.
 #[derive(Debug)]
 pub(crate) enum Piece<'a> {
-    /// A tick with all its frames, and its octets.
-    Tick(Chunk<'a>, &'a [u8]),
+    /// A tick with all its frames.
+    Tick(Chunk<'a>),
     /// Some of what the ack thread took after a tick and before the next, and its octets.
     Drain(AckChunk<'a>, &'a [u8]),
 }
@@ -114,17 +122,14 @@ pub(crate) fn each_tick(
             _ => return,
         };
         is_whole = true;
-        let mut rest = chunks.as_slice();
-        while let Some((chunk, behind)) = Chunk::parse(rest) {
-            let octets = &rest[..rest.len() - behind.len()];
-            rest = behind;
+        each_chunk(&chunks, |chunk| {
             let is_in = stretch.holds(chunk.head.film);
             held.ticks.push_back((chunk.head.deadline, is_in));
             if is_in {
                 ticks += 1;
-                take(contents, Piece::Tick(chunk, octets));
+                take(contents, Piece::Tick(*chunk));
             }
-        }
+        });
     })?;
     if let Some(name) = stretch.seat.as_ref().filter(|name| contents.seat(name).is_none()) {
         let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
@@ -194,6 +199,8 @@ struct Cutting<W: Write + Seek> {
     seats: Vec<RecordedSeat>,
     /// Which seats are taken.
     taken: Vec<bool>,
+    maker: EntryMaker,
+    scene: Option<SeatScene>,
     block: Option<Block>,
     /// Drains of the block that is not over.
     drains: Vec<u8>,
@@ -217,25 +224,32 @@ impl<W: Write + Seek> Cutting<W> {
             mode: if manner.whole { Mode::Full } else { Mode::Sampled },
             clocks: (MonoTime::default(), if manner.film_time { 0 } else { origin }),
         };
-        let taken = contents.seats.iter().map(|seat| stretch.has(seat)).collect();
+        let taken: Vec<bool> = contents.seats.iter().map(|seat| stretch.has(seat)).collect();
         let own = contents.judging();
         let judging = anonymous.as_ref().map_or(own.as_ref(), Anonymous::judging);
         let opening = Opening::new(&about, &seats);
         let opening = judging.into_iter().fold(opening, Opening::judged);
-        let file = Recording::open(out, &opening, EntryMaker::new(seats.len(), about.clocks))?;
+        let maker = EntryMaker::new(seats.len(), about.clocks);
+        let (scene, opening) = if manner.scene {
+            let (scene, opening) = SeatScene::of(opening, &taken);
+            (Some(scene), opening)
+        } else {
+            (None, opening)
+        };
+        let file = Recording::open(out, &opening, maker)?;
         // A window for each tick, whatever the rate.
         let fold = Sampled::new(seats.clone(), 1_000_000);
         let block = manner.whole.then(Block::default);
         let (film_time, drains, ticks) = (manner.film_time, Vec::new(), 0);
-        Ok(Self { file, fold, seats, taken, block, drains, anonymous, film_time, ticks })
+        Ok(Self { file, fold, seats, taken, maker, scene, block, drains, anonymous, film_time, ticks })
     }
 
     fn take(&mut self, piece: &Piece<'_>) -> Result<(), McapError> {
         match (piece, &self.anonymous) {
-            (Piece::Tick(chunk, octets), None) => self.tick(chunk, octets),
-            (Piece::Tick(chunk, _), Some(anonymous)) => {
+            (Piece::Tick(chunk), None) => self.tick(chunk),
+            (Piece::Tick(chunk), Some(anonymous)) => {
                 let octets = anonymous.tick(chunk).unwrap_or_default();
-                Chunk::parse(&octets).map_or(Ok(()), |(chunk, _)| self.tick(&chunk, &octets))
+                Chunk::parse(&octets).map_or(Ok(()), |(chunk, _)| self.tick(&chunk))
             }
             (Piece::Drain(..), _) if self.block.is_none() => Ok(()),
             (Piece::Drain(_, octets), None) => {
@@ -249,13 +263,17 @@ impl<W: Write + Seek> Cutting<W> {
         }
     }
 
-    fn tick(&mut self, chunk: &Chunk<'_>, octets: &[u8]) -> Result<(), McapError> {
-        let Self { file, fold, seats, taken, block, drains, film_time, ticks, .. } = self;
+    fn tick(&mut self, chunk: &Chunk<'_>) -> Result<(), McapError> {
+        let Self { file, fold, seats, taken, maker, scene, block, drains, film_time, ticks, .. } = self;
         *ticks += 1;
         let mut result = Ok(());
         fold.take(chunk, &mut writer(file, taken, *film_time, &mut result));
         result?;
-        match block.as_mut().and_then(|block| block.add(chunk, octets, seats)) {
+        let film = MonoTime::from_nanos(chunk.head.film.as_nanos().max(0).cast_unsigned());
+        let at = if *film_time { film } else { chunk.head.deadline };
+        let of_scene = scene.iter_mut().flat_map(|scene| scene.take(chunk, seats, at, *maker));
+        of_scene.into_iter().try_for_each(|entry| file.put(&entry))?;
+        match block.as_mut().and_then(|block| block.add(chunk, seats)) {
             Some((at, block)) => {
                 file.write(at, &Message::Ticks(block))?;
                 file.write(at, &Message::Drains(std::mem::take(drains)))
@@ -268,7 +286,7 @@ impl<W: Write + Seek> Cutting<W> {
         let mut result = Ok(());
         self.fold.close(&mut writer(&mut self.file, &self.taken, self.film_time, &mut result));
         result?;
-        if let Some((at, block)) = self.block.as_mut().and_then(|block| block.close(&self.seats)) {
+        if let Some((at, block)) = self.block.as_mut().and_then(Block::close) {
             self.file.write(at, &Message::Ticks(block))?;
             self.file.write(at, &Message::Drains(std::mem::take(&mut self.drains)))?;
         }

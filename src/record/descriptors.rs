@@ -7,12 +7,10 @@ pub(crate) fn descriptors() -> Vec<u8> {
     const UINT32: i32 = 13;
     const MESSAGE: i32 = 11;
     const BYTES: i32 = 12;
-    const SINT64: i32 = 18;
     let field = |(number, (name, of)): (i32, &(&str, FieldKind))| {
         let (kind, is_repeated, type_name) = match of {
             FieldKind::Count => (UINT32, false, None),
             FieldKind::Bytes => (BYTES, false, None),
-            FieldKind::Numbers => (SINT64, true, None),
             FieldKind::Many(message) => (MESSAGE, true, Some(format!(".kinocue.{message}"))),
         };
         let label = if is_repeated { 3 } else { 1 };
@@ -40,7 +38,6 @@ pub(crate) fn descriptors() -> Vec<u8> {
 enum FieldKind {
     Count,
     Bytes,
-    Numbers,
     Many(&'static str),
 }
 
@@ -83,7 +80,7 @@ const MESSAGES: [(&str, &[(&str, FieldKind)]); 5] = [
             ("fates", FieldKind::Many("Column")),
         ],
     ),
-    ("Column", &[("second_differences", FieldKind::Numbers)]),
+    ("Column", &[("packed", FieldKind::Bytes)]),
 ];
 
 #[derive(Clone, PartialEq, prost::Message)]

@@ -5,8 +5,8 @@
 
 use prost::Message as _;
 
-use super::chunk::{Asked, Chunk, ChunkWriter, Handed, SentFrame, TickHead, longest_frame};
-use super::columns::{fold, unfold};
+use super::chunk::{Asked, ChunkWriter, Handed, SentFrame, TickHead, longest_frame};
+use super::columns::{Column, ColumnReaders};
 use super::seat::{FrameKind, RecordedSeat};
 use crate::motion::{MAX_AXES, Pulses};
 use crate::state::State;
@@ -22,239 +22,44 @@ const OF_FRAME: usize = 17;
 
 /// Half a second of ticks: `kinocue.Sent`.
 #[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Sent {
+pub(super) struct Sent {
     /// How many ticks.
     #[prost(uint32, tag = "1")]
-    ticks: u32,
+    pub(super) ticks: u32,
     /// Index, deadline in ns, lateness in µs, ticks missed, show time in ns, number of the state, ticks dropped.
     #[prost(message, repeated, tag = "2")]
-    tick_columns: Vec<Column>,
+    pub(super) tick_columns: Vec<Column>,
     /// Lanes that had frames.
     #[prost(message, repeated, tag = "3")]
-    lanes: Vec<Lane>,
+    pub(super) lanes: Vec<Lane>,
 }
 
 /// The frames of a lane: `kinocue.Lane`.
 #[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Lane {
+pub(super) struct Lane {
     /// Its place among the seats of the metadata.
     #[prost(uint32, tag = "1")]
-    lane: u32,
+    pub(super) lane: u32,
     /// How many frames.
     #[prost(uint32, tag = "2")]
-    frames: u32,
-    /// Place of its tick in the block, instant in µs after the deadline, what the kernel said, axes asked for, level as bits of a
+    pub(super) frames: u32,
+    /// Place of its tick in the block, instant in µs after the deadline and the lateness, what the kernel said, axes asked for, level as bits of a
     /// float, clamps, 1 and octets in `raw`, number, 1 for absolute Time, channel, accept, reply, Time in ms, outputs, Extend, positions,
     /// 1 with vibration.
     #[prost(message, repeated, tag = "3")]
-    frame_columns: Vec<Column>,
+    pub(super) frame_columns: Vec<Column>,
     /// Where each slot was sent, pulses.
     #[prost(message, repeated, tag = "4")]
-    positions: Vec<Column>,
+    pub(super) positions: Vec<Column>,
     /// How much farther each axis was asked, pulses.
     #[prost(message, repeated, tag = "5")]
-    asked: Vec<Column>,
+    pub(super) asked: Vec<Column>,
     /// Vibration of each slot: period in 0.125 ms, and amplitude in pulses, by turns.
     #[prost(message, repeated, tag = "6")]
-    vibration: Vec<Column>,
+    pub(super) vibration: Vec<Column>,
     /// Frames that the columns do not make.
     #[prost(bytes = "vec", tag = "7")]
-    raw: Vec<u8>,
-}
-
-/// Second differences: `kinocue.Column`.
-#[derive(Clone, PartialEq, prost::Message)]
-pub(crate) struct Column {
-    /// Those up to the last that is not 0.
-    #[prost(sint64, repeated, tag = "1")]
-    second_differences: Vec<i64>,
-}
-
-impl Column {
-    /// One of these second differences.
-    pub(super) const fn of(second_differences: Vec<i64>) -> Self {
-        Self { second_differences }
-    }
-
-    /// Its second differences.
-    pub(super) fn numbers(&self) -> &[i64] {
-        &self.second_differences
-    }
-}
-
-fn column(numbers: impl IntoIterator<Item = i64>) -> Column {
-    Column { second_differences: fold(numbers) }
-}
-
-fn columns<'a, const N: usize>(rows: impl Iterator<Item = &'a [i64; N]> + Clone) -> Vec<Column> {
-    (0..N).map(|at| column(rows.clone().map(move |row| row[at]))).collect()
-}
-
-/// A frame on its way into columns.
-struct LaneRow {
-    fields: [i64; OF_FRAME],
-    positions: [i64; MAX_AXES],
-    asked: [i64; MAX_AXES],
-    vibration: [i64; 2 * MAX_AXES],
-}
-
-/// Ticks that become a block.
-#[derive(Debug, Default)]
-pub(crate) struct Block {
-    octets: Vec<u8>,
-    first: Option<MonoTime>,
-}
-
-impl Block {
-    /// Adds a tick, as it came. Gives the block before it where that is full.
-    pub(crate) fn add(
-        &mut self,
-        chunk: &Chunk<'_>,
-        octets: &[u8],
-        seats: &[RecordedSeat],
-    ) -> Option<(MonoTime, Vec<u8>)> {
-        const LONGEST_NS: u128 = 500_000_000;
-        let at = chunk.head.deadline;
-        let is_full = self.first.is_some_and(|first| at.since(first).as_nanos() >= LONGEST_NS || at < first);
-        let full = if is_full { self.close(seats) } else { None };
-        self.first.get_or_insert(at);
-        self.octets.extend_from_slice(octets);
-        full
-    }
-
-    /// Gives what there is, and the instant of its first tick.
-    pub(crate) fn close(&mut self, seats: &[RecordedSeat]) -> Option<(MonoTime, Vec<u8>)> {
-        let first = self.first.take()?;
-        let block = pack(&self.octets, seats).encode_to_vec();
-        self.octets.clear();
-        Some((first, block))
-    }
-}
-
-/// These chunks as a block.
-fn pack(octets: &[u8], seats: &[RecordedSeat]) -> Sent {
-    let mut ticks: Vec<[i64; OF_TICK]> = Vec::new();
-    let mut lanes: Vec<(Vec<LaneRow>, Vec<u8>)> = seats.iter().map(|_| (Vec::new(), Vec::new())).collect();
-    let mut rest = octets;
-    while let Some((chunk, behind)) = Chunk::parse(rest) {
-        rest = behind;
-        let TickHead { index, deadline, late_ns, missed, film, state } = chunk.head;
-        let state = State::ALL.iter().position(|one| *one == state).unwrap_or_default() as i64;
-        let [index, deadline, late, missed] =
-            [index, deadline.as_nanos(), late_ns / 1_000, missed].map(u64::cast_signed);
-        let tick = ticks.len() as i64;
-        ticks.push([index, deadline, late, missed, film.as_nanos(), state, chunk.dropped.into()]);
-        for frame in chunk.frames() {
-            if let (Some((rows, raw)), Some(seat)) = (lanes.get_mut(frame.lane), seats.get(frame.lane)) {
-                rows.push(row(&frame, seat, tick, chunk.head.deadline, raw));
-            }
-        }
-    }
-    let lane = |(lane, (rows, raw)): (usize, (Vec<LaneRow>, Vec<u8>))| {
-        (!rows.is_empty()).then(|| lane_of(lane, &rows, raw))
-    };
-    let lanes = lanes.into_iter().enumerate().filter_map(lane).collect();
-    Sent { ticks: count(ticks.len()), tick_columns: columns(ticks.iter()), lanes }
-}
-
-fn count(len: usize) -> u32 {
-    u32::try_from(len).unwrap_or(u32::MAX)
-}
-
-fn lane_of(lane: usize, rows: &[LaneRow], raw: Vec<u8>) -> Lane {
-    // Columns at the end that hold nothing are none.
-    let trimmed = |mut columns: Vec<Column>| {
-        let used = columns.iter().rposition(|column| !column.second_differences.is_empty());
-        columns.truncate(used.map_or(0, |last| last + 1));
-        columns
-    };
-    Lane {
-        lane: count(lane),
-        frames: count(rows.len()),
-        frame_columns: columns(rows.iter().map(|row| &row.fields)),
-        positions: trimmed(columns(rows.iter().map(|row| &row.positions))),
-        asked: trimmed(columns(rows.iter().map(|row| &row.asked))),
-        vibration: trimmed(columns(rows.iter().map(|row| &row.vibration))),
-        raw,
-    }
-}
-
-fn row(
-    frame: &SentFrame<'_>,
-    seat: &RecordedSeat,
-    tick: i64,
-    deadline: MonoTime,
-    raw: &mut Vec<u8>,
-) -> LaneRow {
-    let asked = frame.asked;
-    let after = (frame.at.as_nanos() / 1_000).wrapping_sub(deadline.as_nanos() / 1_000).cast_signed();
-    #[expect(clippy::cast_possible_truncation, reason = "a chunk has it in so many bits")]
-    let (level, handed) = (i64::from((asked.level as f32).to_bits()), frame.handed as i64);
-    let mut row = LaneRow {
-        fields: [0; OF_FRAME],
-        positions: [0; MAX_AXES],
-        asked: [0; MAX_AXES],
-        vibration: [0; 2 * MAX_AXES],
-    };
-    row.fields[..6].copy_from_slice(&[
-        tick,
-        after,
-        handed,
-        asked.slots as i64,
-        level,
-        asked.clamps.cast_signed(),
-    ]);
-    match request(seat.frames, frame.datagram) {
-        Some(request) => fields(&mut row, &request),
-        None => {
-            row.fields[6] = frame.datagram.len() as i64 + 1;
-            raw.extend_from_slice(frame.datagram);
-        }
-    }
-    let (wanted, sent) = (seat.asked(&asked), seat.sent(frame));
-    for (axis, (geometry, wanted)) in seat.axes().iter().zip(wanted).enumerate() {
-        row.asked[axis] = geometry.pulses(wanted) - sent.get(axis).map_or(0, |place| geometry.pulses(*place));
-    }
-    row
-}
-
-/// The fields of a datagram, where these make it again.
-fn request(kind: FrameKind, datagram: &[u8]) -> Option<MotionRequest> {
-    let FrameKind::Datagram(port) = kind else { return None };
-    let request = MotionRequest::parse_as(port, datagram).ok()?;
-    (request.emit_as(port, &mut [0; MAX_LEN]) == datagram).then_some(request)
-}
-
-fn fields(row: &mut LaneRow, request: &MotionRequest) {
-    let MotionRequest {
-        timing,
-        channel,
-        accept,
-        reply,
-        frame,
-        time_ms,
-        positions,
-        outputs,
-        extend,
-        vibration,
-    } = request;
-    row.fields[7..].copy_from_slice(&[
-        frame.0.into(),
-        (*timing == Timing::Absolute).into(),
-        (*channel).into(),
-        accept.0.into(),
-        reply.0.into(),
-        (*time_ms).into(),
-        (*outputs).into(),
-        (*extend).into(),
-        positions.len() as i64,
-        vibration.is_some().into(),
-    ]);
-    row.positions.iter_mut().zip(positions.iter()).for_each(|(to, from)| *to = from.0.into());
-    for (axis, one) in vibration.iter().flat_map(|all| all.iter()).enumerate() {
-        row.vibration[2 * axis] = one.period.into();
-        row.vibration[2 * axis + 1] = one.amplitude.into();
-    }
+    pub(super) raw: Vec<u8>,
 }
 
 /// The chunks of a block, one behind the other; `None` where it is none.
@@ -264,10 +69,10 @@ pub(crate) fn unpack(block: &[u8], seats: &[RecordedSeat]) -> Option<Vec<u8>> {
     let is_sorted = sent.lanes.is_sorted_by(|one, other| one.lane < other.lane);
     let readers = sent.lanes.iter().filter(|_| is_sorted).map(|lane| LaneReader::new(lane, seats));
     let mut lanes = readers.collect::<Option<Vec<_>>>()?;
-    let mut columns = unfolded(&sent.tick_columns);
+    let mut columns = ColumnReaders::new(&sent.tick_columns);
     let mut chunks = Vec::new();
     for tick in 0..ticks {
-        let [index, deadline, late, missed, film, state, dropped] = numbers(&mut columns);
+        let [index, deadline, late, missed, film, state, dropped] = columns.next::<OF_TICK>();
         let head = TickHead {
             index: index.cast_unsigned(),
             deadline: MonoTime::from_nanos(deadline.cast_unsigned()),
@@ -285,20 +90,6 @@ pub(crate) fn unpack(block: &[u8], seats: &[RecordedSeat]) -> Option<Vec<u8>> {
     }
     // What no tick took was of none.
     lanes.iter().all(|lane| lane.left == 0 && !lane.is_damaged).then_some(chunks)
-}
-
-/// Iterators over columns that go on for ever.
-type Unfolded<'a> = Vec<Box<dyn Iterator<Item = i64> + 'a>>;
-
-fn unfolded(columns: &[Column]) -> Unfolded<'_> {
-    columns.iter().map(|one| Box::new(unfold(&one.second_differences)) as Box<_>).collect()
-}
-
-/// The next of each column; 0 of those that are not there.
-fn numbers<const N: usize>(columns: &mut Unfolded<'_>) -> [i64; N] {
-    let mut row = [0; N];
-    row.iter_mut().zip(columns).for_each(|(to, column)| *to = column.next().unwrap_or_default());
-    row
 }
 
 /// A frame out of a block.
@@ -324,27 +115,27 @@ struct LaneReader<'a> {
     left: u32,
     is_damaged: bool,
     next: Option<[i64; OF_FRAME]>,
-    fields: Unfolded<'a>,
-    positions: Unfolded<'a>,
-    asked: Unfolded<'a>,
-    vibration: Unfolded<'a>,
+    fields: ColumnReaders<'a>,
+    positions: ColumnReaders<'a>,
+    asked: ColumnReaders<'a>,
+    vibration: ColumnReaders<'a>,
     raw: &'a [u8],
 }
 
 impl<'a> LaneReader<'a> {
     fn new(lane: &'a Lane, seats: &'a [RecordedSeat]) -> Option<Self> {
         let index = usize::try_from(lane.lane).ok()?;
-        (lane.frames <= count(MOST)).then_some(())?;
+        (lane.frames as usize <= MOST).then_some(())?;
         Some(Self {
             lane: index,
             seat: seats.get(index)?,
             left: lane.frames,
             is_damaged: false,
             next: None,
-            fields: unfolded(&lane.frame_columns),
-            positions: unfolded(&lane.positions),
-            asked: unfolded(&lane.asked),
-            vibration: unfolded(&lane.vibration),
+            fields: ColumnReaders::new(&lane.frame_columns),
+            positions: ColumnReaders::new(&lane.positions),
+            asked: ColumnReaders::new(&lane.asked),
+            vibration: ColumnReaders::new(&lane.vibration),
             raw: &lane.raw,
         })
     }
@@ -352,7 +143,7 @@ impl<'a> LaneReader<'a> {
     /// The next frame, if it is of that tick.
     fn next(&mut self, tick: usize, head: &TickHead) -> Option<OwnedFrame> {
         if self.next.is_none() && self.left > 0 {
-            self.next = Some(numbers(&mut self.fields));
+            self.next = Some(self.fields.next());
         }
         let fields = self.next.take_if(|fields| usize::try_from(fields[0]).is_ok_and(|of| of <= tick))?;
         self.left -= 1;
@@ -364,7 +155,8 @@ impl<'a> LaneReader<'a> {
     fn frame(&mut self, fields: &[i64; OF_FRAME], head: &TickHead) -> Option<OwnedFrame> {
         let datagram = self.datagram(fields)?;
         let [_, after, handed, slots, level, clamps, ..] = *fields;
-        let at = (head.deadline.as_nanos() / 1_000).saturating_add_signed(after).saturating_mul(1_000);
+        let woken = (head.deadline.as_nanos() / 1_000).saturating_add(head.late_ns / 1_000);
+        let at = woken.saturating_add_signed(after).saturating_mul(1_000);
         let mut frame = OwnedFrame {
             lane: self.lane,
             at: MonoTime::from_nanos(at),
@@ -377,7 +169,7 @@ impl<'a> LaneReader<'a> {
             },
             datagram,
         };
-        let farther: [i64; MAX_AXES] = numbers(&mut self.asked);
+        let farther: [i64; MAX_AXES] = self.asked.next();
         if slots > 0 {
             let sent = self.seat.sent(&frame.as_sent());
             let wanted = |(axis, geometry): (usize, &super::seat::RecordedAxis)| {
@@ -391,8 +183,8 @@ impl<'a> LaneReader<'a> {
     }
 
     fn datagram(&mut self, fields: &[i64; OF_FRAME]) -> Option<Vec<u8>> {
-        let positions: [i64; MAX_AXES] = numbers(&mut self.positions);
-        let vibration: [i64; 2 * MAX_AXES] = numbers(&mut self.vibration);
+        let positions: [i64; MAX_AXES] = self.positions.next();
+        let vibration: [i64; 2 * MAX_AXES] = self.vibration.next();
         if fields[6] != 0 {
             let (octets, rest) =
                 self.raw.split_at_checked(usize::try_from(fields[6].wrapping_sub(1)).ok()?)?;

@@ -2,7 +2,7 @@
 
 use rtrb::Consumer;
 
-use super::full::Block;
+use super::block::Block;
 use super::margins::Margins;
 use super::{
     AckChunk, AckRecord, AckTap, Chunk, IncidentCause, Message, RecordedSeat, Sampled, Tap, Watchman,
@@ -155,7 +155,6 @@ impl Intake {
             whole.drains.extend_from_slice(&held_acks);
         }
         while let Some((chunk, behind)) = Chunk::parse(rest) {
-            let octets = &rest[..rest.len() - behind.len()];
             rest = behind;
             self.take_acks(&mut drains, Some(chunk.head.deadline));
             let Self { seats, fold, margins, whole, counts, watchman, found, .. } = self;
@@ -166,7 +165,7 @@ impl Intake {
             margins.take(&chunk, seats, &mut |_, _, _| ());
             fold.take(&chunk, tell);
             if let Some(whole) = whole {
-                let block = whole.ticks.add(&chunk, octets, seats);
+                let block = whole.ticks.add(&chunk, seats);
                 whole.last = chunk.head.deadline;
                 block.into_iter().for_each(|(at, block)| whole.tell(at, block, tell));
             }
@@ -199,9 +198,8 @@ impl Intake {
     /// Tells of what is not over, so that a file that ends here has all that was counted.
     pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
         self.fold.close(tell);
-        let Self { whole, seats, .. } = self;
-        let Some(whole) = whole else { return };
-        if let Some((at, block)) = whole.ticks.close(seats) {
+        let Some(whole) = &mut self.whole else { return };
+        if let Some((at, block)) = whole.ticks.close() {
             whole.tell(at, block, tell);
         }
         // Replies come after the last tick as well.

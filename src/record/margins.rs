@@ -143,12 +143,12 @@ impl Margins {
             let before = std::mem::replace(&mut lane.time_ms, time_ms);
             let lasts = if timing == Timing::Relative { time_ms } else { time_ms.saturating_sub(before) };
             lane.reached += Duration::from_millis(u64::from(lasts.max(1)));
-            for (index, (axis, place)) in lane.axes.iter_mut().zip(places).enumerate() {
+            for (index, (axis, place)) in lane.axes.iter_mut().zip(places.iter()).enumerate() {
                 if !goes_on {
                     axis.measure = Measure::new(*spacing);
                 }
                 let limits = seat.axes()[index].limits();
-                tell(frame.lane, index, axis.push(lane.reached, head.film, place, limits));
+                tell(frame.lane, index, axis.push(lane.reached, head.film, *place, limits));
             }
         }
     }

@@ -4,8 +4,9 @@ use std::io::Cursor;
 
 use proptest::prelude::*;
 
+use super::block::Block;
 use super::chunk::{ChunkWriter, Handed, SentFrame};
-use super::full::{Block, unpack};
+use super::full::unpack;
 use super::tests::{MS, about, asked, frame, head, recorded_as, seat, window};
 use super::*;
 use crate::motion::Pulses;
@@ -136,6 +137,34 @@ fn of_a_cut_file_all_that_is_complete_is_written_anew_with_an_index() {
     assert_eq!(names, ["kinocue", "kinocue.recovered"]);
 }
 
+#[test]
+fn a_cut_with_its_scene_has_a_cube_for_each_seat_once_and_where_it_is_twenty_times_a_second() {
+    let whole = recorded_as(Mode::Full, swing(300));
+    let stretch = Stretch { from: ShowTime::ZERO, until: ShowTime::from_millis(1_999), seat: None };
+    let manner = CutManner { scene: true, ..CutManner::default() };
+    let file = cut(whole.as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().into_inner();
+    let all = |topic: &str| -> Vec<serde_json::Value> {
+        let messages = mcap::MessageStream::new(&file).unwrap().map(Result::unwrap);
+        let of_topic = messages.filter(|one| one.channel.topic == topic);
+        of_topic.map(|one| serde_json::from_slice(&one.data).unwrap()).collect()
+    };
+    let [scene] = &all("/scene")[..] else { panic!("once") };
+    assert_eq!(
+        (&scene["entities"][0]["id"], &scene["entities"][0]["frame_locked"]),
+        (&"A1".into(), &true.into())
+    );
+    let transforms = all("/tf");
+    assert_eq!(transforms.len(), 40, "two seconds");
+    for (tick, (place, _)) in (0..40).zip(swing(200).step_by(5)) {
+        let one = &transforms[tick]["transforms"][0];
+        assert_eq!(one["child_frame_id"], scene["entities"][0]["frame_id"]);
+        // Metres of a stroke of 150 mm, to the pulse.
+        assert!((one["translation"]["z"].as_f64().unwrap() - place * 0.150).abs() < 1e-5, "{one}");
+    }
+    let contents = read(file.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
+    assert!(contents.faults.is_empty() && contents.trouble.is_none(), "{contents:?}");
+}
+
 fn motion(
     window: &crate::motion::Window,
     place: f64,
@@ -184,16 +213,12 @@ proptest! {
             octets.extend_from_slice(writer.close(&head, *dropped).unwrap());
         }
         let mut packed = Vec::new();
-        let mut rest = octets.as_slice();
-        while let Some((chunk, behind)) = Chunk::parse(rest) {
-            packed.extend(block.add(&chunk, &rest[..rest.len() - behind.len()], &seats));
-            rest = behind;
-        }
-        packed.extend(block.close(&seats));
+        each_chunk(&octets, |chunk| packed.extend(block.add(chunk, &seats)));
+        packed.extend(block.close());
         let back: Vec<u8> = packed.iter().flat_map(|(_, block)| unpack(block, &seats).expect("it is ours")).collect();
         prop_assert_eq!(told(&back), told(&octets));
         let mut places = (Vec::new(), Vec::new());
-        let places_of = |chunk: &Chunk<'_>, to: &mut Vec<f64>| chunk.frames().for_each(|one| to.extend(seats[one.lane].asked(&one.asked)));
+        let places_of = |chunk: &Chunk<'_>, to: &mut Vec<f64>| chunk.frames().for_each(|one| to.extend_from_slice(&seats[one.lane].asked(&one.asked)));
         each_chunk(&octets, |chunk| places_of(chunk, &mut places.0));
         each_chunk(&back, |chunk| places_of(chunk, &mut places.1));
         prop_assert!(places.0.iter().zip(&places.1).all(|(one, other)| (one - other).abs() <= 0.5001 * seats[0].axes()[0].pulse));
@@ -212,10 +237,10 @@ proptest! {
         for tick in 0..40 {
             writer.frame(&SentFrame { lane: 0, at: MonoTime::from_nanos(tick), handed: Handed::Taken, asked: asked(0.3), datagram: frame(0.3, &mut [0; MAX_LEN]) });
             let octets = writer.close(&head(tick * 10), 0).unwrap().to_vec();
-            block.add(&Chunk::parse(&octets).unwrap().0, &octets, &[seat()]);
+            block.add(&Chunk::parse(&octets).unwrap().0, &[seat()]);
             writer.clear();
         }
-        let (_, mut packed) = block.close(&[seat()]).unwrap();
+        let (_, mut packed) = block.close().unwrap();
         let at = at.index(packed.len());
         packed[at] = octet;
         let _ = unpack(&packed, &[seat()]);

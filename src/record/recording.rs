@@ -18,7 +18,7 @@ use super::{Message, RecordedSeat};
 use crate::time::{MonoTime, Rate};
 
 /// The version of topics, messages and metadata.
-pub(super) const VERSION: &str = "1";
+pub(super) const VERSION: &str = "2";
 /// The topic of whole ticks.
 pub(super) const SENT: &str = "/full/sent";
 /// That of what the ack thread took.
@@ -108,6 +108,16 @@ impl Opening {
             }
         }
         opening
+    }
+
+    /// The same with more topics of JSON, each with its schema; and the channel of the first.
+    pub(super) fn with_topics(mut self, topics: &[(&str, Value)]) -> (Self, u16) {
+        let first = u16::try_from(self.channels.len()).unwrap_or(u16::MAX);
+        for (topic, schema) in topics {
+            let schema = self.schema(schema);
+            self.channels.push(((*topic).to_owned(), schema, "json".to_owned()));
+        }
+        (self, first)
     }
 
     fn schema(&mut self, schema: &Value) -> usize {

@@ -10,7 +10,7 @@ use super::{RecordedSeat, TickHead};
 use crate::state::State;
 use crate::time::MonoTime;
 use crate::tracker::Fate;
-use crate::wire::ReplyCode;
+use crate::wire::{PerAxis, ReplyCode};
 
 /// A seat in a window: its frame in which asked and sent differ most, the last of these, and sums of all its frames.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -94,8 +94,8 @@ pub(crate) enum Message {
 /// A window of a seat that is not over.
 #[derive(Debug, Clone, Default)]
 struct SeatWindow {
-    /// The worst so far, and how far asked and sent differ in it.
-    worst: Option<(MonoTime, f64)>,
+    /// The worst so far: when, how far asked and sent differ in it, and these.
+    worst: Option<(MonoTime, f64, [PerAxis<f64>; 2])>,
     sample: SeatSample,
     /// Clamps until the window before.
     clamps: u64,
@@ -169,10 +169,13 @@ impl Sampled {
             let mut sample = std::mem::take(&mut window.sample);
             let worst = window.worst.take();
             let is_heard = sample.acked > 0 || sample.refused > 0 || sample.lost > 0;
-            if worst.is_none() {
-                sample.film_s = closed_s;
+            match &worst {
+                Some((_, _, [asked, sent])) => {
+                    (sample.asked_mm, sample.sent_mm) = (round(asked), round(sent));
+                }
+                None => sample.film_s = closed_s,
             }
-            if let Some(at) = worst.map(|(at, _)| at).or_else(|| is_heard.then_some(closed_at)) {
+            if let Some(at) = worst.map(|(at, ..)| at).or_else(|| is_heard.then_some(closed_at)) {
                 (sample.standing, sample.measured_mm) = (window.standing, window.measured_mm.clone());
                 tell(at, Message::Seat(lane, sample));
             }
@@ -204,7 +207,7 @@ impl Sampled {
                 AckRecord::Lost(_, total) => {
                     sample.lost += total.saturating_sub(std::mem::replace(lost, total));
                 }
-                AckRecord::Measured(_, _, pulses) => *measured_mm = round(seat.measured(&pulses)),
+                AckRecord::Measured(_, _, pulses) => *measured_mm = round(&seat.measured(&pulses)),
                 AckRecord::Standing(_, now) => *standing = Some(standing_number(now)),
                 _ => {}
             }
@@ -228,12 +231,12 @@ impl Sampled {
         if !asked.is_empty() {
             sample.clamps += frame.asked.clamps.saturating_sub(std::mem::replace(clamps, frame.asked.clamps));
         }
-        let apart = asked.iter().zip(&sent).map(|(asked, sent)| (asked - sent).abs()).fold(0.0, f64::max);
-        if worst.is_none_or(|(_, most)| apart >= most) {
-            *worst = Some((head.deadline, apart));
+        let apart =
+            asked.iter().zip(sent.iter()).map(|(asked, sent)| (asked - sent).abs()).fold(0.0, f64::max);
+        if worst.is_none_or(|(_, most, _)| apart >= most) {
+            *worst = Some((head.deadline, apart, [asked, sent]));
             sample.film_s = head.film.as_secs_f64();
             sample.level = rounded(frame.asked.level);
-            (sample.asked_mm, sample.sent_mm) = (round(asked), round(sent));
         }
     }
 }
@@ -252,6 +255,6 @@ fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
-fn round(values: Vec<f64>) -> Vec<f64> {
-    values.into_iter().map(rounded).collect()
+fn round(values: &[f64]) -> Vec<f64> {
+    values.iter().copied().map(rounded).collect()
 }

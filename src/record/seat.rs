@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::chunk::{Asked, SentFrame, longest_frame};
 use crate::drive::link::{LinkPose, RECORD_LEN};
 use crate::motion::{AxisUnit, MAX_AXES, Pulses, Window};
-use crate::wire::{FrameNo, MotionRequest, Timing, VibrationPort, motion_len};
+use crate::wire::{FrameNo, MotionRequest, PerAxis, Timing, VibrationPort, motion_len};
 
 /// What the frames of a lane are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,7 +80,9 @@ impl RecordedAxis {
     /// To whole pulses.
     #[expect(clippy::cast_possible_truncation, reason = "a saturating cast is what is wanted")]
     pub(super) fn pulses(&self, place: f64) -> i64 {
-        (place / self.pulse).round() as i64
+        // Rounding by a cast: the function for it is a call to the C library on plain x86-64.
+        let pulses = place / self.pulse;
+        (pulses + 0.5_f64.copysign(pulses)) as i64
     }
 }
 
@@ -146,10 +148,21 @@ impl RecordedSeat {
         longest_frame(self.slots, datagram)
     }
 
+    /// Octets of the positions of one of its frames in columns.
+    pub(super) const fn in_columns(&self) -> usize {
+        match self.frames {
+            FrameKind::Datagram(_) => self.slots,
+            FrameKind::Pose => RECORD_LEN,
+        }
+    }
+
     /// Where its axes were asked to be, millimetres or degrees; none where no tick asked.
-    pub(crate) fn asked(&self, asked: &Asked) -> Vec<f64> {
-        let axes = self.axes.iter().take_while(|axis| axis.slot < asked.slots);
-        axes.map(|axis| axis.low + asked.pose[axis.slot] * axis.stroke).collect()
+    pub(crate) fn asked(&self, asked: &Asked) -> PerAxis<f64> {
+        let axes = self.axes.iter().take_while(|axis| axis.slot < asked.slots).count();
+        PerAxis::from_fn(axes, |axis| {
+            let RecordedAxis { slot, low, stroke, .. } = self.axes[axis];
+            low + asked.pose[slot] * stroke
+        })
     }
 
     /// What has to be asked for so that [`Self::asked`] tells these places.
@@ -162,9 +175,9 @@ impl RecordedSeat {
     }
 
     /// Where its axes are that stand at these places, millimetres or degrees.
-    pub(super) fn measured(&self, pulses: &[Pulses]) -> Vec<f64> {
-        let place = |axis: &RecordedAxis| pulses.get(axis.slot).map(|at| f64::from(at.0) * axis.pulse);
-        self.axes.iter().map_while(place).collect()
+    pub(super) fn measured(&self, pulses: &[Pulses]) -> PerAxis<f64> {
+        let axes = self.axes.iter().take_while(|axis| axis.slot < pulses.len()).count();
+        PerAxis::from_fn(axes, |axis| f64::from(pulses[self.axes[axis].slot].0) * self.axes[axis].pulse)
     }
 
     /// The number of a frame; `None` where that is no frame of its kind.
@@ -178,24 +191,24 @@ impl RecordedSeat {
     }
 
     /// Where its axes were sent, millimetres or degrees; none where that is no frame of its kind.
-    pub(crate) fn sent(&self, frame: &SentFrame<'_>) -> Vec<f64> {
+    pub(crate) fn sent(&self, frame: &SentFrame<'_>) -> PerAxis<f64> {
         self.motion(frame).map(|(places, ..)| places).unwrap_or_default()
     }
 
     /// The same, with what its Time counts from, and that Time in ms.
-    pub(super) fn motion(&self, frame: &SentFrame<'_>) -> Option<(Vec<f64>, Timing, u32)> {
+    pub(super) fn motion(&self, frame: &SentFrame<'_>) -> Option<(PerAxis<f64>, Timing, u32)> {
         match self.frames {
             FrameKind::Datagram(port) => {
                 let request = MotionRequest::parse_as(port, frame.datagram).ok()?;
-                let place = |axis: &RecordedAxis| {
-                    request.positions.get(axis.slot).map(|at| f64::from(at.0) * axis.pulse)
-                };
-                Some((self.axes.iter().map_while(place).collect(), request.timing, request.time_ms))
+                Some((self.measured(&request.positions), request.timing, request.time_ms))
             }
             FrameKind::Pose => {
                 let pose = LinkPose::parse(frame.datagram.try_into().ok()?);
-                let place = |axis: &RecordedAxis| axis.low + pose.axes[axis.slot] * axis.stroke;
-                Some((self.axes.iter().map(place).collect(), Timing::Relative, pose.lasts_ms))
+                let place = |axis: usize| {
+                    let RecordedAxis { slot, low, stroke, .. } = self.axes[axis];
+                    low + pose.axes[slot] * stroke
+                };
+                Some((PerAxis::from_fn(self.axes.len(), place), Timing::Relative, pose.lasts_ms))
             }
         }
     }

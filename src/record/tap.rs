@@ -2,7 +2,7 @@
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::chunk::{ChunkWriter, Handed, SentFrame};
+use super::chunk::{ChunkWriter, Handed};
 use super::{Asked, RecordedSeat, TickHead};
 use crate::net::Delivery;
 use crate::time::{MonoTime, Rate};
@@ -10,6 +10,8 @@ use crate::time::{MonoTime, Rate};
 /// Seconds of ticks that the ring holds: a disk may take so long.
 const HELD_S: f64 = 2.0;
 
+/// Octets of a frame and its reply in columns beside positions: instants, latency, what was held back.
+const OTHERS: usize = 8;
 /// Octets of a sample of a seat.
 const SAMPLE: u64 = 400;
 
@@ -34,13 +36,25 @@ pub fn tap(seats: &[RecordedSeat], rate: Rate) -> (Tap, Consumer<u8>) {
     (Tap { ring, chunk, asked: Asked::NOTHING, dropped: 0 }, end)
 }
 
-/// Octets a second that all of these seats takes in the flight recorder: samples, and columns of ticks and replies, which take less than a
-/// quarter of what crosses the taps.
+/// Octets a second that all of these seats takes in the flight recorder: samples, and columns of ticks and replies, of which a frame
+/// takes less than an octet for each slot and [`OTHERS`], whatever moves; poses for links stand there as they are.
 pub(crate) fn octets_a_second(seats: &[RecordedSeat], rate: Rate, sample_hz: u32) -> u64 {
-    let tick: usize = 64 + seats.iter().map(|seat| seat.longest_frame() + 48).sum::<usize>();
+    let tick: usize = 64 + seats.iter().map(|seat| seat.in_columns() + OTHERS).sum::<usize>();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a thousand a second")]
     let ticks = rate.hz().ceil() as u64;
-    ticks * tick as u64 / 4 + SAMPLE * u64::from(sample_hz) * (1 + seats.len() as u64)
+    ticks * tick as u64 + SAMPLE * u64::from(sample_hz) * (1 + seats.len() as u64)
+}
+
+/// The same of a file: samples are a quarter as long once they are packed, and whole ticks are there only where everything is kept.
+pub(crate) fn file_octets_a_second(
+    seats: &[RecordedSeat],
+    rate: Rate,
+    sample_hz: u32,
+    keeps_ticks: bool,
+) -> u64 {
+    let samples = SAMPLE * u64::from(sample_hz) * (1 + seats.len() as u64);
+    let ticks = octets_a_second(seats, rate, sample_hz) - samples;
+    samples / 4 + if keeps_ticks { ticks } else { 0 }
 }
 
 impl Tap {
@@ -53,9 +67,9 @@ impl Tap {
     /// That left, or was to.
     #[inline]
     pub fn frame(&mut self, lane: usize, datagram: &[u8], at: MonoTime, delivery: Delivery) {
-        let asked = std::mem::replace(&mut self.asked, Asked::NOTHING);
-        let handed = Handed::from(delivery);
-        self.chunk.frame(&SentFrame { lane, at, handed, asked, datagram });
+        self.chunk.put(lane, at, Handed::from(delivery), &self.asked, datagram);
+        let Asked { slots, level, clamps, .. } = Asked::NOTHING;
+        (self.asked.slots, self.asked.level, self.asked.clamps) = (slots, level, clamps);
     }
 
     /// A tick is over.

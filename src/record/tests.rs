@@ -14,7 +14,7 @@ use crate::net::{Delivery, SendFault};
 use crate::state::{PlayMode, State};
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::tracker::Fate;
-use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, ReplyCode, Timing, VibrationPort};
+use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, PerAxis, ReplyCode, Timing, VibrationPort};
 
 pub(super) const MS: u64 = 1_000_000;
 const PLAYING: State = State::Playing(PlayMode::Following);
@@ -83,6 +83,19 @@ pub(crate) fn recorded_falling(
     ticks: impl Iterator<Item = (f64, f64)>,
     standing: impl Fn(u64) -> Option<HealthState>,
 ) -> Vec<u8> {
+    recorded_of(mode, ticks.map(|(wanted, sent)| (wanted, sent, None)), standing)
+}
+
+/// The same of ticks of places sent, at which the seat was measured to be elsewhere.
+pub(crate) fn recorded_measured(ticks: impl Iterator<Item = (f64, Option<f64>)>) -> Vec<u8> {
+    recorded_of(Mode::Sampled, ticks.map(|(sent, measured)| (sent, sent, measured)), |_| None)
+}
+
+fn recorded_of(
+    mode: Mode,
+    ticks: impl Iterator<Item = (f64, f64, Option<f64>)>,
+    standing: impl Fn(u64) -> Option<HealthState>,
+) -> Vec<u8> {
     let seats = [seat()];
     let (Taps { ticks: mut tap, mut acks }, intake) =
         Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);
@@ -91,7 +104,7 @@ pub(crate) fn recorded_falling(
     let file = Recording::begin(Cursor::new(Vec::new()), &about, &seats).unwrap();
     let mut recorder = Recorder::new(intake, file);
     let mut may_move = true;
-    for (tick, (wanted, sent)) in (0_u64..).zip(ticks) {
+    for (tick, (wanted, sent, measured)) in (0_u64..).zip(ticks) {
         let mut buf = [0; MAX_LEN];
         if let Some(standing) = standing(tick) {
             may_move = standing.may_move();
@@ -106,6 +119,11 @@ pub(crate) fn recorded_falling(
         if tick % 2 == 0 {
             let fate = Fate::Answered(ReplyCode::Running);
             acks.take(&AckRecord::Fate(0, FrameNo(u32::try_from(tick).unwrap()), fate, 2_000_000));
+        }
+        if let Some(place) = measured {
+            let at = MonoTime::from_nanos((tick * 10 + 3) * MS);
+            let pulses = PerAxis::from_fn(3, |slot| window().slots()[slot].pulses(place));
+            acks.take(&AckRecord::Measured(0, at, pulses));
         }
         acks.drained(MonoTime::from_nanos((tick * 10 + 5) * MS));
         recorder.take().unwrap();

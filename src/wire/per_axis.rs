@@ -19,6 +19,7 @@ impl<T: Copy + Default> PerAxis<T> {
     }
 
     /// The values that `value` gives for axes 0 to `axes` - 1; at most 12 are asked for.
+    #[inline]
     pub fn from_fn(axes: usize, mut value: impl FnMut(usize) -> T) -> Self {
         let mut values = [T::default(); MAX_AXES];
         let mut len = 0;
@@ -33,6 +34,7 @@ impl<T: Copy + Default> PerAxis<T> {
 impl<T> Deref for PerAxis<T> {
     type Target = [T];
 
+    #[inline]
     fn deref(&self) -> &[T] {
         &self.values[..usize::from(self.len)]
     }

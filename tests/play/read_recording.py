@@ -8,12 +8,22 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 
+def differences(packed):
+    """The second differences of a column: groups of 32, an octet that says how many bits each takes, then these, lowest first."""
+    while packed:
+        width, packed = packed[0], packed[1:]
+        bits, packed = int.from_bytes(packed[: 4 * width], "little"), packed[4 * width :]
+        for at in range(32):
+            word = bits >> at * width & (1 << width) - 1
+            yield word >> 1 ^ -(word & 1)
+
+
 def unfold(column, count):
     """The numbers of a column of second differences, which goes on as it was."""
     last = step = 0
-    numbers = []
-    for at in range(count):
-        step += column.second_differences[at] if at < len(column.second_differences) else 0
+    numbers, seconds = [], differences(column.packed)
+    for _ in range(count):
+        step += next(seconds, 0)
         last += step
         numbers.append(last)
     return numbers

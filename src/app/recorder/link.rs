@@ -80,6 +80,9 @@ pub(crate) struct RecordLink {
 #[derive(Debug, Default)]
 struct SharedFigures {
     dropped: AtomicU64,
+    /// Octets that a second of a show takes, and for which there is room, what may go for them included; 0 where nothing is known.
+    octets_a_s: AtomicU64,
+    room: AtomicU64,
     status: Mutex<RecordStatus>,
 }
 
@@ -109,6 +112,26 @@ impl RecordLink {
         let mut status = self.shared.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
         status.dropped_notes = self.shared.dropped.load(Ordering::Relaxed);
         status
+    }
+
+    /// A second of a show takes so much.
+    pub(in crate::app) fn takes(&self, octets_a_s: u64) {
+        self.shared.octets_a_s.store(octets_a_s, Ordering::Relaxed);
+    }
+
+    /// So much may be recorded yet.
+    pub(in crate::app) fn has_room(&self, octets: u64) {
+        self.shared.room.store(octets, Ordering::Relaxed);
+    }
+
+    /// Octets that a show of so many seconds takes, and those for which there is room, where these are fewer.
+    pub(crate) fn lacks(&self, length_s: f64) -> Option<(u64, u64)> {
+        let [octets_a_s, room] =
+            [&self.shared.octets_a_s, &self.shared.room].map(|one| one.load(Ordering::Relaxed));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cue is some hours")]
+        let needs = octets_a_s.saturating_mul(length_s.max(0.0).ceil() as u64);
+        // Before the first look at the disk nothing is known.
+        (self.asks.is_some() && room > 0 && needs > room).then_some((needs, room))
     }
 
     /// Changes how it stands.

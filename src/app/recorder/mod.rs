@@ -5,6 +5,7 @@ mod beginning;
 mod disk;
 mod leftovers;
 mod link;
+mod open;
 mod worker;
 
 use std::fs;
@@ -19,7 +20,7 @@ pub(crate) use link::{RecordAsk, RecordLink, ShowStart};
 use super::recording;
 use super::runtime::Runtime;
 use crate::config::RecordMode;
-use crate::record::{About, EntryMaker, Intake, Opening, octets_a_second};
+use crate::record::{About, EntryMaker, Intake, Opening, file_octets_a_second, octets_a_second};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
@@ -69,8 +70,12 @@ impl HallRecorder {
             .with("sample_hz", config.record.sample_hz.to_string());
         let maker = EntryMaker::new(seats.len(), clocks);
         let octets_a_s = octets_a_second(&seats, rate, config.record.sample_hz);
-        let (taps, intake) = Intake::new(seats, rate, config.record.sample_hz);
+        let keeps_ticks = config.record.mode == RecordMode::Full;
         let (link, asks) = RecordLink::new();
+        if config.record.mode != RecordMode::Off {
+            link.takes(file_octets_a_second(&seats, rate, config.record.sample_hz, keeps_ticks));
+        }
+        let (taps, intake) = Intake::new(seats, rate, config.record.sample_hz);
         let flight = places.runtime.join(FLIGHT_FILE);
         if config.record.mode == RecordMode::Off && config.record.flight_s == 0 {
             link.tell(|figures| figures.mode = RecordMode::Off.word().to_owned());

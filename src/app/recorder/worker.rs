@@ -2,22 +2,22 @@
 //! incident. What cannot be written is told, and tried again; it never holds up whoever it comes from.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io;
 use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::thread::Builder;
 use std::time::Duration;
 
 use super::beginning::{begun, small_file};
-use super::disk::{Disk, PartFile};
+use super::disk::Disk;
 use super::leftovers::{Leftover, clear_up};
 use super::link::{RecordAsk, RecordLink, RecordPart, ShowStart};
+use super::open::{OpenFile, OpenRecording};
 use crate::app::recording::in_io;
 use crate::config::{Record, RecordMode};
 use crate::record::{
     Counts, Entry, EntryMaker, EventNote, Flight, IncidentCause, IncidentStep, Incidents, Intake, Message,
-    Note, Opening, Recording,
+    Note, Opening,
 };
 use crate::sys::realtime;
 use crate::time::{Clock, MonoTime};
@@ -35,25 +35,6 @@ const BEFORE: Duration = Duration::from_secs(10);
 const AFTER: Duration = Duration::from_secs(5);
 /// Asks that are taken in one look; more wait for the next.
 const ASKS: usize = 256;
-
-/// A recording that is being written.
-struct OpenFile {
-    file: Recording<BufWriter<File>>,
-    disk: PartFile,
-    counts: Counts,
-}
-
-/// A show that is recorded, whether a file of it is open or not.
-struct OpenRecording {
-    start: ShowStart,
-    part: u32,
-    file: Option<OpenFile>,
-    /// When the next file is tried, where the last has failed.
-    again_at: Option<MonoTime>,
-    /// Until when it goes on, once it is over.
-    until: Option<MonoTime>,
-    report: Option<Vec<u8>>,
-}
 
 /// What the thread has.
 pub(super) struct Worker {
@@ -73,6 +54,8 @@ pub(super) struct Worker {
     show: Option<OpenRecording>,
     incidents: Incidents,
     incident: Option<OpenFile>,
+    flush_at: MonoTime,
+    sync_at: MonoTime,
     closes: bool,
 }
 
@@ -102,6 +85,8 @@ impl Worker {
             show: None,
             incidents: Incidents::default(),
             incident: None,
+            flush_at: MonoTime::default(),
+            sync_at: MonoTime::default(),
             closes: false,
         }
     }
@@ -144,27 +129,30 @@ impl Worker {
 
     /// Records until the taps are gone.
     pub(super) fn run(mut self, clock: &impl Clock) {
-        let mut flush_at = clock.now() + FLUSH;
-        let mut sync_at = clock.now();
         loop {
             // Asked before they are emptied: what was pushed before the end is taken.
             let is_over = self.intake.is_over();
             let now = clock.now();
-            self.take_asks(now);
-            self.take_taps();
-            self.mind_ends(now);
-            if now >= flush_at {
-                self.flush(now);
-                flush_at = now + FLUSH;
-            }
-            if now >= sync_at {
-                self.sync(now);
-                sync_at = now + SYNC;
-            }
+            self.look(now);
             if is_over && self.closes {
                 return self.end(now);
             }
             clock.sleep_until(now + LOOK);
+        }
+    }
+
+    /// Takes what is there, and minds what is due.
+    fn look(&mut self, now: MonoTime) {
+        self.take_asks(now);
+        self.take_taps();
+        self.mind_ends(now);
+        if now >= self.flush_at {
+            self.flush(now);
+            self.flush_at = now + FLUSH;
+        }
+        if now >= self.sync_at {
+            self.sync(now);
+            self.sync_at = now + SYNC;
         }
     }
 
@@ -452,6 +440,9 @@ impl Worker {
         if let Ok(free) = &free {
             self.link.tell(|status| status.free_bytes = *free);
         }
+        if let Ok(room) = self.disk.room() {
+            self.link.has_room(room.max(1));
+        }
         let file = self.show.as_ref().and_then(|show| show.file.as_ref());
         let Some(open) = file else { return };
         let kept = open.disk.sync().and_then(|()| self.disk.clear_out_for_more());
@@ -466,3 +457,6 @@ impl Worker {
         self.link.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
     }
 }
+
+#[cfg(test)]
+mod tests;

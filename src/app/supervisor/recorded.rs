@@ -171,6 +171,21 @@ fn records(hall: &HallContext) -> Result<(), Problem> {
     Err(Problem::new(Code::State, why, "set flight_s and mode in [record], and reload"))
 }
 
+/// Why the next show would not be recorded to its end: said once it is loaded, while there is time to make room.
+pub(super) fn lacks_room(hall: &HallContext) -> Option<String> {
+    if hall.recorder.status().recording.is_some() {
+        return None;
+    }
+    let length_s = hall.cued.as_ref()?.timeline.duration().as_secs_f64();
+    let (needs, room) = hall.recorder.lacks(length_s)?;
+    #[expect(clippy::cast_precision_loss, reason = "to a tenth")]
+    let [needs, room] = [needs, room].map(|octets| octets as f64 / 1e6);
+    Some(format!(
+        "a recording of this show takes up to {needs:.1} MB, and there is room for {room:.1} MB; free space on that disk, or set \
+         dir, mode or min_free_gib in [record]"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,6 +201,22 @@ mod tests {
         .who;
         let problem = mark(Some("F4 jerked"), &who, &hall).unwrap_err();
         assert!(problem.remedy.contains("[record]"), "{problem}");
+    }
+
+    #[test]
+    fn a_show_whose_recording_finds_no_room_is_warned_of_once_it_is_loaded() {
+        let mut hall = hall(State::Parked, "one");
+        let (link, _asks) = crate::app::recorder::RecordLink::new();
+        hall.recorder = link.clone();
+        link.takes(1_000_000);
+        assert_eq!(lacks_room(&hall), None, "the disk was not looked at yet");
+        link.has_room(4_000_000);
+        assert_eq!(lacks_room(&hall), None, "four seconds take as much");
+        link.has_room(3_900_000);
+        let warning = lacks_room(&hall).expect("it is too little");
+        assert!(warning.contains("4.0 MB") && warning.contains("3.9 MB"), "{warning}");
+        hall.cued = None;
+        assert_eq!(lacks_room(&hall), None, "nothing is loaded");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::status::StatusParts;
-use super::{belts, player};
+use super::{belts, player, recorded};
 use crate::app::links;
 use crate::control::{Health, Severity, Warning};
 use crate::health::{HealthState, Why};
@@ -54,6 +54,7 @@ impl StatusParts<'_> {
         warnings.extend(features.lasting.warnings(hall));
         let troubles = hall.recorder.status().troubles;
         warnings.extend(troubles.iter().map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));
+        warnings.extend(recorded::lacks_room(hall).map(|trouble| in_two("record-room", &trouble)));
         warnings.extend(settings_file.map(|trouble| in_two("settings", &trouble)));
         warnings.extend(features.records.trouble().map(|trouble| Warning {
             id: "journal".to_owned(),

@@ -8,7 +8,11 @@ use super::{open, shown, unread};
 use crate::record::{Comparison, compare};
 use crate::time::ShowTime;
 
-/// Compares two recordings by show time: how far the sent positions differ, for each axis of each seat.
+/// Events of each that are printed.
+const PRINTED: usize = 20;
+
+/// Compares two recordings by show time: how far the sent positions differ, for each axis of each seat, how much later the second was, and
+/// what happened in one alone.
 ///
 /// Exits with 1 if an axis differs by more than the tolerance.
 #[derive(Debug, clap::Args)]
@@ -56,6 +60,23 @@ fn text(comparison: &Comparison) -> String {
             axis.axis, axis.greatest, axis.rms, axis.compared
         )
         .expect("a String takes all text");
+    }
+    if let Some(lag) = comparison.lag_ms {
+        let words = match lag {
+            0.0 => "neither lags behind the other".to_owned(),
+            ..0.0 => format!("the first is {:.1} ms later by show time", -lag),
+            _ => format!("the second is {lag:.1} ms later by show time"),
+        };
+        out += &format!("{words}\n");
+    }
+    for (name, events) in ["first", "second"].into_iter().zip(&comparison.events) {
+        for event in events.iter().take(PRINTED) {
+            let at = ShowTime::from_secs_f64(event.film_s);
+            out += &format!("only in the {name}: {at} {} {}\n", event.topic, event.text);
+        }
+        if events.len() > PRINTED {
+            out += &format!("only in the {name}: {} more; --json has them\n", events.len() - PRINTED);
+        }
     }
     for seat in &comparison.alone {
         out += &format!("{}: only in one of them\n", shown(seat));

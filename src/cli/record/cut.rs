@@ -32,20 +32,13 @@ pub(in super::super) struct Args {
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Write CSV, one row per frame.
-    #[arg(long, conflicts_with_all = ["pcap", "film_time", "anonymous", "whole"])]
+    #[arg(long, conflicts_with_all = ["pcap", "film_time", "anonymous", "whole", "scene"])]
     csv: bool,
     /// Write the datagrams as a pcap capture.
-    #[arg(long, conflicts_with_all = ["film_time", "anonymous", "whole"])]
+    #[arg(long, conflicts_with_all = ["film_time", "anonymous", "whole", "scene"])]
     pcap: bool,
-    /// Time messages by the film rather than by the clock.
-    #[arg(long)]
-    film_time: bool,
-    /// Omit the names of seats, hall and cue, and addresses, also those in frames and replies.
-    #[arg(long)]
-    anonymous: bool,
-    /// Also keep the original ticks and replies, so that the cut is itself a full recording.
-    #[arg(long, conflicts_with = "film_time")]
-    whole: bool,
+    #[command(flatten)]
+    manner: CutManner,
     /// Overwrite OUT if it exists.
     #[arg(long)]
     force: bool,
@@ -71,8 +64,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     } else if args.pcap {
         pcap(&args.file, &stretch, out)
     } else {
-        let manner = CutManner { film_time: args.film_time, anonymous: args.anonymous, whole: args.whole };
-        cut(open(&args.file)?, &stretch, manner, out).map_err(|error| failure(error, &args.file))
+        cut(open(&args.file)?, &stretch, args.manner, out).map_err(|error| failure(error, &args.file))
     };
     let written = result.and_then(|out| {
         let file = out.into_inner().map_err(std::io::IntoInnerError::into_error).or_exit(Exit::Io)?;
@@ -105,7 +97,7 @@ fn each<W: Write>(
 ) -> Result<W, Failure> {
     let mut result = Ok(());
     each_tick(open(path)?, stretch, &mut |contents, piece| {
-        let Piece::Tick(chunk, _) = piece else { return };
+        let Piece::Tick(chunk) = piece else { return };
         let chunk = &chunk;
         if result.is_ok() {
             result = row(&mut out, contents, chunk);

@@ -107,6 +107,12 @@ fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
     }
     line(format_args!("  hall      {}, {} seats", entry("hall"), contents.seats.len()));
     line(format_args!("  digest    {}", entry("cue_sha256")));
+    if !["", "1"].contains(&contents.entry("part")) {
+        let part = entry("part");
+        line(format_args!(
+            "  part      {part} of its show; what was before is in the files with this digest before it"
+        ));
+    }
     if let Some((first, last)) = contents.span {
         let length = ShowTime::from_nanos((last - first).cast_signed());
         line(format_args!("  time      {} to {}, {length}", wall(first), wall(last)));

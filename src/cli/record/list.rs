@@ -32,6 +32,8 @@ struct Listed {
     mode: String,
     hall: String,
     cue: String,
+    /// Which part of the recording of its show.
+    part: u32,
     /// False where it was not closed.
     whole: bool,
 }
@@ -49,11 +51,12 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let mut out = String::new();
     for one in &listed {
-        let Listed { file, bytes, wall_ns, mode, hall, cue, whole } = one;
+        let Listed { file, bytes, wall_ns, mode, hall, cue, part, whole } = one;
         let open = if *whole { "" } else { "  not closed: kinocue record recover" };
+        let part = if *part > 1 { format!(", part {part}") } else { String::new() };
         writeln!(
             out,
-            "{}  {:>8.1} MB  {mode:<8}{hall}  {cue}  {file}{open}",
+            "{}  {:>8.1} MB  {mode:<8}{hall}  {cue}{part}  {file}{open}",
             wall(*wall_ns),
             megabytes(*bytes)
         )
@@ -75,6 +78,7 @@ fn listed(path: &Path) -> Option<Listed> {
         mode: entry("mode"),
         hall: entry("hall"),
         cue: entry("cue"),
+        part: entry("part").parse().unwrap_or(1),
         whole: !name.ends_with(".part.mcap"),
         file: shown(&name),
     })
