@@ -59,13 +59,14 @@ function tell(text, kind) {
   setProperty(place, 'hidden', false);
 }
 
-/** That a stop was received is old news once the hall is no longer stopped; that it was not stays until the next word. */
+/** That a stop was received is old once the hall is no longer stopped; that it was not, once the server says that nothing moves. */
 function forget() {
   const place = byId('stop-reply');
   if (sending || place.hidden || linkState() !== 'live') return;
-  const state = hall().state;
-  const old = place.classList.contains('received') && state !== 'stopping' && state !== 'stopped';
-  if (old || (place.classList.contains('failed') && state === 'stopped')) setProperty(place, 'hidden', true);
+  const { state, moving } = hall();
+  const received = place.classList.contains('received');
+  if (received ? state !== 'stopping' && state !== 'stopped' : !moving || state === 'stopping') setProperty(place, 'hidden', true);
+  else if (!received) setText(place, `STOP was not delivered, and the hall is ${state}: press STOP again. ${HARD_WIRED}`);
 }
 
 start();
