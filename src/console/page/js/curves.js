@@ -55,7 +55,7 @@ export function showCurves(status) {
 function clearPlot() {
   plot?.destroy();
   plot = null;
-  setLanes([]);
+  setLanes([], [], []);
   byId('curves').replaceChildren();
 }
 
@@ -94,7 +94,8 @@ const size = () => ({ width: Math.max(byId('curves').clientWidth, 200), height: 
 function build(curve) {
   clearPlot();
   length = curve.length_s;
-  setLanes(curve.axes.map(({ min, max }, axis) => ({ min, max, colour: COLOURS[axis % COLOURS.length] })));
+  const axes = curve.axes.map(({ min, max }, axis) => ({ min, max, colour: COLOURS[axis % COLOURS.length] }));
+  setLanes(axes, curve.effects, curve.markers.map(({ at_s: at }) => at / length));
   const { series, bands, data } = linesOf(curve);
   const axis = { stroke: NEUTRAL, grid: { stroke: GRID, width: 1 }, ticks: { stroke: GRID } };
   const options = {

@@ -11,6 +11,7 @@ const ON = ['waiting', 'joining', 'playing', 'holding', 'paused'];
 const MAY_SEEK = ['armed', 'joining', 'playing', 'holding', 'paused'];
 /** A place that was chosen and left alone is forgotten, so that the bar follows the film again. */
 const FORGET_MS = 15_000;
+const EFFECT_COLOUR = '#d9dfe6';
 let chosen = null;
 let timer = null;
 
@@ -92,27 +93,49 @@ function showBar(show, maySeek) {
   bar.style.setProperty('--part', String(show ? Math.min(Math.max(show.position_s / length, 0), 1) : 0));
 }
 
+/** How much of the height a lane of an axis takes, and one of an effect. */
+const AXIS = 3;
+const EFFECT = 1;
+const MARKER = '#ffffff';
 let lanes = [];
+let marks = [];
 
-/** Takes the lanes that are drawn behind the bar, one for each axis: the least and the greatest of each stretch. */
-export function setLanes(axes) {
-  lanes = axes;
+/**
+ * Takes what is drawn behind the bar: a lane for each axis, from the least to the greatest of each stretch of time, one for each
+ * effect, and the markers, as parts of the length.
+ */
+export function setLanes(axes, effects, markers) {
+  lanes = [
+    ...axes.map(({ colour, min, max }) => ({ colour, tall: AXIS, ends: (at) => [min[at], max[at]], count: min.length })),
+    ...effects.map(({ on }) => ({ colour: EFFECT_COLOUR, tall: EFFECT, ends: (at) => (on[at] ? [0, 1] : null), count: on.length })),
+  ];
+  marks = markers;
   drawLanes();
 }
 
 function drawLanes() {
   const canvas = byId('lanes');
   const scale = window.devicePixelRatio;
-  const width = (canvas.width = canvas.clientWidth * scale);
-  const height = (canvas.height = canvas.clientHeight * scale);
+  canvas.width = canvas.clientWidth * scale;
+  canvas.height = canvas.clientHeight * scale;
   const pen = canvas.getContext('2d');
-  const tall = height / lanes.length;
-  for (const [lane, { colour, min, max }] of lanes.entries()) {
-    pen.fillStyle = colour;
-    for (let x = 0; x < width; x += scale) {
-      const at = Math.min(Math.floor((x / width) * min.length), min.length - 1);
-      const [top, bottom] = [max[at], min[at]].map((part) => (lane + 0.92 - 0.84 * part) * tall);
-      pen.fillRect(x, top, scale, Math.max(bottom - top, scale));
-    }
+  const unit = canvas.height / lanes.reduce((all, { tall }) => all + tall, 0);
+  let top = 0;
+  for (const lane of lanes) {
+    drawLane(pen, lane, { top, height: lane.tall * unit, scale });
+    top += lane.tall * unit;
+  }
+  pen.fillStyle = MARKER;
+  for (const part of marks) pen.fillRect(part * canvas.width, 0, scale, canvas.height / 3);
+}
+
+function drawLane(pen, { colour, ends, count }, { top, height, scale }) {
+  const { width } = pen.canvas;
+  pen.fillStyle = colour;
+  for (let x = 0; x < width; x += scale) {
+    const found = ends(Math.min(Math.floor((x / width) * count), count - 1));
+    if (found === null) continue;
+    const [low, high] = found.map((part) => top + (0.92 - 0.84 * part) * height);
+    pen.fillRect(x, high, scale, Math.max(low - high, scale));
   }
 }
