@@ -108,8 +108,8 @@ impl From<LevelUse> for OutputReport {
 
 impl From<EffectUse> for EffectReport {
     fn from(usage: EffectUse) -> Self {
-        let EffectUse { name, times, on, first } = usage;
-        Self { name, times, on_s: on.as_secs_f64(), first_s: first.map(ShowTime::as_secs_f64) }
+        let first_s = usage.spans.first().map(|(from, _)| from.as_secs_f64());
+        Self { times: usage.spans.len(), on_s: usage.on().as_secs_f64(), first_s, name: usage.name }
     }
 }
 

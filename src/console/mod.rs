@@ -49,6 +49,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/main.js" JS,
     "js/map.js" JS,
     "js/marks.js" JS,
+    "js/next.js" JS,
     "js/picture.js" JS,
     "js/playlist.js" JS,
     "js/pose.js" JS,

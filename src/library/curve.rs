@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::config::Config;
-use crate::cue::Unit;
+use crate::cue::{Marker, Unit};
 use crate::motion::{SeatType, Slot};
-use crate::timeline::{Stretches, Timeline};
+use crate::timeline::{EffectUse, Stretches, Timeline};
 
 /// The most stretches that a curve is asked in.
 pub(crate) const MAX_POINTS: usize = 4000;
@@ -30,6 +30,28 @@ pub struct CurveData {
     pub t_s: Vec<f64>,
     /// Each axis, axis 1 first.
     pub axes: Vec<AxisCurve>,
+    /// Each effect and output that is used.
+    pub(crate) effects: Vec<EffectCurve>,
+    /// Named places, in order.
+    pub(crate) markers: Vec<CurveMarker>,
+}
+
+/// When an effect or an output is on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub(crate) struct EffectCurve {
+    /// As its switch is called.
+    pub(crate) name: String,
+    /// For each stretch whether it is ever on in it.
+    pub(crate) on: Vec<bool>,
+}
+
+/// A named place in a cue.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub(crate) struct CurveMarker {
+    /// Where, s.
+    pub(crate) at_s: f64,
+    /// What it is called.
+    pub(crate) name: String,
 }
 
 /// The curve of one axis, as parts of the stroke, 0 to 1.
@@ -59,7 +81,28 @@ pub(crate) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) ->
         length_s,
         t_s: (0..points).map(|stretch| stretches.start(stretch) + 0.5 * stretches.span).collect(),
         axes: (0..timeline.axes()).map(|axis| axis_curve(timeline, axis, &slot(axis), &stretches)).collect(),
+        effects: effects(timeline).map(|usage| effect_curve(usage, &stretches)).collect(),
+        markers: timeline.cue().markers().iter().map(CurveMarker::from).collect(),
     }
+}
+
+impl From<&Marker> for CurveMarker {
+    fn from(marker: &Marker) -> Self {
+        Self { at_s: marker.at.as_secs_f64(), name: marker.name.clone() }
+    }
+}
+
+fn effects(timeline: &Timeline) -> impl Iterator<Item = EffectUse> {
+    let levels = timeline.level_uses().into_iter().map(|level| level.usage);
+    timeline.effect_uses().into_iter().chain(levels).filter(|usage| !usage.spans.is_empty())
+}
+
+fn effect_curve(EffectUse { name, spans }: EffectUse, stretches: &Stretches) -> EffectCurve {
+    let mut on = vec![false; stretches.count];
+    for (from, until) in spans {
+        on[stretches.touched(from.as_secs_f64(), until.as_secs_f64())].fill(true);
+    }
+    EffectCurve { name, on }
 }
 
 /// True if the hall has to be known to draw a cue: some axis is not in fractions.
@@ -107,6 +150,14 @@ mod tests {
         assert_eq!(curve.axes[0].min, [0.0, 0.0, 0.0, 0.0]);
         assert_eq!((&curve.axes[1].min, &curve.axes[1].max), (&vec![0.5; 4], &vec![0.5; 4]));
         assert_eq!(curve.axes[1].name, "a2");
+    }
+
+    #[test]
+    fn an_effect_is_on_in_each_stretch_in_which_it_ever_is() {
+        let cue = timeline("time_s,a1,fx_air,fx_wind\n0,0,0,0\n1.9,0,1,0\n2.1,0,0,0\n8,0,0,0\n");
+        let curve = draw(&cue, None, 8);
+        let [EffectCurve { name, on }] = &curve.effects[..] else { panic!("{:?}", curve.effects) };
+        assert_eq!((name.as_str(), &on[..4]), ("air", &[false, true, true, false][..]));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::text::number;
 use super::{Band, Flag, Lane, Mark, Panel, Picture, Scale, Shade, Table, TimeAxis};
 use crate::channel;
-use crate::cue::{Effects, Place, TrackStep, Vibration};
+use crate::cue::{Place, Vibration};
 use crate::motion::{AxisGeometry, SeatAxis};
 use crate::proof::{AxisStrain, Quantity, SLACK, strains};
 use crate::time::{Rate, ShowTime};
@@ -264,19 +264,12 @@ impl View<'_> {
     fn outputs(&self) -> Vec<Lane> {
         let timeline = self.timeline;
         let full = |is_on: bool| Shade { height: f32::from(u8::from(is_on)), tone: 1.0 };
-        let effects = timeline.effect_uses().into_iter().enumerate().filter(|(_, usage)| usage.times > 0);
-        let effects = effects.map(|(bit, usage)| {
-            let columns = match timeline.cue().effects() {
-                Effects::Named { steps, .. } => self
-                    .filled(steps.as_slice().iter().map(|step| (step.at, full(step.value >> bit & 1 == 1)))),
-                Effects::Words(steps) => {
-                    let bit = usage.name.trim_start_matches('Y').parse::<u32>().unwrap_or(1) - 1;
-                    let on = |step: &TrackStep<u16>| (step.at, full(step.value >> bit & 1 == 1));
-                    self.filled(steps.as_slice().iter().map(on))
-                }
-            };
-            let note = format!("{}×, {:.1} s", usage.times, usage.on.as_secs_f64());
-            Lane { name: usage.name, note, columns }
+        let used = timeline.effect_uses().into_iter().filter(|usage| !usage.spans.is_empty());
+        let effects = used.map(|usage| {
+            let note = format!("{}×, {:.1} s", usage.spans.len(), usage.on().as_secs_f64());
+            let runs =
+                usage.spans.iter().flat_map(|(from, until)| [(*from, full(true)), (*until, full(false))]);
+            Lane { columns: self.filled(runs), name: usage.name, note }
         });
         let levels = channel::switches().filter_map(|(track, part, name)| {
             let (_, most) = timeline.greatest_level(track, part)?;
@@ -298,11 +291,7 @@ impl View<'_> {
             if until <= self.stretches.from || from >= self.stretches.end() || shade.height <= 0.0 {
                 continue;
             }
-            let first = self.stretches.holding(from);
-            // What ends where a column begins is not on in it.
-            let last = self.stretches.holding(until);
-            let last = if last > first && self.stretches.start(last) >= until { last - 1 } else { last };
-            for column in &mut columns[first..=last] {
+            for column in &mut columns[self.stretches.touched(from, until)] {
                 if shade.height > column.height {
                     *column = shade;
                 }

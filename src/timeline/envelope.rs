@@ -1,6 +1,8 @@
 //! The least and greatest value of an axis in each of many stretches of time, exact also between rows: what a curve is drawn by, so
 //! that no peak can vanish between two pixels.
 
+use std::ops::RangeInclusive;
+
 use super::{Cubic, Timeline};
 use crate::time::ShowTime;
 
@@ -34,6 +36,13 @@ impl Stretches {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at 0")]
     pub(crate) fn holding(&self, time: f64) -> usize {
         (((time - self.from) / self.span) as usize).min(self.count - 1)
+    }
+
+    /// Those that a span of time lies in; where it ends as one begins, that one is none of them.
+    #[must_use]
+    pub(crate) fn touched(&self, from: f64, until: f64) -> RangeInclusive<usize> {
+        let (first, last) = (self.holding(from), self.holding(until));
+        first..=if last > first && self.start(last) >= until { last - 1 } else { last }
     }
 }
 

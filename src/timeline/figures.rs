@@ -23,12 +23,19 @@ pub struct Figure {
 pub(crate) struct EffectUse {
     /// The effect's name; `Y01` to `Y12` for a bit of a raw output word.
     pub(crate) name: String,
-    /// How often it goes on.
-    pub(crate) times: usize,
+    /// From when until when it is on, each time, in order.
+    pub(crate) spans: Vec<(ShowTime, ShowTime)>,
+}
+
+impl EffectUse {
     /// How long it is on in all.
-    pub(crate) on: Duration,
-    /// When it first goes on.
-    pub(crate) first: Option<ShowTime>,
+    #[must_use]
+    pub(crate) fn on(&self) -> Duration {
+        self.spans
+            .iter()
+            .map(|(from, until)| Duration::from_nanos(until.as_nanos().abs_diff(from.as_nanos())))
+            .sum()
+    }
 }
 
 /// How much an output of the table is used.
@@ -65,7 +72,7 @@ impl Timeline {
                 .collect(),
             Effects::Words(steps) => (0..12)
                 .map(|bit| usage(format!("Y{:02}", bit + 1), steps, end, |word| u32::from(word) >> bit & 1))
-                .filter(|usage| usage.times > 0)
+                .filter(|usage| !usage.spans.is_empty())
                 .collect(),
         }
     }
@@ -90,24 +97,17 @@ fn usage<T: Copy + PartialEq + Default>(
     end: ShowTime,
     is_on: impl Fn(T) -> u32,
 ) -> EffectUse {
-    let mut usage = EffectUse { name, times: 0, on: Duration::ZERO, first: None };
+    let mut spans = Vec::new();
     let mut since: Option<ShowTime> = None;
     let last = TrackStep { at: end, value: T::default() };
     for step in steps.as_slice().iter().chain([&last]) {
         match (since, is_on(step.value) == 1) {
-            (None, true) => {
-                usage.times += 1;
-                usage.first = usage.first.or(Some(step.at));
-                since = Some(step.at);
-            }
-            (Some(start), false) => {
-                usage.on += Duration::from_nanos(step.at.as_nanos().abs_diff(start.as_nanos()));
-                since = None;
-            }
+            (None, true) => since = Some(step.at),
+            (Some(_), false) => spans.extend(since.take().map(|from| (from, step.at))),
             _ => {}
         }
     }
-    usage
+    EffectUse { name, spans }
 }
 
 #[cfg(test)]
@@ -125,22 +125,25 @@ mod tests {
     fn an_effect_is_counted_each_time_it_goes_on() {
         let cue = timeline("time_s,a1,fx_air,fx_wind\n0,0,1,0\n1,0,0,0\n2,0,1,0\n3,0,1,0\n5,0,1,0\n");
         let uses = cue.effect_uses();
-        assert_eq!((uses[0].times, uses[0].on), (2, Duration::from_secs(4)));
-        assert_eq!((uses[0].first, uses[1].first), (Some(ShowTime::ZERO), None));
-        assert_eq!((uses[1].times, uses[1].on), (0, Duration::ZERO));
+        let at = ShowTime::from_secs_f64;
+        assert_eq!(uses[0].spans, [(at(0.0), at(1.0)), (at(2.0), at(5.0))]);
+        assert_eq!((uses[0].on(), uses[1].on()), (Duration::from_secs(4), Duration::ZERO));
     }
 
     #[test]
     fn an_output_is_counted_while_its_level_is_above_0() {
         let uses = timeline("time_s,a1,dac1,dac2\n0,0,0,0\n1,0,0.5,0\n2,0,0.75,0\n4,0,0,0\n").level_uses();
         let [LevelUse { usage, most }] = &uses[..] else { panic!("dac2 is always off: {uses:?}") };
-        assert_eq!((usage.name.as_str(), usage.times, usage.on.as_secs(), *most), ("dac1", 1, 3, 0.75));
+        assert_eq!(
+            (usage.name.as_str(), usage.spans.len(), usage.on().as_secs(), *most),
+            ("dac1", 1, 3, 0.75)
+        );
     }
 
     #[test]
     fn bits_of_a_raw_word_are_outputs() {
         let uses = timeline("time_s,a1,io\n0,0,0x001\n1,0,0x801\n2,0,0\n").effect_uses();
-        let names: Vec<_> = uses.iter().map(|usage| (usage.name.as_str(), usage.on.as_secs())).collect();
+        let names: Vec<_> = uses.iter().map(|usage| (usage.name.as_str(), usage.on().as_secs())).collect();
         assert_eq!(names, [("Y01", 2), ("Y12", 1)]);
     }
 

@@ -67,7 +67,7 @@ export function showController(status) {
   if (!controller) return;
   if (parts === null) {
     parts = build(controller);
-    place.replaceChildren(...parts.all);
+    byId('controller-parts').replaceChildren(...parts.all);
   }
   const health = healthOf(controller);
   setProperty(parts.health, 'className', `health look-${health.look}`);
@@ -77,12 +77,20 @@ export function showController(status) {
   }
   showPose(parts.pose, controller);
   const forGood = controller.health === 'out';
-  setText(parts.word, forGood ? 'disabled in the configuration' : controller.enabled ? controller.health : `disabled, ${controller.health}`);
+  setText(parts.word, controller.enabled || forGood ? controller.health : `disabled, ${controller.health}`);
   setText(parts.why, sentence(controller.why));
   for (const [label, figure] of Object.entries(FIGURES)) setText(parts.figures[label], figure(controller));
   setProperty(parts.out, 'hidden', !controller.enabled);
   setProperty(parts.reason, 'hidden', !controller.enabled);
   setProperty(parts.in, 'hidden', controller.enabled || forGood);
+}
+
+const takeOut = (button, which, body = {}) => ask(button, `disable ${which}`, () => change('POST', `controllers/${encodeURIComponent(which)}/disable`, body));
+
+/** Has a button that stands apart from its seat disable that, upon a second press. */
+export function disable(button, which) {
+  onTwoPresses(button, { asks: 'SURE?', label: () => button, action: () => takeOut(button, which) });
+  return button;
 }
 
 function build({ name: which, row, seat, address, group }) {
@@ -104,8 +112,7 @@ function build({ name: which, row, seat, address, group }) {
   const close = make('button', { type: 'button' }, 'Close');
   onPress(out, (button) => {
     const why = reason.value.trim();
-    const path = `controllers/${encodeURIComponent(which)}/disable`;
-    ask(button, `disable ${which}`, () => change('POST', path, why ? { why } : {}));
+    takeOut(button, which, why ? { why } : {});
     reason.value = '';
   });
   onTwoPresses(back, {
@@ -115,10 +122,10 @@ function build({ name: which, row, seat, address, group }) {
   });
   onPress(close, () => select(null));
   const pose = makePose('large');
-  const title = make('h3', {}, `${which}${row ? `, row ${row}` : ''}`);
+  setText(byId('controller-title'), `Seat ${which}${row ? `, row ${row}` : ''}`);
   const where = make('p', { className: 'quiet' }, `seat ${seat}, at ${address}${together ? `, one seat${together}` : ''}`);
   const buttons = make('div', { className: 'row' }, out, reason, back, close);
-  return { all: [title, where, health, why, buttons, pose, list], pose, health, picture, word, why, figures, out, reason, in: back, shape: '' };
+  return { all: [where, health, why, buttons, pose, list], pose, health, picture, word, why, figures, out, reason, in: back, shape: '' };
 }
 
 function drives(errors) {

@@ -3,6 +3,7 @@
 
 import { byId, choice, make, setProperty, setText } from './dom.js';
 import { get } from './api.js';
+import { setLanes } from './film.js';
 import { drawTrace, keepTrace, tracedSeat } from './trace.js';
 import { clock } from './words.js';
 
@@ -54,6 +55,7 @@ export function showCurves(status) {
 function clearPlot() {
   plot?.destroy();
   plot = null;
+  setLanes([], [], []);
   byId('curves').replaceChildren();
 }
 
@@ -92,6 +94,8 @@ const size = () => ({ width: Math.max(byId('curves').clientWidth, 200), height: 
 function build(curve) {
   clearPlot();
   length = curve.length_s;
+  const axes = curve.axes.map(({ min, max }, axis) => ({ min, max, colour: COLOURS[axis % COLOURS.length] }));
+  setLanes(axes, curve.effects, curve.markers.map(({ at_s: at }) => at / length));
   const { series, bands, data } = linesOf(curve);
   const axis = { stroke: NEUTRAL, grid: { stroke: GRID, width: 1 }, ticks: { stroke: GRID } };
   const options = {

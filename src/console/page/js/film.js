@@ -5,11 +5,13 @@ import { byId, setAttribute, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress, say } from './press.js';
 import { hall } from './state.js';
-import { clock } from './words.js';
+import { clock, timeOfDay } from './words.js';
 
+const ON = ['waiting', 'joining', 'playing', 'holding', 'paused'];
 const MAY_SEEK = ['armed', 'joining', 'playing', 'holding', 'paused'];
 /** A place that was chosen and left alone is forgotten, so that the bar follows the film again. */
 const FORGET_MS = 15_000;
+const EFFECT_COLOUR = '#d9dfe6';
 let chosen = null;
 let timer = null;
 
@@ -21,6 +23,7 @@ export function startFilm() {
     onPress(step, () => choose((chosen ?? 0) + Number(step.dataset.step)));
   }
   onPress(byId('seek-leave'), leave);
+  new ResizeObserver(drawLanes).observe(byId('lanes'));
   onPress(byId('seek-go'), async (button) => {
     const at = chosen;
     if (await ask(button, `seek to ${clock(at)}`, () => change('POST', 'show/seek', { position_s: at }))) leave();
@@ -42,13 +45,14 @@ function leave() {
   if (hall()) showFilm(hall());
 }
 
-/** Shows position, length and what is loaded. */
+/** Shows the position, what is left, what is loaded and what comes next. */
 export function showFilm(status) {
   if (!status) return;
   const show = status.show;
   setText(byId('film-title'), show ? titleOf(show, status.state) : 'Nothing is loaded');
+  setText(byId('film-next'), nextOf(status));
   setText(byId('position'), show ? clock(show.position_s, 1, show.length_s) : '–');
-  setText(byId('length'), show ? ` / ${clock(show.length_s, 0)}` : '');
+  setText(byId('remaining'), show ? `−${clock(Math.max(show.length_s - show.position_s, 0), 0)}` : '');
   const maySeek = show !== null && MAY_SEEK.includes(status.state);
   if (!maySeek && chosen !== null) {
     chosen = null;
@@ -59,10 +63,23 @@ export function showFilm(status) {
   if (chosen !== null) setText(byId('seek-go'), `Seek ${clock(chosen)}`);
 }
 
-/** What is loaded; before it starts, with how long the seats take to get onto it. */
+/** What is loaded and how long it is; before it starts, with how long the seats take to get onto it. */
 function titleOf(show, state) {
   const first = state === 'armed' && show.join_s > 0 ? `, first move ${show.join_s.toFixed(1)} s` : '';
-  return `${show.title ?? show.cue}${first}`;
+  return `${show.title ?? show.cue}, ${clock(show.length_s, 0)}${first}`;
+}
+
+/** The entry of the playlist that comes next, and when. */
+function nextOf({ playlist, show, state }) {
+  if (!playlist) return '';
+  const { entries, current, next_start: start } = playlist;
+  const isLoaded = show?.cue === entries[current]?.cue;
+  const at = start ? `at ${timeOfDay(start).slice(0, 5)}${state === 'armed' || ON.includes(state) ? '' : ' if armed'}` : '';
+  if (isLoaded && !ON.includes(state)) return at && `starts ${at}`;
+  const next = entries[current + 1];
+  if (!next) return isLoaded ? 'the last entry' : '';
+  const title = next.title ?? next.cue;
+  return `then ${title}, ${entries[current].then === 'go' ? 'by itself' : next.at ? `at ${next.at}` : 'by GO'}`;
 }
 
 function showBar(show, maySeek) {
@@ -74,4 +91,51 @@ function showBar(show, maySeek) {
   setProperty(bar, 'value', String(Math.round(at * 10) / 10));
   setAttribute(bar, 'aria-valuetext', clock(at));
   bar.style.setProperty('--part', String(show ? Math.min(Math.max(show.position_s / length, 0), 1) : 0));
+}
+
+/** How much of the height a lane of an axis takes, and one of an effect. */
+const AXIS = 3;
+const EFFECT = 1;
+const MARKER = '#ffffff';
+let lanes = [];
+let marks = [];
+
+/**
+ * Takes what is drawn behind the bar: a lane for each axis, from the least to the greatest of each stretch of time, one for each
+ * effect, and the markers, as parts of the length.
+ */
+export function setLanes(axes, effects, markers) {
+  lanes = [
+    ...axes.map(({ colour, min, max }) => ({ colour, tall: AXIS, ends: (at) => [min[at], max[at]], count: min.length })),
+    ...effects.map(({ on }) => ({ colour: EFFECT_COLOUR, tall: EFFECT, ends: (at) => (on[at] ? [0, 1] : null), count: on.length })),
+  ];
+  marks = markers;
+  drawLanes();
+}
+
+function drawLanes() {
+  const canvas = byId('lanes');
+  const scale = window.devicePixelRatio;
+  canvas.width = canvas.clientWidth * scale;
+  canvas.height = canvas.clientHeight * scale;
+  const pen = canvas.getContext('2d');
+  const unit = canvas.height / lanes.reduce((all, { tall }) => all + tall, 0);
+  let top = 0;
+  for (const lane of lanes) {
+    drawLane(pen, lane, { top, height: lane.tall * unit, scale });
+    top += lane.tall * unit;
+  }
+  pen.fillStyle = MARKER;
+  for (const part of marks) pen.fillRect(part * canvas.width, 0, scale, canvas.height / 3);
+}
+
+function drawLane(pen, { colour, ends, count }, { top, height, scale }) {
+  const { width } = pen.canvas;
+  pen.fillStyle = colour;
+  for (let x = 0; x < width; x += scale) {
+    const found = ends(Math.min(Math.floor((x / width) * count), count - 1));
+    if (found === null) continue;
+    const [low, high] = found.map((part) => top + (0.92 - 0.84 * part) * height);
+    pen.fillRect(x, high, scale, Math.max(low - high, scale));
+  }
 }

@@ -3,10 +3,11 @@
 
 import { byId, onChange, setAttribute, setProperty, setText } from './dom.js';
 import { addError, resizeErrors } from './error.js';
+import { badge } from './headline.js';
 import { filmLook, mark } from './marks.js';
 import { showSources } from './sources.js';
 import { linkState } from './state.js';
-import { clock, sentence, span } from './words.js';
+import { clock, sentence, signed, span } from './words.js';
 
 const AGE_MS = 1000;
 
@@ -39,11 +40,10 @@ const showMark = onChange((name) => byId('follow-mark').replaceChildren(mark(nam
 
 /** In view wherever the page is scrolled to. */
 function showBadge(film) {
-  const badge = byId('follow-badge');
-  setProperty(badge, 'hidden', film === null);
-  if (film === null) return;
-  setProperty(badge, 'className', `badge follow-badge look-${filmLook(film.state).look}`);
-  setText(badge, `film ${film.state}`);
+  if (film === null) return badge('follow-badge', '', 'away');
+  const { state, source, error_ms: error } = film;
+  const words = [`film ${state}`, source && source.split(':')[0], error !== null && signed(Number(error.toFixed(1)))];
+  badge('follow-badge', words.filter(Boolean).join(', '), filmLook(state).look, film.cause);
 }
 
 /** The label of the frame; of a film without labels its place in the cue. */

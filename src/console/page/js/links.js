@@ -1,7 +1,7 @@
 // Serial links and the axes on them: is the port there, how often and how far ahead they play, how their drives do.
 
 import { byId, make, onChange, setProperty, setText } from './dom.js';
-import { healthOf, mark } from './marks.js';
+import { healthOf, healthWord, mark } from './marks.js';
 import { micros, whole } from './words.js';
 
 const OPEN = { look: 'good', mark: 'disc', word: 'open' };
@@ -82,7 +82,7 @@ function showLink({ state, figures, lines }, link, controllers) {
     const { state: told, cells } = lines[place];
     const seat = controllers.find(({ name }) => name === axis.controller);
     const look = seat ? healthOf(seat) : { look: 'away', mark: 'what' };
-    showMark(told, `grave look-${look.look}`, look, seat ? (seat.enabled ? seat.health : 'disabled') : 'unknown');
+    showMark(told, `grave look-${look.look}`, look, seat ? healthWord(seat) : 'unknown');
     for (const [column, figure] of Object.values(COLUMNS).entries()) setText(cells[column], figure(axis, link.dialect === 'silvermax'));
   }
 }

@@ -9,6 +9,7 @@ import { showFollow, startFollow } from './follow.js';
 import { showHistograms } from './histogram.js';
 import { showLevels } from './levels.js';
 import { showLinks } from './links.js';
+import { showNext } from './next.js';
 import { showMap, startMap } from './map.js';
 import { readLists, showPlaylist, startPlaylist } from './playlist.js';
 import { showRecordings, startRecordings } from './recordings.js';
@@ -27,7 +28,7 @@ const STARTS = [
   startUpload, startWarnings, startFollow, startSources, startRecordings, startPicture,
 ];
 const SHOWS = [
-  showHeadline, showTransport, showFilm, showFollow, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,
+  showHeadline, showTransport, showNext, showFilm, showFollow, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,
   showLinks, showHistograms, showReports, showCurves, showRecordings,
 ];
 

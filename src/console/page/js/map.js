@@ -1,7 +1,7 @@
 // The hall as a map: a line for each row, a field for each controller, coloured and marked by how it stands.
 
 import { byId, choice, make, setAttribute, setProperty, setStyle, setText } from './dom.js';
-import { BANDS, HEALTH, ackBand, latencyBand, mark, healthOf } from './marks.js';
+import { BANDS, HEALTH, ackBand, healthOf, healthWord, latencyBand, mark } from './marks.js';
 import { ackRate, micros } from './words.js';
 import { hall } from './state.js';
 import { selected, select } from './controller.js';
@@ -14,9 +14,12 @@ const SHORT_SEAT = 6;
 let by = 'health';
 let drawn = '';
 let fields = new Map();
+/** The fields as they lie, row by row: one is the tab stop of all, the arrow keys lead on. */
+let rows = [];
 
-/** Makes the choice of colours work. */
+/** Makes the choice of colours and the keys work. */
 export function startMap() {
+  byId('map').addEventListener('keydown', onKey);
   choice(byId('map-by'), (data) => {
     by = data.by;
     showLegend();
@@ -38,15 +41,17 @@ export function showMap(status) {
 
 function layOut(controllers) {
   fields = new Map();
-  const rows = new Map();
+  const named = new Map();
   for (const controller of controllers) {
     const row = controller.row ?? NO_ROW;
-    if (!rows.has(row)) rows.set(row, []);
-    rows.get(row).push(makeField(controller));
+    if (!named.has(row)) named.set(row, []);
+    named.get(row).push(makeField(controller));
   }
-  const widest = Math.max(...[...rows.values()].map((seats) => seats.length));
+  rows = [...named.values()];
+  if (rows.length > 0) rows[0][0].tabIndex = 0;
+  const widest = Math.max(...rows.map((seats) => seats.length));
   setStyle(byId('map'), '--widest', String(widest));
-  const lines = [...rows].map(([row, seats]) => {
+  const lines = [...named].map(([row, seats]) => {
     const title = row === NO_ROW ? '' : row;
     const isWide = seats.some((seat) => seat.dataset.controller.length > SHORT_SEAT);
     const line = make('div', { className: isWide ? 'seats wide-names' : 'seats', role: 'group', 'aria-label': row === NO_ROW ? 'Seats without a row' : `Row ${row}` });
@@ -58,15 +63,14 @@ function layOut(controllers) {
 
 function makeField({ name }) {
   const picture = make('span', { className: 'picture' });
-  const letters = make('span', { className: 'letters' });
   const pose = makePose('small');
   const figure = make('span', { className: 'field-figure' });
-  const button = make('button', { type: 'button', className: 'field' },
-    make('span', { className: 'field-head' }, picture, letters, pose),
-    make('span', { className: 'field-name' }, name), figure);
+  const button = make('button', { type: 'button', className: 'field', tabIndex: -1 },
+    make('span', { className: 'field-head' }, picture, make('span', { className: 'field-name' }, name), pose), figure);
   button.dataset.controller = name;
+  button.addEventListener('focus', () => moveStop(button));
   button.addEventListener('click', () => select(selected() === name ? null : name));
-  fields.set(name, { button, picture, letters, pose, figure, shape: '' });
+  fields.set(name, { button, picture, pose, figure, shape: '' });
   return button;
 }
 
@@ -78,9 +82,8 @@ function showField(field, controller) {
     field.shape = look.mark;
     field.picture.replaceChildren(mark(look.mark));
   }
-  setText(field.letters, look.letters);
   showPose(field.pose, controller);
-  setText(field.figure, by === 'latency' ? micros(controller.ack_p99_us, 2) : ackRate(controller.ack_rate));
+  setText(field.figure, look.figure ?? healthWord(controller));
   setAttribute(field.button, 'aria-label', spoken(controller));
   setProperty(field.button, 'title', controller.why);
 }
@@ -88,17 +91,19 @@ function showField(field, controller) {
 function lookOf(controller) {
   const health = healthOf(controller);
   // A controller that takes no part has no figures worth a colour.
-  if (by === 'health' || ['away', 'bad', 'held'].includes(health.look)) return health;
-  return by === 'acks' ? ackBand(controller.ack_rate) : latencyBand(controller.ack_p99_us);
+  if (by === 'health' || ['away', 'bad', 'fault', 'held', 'homeless'].includes(health.look)) return health;
+  const { ack_rate: rate, ack_p99_us: p99 } = controller;
+  return by === 'acks' ? { ...ackBand(rate), figure: `acks ${ackRate(rate)}` } : { ...latencyBand(p99), figure: `p99 ${micros(p99, 2)}` };
 }
 
-function spoken({ name, row, enabled, health, ack_rate: acks, ack_p99_us: p99 }) {
+function spoken(controller) {
+  const { name, row, ack_rate: acks, ack_p99_us: p99 } = controller;
   const place = row ? `, row ${row}` : '';
-  return `${name}${place}: ${enabled ? health : health === 'out' ? 'disabled in the configuration' : 'disabled'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
+  return `${name}${place}: ${healthWord(controller)}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
 }
 
 function showLegend() {
-  const entry = (look, text) => make('li', { className: `look-${look.look}` }, mark(look.mark), make('b', {}, look.letters), ` ${text}`);
+  const entry = (look, text) => make('li', { className: `look-${look.look}` }, mark(look.mark), ` ${text}`);
   const bands = {
     acks: ['99.5 % or more acked', '95 % or more', 'less', 'no acks requested'],
     latency: ['p99 up to 2 ms', 'up to 10 ms', 'longer', 'no acks'],
@@ -107,4 +112,25 @@ function showLegend() {
     ? Object.values(BANDS).map((look, index) => entry(look, bands[index]))
     : Object.entries(HEALTH).map(([name, look]) => entry(look, `${name}: ${look.means}`));
   byId('legend').replaceChildren(...entries);
+}
+
+/** Left and right along the hall, up and down to the nearest seat of the next row, Home and End to the ends of a row. */
+function onKey(event) {
+  const row = rows.findIndex((seats) => seats.includes(document.activeElement));
+  if (row < 0) return;
+  const seat = rows[row].indexOf(document.activeElement);
+  const all = rows.flat();
+  const at = all.indexOf(document.activeElement);
+  const beside = (seats) => seats?.[Math.min(seat, seats.length - 1)];
+  const next = {
+    ArrowRight: all[at + 1], ArrowLeft: all[at - 1], ArrowDown: beside(rows[row + 1]), ArrowUp: beside(rows[row - 1]),
+    Home: rows[row][0], End: rows[row].at(-1),
+  };
+  if (!(event.key in next)) return;
+  event.preventDefault();
+  next[event.key]?.focus();
+}
+
+function moveStop(button) {
+  for (const each of rows.flat()) setProperty(each, 'tabIndex', each === button ? 0 : -1);
 }

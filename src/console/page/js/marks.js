@@ -1,23 +1,30 @@
-// What is shown by colour is shown by a mark and a letter too: the health of controllers, and how good a figure is.
+// What is shown by colour is shown by a mark and a word too: the health of controllers, and how good a figure is.
 
 import { draw } from './dom.js';
 
-/** Every health: its class of colour, its mark, its letters and what it means. */
+/** Every health: its class of colour, its mark and what it means. */
 export const HEALTH = {
-  ok: { look: 'good', mark: 'disc', letters: 'OK', means: 'answers' },
-  unwatched: { look: 'calm', mark: 'ring', letters: 'UW', means: 'not monitored: acks are off' },
-  degraded: { look: 'weak', mark: 'half', letters: 'DG', means: 'some answers late or missing' },
-  rejoining: { look: 'calm', mark: 'turn', letters: 'RJ', means: 'rejoins' },
-  lost: { look: 'bad', mark: 'cross', letters: 'LO', means: 'does not answer' },
-  error: { look: 'bad', mark: 'peak', letters: 'ER', means: 'has an error' },
-  stopped: { look: 'held', mark: 'block', letters: 'ST', means: 'emergency stop' },
-  excluded: { look: 'away', mark: 'dash', letters: 'EX', means: 'disabled, or has to be homed' },
-  out: { look: 'away', mark: 'dash', letters: 'XX', means: 'disabled in the configuration' },
-  unknown: { look: 'away', mark: 'what', letters: '??', means: 'no answer yet' },
+  ok: { look: 'good', mark: 'disc', means: 'answers' },
+  unwatched: { look: 'calm', mark: 'ring', means: 'not monitored: acks are off' },
+  degraded: { look: 'weak', mark: 'half', means: 'some answers late or missing' },
+  rejoining: { look: 'calm', mark: 'turn', means: 'rejoins' },
+  lost: { look: 'bad', mark: 'cross', means: 'does not answer' },
+  error: { look: 'fault', mark: 'peak', means: 'has an error' },
+  stopped: { look: 'held', mark: 'block', means: 'emergency stop' },
+  excluded: { look: 'homeless', mark: 'house', means: 'has to be homed' },
+  disabled: { look: 'away', mark: 'dash', means: 'by a person' },
+  out: { look: 'away', mark: 'gap', means: 'disabled in the configuration' },
+  unknown: { look: 'away', mark: 'what', means: 'no answer yet' },
 };
 
-/** How a controller stands; one that a person took out is shown as that, however well it answers. */
-export const healthOf = ({ enabled, health }) => HEALTH[enabled || health === 'out' ? health : 'excluded'] ?? HEALTH.unknown;
+/** The word for how a controller stands; one that a person took out is called that, however well it answers. */
+export const healthWord = ({ enabled, health }) => (enabled || health === 'out' ? health : 'disabled');
+
+/** How a controller stands. */
+export const healthOf = (controller) => HEALTH[healthWord(controller)] ?? HEALTH.unknown;
+
+/** Whether a controller follows a show. */
+export const takesPart = (controller) => ['ok', 'degraded', 'unwatched'].includes(healthWord(controller));
 
 /** Every state of a film: its class of colour and its mark. */
 const FILM = {
@@ -39,10 +46,10 @@ export const filmLook = (state) => FILM[state] ?? FILM.absent;
 
 /** The bands of a figure. */
 export const BANDS = {
-  good: { look: 'good', mark: 'disc', letters: 'A' },
-  weak: { look: 'weak', mark: 'half', letters: 'B' },
-  bad: { look: 'bad', mark: 'cross', letters: 'C' },
-  none: { look: 'away', mark: 'what', letters: '–' },
+  good: { look: 'good', mark: 'disc' },
+  weak: { look: 'weak', mark: 'half' },
+  bad: { look: 'bad', mark: 'cross' },
+  none: { look: 'away', mark: 'what' },
 };
 
 const SHAPES = {
@@ -53,6 +60,8 @@ const SHAPES = {
   cross: () => [draw('path', { d: 'M5 5 19 19M19 5 5 19', class: 'line' })],
   peak: () => [draw('path', { d: 'M12 3 22 21H2z', class: 'fill' }), draw('path', { d: 'M12 9v6M12 17.4v1.6', class: 'hole' })],
   block: () => [draw('rect', { x: 4, y: 4, width: 16, height: 16, class: 'fill' })],
+  house: () => [draw('path', { d: 'M3 12 12 4l9 8M6 10v10h12V10', class: 'line' })],
+  gap: () => [draw('path', { d: 'M3 12h5M16 12h5', class: 'line' })],
   dash: () => [draw('path', { d: 'M4 12h16', class: 'line' })],
   what: () => [draw('path', { d: 'M8 9a4 4 0 1 1 5.5 3.7c-1 .5-1.5 1-1.5 2.3M12 18v1.5', class: 'line' })],
   info: () => [draw('circle', { cx: 12, cy: 12, r: 9, class: 'line' }), draw('path', { d: 'M12 11v6M12 6.6v1', class: 'line' })],

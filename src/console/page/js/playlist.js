@@ -15,14 +15,20 @@ export function startPlaylist() {
     if (id) ask(button, `playlist ${id}`, () => change('PUT', 'playlist', { id }));
   });
   onPress(byId('playlist-drop'), (button) => ask(button, 'unload the playlist', () => change('PUT', 'playlist', { id: null })));
-  onPress(byId('cue-load'), (button) => {
-    const cue = byId('cues').value;
-    // Only reading a cue shows its title and length, or its faults.
-    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(() => readLists());
-  });
+  onPress(byId('cue-load'), loadCue);
   onPress(byId('lists-again'), () => readLists());
   byId('cues').addEventListener('change', showCueNote);
   onToken(() => readLists());
+}
+
+/** The cue that is chosen in the list; empty where there is none. */
+export const chosenCue = () => byId('cues').value;
+
+/** Loads it. */
+export function loadCue(button) {
+  const cue = chosenCue();
+  // Only reading a cue shows its title and length, or its faults.
+  if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(() => readLists());
 }
 
 /** Whether the library has a cue of that id, as far as is known. */
@@ -90,7 +96,7 @@ function entryLine(entry, index, isLoaded) {
   ].filter(Boolean);
   const words = make('span', { className: 'entry-words' }, make('b', {}, title), make('span', { className: 'quiet' }, facts.join(', ')));
   if (isLoaded) {
-    return make('li', { className: 'entry current', 'aria-current': 'true' }, words, make('span', { className: 'now' }, 'loaded'));
+    return make('li', { className: 'entry current', 'aria-current': 'true' }, words, make('span', { className: 'loaded' }, 'loaded'));
   }
   const button = make('button', { type: 'button', 'aria-label': `Select ${title} as the next entry` }, 'Select');
   onPress(button, () => ask(button, `select ${title}`, () => change('POST', 'playlist/select', { entry: index })));

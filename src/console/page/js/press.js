@@ -2,6 +2,7 @@
 
 import { byId, setAttribute, setText } from './dom.js';
 import { Problem } from './api.js';
+import { hall, watch } from './state.js';
 import { sentence } from './words.js';
 
 const SURE_WITHIN_MS = 3000;
@@ -19,12 +20,22 @@ export function say(near, text, failed = false) {
   reply.classList.toggle('failed', failed);
   setText(reply, text);
   clearTimeout(timers.get(reply));
-  const forget = () => {
-    setText(reply, '');
-    reply.classList.remove('failed');
-  };
-  timers.set(reply, setTimeout(forget, failed ? FAILED_MS : DONE_MS));
+  timers.set(reply, setTimeout(() => forget(reply), failed ? FAILED_MS : DONE_MS));
+  if (failed) obstacles.set(reply, obstacle(hall()));
 }
+
+function forget(reply) {
+  setText(reply, '');
+  reply.classList.remove('failed');
+  obstacles.delete(reply);
+}
+
+// Why something was not done is over once the hall is another one.
+const obstacles = new Map();
+const obstacle = (status) => status && `${status.state} ${status.next} ${status.show?.sha256}`;
+watch((status) => {
+  for (const [reply, then] of obstacles) if (obstacle(status) !== then) forget(reply);
+});
 
 /** Asks, and says what came of it beside the element that was pressed. Gives whether it was done. */
 export async function ask(near, what, request) {

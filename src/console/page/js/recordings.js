@@ -1,6 +1,7 @@
 // What is recorded: the badge, the mark of a moment (a button and the key M), and the last recordings.
 
-import { byId, make, onChange, setAttribute, setProperty, setText } from './dom.js';
+import { byId, make, onChange, setProperty, setText } from './dom.js';
+import { badge } from './headline.js';
 import { change, get } from './api.js';
 import { ask, onPress } from './press.js';
 import { hall } from './state.js';
@@ -31,13 +32,9 @@ function mark(button) {
 /** Shows whether anything is recorded, and what was. */
 export function showRecordings(status, link) {
   if (!status?.record) return;
-  const { mode, recording, flight_s: flight, troubles } = status.record;
-  const badge = byId('record-badge');
+  const { recording, flight_s: flight, troubles } = status.record;
   const trouble = troubles.show;
-  const words = trouble ? 'not recorded' : recording ? `recording, ${mode}` : flight > 0 ? `last ${Math.round(flight)} s kept` : '';
-  setProperty(badge, 'hidden', words === '');
-  setText(badge, words);
-  setAttribute(badge, 'data-is', trouble ? 'trouble' : recording ? 'recording' : 'flight');
+  badge('record-badge', trouble ? 'not recorded' : recording ? 'recording' : '', trouble ? 'weak' : 'calm', trouble ?? '');
   setProperty(byId('mark'), 'disabled', link !== 'live' || (flight === 0 && !recording));
   readList(status.record.last);
 }

@@ -9,8 +9,11 @@ import { lasting, sentence, timeOfDay } from './words.js';
 
 /** Makes preflight run. */
 export function startReports() {
-  onPress(byId('preflight-run'), (button) => ask(button, 'preflight', () => change('POST', 'preflight')));
+  onPress(byId('preflight-run'), runPreflight);
 }
+
+/** Has every seat asked whether it is fit for a show. */
+export const runPreflight = (button) => ask(button, 'preflight', () => change('POST', 'preflight'));
 
 /** Shows both tables. */
 export function showReports(status) {

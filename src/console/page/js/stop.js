@@ -11,6 +11,8 @@ const BETWEEN_MS = 150;
 const HARD_WIRED = 'In danger press the hard-wired emergency stop.';
 
 let sending = false;
+/** Whether nothing was heard of the server at some time since the last word about a stop. */
+let wasGone = false;
 
 function start() {
   const button = byId('stop');
@@ -53,19 +55,26 @@ async function stop() {
 }
 
 function tell(text, kind) {
+  wasGone = linkState() !== 'live';
   const place = byId('stop-reply');
   setText(place, text);
   setProperty(place, 'className', `stop-reply ${kind}`);
   setProperty(place, 'hidden', false);
 }
 
-/** That a stop was received is old news once the hall is no longer stopped; that it was not stays until the next word. */
+/**
+ * That a stop was received is old once the hall is no longer stopped. That it was not stays until the hall is stopped; where the
+ * server was gone meanwhile and is back, it is over if nothing moves, and else said of what moves.
+ */
 function forget() {
   const place = byId('stop-reply');
+  if (linkState() !== 'live') wasGone = true;
   if (sending || place.hidden || linkState() !== 'live') return;
-  const state = hall().state;
-  const old = place.classList.contains('received') && state !== 'stopping' && state !== 'stopped';
-  if (old || (place.classList.contains('failed') && state === 'stopped')) setProperty(place, 'hidden', true);
+  const { state, moving } = hall();
+  const received = place.classList.contains('received');
+  const over = received ? state !== 'stopping' && state !== 'stopped' : state === 'stopped' || (wasGone && !moving);
+  if (over) setProperty(place, 'hidden', true);
+  else if (!received && wasGone) setText(place, `STOP was not delivered, and the hall is ${state}: press STOP again. ${HARD_WIRED}`);
 }
 
 start();

@@ -2,6 +2,7 @@
 
 import { byId, setAttribute, setProperty, setText } from './dom.js';
 import { change } from './api.js';
+import { armNeeds } from './next.js';
 import { ask, onPress, onTwoPresses, say } from './press.js';
 import { hall } from './state.js';
 import { clock } from './words.js';
@@ -83,7 +84,7 @@ function letGo(button, what, request) {
 export function showTransport(status, link) {
   const state = link === 'live' ? status.state : null;
   for (const what of ['pause', 'resume', 'park', 'go']) setProperty(byId(what), 'disabled', !may(what, state));
-  showArm(state, status?.arm_homes ?? false);
+  showArm(state, status);
   showGo(state, status);
   showGoFrom(state, status);
   // What a press would need is in the next action; these two show only where they are one.
@@ -96,16 +97,19 @@ function showWhere(what, wanted, live) {
   setProperty(byId(what), 'disabled', !wanted || !live);
 }
 
-function showArm(state, homes) {
+function showArm(state, status) {
+  const homes = status?.arm_homes ?? false;
+  const needs = state === 'parked' ? armNeeds(status) : null;
   const button = byId('arm');
   const now = may('disarm', state) ? 'disarm' : 'arm';
   if (now !== armIs) {
     armIs = now;
     armSince = performance.now();
-    setText(button, now.toUpperCase());
+    setText(byId('arm-word'), now.toUpperCase());
     setAttribute(button, 'data-is', now);
   }
-  setProperty(button, 'disabled', !may(now, state));
+  setProperty(button, 'disabled', !may(now, state) || needs !== null);
+  setText(byId('arm-note'), needs ?? '');
   // Where the seats home first a button of its own asks whether they are empty.
   setProperty(button, 'hidden', homes);
   setProperty(byId('home-arm'), 'hidden', !homes);
@@ -138,6 +142,5 @@ function goNote(state, status) {
   if (state === null) return 'no data';
   if (may('go', state)) return 'press twice';
   if (may('pause', state)) return 'the show is running';
-  if (!status.show) return 'load a cue first';
   return state === 'parked' ? 'arm first' : `not while ${state}`;
 }

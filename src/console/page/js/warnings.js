@@ -3,7 +3,7 @@
 import { byId, make, onChange, setProperty, setText } from './dom.js';
 import { mark } from './marks.js';
 import { hall } from './state.js';
-import { select } from './controller.js';
+import { disable, select } from './controller.js';
 import { sentence } from './words.js';
 
 /** How each severity is marked and called. */
@@ -18,16 +18,10 @@ const FIRST = 4;
 const NAMED = 8;
 let all = false;
 let lines = [];
-let inView = true;
 
-/** Makes the rest of a long list appear, and go; keeps the gravest warning in view where the list is not. */
+/** Makes the rest of a long list appear, and go; leads from the gravest warning, which is always in view, to the list. */
 export function startWarnings() {
-  const panel = byId('warnings-panel');
-  new IntersectionObserver(([{ isIntersecting }]) => {
-    inView = isIntersecting;
-    showGravest(hall()?.warnings ?? []);
-  }, { root: byId('main') }).observe(panel);
-  byId('gravest').addEventListener('click', () => panel.scrollIntoView());
+  byId('gravest').addEventListener('click', () => byId('warnings-panel').scrollIntoView());
   byId('warnings-more').addEventListener('click', () => {
     all = !all;
     showWarnings(hall());
@@ -78,9 +72,8 @@ function matter({ controllers, text }) {
 
 function showGravest(warnings) {
   const grave = alike(warnings).filter(({ severity }) => severity !== 'info');
-  const shown = grave.length > 0 && !inView;
-  setProperty(byId('gravest'), 'hidden', !shown);
-  if (!shown) return;
+  setProperty(byId('gravest'), 'hidden', grave.length === 0);
+  if (grave.length === 0) return;
   const { look, mark: name, word } = SEVERITIES[grave[0].severity] ?? SEVERITIES.warning;
   setProperty(byId('gravest'), 'className', `gravest live look-${look}`);
   showMark(name);
@@ -108,6 +101,7 @@ function line({ severity, first }) {
     const button = make('button', { type: 'button' }, `Show ${first}`);
     button.addEventListener('click', () => select(first));
     item.append(button);
+    if (severity === 'error') item.append(disable(make('button', { type: 'button' }, `Disable ${first}`), first));
   }
   return { item, text, remedy };
 }

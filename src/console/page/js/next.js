@@ -1,0 +1,61 @@
+// What a person does next, as a button where the page can do it: one beside the words, or the marked one of the show's buttons.
+
+import { byId, make, onChange, setAttribute } from './dom.js';
+import { disable } from './controller.js';
+import { healthWord } from './marks.js';
+import { chosenCue, loadCue } from './playlist.js';
+import { onPress } from './press.js';
+import { runPreflight } from './reports.js';
+
+/** Seats that are offered to be disabled; of more the map and the warnings are the place. */
+const OFFERED = 2;
+const SILENT = ['lost', 'unknown', 'error'];
+
+/** What arming still waits for; null where it waits for nothing. */
+export function armNeeds({ show, preflight }) {
+  if (!show) return 'load a cue first';
+  return preflight?.passed ? null : 'preflight first';
+}
+
+/** Shows both. */
+export function showNext(status, link) {
+  const live = link === 'live';
+  showActions(live ? actionsOf(status) : []);
+  const next = live ? pressedNext(status) : null;
+  for (const button of document.querySelectorAll('.transport button')) setAttribute(button, 'data-next', String(button.id === next));
+}
+
+function actionsOf(status) {
+  const { state, show, preflight, may_clear: mayClear } = status;
+  if (state === 'boot') return inTheWay(status);
+  if (state !== 'parked' || mayClear) return [];
+  if (!show) return [{ what: 'load', of: chosenCue() }];
+  return preflight?.passed ? [] : [{ what: 'preflight' }, ...(preflight ? inTheWay(status) : [])];
+}
+
+/** Who does not answer, or failed preflight. */
+function inTheWay({ controllers, preflight }) {
+  const failed = (preflight?.findings ?? []).filter(({ severity }) => severity === 'error').map(({ controller }) => controller);
+  const all = controllers.filter((one) => failed.includes(one.name) || SILENT.includes(healthWord(one)));
+  return all.slice(0, OFFERED).map(({ name }) => ({ what: 'disable', of: name }));
+}
+
+const showActions = onChange((actions) => byId('next-actions').replaceChildren(...actions.map(buttonOf)));
+
+function buttonOf({ what, of }) {
+  const words = { load: of ? `Load ${of}` : 'Choose a cue', preflight: 'Run preflight', disable: `Disable ${of}` }[what];
+  const button = make('button', { type: 'button', className: 'strong', 'data-do': what }, words);
+  if (what === 'disable') return disable(button, of);
+  const actions = { load: () => (of ? loadCue(button) : byId('upload-file').focus()), preflight: () => runPreflight(button) };
+  onPress(button, actions[what]);
+  return button;
+}
+
+/** The button among those of the show that is next. */
+function pressedNext(status) {
+  const { state, controllers, may_clear: mayClear, arm_homes: homes } = status;
+  if (mayClear) return controllers.some((one) => one.enabled && one.emergency_stop) ? null : 'clear';
+  if (state === 'recovering') return controllers.some((one) => one.enabled && one.homed === false) ? 'home' : 'park';
+  if (state === 'parked' && armNeeds(status) === null) return homes ? 'home-arm' : 'arm';
+  return { armed: 'go', paused: 'resume' }[state] ?? null;
+}
