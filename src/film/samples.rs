@@ -126,19 +126,13 @@ impl SampleClock {
             self.row = None;
             return;
         }
-        let late_s = read.late_s;
-        let mut row =
-            self.row.unwrap_or(LateRow { since_s: read.at_s, reads: 0, least_s: late_s, most_s: late_s });
-        row = LateRow {
-            reads: row.reads + 1,
-            least_s: row.least_s.min(late_s),
-            most_s: row.most_s.max(late_s),
-            ..row
-        };
-        if row.most_s - row.least_s > ALIKE_S {
-            row = LateRow { since_s: read.at_s, reads: 1, least_s: late_s, most_s: late_s };
-        }
-        let is_lost = row.reads >= ROW && read.at_s - row.since_s >= ROW_S;
+        let Quickest { at_s, late_s } = *read;
+        let alone = LateRow { since_s: at_s, reads: 0, least_s: late_s, most_s: late_s };
+        let row = self.row.unwrap_or(alone);
+        let (least_s, most_s) = (row.least_s.min(late_s), row.most_s.max(late_s));
+        let row = if most_s - least_s > ALIKE_S { alone } else { LateRow { least_s, most_s, ..row } };
+        let row = LateRow { reads: row.reads + 1, ..row };
+        let is_lost = row.reads >= ROW && at_s - row.since_s >= ROW_S;
         self.row = Some(row).filter(|_| !is_lost);
         if is_lost {
             (self.count, self.is_unsure) = (0, false);
