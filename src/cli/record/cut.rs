@@ -54,8 +54,6 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     exit::refuse_to_replace(&args.output, args.force)?;
     let (from, until) = args.film.unwrap_or((ShowTime::from_nanos(i64::MIN), ShowTime::from_nanos(i64::MAX)));
     let stretch = Stretch { from, until, seat: args.seat.clone() };
-    // Before a file is begun for it.
-    drop(open(&args.file)?);
     let part = args.output.with_extension("cutting");
     let file = File::create(&part).with_context(|| part.display().to_string()).or_exit(Exit::Io)?;
     let out = BufWriter::new(file);
@@ -64,7 +62,10 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     } else if args.pcap {
         pcap(&args.file, &stretch, out)
     } else {
-        cut(open(&args.file)?, &stretch, args.manner, out).map_err(|error| failure(error, &args.file))
+        let input = open(&args.file);
+        input.and_then(|input| {
+            cut(input, &stretch, args.manner, out).map_err(|error| failure(error, &args.file))
+        })
     };
     let written = result.and_then(|out| {
         let file = out.into_inner().map_err(std::io::IntoInnerError::into_error).or_exit(Exit::Io)?;
