@@ -150,12 +150,12 @@ impl Disk {
         Ok(about.f_bavail.saturating_mul(about.f_frsize))
     }
 
-    /// Octets that may be recorded yet: what is free and need not stay so, and the recordings that would go for it.
-    pub(super) fn room(&self) -> io::Result<u64> {
+    /// Octets that may be recorded yet where so many are free: those that need not stay so, and the recordings that would go for it.
+    pub(super) fn room(&self, free: u64) -> io::Result<u64> {
         let ours: u64 = self.kept()?.iter().map(|one| one.len).sum();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size")]
         let stays_free = (self.record.min_free_gib * GIB) as u64;
-        Ok((self.free()? + ours).saturating_sub(stays_free))
+        Ok((free + ours).saturating_sub(stays_free))
     }
 
     /// Removes what is too old or too much; says whether as much is free as has to be.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
+use super::AGAIN;
 use super::disk::{Disk, PART};
 use super::link::{RecordLink, RecordPart};
 use crate::app::recording::in_io;
@@ -18,8 +19,6 @@ use crate::time::MonoTime;
 
 /// How often it is asked whether it may go on.
 const PATIENCE: Duration = Duration::from_millis(100);
-/// What failed is tried again after so long.
-const AGAIN: Duration = Duration::from_secs(30);
 
 /// What a flight recorder held.
 pub(super) type Leftover = (Opening, Vec<Entry>);
@@ -52,9 +51,7 @@ pub(super) fn clear_up(
                 true
             }
             Ok(()) => {
-                link.tell(|status| {
-                    *status.incidents.entry(IncidentCause::Crash.word().to_owned()).or_default() += 1;
-                });
+                link.count(IncidentCause::Crash);
                 false
             }
         });

@@ -139,6 +139,11 @@ impl RecordLink {
         change(&mut self.shared.status.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
+    /// Counts an incident.
+    pub(super) fn count(&self, cause: IncidentCause) {
+        self.tell(|status| *status.incidents.entry(cause.word().to_owned()).or_default() += 1);
+    }
+
     /// Says what is wrong with a part; none for nothing.
     pub(super) fn trouble(&self, part: RecordPart, trouble: Option<String>) {
         self.tell(|status| {

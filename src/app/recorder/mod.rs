@@ -12,6 +12,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::{self, Builder, JoinHandle};
+use std::time::Duration;
 
 use sha2::{Digest as _, Sha256};
 
@@ -28,6 +29,8 @@ use disk::Disk;
 use link::RecordPart;
 use worker::Worker;
 
+/// What could not be written is tried again after so long.
+const AGAIN: Duration = Duration::from_secs(30);
 /// The flight recorder's file in the runtime folder.
 const FLIGHT_FILE: &str = "flight.ring";
 /// Octets that it may have at the most.

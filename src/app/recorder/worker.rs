@@ -8,6 +8,7 @@ use std::sync::mpsc::Receiver;
 use std::thread::Builder;
 use std::time::Duration;
 
+use super::AGAIN;
 use super::beginning::{begun, small_file};
 use super::disk::Disk;
 use super::leftovers::{Leftover, clear_up};
@@ -28,8 +29,6 @@ const LOOK: Duration = Duration::from_millis(20);
 const FLUSH: Duration = Duration::from_millis(500);
 /// How often they are put on the disk, what is free is looked at, and files that are too old or too many go.
 const SYNC: Duration = Duration::from_secs(5);
-/// What failed is tried again after so long.
-const AGAIN: Duration = Duration::from_secs(30);
 /// A recording begins so long before its show, and ends so long after it.
 const BEFORE: Duration = Duration::from_secs(10);
 const AFTER: Duration = Duration::from_secs(5);
@@ -325,7 +324,7 @@ impl Worker {
     }
 
     fn say_incident(&mut self, cause: IncidentCause, now: MonoTime) {
-        self.link.tell(|status| *status.incidents.entry(cause.word().to_owned()).or_default() += 1);
+        self.link.count(cause);
         let event = EventNote { kind: "incident", seat: String::new(), text: cause.word().to_owned() };
         self.keep(now, Note::Event(event));
     }
@@ -436,12 +435,11 @@ impl Worker {
     }
 
     fn sync(&mut self, now: MonoTime) {
-        let free = self.disk.free();
-        if let Ok(free) = &free {
-            self.link.tell(|status| status.free_bytes = *free);
-        }
-        if let Ok(room) = self.disk.room() {
-            self.link.has_room(room.max(1));
+        if let Ok(free) = self.disk.free() {
+            self.link.tell(|status| status.free_bytes = free);
+            if let Ok(room) = self.disk.room(free) {
+                self.link.has_room(room.max(1));
+            }
         }
         let file = self.show.as_ref().and_then(|show| show.file.as_ref());
         let Some(open) = file else { return };

@@ -128,7 +128,7 @@ impl HallSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::supervisor::testing::Rig;
+    use crate::app::supervisor::testing::{Rig, desired};
     use crate::control::Surface;
 
     fn role(result: Result<std::sync::Arc<crate::control::Status>, Problem>) -> String {
@@ -169,7 +169,7 @@ mod tests {
         let mut rig = Rig::playing();
         rig.supervisor.hall.mirror.state = WAITING;
         let limits = |rig: &Rig, ask| {
-            let desired = crate::app::supervisor::testing::desired(Surface::Osc, ask);
+            let desired = desired(Surface::Osc, ask);
             GearLimits::default().may_ask(&desired, &rig.supervisor.hall)
         };
         assert!(limits(&rig, Command::Resume).is_err());

@@ -173,11 +173,11 @@ fn records(hall: &HallContext) -> Result<(), Problem> {
 
 /// Why the next show would not be recorded to its end: said once it is loaded, while there is time to make room.
 pub(super) fn lacks_room(hall: &HallContext) -> Option<String> {
+    let length_s = hall.cued.as_ref()?.timeline.duration().as_secs_f64();
+    let (needs, room) = hall.recorder.lacks(length_s)?;
     if hall.recorder.status().recording.is_some() {
         return None;
     }
-    let length_s = hall.cued.as_ref()?.timeline.duration().as_secs_f64();
-    let (needs, room) = hall.recorder.lacks(length_s)?;
     #[expect(clippy::cast_precision_loss, reason = "to a tenth")]
     let [needs, room] = [needs, room].map(|octets| octets as f64 / 1e6);
     Some(format!(
