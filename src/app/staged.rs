@@ -41,9 +41,11 @@ pub fn headroom(config: &Config, timeline: &Timeline, rate: Rate) -> Headroom {
     Headroom::measure(&windows, timeline, rate)
 }
 
+const _: () = assert!(PaceLimits::MOST_OFF <= MAX_SPEED_UP, "no film asks for more than seats are given");
+
 /// How a film that is followed so may have the pace changed.
 fn slewing(pace: PaceLimits) -> Slewing {
-    Slewing { most: (pace.most() - 1.0).min(MAX_SPEED_UP), change_per_s: pace.change_per_s() }
+    Slewing { most: pace.most() - 1.0, change_per_s: pace.change_per_s() }
 }
 
 /// The headroom of a cue that chases a film, and was proved [`at_any_pace`] of that.

@@ -107,11 +107,11 @@ mod tests {
         assert!(hall.sync.is_some_and(|sync| sync.sources.is_empty() && !sync.leads));
         let hall = hall_with(
             "[film]\nplayer = \"mpv\"\nfolder = \"/srv/films\"\non_stop = \"keep\"\nfullscreen = false\n\
-             audio_device = \"alsa/hdmi:CARD=PCH,DEV=0\"\nvideo_output = \"gpu-next\"\n[sync]\nsources = []\nslew = \"2%\"\n",
+             audio_device = \"alsa/hdmi:CARD=PCH,DEV=0\"\nvideo_output = \"gpu-next\"\n[sync]\nsources = []\nslew = \"1.8%\"\n",
         );
         let film = hall.film.unwrap();
         assert_eq!((film.on_stop, film.fullscreen), (OnStop::Keep, false));
-        assert!((hall.sync.unwrap().pace.slew - 0.02).abs() < 1e-9);
+        assert!((hall.sync.unwrap().pace.slew - 0.018).abs() < 1e-9);
     }
 
     #[test]

@@ -12,8 +12,8 @@ use crate::film::source::{FilmArgs, FilmSource, milliseconds};
 use crate::film::timecode::{Label, Timecode};
 use crate::time::ShowTime;
 
-/// How far from 1 a film's rate may be, and how much the seats may add to it: 25/24 is 4.2 %.
-const BAND_MOST: f64 = 0.05;
+/// How far from 1 a film's rate may be, and how much the seats may add to it: no more together than [`PaceLimits::MOST_OFF`].
+const BAND: std::ops::RangeInclusive<f64> = 0.0..=0.015;
 const SLEW: std::ops::RangeInclusive<f64> = 0.005..=0.02;
 /// A tenth of it is 50 ms for a silent line, two timecode frames; with twice of it nobody notices within 4 s that a film stands.
 const FREEWHEEL: std::ops::RangeInclusive<f64> = 0.1..=2.0;
@@ -104,11 +104,7 @@ pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync
         Some(FilmArgs { latency, films, channel, ..args })
     };
     let sources = sources.into_iter().filter_map(args).collect();
-    let default = PaceLimits::default();
-    let pace = PaceLimits {
-        band: share(&mut section, "rate_band", 0.0..=BAND_MOST).unwrap_or(default.band),
-        slew: share(&mut section, "slew", SLEW).unwrap_or(default.slew),
-    };
+    let pace = pace(&mut section);
     let freewheel = share(&mut section, "freewheel", FREEWHEEL).unwrap_or(1.0);
     let join_above = section.get("join_above").and_then(|entry| apart(entry, section.faults));
     let offset = section.get("offset").and_then(|entry| signed_ms(entry, section.faults)).unwrap_or_default();
@@ -200,6 +196,22 @@ fn apart(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Duration> {
         );
     }
     span
+}
+
+/// How far the pace may be from the film's own, and that from 1: what seats cannot follow is not promised.
+fn pace(section: &mut Section<'_, '_, '_>) -> PaceLimits {
+    let default = PaceLimits::default();
+    let band = share(section, "rate_band", BAND).unwrap_or(default.band);
+    let pace = PaceLimits { band, slew: share(section, "slew", SLEW).unwrap_or(default.slew) };
+    let named = section.get("rate_band").or_else(|| section.get("slew"));
+    if let Some(entry) = named.filter(|_| !pace.is_kept_by_seats()) {
+        let [both, most] = [pace.band + pace.slew, PaceLimits::MOST_OFF].map(|share| 100.0 * share);
+        let what = format!(
+            "rate_band and slew are {both:.2}% together; seats change their pace by at most {most}%: lower one"
+        );
+        entry.fault(section.faults, &what);
+    }
+    pace
 }
 
 /// `"0.15%"`.
@@ -309,7 +321,12 @@ mod tests {
             ("sources = [\"artnet:anybody\"]", "has no sender"),
             ("sources = [\"mpv:/s\"]\nfilm_fps = \"26\"", "is not a frame rate; take 23.976"),
             ("sources = [\"mpv:/s\"]\nstart = \"1:2\"", "is not a timecode"),
-            ("sources = [\"mpv:/s\"]\nrate_band = \"9%\"", "is not a share within 0% to 5%"),
+            ("sources = [\"mpv:/s\"]\nrate_band = \"9%\"", "is not a share within 0% to 1.5%"),
+            ("sources = [\"mpv:/s\"]\nrate_band = \"1.2%\"", "rate_band and slew are 2.20% together"),
+            (
+                "sources = [\"mpv:/s\"]\nslew = \"2%\"",
+                "are 2.15% together; seats change their pace by at most 2%",
+            ),
             ("sources = [\"mpv:/s\"]\nslew = 0.01", "expected a string"),
             ("sources = [\"mpv:/s\"]\noffset = \"1s\"", "write it as \"-40ms\""),
             (

@@ -45,6 +45,14 @@ impl Default for PaceLimits {
 }
 
 impl PaceLimits {
+    /// How far the pace may be from the clock's at the most: ends of cues and joins are made for no more.
+    pub(crate) const MOST_OFF: f64 = 0.02;
+
+    /// False if a film may ask for a pace that no seat is given. Rounding is no pace.
+    pub(crate) fn is_kept_by_seats(&self) -> bool {
+        self.band + self.slew <= Self::MOST_OFF + NO_PACE
+    }
+
     /// The greatest pace that can be asked for.
     #[must_use]
     pub(crate) const fn most(&self) -> f64 {

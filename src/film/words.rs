@@ -7,7 +7,7 @@ impl FilmState {
     const fn words(self) -> &'static str {
         match self {
             Self::FreeRunning | Self::Locked => "the film is outside the cue, or has just been found",
-            Self::Freewheeling => "nothing is received from the film at the moment",
+            Self::Freewheeling => "no position is received from the film at the moment",
             Self::Absent => "nothing has been received from the film yet",
             Self::Acquiring => "the position of the film is not known well enough yet",
             Self::Stopped => "the film is stopped",
@@ -16,7 +16,7 @@ impl FilmState {
             Self::Reverse => "the film runs backwards",
             Self::Shuttle => "the film runs at a speed that seats may not follow",
             Self::Unusable => "what is received from the film makes no sense, or is too coarse",
-            Self::Lost => "nothing is received from the film any more",
+            Self::Lost => "no position is received from the film any more",
         }
     }
 }

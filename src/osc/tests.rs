@@ -249,7 +249,7 @@ fn a_subscriber_hears_of_the_film_what_is_new_of_it() {
     assert_eq!(stage.heard("timecode"), [OscType::from("01:00:05:12")]);
     stage.source.put(film("locked", "the film runs", Some("01:00:05:14")));
     assert_eq!(stage.heard("timecode"), [OscType::from("01:00:05:14")]);
-    stage.source.put(film("lost", "nothing is received from the film any more", None));
+    stage.source.put(film("lost", "no position is received from the film any more", None));
     let next = stage.heard("film");
     assert_eq!(next[0], OscType::from("lost"), "what did not change was not told again");
 }

@@ -60,7 +60,7 @@ fn a_show_follows_the_film_of_its_hall_once_a_person_has_let_it_go_and_moves_nob
     let waits = hall.wait(|status| status["state"] == "waiting" && status["film"]["state"] == "lost");
     assert_eq!(waits["film"]["error_ms"], serde_json::Value::Null, "seats that wait follow nothing");
     assert_eq!(waits["film"]["joins"], 1, "{}", waits["film"]);
-    assert_eq!(waits["cause"], "nothing is received from the film any more");
+    assert_eq!(waits["cause"], "no position is received from the film any more");
     assert!(waits["next"].as_str().is_some_and(|next| next.contains("check the film")), "{}", waits["next"]);
     let reel = film(0, "01:00:30:00");
     let again = hall

@@ -307,7 +307,7 @@ fn midi_timecode_of_a_fifo_leads_the_seat_which_rests_once_it_falls_silent() {
     let film = sent(&["--mtc", fifo]);
     playing.wait_for("playing: ");
     drop(film);
-    playing.wait_for("waiting: nothing is received from the film any more");
+    playing.wait_for("waiting: no position is received from the film any more");
     playing.signal(Signal::INT);
     let run = playing.finish();
     assert_eq!(run.code, Some(0), "{}", run.stderr);

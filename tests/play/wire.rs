@@ -146,5 +146,5 @@ fn frames_lead_to_where_the_film_of_a_player_is_when_they_are_over_and_so_they_d
         assert!(behind.abs() < 0.003, "{:.2} ms at speed {speed}", 1e3 * behind);
     }
     drop(film);
-    playing.wait_for("waiting: nothing is received from the film any more");
+    playing.wait_for("waiting: no position is received from the film any more");
 }

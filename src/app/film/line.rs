@@ -43,6 +43,9 @@ impl ByteLine {
     /// Reads what a relay sends of its device, with the instants at which it was read there.
     pub(super) fn read_relayed(&self, socket: &Path, kind: LineKind) -> io::Result<()> {
         let stream = LeftRead::new(UnixStream::connect(socket)?, &self.told);
+        let silent =
+            format!("{} accepts and says nothing; restart the service that has the line", socket.display());
+        self.told.note(|notes| notes.trouble = Some(silent));
         let mut relayed = RelayedRead::begin(stream, kind)?;
         let mut taker = self.begin();
         while let Some((bytes, at)) = relayed.next()? {

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::line::{ByteLine, LineTaker};
-use super::relayed::{greeting, record};
+use super::relayed::{FULL, greeting, record};
 use super::{ChildSlot, FilmError, WordSink, mtc, sound_line, start};
 use crate::film::source::{FilmSource, LineKind, MtcInput, SoundLine};
 use crate::sys::unix_socket::listen_in_place;
@@ -74,11 +74,12 @@ impl Listeners {
             return Ok(());
         }
         stream.set_nonblocking(true)?;
-        stream.write_all(greeting(kind).as_bytes())?;
         let mut streams = self.streams();
-        if streams.len() < LISTENERS {
-            streams.push(stream);
+        if streams.len() >= LISTENERS {
+            return stream.write_all(FULL);
         }
+        stream.write_all(greeting(kind).as_bytes())?;
+        streams.push(stream);
         Ok(())
     }
 
@@ -144,9 +145,6 @@ mod tests {
         let mut line = listeners.begin();
         let join = || RelayedRead::begin(UnixStream::connect(&socket).unwrap(), LineKind::Ltc).unwrap();
         let mut both = [join(), join()];
-        while listeners.streams().len() < 2 {
-            std::thread::yield_now(); // one is greeted before it is counted
-        }
         let (first, second) = (Monotonic.now(), Monotonic.now());
         line.take(b"one", first).unwrap();
         line.take(b"two", second).unwrap();
@@ -158,6 +156,19 @@ mod tests {
         assert!(both.iter_mut().all(|one| one.next().unwrap().is_none()), "the device is gone");
         let taken = Listeners::serve(&source, folder.path()).unwrap_err();
         assert!(matches!(taken, FilmError::Open { source, .. } if source.kind() == io::ErrorKind::AddrInUse));
+    }
+
+    #[test]
+    fn one_more_than_are_served_learns_why_it_hears_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let listeners = Listeners::serve(&FilmSource::Ltc(SoundLine::Stdin), folder.path()).unwrap();
+        let _line = listeners.begin();
+        let connect = || UnixStream::connect(folder.path().join("ltc.sock")).unwrap();
+        let join = || RelayedRead::begin(connect(), LineKind::Ltc);
+        let served: Vec<_> = (0..LISTENERS).map(|_| join().unwrap()).collect();
+        let refused = join().err().unwrap().to_string();
+        assert!(refused.contains("as many halls as it can"), "{refused}");
+        drop(served);
     }
 
     #[test]

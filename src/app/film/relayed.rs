@@ -14,10 +14,13 @@ const HEAD: usize = 10;
 /// What was read longer ago tells nothing of now.
 const OLDEST: Duration = Duration::from_secs(2);
 
-/// What a relay says first.
+/// What a relay says first to those that it lets in: which kind of line it has.
 pub(super) fn greeting(kind: LineKind) -> String {
     format!("kinocue relay 1 {}\n", kind.name())
 }
+
+/// What it says to one more than it can serve, as long as a greeting.
+pub(super) const FULL: &[u8] = b"kinocue relay full.\n";
 
 /// What was read at an instant: no more than a block.
 pub(super) fn record(bytes: &[u8], at: MonoTime) -> Vec<u8> {
@@ -46,6 +49,9 @@ impl<R: Read> RelayedRead<R> {
                 Err(fault("the relay has no line at present; its log says why".to_owned()))
             }
             Err(error) => Err(error),
+            Ok(()) if greeted == FULL => {
+                Err(fault("the relay serves as many halls as it can; end one that hears it".to_owned()))
+            }
             Ok(()) if greeted != wanted.as_bytes() => {
                 Err(fault(format!("it does not relay {}", kind.name())))
             }
@@ -92,6 +98,7 @@ mod tests {
         let now = Monotonic.now();
         assert!(said(b"HTTP/1.1 400 Bad Request\r\n").is_err() && said(b"kino").is_err());
         assert!(said(b"kinocue relay 1 mtc\n").is_err(), "another kind of line");
+        assert_eq!(FULL.len(), greeting(LineKind::Ltc).len());
         let earlier = now.before(Duration::from_secs(5));
         let wrong = [
             record(b"", now),

@@ -402,7 +402,9 @@ impl Supervisor {
         let latched = self.hall.mirror.state.is_latched();
         if latched {
             let (state, cause) = (self.hall.mirror.state, self.hall.cause());
-            self.note(format!("the hall was in {state} before the configuration was reloaded: {cause}"));
+            let then =
+                if self.reload.is_some() { "the configuration was reloaded" } else { "the service ended" };
+            self.note(format!("the hall was in {state} before {then}: {cause}"));
         }
         Carryover {
             settings: Some(self.settings()),
