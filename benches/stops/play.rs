@@ -105,7 +105,7 @@ fn took(lanes: &[Seen], asked: MonoTime, rate_hz: f64) -> Option<[f64; 2]> {
     let mut took = [f64::INFINITY, 0.0_f64];
     for seen in lanes {
         #[expect(clippy::cast_precision_loss, reason = "some hundred frames")]
-        let at_rest_s = seen.since.saturating_sub(HOLD_FRAMES) as f64 / rate_hz;
+        let at_rest_s = seen.since.saturating_sub(seen.still) as f64 / rate_hz;
         let unlit = seen.unlit.filter(|unlit| *unlit >= asked)?;
         assert!(at_rest_s <= AT_REST_S && seen.still >= HOLD_FRAMES, "{seen:?}");
         let ms = unlit.since(asked).as_secs_f64() * 1e3;
