@@ -22,7 +22,7 @@ use super::watch::{Seen, Watch};
 
 /// From here to tick 0: time to start the threads.
 const RUN_UP: Duration = Duration::from_millis(20);
-/// Seats are at rest so soon after the first decelerating frame: 150 ms from full speed, and three hold frames.
+/// Seats stand so soon after the first decelerating frame: 150 ms from full speed, and some to spare.
 const AT_REST_S: f64 = 0.2;
 const HOLD_FRAMES: u64 = 3;
 const RIDE_S: u32 = 10;
