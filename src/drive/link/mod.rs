@@ -32,7 +32,7 @@ pub(crate) use streaming::{
 #[cfg(test)]
 pub(crate) use virtual_play::{TICK, VirtualPlay, back, ride_about, there};
 #[cfg(test)]
-pub(crate) use virtual_port::VirtualPort;
+pub(crate) use virtual_port::{Damage, VirtualPort};
 
 use crate::channel::ChannelId;
 use crate::cue::Vibration;

@@ -11,7 +11,7 @@ use super::talk::Talk;
 use crate::config::drive::homing::{HomeWay, Side};
 use crate::drive::link::{LinkPort, LinkTalk as _, Step};
 use crate::time::MonoTime;
-use crate::wire::silvermax::register::{ACCUMULATOR, INPUT_POSITION, POSITION};
+use crate::wire::silvermax::register::{ACCUMULATOR, CANARY, INPUT_POSITION, POSITION};
 use crate::wire::silvermax::{Internal, Io, Poll, Request, StatusWord, StopOn};
 
 /// How far an axis moves off its switch, mm.
@@ -29,7 +29,8 @@ const LOOKS: Duration = Duration::from_millis(10);
 
 /// Around a homing.
 pub(crate) struct Homing<'a> {
-    /// What is written into register 40 of each unit at the end: not 0, and no number that others would write.
+    /// What is written into register 37 of each unit at the begin, and into 40 at the end: not 0, and no number that others would
+    /// write.
     pub(crate) canary: i32,
     /// False once somebody wants it to end: the axes are braked before anything else is asked.
     pub(crate) goes_on: &'a dyn Fn() -> bool,
@@ -52,10 +53,14 @@ pub(crate) fn home<P: LinkPort>(
     let axes = seat.axes()?;
     let done = run(talk, &axes, &mut around);
     if done.is_err() {
-        for axis in &axes {
-            // What is wrong already is told; that the line is gone, too, is no news.
-            let _ = talk.insist(axis.unit, Request::Stop { deceleration: axis.brake() });
-        }
+        // What is wrong already is told; that the line is gone, too, is no news.
+        let mut tell_all = |request: &dyn Fn(&UnitAxis<'_>) -> Request| {
+            for axis in &axes {
+                let _ = talk.insist(axis.unit, request(axis));
+            }
+        };
+        tell_all(&|axis| Request::Stop { deceleration: axis.brake() });
+        tell_all(&|_| Request::WriteRegister { register: CANARY, value: 0 });
     }
     done
 }
@@ -67,7 +72,7 @@ fn run<P: LinkPort>(
 ) -> Result<(), HomeError> {
     for (index, axis) in axes.iter().enumerate() {
         goes_on(around)?;
-        axis.disarm(talk)?;
+        axis.disarm(talk, around.canary)?;
         (around.told)(Step::Held(index));
     }
     let together = axes.first().is_some_and(|axis| axis.of.drive.homing.together);
@@ -139,7 +144,7 @@ fn off_switch<P: LinkPort>(
     let stop = StopOn::Input { input, is_high: !active_high };
     for (index, axis) in &on {
         (around.told)(Step::OffSwitch(*index));
-        axis.go(talk, -axis.toward() * OFF_SWITCH_MM, stop)?;
+        axis.go(talk, -axis.toward() * OFF_SWITCH_MM, stop, around)?;
     }
     arrive(talk, &on, OFF_SWITCH_MM, around)?;
     for (_, axis) in &on {
@@ -160,7 +165,7 @@ fn search<P: LinkPort>(
     let travel_mm = group[0].1.of.drive.homing.travel_mm;
     for (index, axis) in group {
         (around.told)(Step::Searching(*index));
-        axis.go(talk, axis.toward() * travel_mm, stop)?;
+        axis.go(talk, axis.toward() * travel_mm, stop, around)?;
     }
     arrive(talk, group, travel_mm, around)?;
     for (_, axis) in group {
@@ -177,7 +182,7 @@ fn index<P: LinkPort>(
 ) -> Result<(), HomeError> {
     for (_, axis) in group {
         let turn = 1.1 * axis.axis.lead;
-        axis.go(talk, -axis.toward() * turn, StopOn::Index)?;
+        axis.go(talk, -axis.toward() * turn, StopOn::Index, around)?;
     }
     let turn = 1.1 * group[0].1.axis.lead;
     arrive(talk, group, turn, around)?;
@@ -215,6 +220,8 @@ fn park<P: LinkPort>(
 ) -> Result<(), HomeError> {
     goes_on(around)?;
     (around.told)(Step::Parking);
+    // None moves before all have their zero: one that waited for the others may have been restarted.
+    group.iter().try_for_each(|(_, axis)| axis.is_up_since(talk, around.canary))?;
     let mut farthest = 0.0_f64;
     for (_, axis) in group {
         let here = axis.scale.mm(f64::from(talk.register(axis.unit, POSITION)?));
@@ -270,7 +277,14 @@ impl UnitAxis<'_> {
     }
 
     /// Moves by so many mm, or until something is sensed. Relative: never farther.
-    fn go<P: LinkPort>(&self, talk: &mut Talk<P>, mm: f64, stop: StopOn) -> Result<(), HomeError> {
+    fn go<P: LinkPort>(
+        &self,
+        talk: &mut Talk<P>,
+        mm: f64,
+        stop: StopOn,
+        around: &Homing<'_>,
+    ) -> Result<(), HomeError> {
+        self.is_up_since(talk, around.canary)?;
         let [acceleration, velocity] = self.pace();
         write(talk, self.unit, Request::ClearInternalStatus)?;
         self.forget(talk)?;

@@ -7,7 +7,7 @@ use crate::drive::TICK_NS;
 use crate::drive::link::LinkPort;
 use crate::motion::{AxisGeometry, SeatType};
 use crate::wire::silvermax::register::{
-    self, CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, QUEUE_SOURCE, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW,
+    self, CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, MARK, QUEUE_SOURCE, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW,
     TORQUE_CLOSED, TORQUE_OPEN,
 };
 use crate::wire::silvermax::{Io, NakReason, Poll, Request, StatusWord, command};
@@ -158,6 +158,14 @@ pub(crate) enum HomeError {
         /// Where it should be.
         wanted_mm: f64,
     },
+    /// It has forgotten where it is, and how it was set.
+    #[error(
+        "unit {unit} was restarted while the seat was homed; check its supply (does it sag as the next motor starts?), then home again"
+    )]
+    Restarted {
+        /// Who.
+        unit: u8,
+    },
     /// A person stopped it.
     #[error("homing was stopped; the seat is not home")]
     Aborted,
@@ -241,8 +249,9 @@ fn mnemonic(request: Request) -> &'static str {
 }
 
 impl UnitAxis<'_> {
-    /// Before anything moves: what is wrong, then disarmed and held by its driver where it stands.
-    pub(super) fn disarm<P: LinkPort>(&self, talk: &mut Talk<P>) -> Result<(), HomeError> {
+    /// Before anything moves: what is wrong, then disarmed and held by its driver where it stands, with a mark that a restart
+    /// takes away.
+    pub(super) fn disarm<P: LinkPort>(&self, talk: &mut Talk<P>, mark: i32) -> Result<(), HomeError> {
         let unit = self.unit;
         write(talk, unit, Request::StopAtOnce)?;
         if talk.internal(unit)?.is_hot() {
@@ -250,6 +259,7 @@ impl UnitAxis<'_> {
         }
         let offset = i16::try_from(self.of.silvermax.gravity).unwrap_or_default();
         let requests = [
+            Request::WriteRegister { register: MARK, value: mark },
             Request::ClearInternalStatus,
             Request::EnableMultiTasking,
             // On heat alone: an error is what a hard stop is found by, and an input the switch.
@@ -268,6 +278,12 @@ impl UnitAxis<'_> {
         requests.into_iter().try_for_each(|request| write(talk, unit, request))
     }
 
+    /// That it has not been restarted since it was disarmed. One bad digit looks so, too: twice is believed.
+    pub(super) fn is_up_since<P: LinkPort>(&self, talk: &mut Talk<P>, mark: i32) -> Result<(), HomeError> {
+        let mut has_mark = || talk.register(self.unit, MARK).map(|found| found == mark);
+        if has_mark()? || has_mark()? { Ok(()) } else { Err(HomeError::Restarted { unit: self.unit }) }
+    }
+
     /// The limits of a show, and the kill conditions.
     pub(super) fn arm<P: LinkPort>(&self, talk: &mut Talk<P>) -> Result<(), HomeError> {
         let errors = Io::MOVING_ERROR | Io::HOLDING_ERROR;
@@ -280,7 +296,8 @@ impl UnitAxis<'_> {
         requests.into_iter().try_for_each(|request| write(talk, self.unit, request))
     }
 
-    /// Inside the stroke: what holds it there, read back; the canary last.
+    /// Inside the stroke: what holds it there, read back; the canary last. One that was restarted meanwhile has lost its zero,
+    /// wherever it says it is.
     pub(super) fn seal<P: LinkPort>(&self, talk: &mut Talk<P>, canary: i32) -> Result<(), HomeError> {
         let [low, high] = self.soft_limits();
         let written = [
@@ -297,8 +314,10 @@ impl UnitAxis<'_> {
         let settings = [(TORQUE_CLOSED, torque), (TORQUE_OPEN, torque), (ERROR_LIMITS, self.error_words())];
         let held = settings.into_iter().chain(written.into_iter().take(3));
         held.into_iter().try_for_each(|(number, wanted)| self.read_back(talk, number, wanted))?;
+        self.is_up_since(talk, canary)?;
         write(talk, self.unit, Request::WriteRegister { register: CANARY, value: canary })?;
-        self.read_back(talk, CANARY, canary)
+        self.read_back(talk, CANARY, canary)?;
+        self.is_up_since(talk, canary)
     }
 
     fn read_back<P: LinkPort>(&self, talk: &mut Talk<P>, number: u8, wanted: i32) -> Result<(), HomeError> {

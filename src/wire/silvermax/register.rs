@@ -26,6 +26,8 @@ pub(crate) const SEGMENT_ACCELERATION: u8 = 21;
 pub(crate) const SEGMENT_VELOCITY: u8 = 22;
 /// The deceleration of a profile move.
 pub(crate) const SEGMENT_DECELERATION: u8 = 23;
+/// A number that a unit is given when its homing begins, gone after a restart; our choice.
+pub(crate) const MARK: u8 = 37;
 /// The least target while soft limits are on; our choice.
 pub(crate) const SOFT_LIMIT_LOW: u8 = 38;
 /// The greatest.
@@ -63,6 +65,7 @@ pub(crate) const fn name(register: u8) -> Option<&'static str> {
         SEGMENT_VELOCITY => "segment velocity",
         SEGMENT_DECELERATION => "segment deceleration",
         24 => "segment offset",
+        MARK => "mark of a homing",
         SOFT_LIMIT_LOW => "lower soft limit",
         SOFT_LIMIT_HIGH => "upper soft limit",
         CANARY => "canary",

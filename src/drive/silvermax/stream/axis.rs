@@ -104,9 +104,10 @@ pub(crate) struct Axis {
     pub(super) not_before: MonoTime,
     pub(super) doubt: Option<Doubt>,
     pub(super) failing_since: Option<MonoTime>,
-    /// What register 40 held when it was read last; and canaries, and targets, that were wrong one after the other.
+    /// What register 40 held when it was read last, and what it is believed to hold.
+    pub(super) read_canary: Option<i32>,
     pub(super) canary: Option<i32>,
-    pub(super) strikes: u8,
+    /// Targets that were wrong one after the other.
     pub(super) strayed: u8,
     /// It has to be told to brake.
     pub(super) owes_stop: bool,
@@ -153,8 +154,8 @@ impl Axis {
             not_before: now,
             doubt: None,
             failing_since: None,
+            read_canary: None,
             canary: None,
-            strikes: 0,
             strayed: 0,
             owes_stop: true,
             step: 0,

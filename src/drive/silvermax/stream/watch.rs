@@ -58,18 +58,21 @@ impl<P: LinkPort> Stream<SilverMax, P> {
         }
     }
 
-    /// A unit that was restarted has another canary. One bad digit makes one, too: twice is believed.
+    /// A unit that was restarted has another canary. One bad digit makes one, too: what is not that of the lane is believed
+    /// once it was read twice.
     fn compare_canary(&mut self, l: usize, a: usize, value: i32) {
         let now = self.talk.now();
         let lane = &mut self.lanes[l];
-        let (canary, axis) = (lane.own.canary, &mut lane.axes[a]);
+        let (known, axis) = (lane.own.canary, &mut lane.axes[a]);
+        if axis.read_canary.replace(value) != Some(value) && known != Some(value) {
+            axis.polls.hurry(Question::Canary, now);
+            return;
+        }
         axis.canary = Some(value);
-        let is_wrong = canary.is_some_and(|canary| value != canary) && lane.stage != Stage::Out;
-        axis.strikes = if is_wrong { axis.strikes + 1 } else { 0 };
-        match axis.strikes {
-            0 => self.mind_home(l),
-            1 => axis.polls.hurry(Question::Canary, now),
-            _ => self.put_out(l, StreamEvent::Restarted { lane: number(l), axis: axis_number(a) }),
+        if known.is_some_and(|known| known != value) && lane.stage != Stage::Out {
+            self.put_out(l, StreamEvent::Restarted { lane: number(l), axis: axis_number(a) });
+        } else {
+            self.mind_home(l);
         }
     }
 

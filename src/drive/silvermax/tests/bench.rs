@@ -94,6 +94,11 @@ pub(super) const PERIOD: Duration = Duration::from_micros(33_352);
 impl Play {
     /// Units whose crystals are off by so much.
     pub(super) fn with_ppm(ppm: [i32; 3]) -> Self {
+        Self::with_damage(ppm, None)
+    }
+
+    /// The same; what is asked first of units that are home may be damaged.
+    pub(super) fn with_damage(ppm: [i32; 3], damage: Option<Damage>) -> Self {
         let mut unit = 15;
         let setups = ppm.map(|ppm| {
             unit += 1;
@@ -104,6 +109,7 @@ impl Play {
         let (homed, _) = home_as(&mut talk, &drive, &[16, 17, 18]);
         assert_eq!(homed, Ok(()));
         talk.port().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
+        talk.port().damage = damage;
         let (seat, silvermax) = (seat(), drive.silvermax.clone().unwrap());
         let seat = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16, 17, 18] };
         let mut play = Self::over(talk, PERIOD, &[seat], Self::judge).unwrap();

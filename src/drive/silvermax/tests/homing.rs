@@ -1,8 +1,10 @@
 //! How seats find their zero.
 
+use std::time::Duration;
+
 use super::bench::*;
 use crate::config::drive::homing::HomeWay;
-use crate::drive::link::{LinkTalk as _, Step};
+use crate::drive::link::{LinkPort as _, LinkTalk as _, Step};
 use crate::drive::silvermax::*;
 use crate::sim::silvermax::{Action, UnitSetup};
 
@@ -135,9 +137,39 @@ fn a_homing_is_stopped_between_two_looks() {
         Homing { canary: CANARY, goes_on: &|| !abort.load(Ordering::Relaxed), told: &mut told },
     );
     assert_eq!(homed, Err(HomeError::Aborted));
-    let last = talk.port().sent.last().unwrap().1.clone();
-    assert_eq!(last, b"@16 3 2319282\r");
+    let sent: Vec<_> = talk.port().sent.iter().rev().map(|(_, octets)| octets.as_slice()).collect();
+    assert_eq!(sent[..2], [&b"@16 11 40 0\r"[..], b"@16 3 2319282\r"]);
     assert!(unit(&mut talk, 0).place() > 63_000.0, "it had hardly begun to move");
+}
+
+/// Units that forget where they are do not say so: they are at 0 wherever they stand.
+#[test]
+fn a_unit_that_is_restarted_at_any_instant_of_a_homing_is_never_home() {
+    const PARTS: u32 = 24;
+    let ways = [(SWITCH, false), (SWITCH, true), (HomeWay::HardStop, false), (HomeWay::Here, false)];
+    let mut told = 0;
+    for (way, together) in ways {
+        let mut drive = drive(way);
+        (drive.homing.speed_mm_s, drive.homing.together) = (40.0, together);
+        let lasts = {
+            let mut talk = talk_to(&three());
+            let begun = talk.now();
+            assert_eq!(home_as(&mut talk, &drive, &[16, 17, 18]).0, Ok(()));
+            talk.now().since(begun)
+        };
+        for part in 1..PARTS {
+            let mut talk = talk_to(&three());
+            let then = talk.now() + lasts * part / PARTS;
+            talk.port().script = Some((then, |line, now| line.bus_mut().act(Some(16), Action::Reset, now)));
+            let homed = home_as(&mut talk, &drive, &[16, 17, 18]).0;
+            let up_again = talk.now() + Duration::from_secs(2);
+            talk.port().sleep_until(up_again);
+            told += u32::from(matches!(homed, Err(HomeError::Restarted { unit: 16 })));
+            // One that was the first to be sealed, and is restarted before the last is, will say so itself.
+            assert_eq!(look(&mut talk, 16).unwrap().canary, 0, "{way:?} {together} {part}: {homed:?}");
+        }
+    }
+    assert!(told > 10, "{told}");
 }
 
 #[test]

@@ -141,6 +141,33 @@ fn a_unit_that_was_restarted_is_told_and_its_seat_stays_out_until_it_is_homed() 
     assert!(play.stream.is_ready(0));
 }
 
+/// Asks a unit for another register instead of its canary, once: a digit was bad on the way.
+fn misread_canary(unit: u8) -> Damage {
+    Box::new(move |octets| {
+        let is_it = octets == format!("@{unit} 12 40\r").as_bytes();
+        if is_it {
+            *octets = format!("@{unit} 12 39\r").into_bytes();
+        }
+        is_it
+    })
+}
+
+#[test]
+fn one_bad_digit_of_a_canary_puts_no_seat_out() {
+    for unit in [16, 17, 18] {
+        let mut play = Play::with_damage([0; 3], Some(misread_canary(unit)));
+        play.begin(ride);
+        for _ in 0..3 {
+            play.play(3.0, 0);
+            play.stream.talk.port().damage = Some(misread_canary(unit));
+        }
+        play.play(3.0, 0);
+        assert!(play.stream.talk.port().damage.is_none(), "it was misread");
+        assert!(!play.has("homed: false"), "{unit}: {:?}", play.rare());
+        assert!(!play.has("Restarted"), "{unit}: {:?}", play.rare());
+    }
+}
+
 #[test]
 fn a_blocked_axis_is_killed_and_told_by_what() {
     let mut play = Play::with_ppm([0; 3]);
