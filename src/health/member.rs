@@ -237,21 +237,24 @@ impl Member {
         }
     }
 
-    /// Nobody knows where its frames have led it: what was seen of it is from before the last of them.
-    pub(super) fn on_fell_out(&mut self, why: Fall) {
+    /// Nobody knows where its frames have led it: what was seen of it is from before the last of them. `was_in` where it took part
+    /// until then.
+    pub(super) fn on_fell_out(&mut self, why: Fall, was_in: bool) {
         let why = match why {
             Fall::Gap => Why::Unsure(self.controller),
             Fall::Astray => Why::Astray(self.controller),
             Fall::PutBack | Fall::Stale => Why::NotSeenYet,
             Fall::Stopped => Why::CutShort(self.controller),
         };
+        // One event on a link may tell several times that a seat fell out: of one that is out that is no news.
+        let counts = was_in && self.unsure.is_none() && !matches!(why, Why::NotSeenYet | Why::CutShort(_));
         // That somebody moved its seat goes on to be worth a word.
         if !matches!(self.unsure, Some(Why::Moved(_))) {
             self.unsure = Some(why);
         }
         self.seen = None;
         self.reads.forget_open();
-        if matches!(why, Why::NotSeenYet | Why::CutShort(_)) {
+        if !counts {
             return;
         }
         let [last, before] = self.falls;

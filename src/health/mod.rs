@@ -218,7 +218,8 @@ impl HealthTable {
     /// It is not known where the frames to a controller have led its seat, and none goes there any more: its group is out until it was
     /// looked at.
     pub(crate) fn on_fell_out(&mut self, controller: usize, why: Fall) {
-        self.members[controller].on_fell_out(why);
+        let was_in = self.places[self.groups.group_of(controller)].standing.may_move();
+        self.members[controller].on_fell_out(why, was_in);
     }
 
     /// A seat was found, but not all of its axes tell where they are: its group is out until it was homed.

@@ -102,6 +102,22 @@ fn one_of_a_seat_that_is_lost_already_parks_as_well() {
 }
 
 #[test]
+fn a_seat_that_falls_out_and_back_three_times_in_a_minute_stays_out_and_one_that_is_out_falls_no_more() {
+    for comes_back in [false, true] {
+        let mut hall = Hall::new(LossPolicy::Continue);
+        hall.run(30);
+        for _ in 0..3 {
+            hall.health.on_fell_out(2, crate::belief::Fall::Gap);
+            hall.answers_reads = comes_back;
+            hall.run(60);
+            hall.health.on_joined(1);
+        }
+        let is_unsteady = hall.health.why(1) == Why::Unsteady(2);
+        assert_eq!(is_unsteady, comes_back, "{:?}", hall.changes());
+    }
+}
+
+#[test]
 fn a_controller_that_refuses_frames_is_in_error_until_a_read_finds_none() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.run(10);
