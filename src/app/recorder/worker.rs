@@ -261,9 +261,10 @@ impl Worker {
             let word = if cue.is_empty() { kind } else { cue.as_str() };
             let (disk, out) = self.disk.create(kind, word, number)?;
             let disk = disk.until_begun();
-            // The first has what was before the show; those behind it how the hall stands.
-            let first = self.recent.iter().filter(|_| number == 1);
-            let entries = self.hall.iter().filter(|_| number > 1).chain(first);
+            // The first has what was before the show, and all of them how the hall stands.
+            let before = if number == 1 { &self.recent } else { &VecDeque::new() };
+            let is_told = |hall: &&Entry| before.front().is_some_and(|first| first.log_time <= hall.log_time);
+            let entries = self.hall.iter().filter(|hall| !is_told(hall)).chain(before);
             let mut file = begun(out, &opening, self.maker, self.safe.as_deref(), entries)?;
             if let Some(cue) = attached.as_ref().filter(|_| number == 1)
                 && let Some(octets) = small_file(cue)
@@ -387,6 +388,8 @@ impl Worker {
             self.cut();
         }
         let Some(OpenRecording { file, report, .. }) = self.show.take() else { return };
+        // What a show's file has is in no other: the counts of the next would not be its own.
+        self.recent.clear();
         self.link.tell(|status| status.recording = None);
         match file.map(|open| self.close_file(open, report.as_deref())) {
             Some(Err(error)) => self.fail_show(&error, now),

@@ -186,6 +186,33 @@ fn a_show_that_passes_the_size_of_a_part_goes_on_in_the_next_and_each_part_stand
     assert!(datagrams == bench.sent, "each frame is in one part, in its order");
 }
 
+#[test]
+fn a_show_that_follows_at_once_has_the_counts_of_its_own_and_says_how_the_hall_stands() {
+    let mut bench = Bench::new();
+    bench.worker.record.mode = RecordMode::Sampled;
+    let shows = [1_700, 900, 400];
+    for ticks in shows {
+        bench.begin();
+        bench.ticks(ticks);
+    }
+    bench.worker.close_show(at(bench.tick));
+    let mut files = bench.files();
+    files.sort();
+    assert_eq!(files.len(), shows.len(), "{files:?}");
+    for (path, ticks) in files.iter().zip(shows) {
+        let file = std::fs::read(path).expect("it is there");
+        let (mut counted, mut stands) = (0, false);
+        let mut take = |_: &Contents, _, told: Told<'_>| match told {
+            Told::Tick(sample) => counted += u64::from(sample.ticks),
+            Told::State(_) => stands = true,
+            _ => {}
+        };
+        read(file.as_slice(), Wanted::ALL, &mut take).expect("a recording");
+        assert!(stands, "{path:?}");
+        assert_eq!(counted, ticks, "{path:?}");
+    }
+}
+
 /// A file that takes no more than it has, whoever writes.
 fn full(begin: impl FnOnce(File) -> Recording<BufWriter<File>>) -> Recording<BufWriter<File>> {
     let place =
