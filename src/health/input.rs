@@ -117,6 +117,11 @@ impl HealthTable {
         self.places[group] = super::GroupStanding { standing, why, poor: MonoTime::default() };
     }
 
+    /// True if a look at that controller was taken: it is known by what it counted then.
+    pub(crate) fn has_seen(&self, controller: usize) -> bool {
+        self.members[controller].has_baseline()
+    }
+
     /// True if the table knows that already, so that nothing comes of telling it again.
     pub(crate) fn knows(&self, input: HealthInput) -> bool {
         match input {

@@ -230,6 +230,11 @@ impl Member {
         self.must_rehome.get_or_insert(why);
     }
 
+    /// True if it was seen, and can prove by that that it has not restarted since.
+    pub(super) const fn has_baseline(&self) -> bool {
+        matches!(self.identity, KnownBy::Seen(_))
+    }
+
     const fn baseline(&self) -> Option<Baseline> {
         match self.identity {
             KnownBy::Seen(baseline) => Some(baseline),

@@ -28,8 +28,8 @@ struct KnownFrames {
     lost: Option<u64>,
     /// How it was recorded to stand.
     standing: Option<HealthState>,
-    /// It was looked at since what it is known by is known.
-    is_seen: bool,
+    /// The recording begins with it.
+    from_the_start: bool,
 }
 
 /// Whether a group is judged.
@@ -140,11 +140,11 @@ impl Bench {
             first: Some((first, MonoTime::default())),
             recorded_lost: Some(0),
             lost: Some(0),
-            is_seen: true,
+            from_the_start: true,
             ..*known
         };
         books.tracker_mut().begin_at(controller, first);
-        self.verdict.from_the_start = self.known.iter().all(|known| known.is_seen);
+        self.verdict.from_the_start = self.known.iter().all(|known| known.from_the_start);
         if self.verdict.from_the_start {
             self.groups.fill(GroupKnown::Yes);
             // It has its say once somebody watches.
@@ -216,9 +216,6 @@ impl Bench {
         if !input.is_of(self.seats.len(), self.groups.len()) {
             return;
         }
-        if let HealthInput::Seen(controller, ..) = input {
-            self.known[controller].is_seen = true;
-        }
         self.health.take(input);
     }
 
@@ -280,20 +277,21 @@ impl Bench {
         let is_well = members
             .iter()
             .all(|controller| matches!(told(controller), Some(HealthState::Ok | HealthState::Unwatched)));
+        // A look that was asked for before the file is not taken here: how it comes back cannot be judged by it.
+        let is_known =
+            |controller: &usize| self.known[*controller].from_the_start || self.health.has_seen(*controller);
+        let is_unknown = !again.may_move() && !members.iter().all(is_known);
         match self.groups[group] {
-            GroupKnown::Yes if !is_told(again) => {
+            GroupKnown::Yes | GroupKnown::From(_) if is_told(again) && is_unknown => {
+                self.groups[group] = GroupKnown::Not;
+                self.verdict.unjudged += 1;
+            }
+            GroupKnown::Yes if is_told(again) => {}
+            GroupKnown::Yes => {
                 let recorded = members.iter().find_map(told).map_or_else(String::new, |one| one.to_string());
                 let what = "how it stands".to_owned();
                 self.differs(at, members.first().copied(), what, (recorded, again.to_string()));
                 self.groups[group] = GroupKnown::Not;
-            }
-            GroupKnown::Yes => {
-                let is_unknown =
-                    !again.may_move() && members.iter().any(|controller| !self.known[*controller].is_seen);
-                if is_unknown {
-                    self.groups[group] = GroupKnown::Not;
-                    self.verdict.unjudged += 1;
-                }
             }
             GroupKnown::From(from) if is_told(again) => {
                 if at >= from {

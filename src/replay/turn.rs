@@ -138,13 +138,21 @@ impl<'a> Turn<'a> {
         }
     }
 
-    /// What was recorded of the next reply.
+    /// What was recorded of the next reply. That before it which is not known is passed over, with what it told.
     fn next_fate(&mut self) -> Option<(usize, FrameNo, Fate, u32)> {
-        while let Some((AckRecord::Fate(controller, frame, fate, latency), rest)) = self.records.split_first()
-        {
-            self.records = rest;
-            if self.bench.knows(*controller, *frame) {
-                return Some((*controller, *frame, *fate, *latency));
+        while let Some((record, rest)) = self.records.split_first() {
+            match *record {
+                AckRecord::Fate(controller, frame, fate, latency) => {
+                    self.records = rest;
+                    if self.bench.knows(controller, frame) {
+                        return Some((controller, frame, fate, latency));
+                    }
+                }
+                AckRecord::Health(input @ HealthInput::Refused(_)) => {
+                    self.bench.judge(input);
+                    self.records = rest;
+                }
+                _ => return None,
             }
         }
         None
