@@ -318,6 +318,12 @@ pub fn load(path: &Path) -> Result<Config, ConfigFaults> {
     read::document(path, &text)
 }
 
+/// Reads a configuration from its text; `path` names it in faults.
+#[cfg(feature = "harness")]
+pub(crate) fn parse(path: &Path, text: &str) -> Result<Config, ConfigFaults> {
+    read::document(path, text)
+}
+
 /// True if a window of `axes` axes from `offset` on can be one of a cue; the reason if not.
 fn check_window(offset: usize, axes: usize, fan_out: FanOut) -> Result<(), String> {
     if fan_out == FanOut::Shared && offset + axes > MAX_AXES {

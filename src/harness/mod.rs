@@ -8,6 +8,7 @@
 )]
 
 pub mod asked;
+pub mod doors;
 mod hall;
 mod link_outlets;
 mod played;

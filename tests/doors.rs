@@ -1,0 +1,125 @@
+//! Whatever comes in at a door, nothing panics: true messages and files, and each with a few octets wrong. `fuzz/run.sh` searches on from
+//! the same beginnings.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use kinocue::harness::doors::DOORS;
+
+/// Wrong copies of each beginning.
+const WRONG: usize = 60;
+
+fn file(name: &str) -> Vec<u8> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+    fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn octets(hex: &str) -> Vec<u8> {
+    let digits: Vec<u8> = hex.bytes().filter(u8::is_ascii_hexdigit).collect();
+    let pair = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+    digits.chunks_exact(2).map(pair).collect()
+}
+
+/// All strings of hexadecimal digits in a file.
+fn hex_of(name: &str) -> Vec<Vec<u8>> {
+    let text = String::from_utf8(file(name)).unwrap();
+    let words = text.split(|sign: char| !sign.is_ascii_hexdigit());
+    words.filter(|word| word.len() >= 16 && word.len() % 2 == 0).map(octets).collect()
+}
+
+/// The lines of a text that a whole file is too long for.
+fn head(name: &str, lines: usize) -> Vec<u8> {
+    let text = file(name);
+    let end = text.iter().enumerate().filter(|(_, octet)| **octet == b'\n').nth(lines);
+    end.map_or(&text[..], |(at, _)| &text[..=at]).to_vec()
+}
+
+/// What is true at a door.
+fn beginnings(door: &str) -> Vec<Vec<u8>> {
+    let text = |texts: &[&str]| texts.iter().map(|text| text.as_bytes().to_vec()).collect();
+    match door {
+        "controller" | "message" => {
+            [hex_of("tests/golden/wire.json"), hex_of("tests/golden/show.hex")].concat()
+        }
+        "silvermax" => text(&["*10\r", "#10 000C 0000 0005\r", "!10 0019 0006\r"]),
+        "sixpack2" => vec![octets("01500000000000000001260102030405060700")],
+        "cue-csv" => vec![head("cues/bench-ride.csv", 40), head("cues/voyage.csv", 20)],
+        "cue-mcap" => vec![file("cues/storm.mcap")],
+        "cue-rows" => text(&["1,20,0,0,0,0,0,0\n2,20,1,1,1,0,0,0\n3,20,0,0,0,0,0,0\n"]),
+        "cue-u8" => vec![vec![0; 30], (0..90).collect()],
+        "config" => [
+            "tests/data/config/hall.toml",
+            "tests/data/config/drives.toml",
+            "tests/data/config/every_fault.toml",
+        ]
+        .map(file)
+        .into(),
+        "playlist" => text(&[
+            "title = \"Today\"\n[[entry]]\ncue = \"coaster\"\nat = \"19:00\"\nthen = \"go\"\nlevel = 0.8\n",
+        ]),
+        "settings" => text(&["[levels]\n"]),
+        "registers" => text(&["controller,register,value\n"]),
+        "label" => text(&["01:02:03:04", "23:59:59;29"]),
+        "osc" => vec![
+            b"/kinocue/go\0,f\0\0\x3f\x80\0\0".to_vec(),
+            b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\0\x10/kinocue/stop\0\0\0".to_vec(),
+        ],
+        "text" => text(&["go", "level 60%", "seek 01:02:03", "stop"]),
+        "ltc" => vec![[[0_u8, 0x20].repeat(20), [0, 0xe0].repeat(20)].concat().repeat(40)],
+        "mtc" => vec![(0..8).flat_map(|piece| [0xf1, piece << 4]).collect(), octets("f07f7f0101610203 04f7")],
+        "artnet" => vec![[&b"Art-Net\0\0\x97\0\x0e\0\0"[..], &[4, 3, 2, 1, 1]].concat()],
+        "mpv" => text(&[
+            "{\"event\":\"property-change\",\"id\":1,\"name\":\"pause\",\"data\":false}\n{\"request_id\":1,\"error\":\"success\",\"data\":12.5}\n",
+        ]),
+        "recording" | "replay" => ["refused", "came-back", "lost-frames"]
+            .map(|name| file(&format!("tests/data/recordings/{name}.mcap")))
+            .into(),
+        "capture" => vec![octets(
+            "d4c3b2a1020004000000000000000000ffff000001000000 00000000000000000e0000000e000000 ffffffffffffffffffffffff0800",
+        )],
+        "latency" => text(&["#[StartTime: 1.0 (seconds since epoch)]\n"]),
+        other => panic!("nothing is known to be true at {other}"),
+    }
+}
+
+/// Octets with a few of them wrong, lost or doubled, by chance.
+fn wrong(octets: &[u8], seed: &mut u64) -> Vec<u8> {
+    let mut next = |below: usize| {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 33) as usize % below.max(1)
+    };
+    let mut octets = octets.to_vec();
+    for _ in 0..=next(6) {
+        let at = next(octets.len());
+        match next(5) {
+            0 if at < octets.len() => octets[at] ^= 1 << next(8),
+            1 if at < octets.len() => octets[at] = [0, 0xff, 0x7f, 0x80, b'-'][next(5)],
+            2 => octets.truncate(at),
+            3 => {
+                let piece = octets[at..(at + next(40)).min(octets.len())].to_vec();
+                octets.splice(at..at, piece);
+            }
+            _ => drop(octets.drain(at..(at + next(8)).min(octets.len()))),
+        }
+    }
+    octets
+}
+
+#[test]
+fn nothing_that_comes_in_at_a_door_panics() {
+    let written = std::env::var_os("KINOCUE_SEEDS").map(PathBuf::from);
+    for (name, door) in DOORS {
+        let begun = beginnings(name);
+        assert!(!begun.is_empty(), "{name}");
+        let (mut seed, copies) = (20_261_126, WRONG * 20 / begun.len().clamp(4, 40));
+        for (number, octets) in begun.iter().enumerate() {
+            if let Some(folder) = &written {
+                fs::create_dir_all(folder.join(name)).unwrap();
+                fs::write(folder.join(name).join(number.to_string()), octets).unwrap();
+            }
+            door(octets);
+            let copies = if octets.len() > 100_000 { 20 } else { copies };
+            (0..copies).for_each(|_| door(&wrong(octets, &mut seed)));
+        }
+    }
+}
