@@ -85,6 +85,8 @@ fn a_seat_on_a_sixpack_reads_as_it_is_written_and_its_link_has_the_rate_that_is_
     let bus = LINK.replace("/dev/ttyUSB0", "can0") + "wiring = \"can\"\n";
     let can = parse(&sixpack_hall(SIX, &bus)).unwrap();
     assert_eq!((can.links[0].wiring, can.links[0].baud), (LinkWiring::Can, 500_000));
+    let slow = only(parse(&sixpack_hall(SIX, &(bus + "baud = 20000\n"))));
+    assert!(slow.contains("baud: 20000 is outside 50000..=1000000, the bit rates of a CAN bus"), "{slow}");
 }
 
 #[test]

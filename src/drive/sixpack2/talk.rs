@@ -1,12 +1,14 @@
 //! One exchange at a time, in frames of nine octets: what a unit is told, and what it answers where it is asked.
 //!
 //! Nothing but a question is answered, and no frame carries a sum. So each frame begins behind a break, by which a unit forgets what it
-//! has of another: an octet that is lost or comes twice costs one frame and no more. What has to be taken is sent with a question right
+//! has of another: an octet that is lost or comes twice costs one frame and no more. (On a bus each is whole by itself, and the break is
+//! none.) What has to be taken is sent with a question right
 //! behind it ([`Talk::confirm`]): the question is answered only where what stands before it had nine octets. A bit that is flipped
 //! is obeyed all the same, so what can be read back is.
 
 use std::time::Duration;
 
+use super::ask::waking_baud;
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk, Moment, TalkState, TalkTerms};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{
@@ -76,6 +78,12 @@ impl<P: LinkPort> Talk<P> {
     /// The rate of the link.
     pub(super) const fn own_baud(&self) -> u32 {
         self.own_baud
+    }
+
+    /// The other rate at which units may be found, as they wake; none where all talk at that of the link for ever.
+    pub(super) fn other_baud(&self) -> Option<u32> {
+        let waking = waking_baud();
+        (!self.state.terms.is_bus && self.own_baud != waking).then_some(waking)
     }
 
     /// When a frame that is sent now has wholly arrived, and how long one takes.

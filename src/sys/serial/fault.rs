@@ -7,6 +7,7 @@ use std::sync::Arc;
 use rustix::io::Errno;
 
 use crate::plain;
+use crate::sys::can::CanError;
 
 /// Why a line cannot be opened, and what to do.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -63,6 +64,9 @@ pub(crate) enum SerialError {
         plain::path(.0)
     )]
     Rs485(PathBuf),
+    /// It is a bus.
+    #[error(transparent)]
+    Can(#[from] CanError),
     /// Anything else that the system says.
     #[error("{}: cannot set up the line; check the adapter and its driver", plain::path(path))]
     System {
