@@ -10,8 +10,7 @@ use crate::drive::link::{LinkPort, LinkTalk as _, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
 use crate::drive::{motors_of, silvermax, sixpack2};
-use crate::sys::can::CanError;
-use crate::sys::serial::SerialError;
+use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Poll, StatusWord as _};
 
 /// Answers that begin so late are held back by an adapter, no unit waits so long.

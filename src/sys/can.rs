@@ -8,8 +8,7 @@ use std::fs;
 use std::io;
 use std::num::NonZeroU32;
 use std::os::fd::{AsRawFd as _, OwnedFd};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
 use rustix::io::Errno;
 use rustix::net::netdevice::name_to_index;
@@ -17,86 +16,17 @@ use rustix::net::{
     AddressFamily, Protocol, SocketAddrUnix, SocketFlags, SocketType, bind, socket_with, sockopt,
 };
 
-use super::serial::{OctetLine, PortFault};
-use crate::plain;
+use super::serial::{CanError, OctetLine, PortFault, QUEUE};
 use crate::time::MonoTime;
 
 /// Octets of a frame as the kernel has it: identifier and flags, length, three of nothing, data.
 const FRAME_LEN: usize = 16;
 /// Octets of data: frames of any other length are none of ours.
 const DATA_LEN: u8 = 8;
-/// Frames that an interface has to take at least while nobody acknowledges any: what motors were told last, and behind it that they stop.
-/// Without a queue (0) there is no such wait.
-const QUEUE: u32 = 64;
 /// Nobody waits for a socket, and no other program gets it.
 const FLAGS: SocketFlags = SocketFlags::NONBLOCK.union(SocketFlags::CLOEXEC);
 /// Where interfaces tell how they are.
 const INTERFACES: &str = "/sys/class/net";
-
-/// Why a bus cannot be had, and what to do.
-#[derive(Debug, Clone, thiserror::Error)]
-#[non_exhaustive]
-pub(crate) enum CanError {
-    /// The kernel, or the service's sandbox, knows none.
-    #[error(
-        "{at}: this system opens no CAN bus; load the kernel's module can-raw, give the service the drop-in kinocue-drives.conf, or put the \
-         units on a serial line",
-        at = plain::path(.0)
-    )]
-    NoCan(PathBuf),
-    /// Nothing has that name.
-    #[error("{at}: there is no such interface; plug the adapter in, and look for its name by `ip link`", at = plain::path(.0))]
-    Missing(PathBuf),
-    /// It is a network of another kind.
-    #[error("{at}: it is no CAN bus; name the interface of the adapter, such as can0", at = plain::path(.0))]
-    Other(PathBuf),
-    /// Nobody has brought it up.
-    #[error(
-        "{at}: the interface is down; `ip link set {at} up type can bitrate N`, with the bit rate of the units",
-        at = plain::path(.0)
-    )]
-    Down(PathBuf),
-    /// Its controller has made too many faults to take part.
-    #[error(
-        "{at}: its controller has left the bus (bus-off); check wiring, terminating resistors and bit rate, then \
-         `ip link set {at} type can restart`",
-        at = plain::path(.0)
-    )]
-    Off(PathBuf),
-    /// Nobody acknowledges what is sent.
-    #[error(
-        "{at}: nobody on the bus acknowledges what is sent; check plug, terminating resistors, bit rate and the power of the units",
-        at = plain::path(.0)
-    )]
-    Unheard(PathBuf),
-    /// A stop could find no room behind what waits.
-    #[error("{at}: the interface queues {count} frames, {QUEUE} are needed; `ip link set {at} txqueuelen {QUEUE}`", at = plain::path(.0), count = .1)]
-    ShortQueue(PathBuf, u32),
-    /// Another play has it.
-    #[error("{at}: another kinocue has it; end that program: two masters on one bus move each other's seats", at = plain::path(.0))]
-    Taken(PathBuf),
-    /// Anything else that the system says.
-    #[error("{}: cannot open the bus; check the adapter and its driver", plain::path(path))]
-    System {
-        /// The interface.
-        path: PathBuf,
-        /// What it says.
-        source: Arc<io::Error>,
-    },
-}
-
-impl CanError {
-    fn of(interface: &Path, errno: Errno) -> Self {
-        let path = interface.to_owned();
-        match errno {
-            Errno::AFNOSUPPORT | Errno::PROTONOSUPPORT => Self::NoCan(path),
-            Errno::NODEV | Errno::NXIO | Errno::INVAL => Self::Missing(path),
-            Errno::NETDOWN => Self::Down(path),
-            Errno::ADDRINUSE => Self::Taken(path),
-            errno => Self::System { path, source: Arc::new(errno.into()) },
-        }
-    }
-}
 
 /// Which identifiers are read, the others stay in the kernel: those that are `id` in the bits of `mask`.
 #[derive(Debug, Clone, Copy)]

@@ -13,8 +13,7 @@ use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Drives, Link};
 use crate::drive::link::{LinkLine, TalkTerms};
 use crate::drive::{silvermax, sixpack2};
-use crate::sys::can::CanError;
-use crate::sys::serial::SerialError;
+use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::register;
 use crate::wire::silvermax::{Internal, StatusWord as _};
 

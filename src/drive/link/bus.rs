@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use crate::sys::can::{CanError, CanIds, CanSocket};
-use crate::sys::serial::PortFault;
+use crate::sys::can::{CanIds, CanSocket};
+use crate::sys::serial::{CanError, PortFault};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{CanFrame, FRAME_LEN, ID_ZEROS, SixpackFrame};
 

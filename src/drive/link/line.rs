@@ -6,11 +6,10 @@ use super::bus::BusPort;
 use super::{LinkFault, LinkPort};
 use crate::config::Link;
 use crate::config::link::LinkWiring;
-use crate::sys::can::CanError;
 #[cfg(test)]
 use crate::sys::can::CanSocket;
 use crate::sys::clock::Monotonic;
-use crate::sys::serial::{SerialError, SerialPort, SerialSettings, StopBits};
+use crate::sys::serial::{CanError, SerialError, SerialPort, SerialSettings, StopBits};
 use crate::time::{Clock as _, MonoTime};
 
 /// How long the driver may take for a message: its buffer holds more than any.

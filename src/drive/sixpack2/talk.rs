@@ -8,11 +8,10 @@
 
 use std::time::Duration;
 
-use super::ask::waking_baud;
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk, Moment, TalkState, TalkTerms};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{
-    BAUD_CLOCK, BaudSwitch, FRAME_LEN, SixpackFrame, SixpackOrder, SixpackReply, baud_of,
+    BAUD_CLOCK, BaudSwitch, FRAME_LEN, SixpackFrame, SixpackOrder, SixpackReply, WAKING_DIVISOR, baud_of,
 };
 
 /// The address of answers: no unit has it, so that none takes an answer on the same wires for a question.
@@ -29,6 +28,11 @@ pub(super) const LONGEST_DELAY: Duration = Duration::from_millis(17);
 const TRIES: u32 = 4;
 /// How long a unit is told to wait before it answers, and to hold the line, in 2 ms: what a host needs to let go of two wires.
 const DELAY: u16 = 1;
+
+/// The rate with which units wake.
+pub(super) fn waking_baud() -> u32 {
+    baud_of(WAKING_DIVISOR).unwrap_or(19_200)
+}
 
 /// Why there is no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

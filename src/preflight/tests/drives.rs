@@ -10,8 +10,7 @@ use crate::drive::link::TalkCounts;
 use crate::drive::rates::LinkLoad;
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts};
 use crate::drive::sixpack2::{self, MotorFacts};
-use crate::sys::can::CanError;
-use crate::sys::serial::SerialError;
+use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
 use crate::wire::sixpack2::action;
 

@@ -16,9 +16,9 @@ use crate::drive::link::{LinkFault, LinkLine, LinkPlay as _, LinkPort, LinkTalk 
 use crate::drive::sixpack2::*;
 use crate::sim::serial::{LineFaults, SerialLine};
 use crate::sim::sixpack2::{SixpackBus, SixpackFault, SixpackSetup};
-use crate::sys::can::{CanError, CanIds, CanSocket};
+use crate::sys::can::{CanIds, CanSocket};
 use crate::sys::clock::Monotonic;
-use crate::sys::serial::SerialError;
+use crate::sys::serial::{CanError, SerialError};
 use crate::time::Clock as _;
 use crate::wire::sixpack2::{CanFrame, FRAME_LEN, PiTarget, SixpackFrame, SixpackOrder};
 
