@@ -130,11 +130,6 @@ pub(crate) trait LinkTalk {
         self.state().terms.baud
     }
 
-    /// It is a bus: what came is what was sent.
-    fn is_bus(&self) -> bool {
-        self.state().terms.is_bus
-    }
-
     /// What came so far.
     fn counts(&self) -> TalkCounts {
         self.state().counts

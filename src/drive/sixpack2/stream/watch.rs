@@ -141,12 +141,12 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
             axis.strays_since = sent;
         }
         axis.strayed += 1;
-        // What was damaged may be the answer: it is believed twice, but for one with a sum. A target that was brings it off its course for a while.
+        // What was damaged may be the answer: it is believed twice. A target that was brings it off its course for a while.
         let axis = &self.lanes[index].axes[a];
         let (low, high) = axis.scale.reach(LOST_ZERO_MM);
         let is_lost = !(low..=high).contains(&f64::from(told.position));
         let is_for_good = is_wrong || is_lost || sent.since(axis.strays_since) > axis.heals_in();
-        if (axis.strayed > 1 || is_lost && self.talk.is_bus()) && is_for_good {
+        if axis.strayed > 1 && is_for_good {
             if is_lost {
                 return self.is_not_home(index, a);
             }

@@ -71,7 +71,7 @@ fn a_ride_over_a_bus_is_told_each_motor_in_each_tick_of_its_unit_and_nobody_is_s
 
 #[expect(clippy::print_stdout, reason = "the figure is for who asks to see it")]
 #[test]
-fn a_unit_that_restarts_on_a_bus_hears_on_and_is_stopped_by_the_first_reading_of_its_counter() {
+fn a_unit_that_restarts_on_a_bus_hears_on_until_its_counter_was_read() {
     let mut longest = 0.0_f64;
     for phase in 0..16 {
         let mut play = homed();
