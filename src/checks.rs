@@ -134,8 +134,6 @@ checks! {
          answers are so late that the link cannot carry both motion and monitoring.";
     BrokenReplies "broken-replies" Answers Warn
         "Datagrams from the controller's address are not messages of the protocol: a broken cable or switch, or another device.";
-    DrivesUnasked "drives-unasked" Answers Fail
-        "Drives on a CAN bus cannot be read yet, so nothing is known about their seat.";
 
     Address "address" Identity Fail
         "The controller has another address or port in its settings (PA10 to PA14) than it was reached at: its station \
@@ -375,7 +373,6 @@ impl Check {
             Self::NoAnswer
                 | Self::RegisterUnread
                 | Self::Route
-                | Self::DrivesUnasked
                 | Self::DuplicateUnit
                 | Self::PortMissing
                 | Self::PortTaken

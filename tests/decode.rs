@@ -368,3 +368,22 @@ fn frames_are_told_in_words_and_octets_without_a_frame_are_shown() {
         assert!(ran.out.contains(words), "{words}: {}", ran.out);
     }
 }
+
+#[test]
+fn frames_of_a_bus_are_read_as_candump_writes_them() {
+    let log = b"(1436509052.249713) can0 008#2400401F00000000\n\
+                (1436509052.251) can0 008#2000FF0000000000\n\
+                (1436509052.252) can0 7F8#2000401F00000A00\n\
+                (1436509052.253) can0 009#2000401F00000A00\n\
+                (1436509052.254) can0 008#2000\n";
+    let ran = sixpack2(log, &[]);
+    assert_eq!(ran.code, 65);
+    for words in [
+        ">   1  PI target motor=0 target=8000\n",
+        ">   1  position? motor=0 response=255\n",
+        "< 255  position motor=0 position=8000 action=10 (PI) stop=0\n",
+        "3 messages, 2 times octets that are none",
+    ] {
+        assert!(ran.out.contains(words), "{words}: {}", ran.out);
+    }
+}

@@ -56,7 +56,7 @@ pub(super) struct Args {
 
     /// Family whose manual the messages follow; imax is the layout as its manual prints it, which no known
     /// program sends. For serial drives, a file or standard input holds raw bytes, lines of hex, or a log of lines
-    /// "seconds > hex" to the drive and "seconds < hex" from it.
+    /// "seconds > hex" to the drive and "seconds < hex" from it, or one that candump -L wrote on a CAN bus.
     #[arg(long, value_enum, default_value_t = MessageReading::Smc)]
     dialect: MessageReading,
 

@@ -220,7 +220,6 @@ pub(super) fn without_drives(path: &Path) -> Result<Config, Failure> {
 /// Reads a configuration that is about to be played in the foreground.
 pub(super) fn streamed(path: &Path, silent: bool) -> Result<Config, Failure> {
     let config = config(path)?;
-    config.streamed().or_exit(Exit::Config)?;
     if silent && let Some(one) = config.on_links().next() {
         let error = anyhow!(
             "{} is on a serial link, whose drives answer everything they are sent; omit --no-acks",

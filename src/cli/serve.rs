@@ -44,7 +44,6 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let config = config::load(&args.config).or_exit(Exit::Config)?;
-    config.streamed().or_exit(Exit::Config)?;
     let beside = || args.socket.with_file_name("stop.sock");
     let sockets =
         Sockets { control: args.socket.clone(), stop: args.stop_socket.clone().unwrap_or_else(beside) };

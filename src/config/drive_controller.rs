@@ -1,5 +1,7 @@
 //! `[[controller]]` with `address = "link:NAME"`: seats that serial drives move, and the links that they share.
 
+mod together;
+
 use std::sync::Arc;
 
 use toml::de::DeTable;
@@ -7,11 +9,14 @@ use toml::de::DeTable;
 use crate::channel::{self, SWITCHES};
 use crate::motion::{MAX_AXES, SeatType};
 
+pub(super) use together::{refuse_parted_groups, settle};
+
 use super::accept::acceptances;
 use super::drive::homing::HomeWay;
+use super::drive::sixpack2::Sixpack2Drive;
 use super::drive::{DriveEntry, DriveFamily, SeatDrive, refuse_axes};
 use super::fault::Faults;
-use super::link::{Link, LinkEntry, LinkWiring};
+use super::link::LinkEntry;
 use super::section::{Entry, Section, did_you_mean};
 use super::site::{Site, inputs_up_to, seat_of};
 use super::{Connection, Controller};
@@ -254,7 +259,8 @@ fn drive_of(
     }
     refuse_home(&drive, family, found.at, faults);
     if let Some(why) = drive.sixpack2.as_ref().filter(|_| family == DriveFamily::Sixpack2) {
-        why.too_slow_for(seat).into_iter().for_each(|why| note(faults, why));
+        let unclear = Sixpack2Drive::ambiguous_for(seat, drive.homing.travel_mm);
+        why.too_slow_for(seat).into_iter().chain(unclear).for_each(|why| note(faults, why));
     }
     Some(drive)
 }
@@ -284,99 +290,5 @@ fn refuse_switch(entry: Entry<'_>, drive: &SeatDrive, estop_inputs: u16, faults:
         && estop_inputs & 1 << (input - 1) != 0
     {
         entry.fault(faults, &format!("input {input} is the switch of home on these units; wire another"));
-    }
-}
-
-/// Settles the links for the drives that are on them, and notes what these cannot be together.
-pub(super) fn settle(links: Vec<LinkEntry<'_>>, placed: &[Placed], faults: &mut Faults<'_>) -> Vec<Link> {
-    let mut settled = Vec::new();
-    for entry in links {
-        let on_it: Vec<_> = placed.iter().filter(|one| one.link == entry.name).collect();
-        let family = on_it.first().map(|one| one.motors.family());
-        refuse_two_families(&on_it, family, faults);
-        refuse_twins(&on_it, faults);
-        let link = entry.settle(family, faults);
-        if let Some(link) = link {
-            refuse_units_of_rs232(&link, &on_it, faults);
-            settled.push(link);
-        }
-    }
-    settled
-}
-
-fn refuse_two_families(on_it: &[&Placed], family: Option<DriveFamily>, faults: &mut Faults<'_>) {
-    let is_other = |one: &&&Placed| Some(one.motors.family()) != family;
-    for other in on_it.iter().filter(is_other) {
-        let Placed { link, motors, .. } = other;
-        let (word, first) = (motors.family().word(), &on_it[0].controller.name);
-        let message = format!(
-            "dialect: link {link} has {} already, by {first}, and one line carries one dialect; put {word} on a link of its \
-             own",
-            family.map_or("another", DriveFamily::word)
-        );
-        faults.note(other.unit_at, message);
-    }
-}
-
-/// Notes motors that move two axes.
-fn refuse_twins(on_it: &[&Placed], faults: &mut Faults<'_>) {
-    let mut taken: Vec<(u8, Option<u8>, usize)> = Vec::new();
-    for one in on_it {
-        let named: Vec<(u8, Option<u8>)> = match &one.motors {
-            Motors::SilverMax(units) => units.iter().map(|unit| (*unit, None)).collect(),
-            Motors::Sixpack2 { unit, motors } => motors.iter().map(|motor| (*unit, Some(*motor))).collect(),
-        };
-        for ((unit, motor), at) in named.into_iter().zip(one.motors_at.iter().copied()) {
-            let Some((.., first)) = taken.iter().find(|(u, m, _)| (*u, *m) == (unit, motor)) else {
-                taken.push((unit, motor, at));
-                continue;
-            };
-            let line = faults.line(*first);
-            let (link, what) = (&one.link, motor.map_or(String::new(), |m| format!("motor {m} of ")));
-            let message = format!(
-                "units: {what}unit {unit} of link {link} moves another axis already, on line {line}; one motor moves one axis"
-            );
-            faults.note(at, message);
-        }
-    }
-}
-
-/// A SIXpack 2 by RS-232 is alone on its line.
-fn refuse_units_of_rs232(link: &Link, on_it: &[&Placed], faults: &mut Faults<'_>) {
-    if (link.wiring, link.family) != (LinkWiring::Rs232, Some(DriveFamily::Sixpack2)) {
-        return;
-    }
-    let unit = |one: &Placed| match one.motors {
-        Motors::Sixpack2 { unit, .. } => Some(unit),
-        Motors::SilverMax(_) => None,
-    };
-    let first = on_it.first().and_then(|one| unit(one));
-    for other in on_it.iter().filter(|one| unit(one) != first) {
-        let message = format!(
-            "unit: link {} is RS-232, which has one SIXpack 2; use wiring = \"rs485\", or a link for each",
-            link.name
-        );
-        faults.note(other.unit_at, message);
-    }
-}
-
-/// Notes groups whose controllers cannot keep together: a rigid seat would be bent.
-pub(super) fn refuse_parted_groups(placed: &[Placed], others: &[&Controller], faults: &mut Faults<'_>) {
-    for (index, one) in placed.iter().enumerate() {
-        let group = &one.controller.group;
-        let parts = |other: &&Placed| other.link != one.link || other.enabled != one.enabled;
-        let apart = placed[..index].iter().find(|other| other.controller.group == *group && parts(other));
-        let by_udp = others.iter().find(|other| other.group == *group);
-        let (name, why) = match (apart, by_udp) {
-            (Some(other), _) if other.link != one.link => (&other.controller.name, "is on another link"),
-            (Some(other), _) => (&other.controller.name, "and this are not both enabled"),
-            (None, Some(other)) => (&other.name, "is on the network"),
-            (None, None) => continue,
-        };
-        let message = format!(
-            "group: {name} of the group {group} {why}, and a rigid seat moves by all of its controllers at one instant; put \
-             them on one link, with the same enabled"
-        );
-        faults.note(one.group_at, message);
     }
 }

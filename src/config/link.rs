@@ -15,8 +15,9 @@ const SILVERMAX_BAUDS: [u32; 12] =
 const SIXPACK2_BAUDS: std::ops::RangeInclusive<u32> = 9_600..=250_000;
 /// How far from the rate that was asked for a SIXpack 2 may be: another program asks for 57,600, and it makes 56,818.
 const TOLERANCE: f64 = 0.02;
-/// The bit rate of a CAN bus unless another is named.
+/// The bit rate of a CAN bus unless another is named, and all there are.
 const CAN_BAUD: u32 = 500_000;
+const CAN_BAUDS: std::ops::RangeInclusive<u32> = 50_000..=1_000_000;
 /// Segments a second that no drive executes any more.
 const MOST_HZ: f64 = 500.0;
 
@@ -41,6 +42,14 @@ pub(crate) struct Link {
     pub(crate) rate_hz: Option<f64>,
     /// What its drives are; `None` if no controller is on it.
     pub(crate) family: Option<DriveFamily>,
+}
+
+impl Link {
+    /// Bits of an octet: a start bit, eight, and the stop bits. On a bus nine octets are a frame of 135 bits at the most, its gap and what is
+    /// stuffed in among them.
+    pub(crate) fn octet_bits(&self) -> u32 {
+        if self.wiring == LinkWiring::Can { 15 } else { 9 + u32::from(self.stop_bits) }
+    }
 }
 
 /// How a link is wired.
@@ -157,6 +166,9 @@ impl LinkEntry<'_> {
         let usual = if self.wiring == LinkWiring::Can { CAN_BAUD } else { 57_600 };
         let (asked_baud, baud_at) = self.baud.unwrap_or((usual, self.at));
         let made = match (self.wiring, family) {
+            (LinkWiring::Can, _) if !CAN_BAUDS.contains(&asked_baud) => {
+                Err(format!("{asked_baud} is outside {CAN_BAUDS:?}, the bit rates of a CAN bus"))
+            }
             (LinkWiring::Can, _) | (_, None) => Ok(asked_baud),
             (_, Some(DriveFamily::SilverMax)) => silvermax_baud(asked_baud),
             (_, Some(DriveFamily::Sixpack2)) => sixpack2_baud(asked_baud),

@@ -260,19 +260,6 @@ impl Config {
         if names.is_empty() { Ok(()) } else { Err(OnLinks(names.join(", "))) }
     }
 
-    /// Whether this program can play the hall: it opens no CAN bus.
-    ///
-    /// # Errors
-    /// [`DrivesUnplayed`] with the names of those that it cannot.
-    pub(crate) fn streamed(&self) -> Result<(), DrivesUnplayed> {
-        let is_bus = |name: &str| {
-            self.links.iter().any(|link| link.name == name && link.wiring == link::LinkWiring::Can)
-        };
-        let is_other = |one: &&Controller| one.drives().is_some_and(|drives| is_bus(&drives.link));
-        let names: Vec<_> = self.controllers.iter().filter(is_other).map(|one| one.name.as_str()).collect();
-        if names.is_empty() { Ok(()) } else { Err(DrivesUnplayed(names.join(", "))) }
-    }
-
     /// The folder with the playlists: the one of the configuration, else `playlists` beside the library.
     #[must_use]
     pub(crate) fn playlists(&self) -> PathBuf {
@@ -292,14 +279,6 @@ impl Config {
         self.seats.iter().find(|seat| seat.name == name)
     }
 }
-
-/// A hall that has seats with serial drives.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "no CAN bus is opened yet: {0} on one; put their units on a serial line (wiring = \"rs232\" or \"rs485\"), or take those \
-     controllers out of the file; `kinocue check` and `info` read such a hall"
-)]
-pub(crate) struct DrivesUnplayed(String);
 
 /// Seats on serial links, for a command that reaches controllers on the network alone.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -24,8 +24,6 @@ const SIXPACK2_DELAY: Duration = Duration::from_micros(6_000);
 /// Octets of a message of a SIXpack 2, and targets to a query, which is answered by as many octets.
 const SIXPACK2_OCTETS: u32 = 9;
 const TARGETS_A_QUERY: u32 = 10;
-/// A frame on a CAN bus of 500,000 bits a second takes so many bits with its gap.
-const CAN_BITS: u32 = 135;
 /// The part of a line that motion may take; polls take the rest, over USB a quarter.
 const SHARE: f64 = 0.80;
 const USB_SHARE: f64 = 0.75;
@@ -43,7 +41,7 @@ pub(crate) struct LinkLoad {
     pub(crate) wiring: LinkWiring,
     /// Bits a second.
     pub(crate) baud: u32,
-    /// Bits of an octet: a start bit, eight, and the stop bits.
+    /// As [`Link::octet_bits`].
     pub(crate) octet_bits: u32,
     /// Axes that it moves, at least one.
     pub(crate) axes: u32,
@@ -72,14 +70,15 @@ impl LinkLoad {
         let is_usb = is_usb(&link.port);
         let delay = match (family, link.wiring) {
             (DriveFamily::SilverMax, LinkWiring::Rs485) => RS485_DELAY,
-            (DriveFamily::SilverMax, _) => Duration::ZERO,
+            // On a bus there is no transmitter to wait for.
+            (DriveFamily::SilverMax, _) | (_, LinkWiring::Can) => Duration::ZERO,
             (DriveFamily::Sixpack2, _) => SIXPACK2_DELAY,
         };
         Some(Self {
             family,
             wiring: link.wiring,
             baud: link.baud,
-            octet_bits: 9 + u32::from(link.stop_bits),
+            octet_bits: link.octet_bits(),
             axes,
             seat_axes: each.iter().copied().max().unwrap_or(axes),
             seats: u32::try_from(each.len()).unwrap_or(u32::MAX),
@@ -96,11 +95,10 @@ impl LinkLoad {
         let targets = f64::from(TARGETS_A_QUERY);
         let octets = |count: u32| f64::from(count * self.octet_bits) * bit;
         let delay = self.answer_delay.as_secs_f64();
-        let an_axis = match (self.family, self.wiring) {
-            (DriveFamily::SilverMax, _) => octets(self.exchange_octets) + delay,
-            // Targets, and now and then a query and its answer; on a bus others go on while one waits.
-            (DriveFamily::Sixpack2, LinkWiring::Can) => f64::from(CAN_BITS) * bit * (targets + 2.0) / targets,
-            (DriveFamily::Sixpack2, _) => (octets(SIXPACK2_OCTETS * (TARGETS_A_QUERY + 2)) + delay) / targets,
+        let an_axis = match self.family {
+            DriveFamily::SilverMax => octets(self.exchange_octets) + delay,
+            // Targets, and now and then a query and its answer.
+            DriveFamily::Sixpack2 => (octets(SIXPACK2_OCTETS * (TARGETS_A_QUERY + 2)) + delay) / targets,
         };
         self.on_ticks(f64::from(self.axes) * an_axis / self.share)
     }
@@ -299,7 +297,8 @@ mod tests {
 
     #[test]
     fn a_bus_plays_on_the_ticks_of_its_drives() {
-        let bus = |axes| LinkLoad { wiring: LinkWiring::Can, ..six(500_000, SIXPACK2_DELAY, axes) };
+        let wiring = LinkWiring::Can;
+        let bus = |axes| LinkLoad { wiring, octet_bits: 15, ..six(500_000, Duration::ZERO, axes) };
         assert_eq!([3, 6].map(|axes| bus(axes).rate_hz()), [500.0, 250.0]);
         assert_eq!(bus(3).period_for(Some(300.0)), Ok(Duration::from_millis(4)));
     }

@@ -5,13 +5,12 @@ use std::time::Duration;
 
 use super::{Check, Notes};
 use crate::config::drive_controller::Motors;
-use crate::config::link::LinkWiring;
 use crate::config::{Controller, Drives, Link};
 use crate::drive::link::{LinkPort, LinkTalk as _, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
 use crate::drive::{motors_of, silvermax, sixpack2};
-use crate::sys::serial::SerialError;
+use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Poll, StatusWord as _};
 
 /// Answers that begin so late are held back by an adapter, no unit waits so long.
@@ -129,14 +128,7 @@ impl DriveSubject<'_> {
 /// What is found of one of them.
 pub(super) fn one(subject: &DriveSubject<'_>) -> Notes {
     let mut notes = Notes::default();
-    if subject.link.wiring == LinkWiring::Can {
-        let found = format!("link {} is a CAN bus, which is not supported yet", subject.link.name);
-        notes.add(
-            Check::DrivesUnasked,
-            found,
-            "put its units on a serial line, or check them with their own program",
-        );
-    } else if let Some(error) = &subject.survey.fault {
+    if let Some(error) = &subject.survey.fault {
         port(error, &mut notes);
     } else if let Some(Motors::Sixpack2 { unit, .. }) = subject.controller.drives().map(|one| &one.motors) {
         sixpack(subject, *unit, &mut notes);
@@ -155,8 +147,10 @@ pub(super) fn one(subject: &DriveSubject<'_>) -> Notes {
 
 fn port(error: &SerialError, notes: &mut Notes) {
     let check = match error {
-        SerialError::Missing(_) | SerialError::Vanished(_) => Check::PortMissing,
-        SerialError::Taken(_) => Check::PortTaken,
+        SerialError::Missing(_) | SerialError::Vanished(_) | SerialError::Can(CanError::Missing(_)) => {
+            Check::PortMissing
+        }
+        SerialError::Taken(_) | SerialError::Can(CanError::Taken(_)) => Check::PortTaken,
         SerialError::Forbidden(_) => Check::PortForbidden,
         _ => Check::PortUnfit,
     };

@@ -260,8 +260,7 @@ impl LinkLoop {
         let is_gone = told.and_then(|()| self.stream.play().round()).is_err();
         let fault = if is_gone {
             let port = self.stream.port();
-            port.sleep_until(port.now() + GONE);
-            port.mend().err()
+            port.mend(port.now() + GONE).err()
         } else {
             None
         };

@@ -4,6 +4,7 @@
 
 pub(crate) mod adjusted;
 pub(crate) mod batch;
+pub(crate) mod can;
 pub(crate) mod child;
 pub(crate) mod clock;
 pub(crate) mod file;

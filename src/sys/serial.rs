@@ -22,7 +22,8 @@ pub(crate) mod pty;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use fault::{PortFault, SerialError};
+pub(in crate::sys) use fault::QUEUE;
+pub(crate) use fault::{CanError, PortFault, SerialError};
 pub(crate) use octets::OctetLine;
 
 /// How far the baud rate that is made may be from the one that was asked for: two ends together may differ by 4 %.

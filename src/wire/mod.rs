@@ -21,7 +21,6 @@ mod reply;
 mod report;
 mod servo;
 pub(crate) mod silvermax;
-#[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "what a host sends is sent by none yet"))]
 pub(crate) mod sixpack2;
 mod status;
 mod vibration;

@@ -90,12 +90,5 @@ pub(super) fn reload(hall: &HallContext, path: &Path) -> Result<Arc<Config>, Pro
         let faults = faults.to_string().lines().map(str::to_owned).collect();
         Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
     })?;
-    config.streamed().map_err(|error| {
-        Problem::new(
-            Code::Check,
-            error.to_string(),
-            "the old configuration is kept; take them out, and reload again",
-        )
-    })?;
     Ok(Arc::new(config))
 }

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 use super::input::{Input, bytes};
 use super::{Args, end};
 use crate::cli::{Exit, Failure, OrExit as _};
+use crate::wire::sixpack2::{CanFrame, SixpackFrame};
 
 /// Bytes that are read ahead, and the longest line.
 const AHEAD: usize = 1 << 16;
@@ -112,7 +113,7 @@ pub(super) fn run(args: &Args, decoder: impl SerialDecoder) -> Result<Exit, Fail
 /// What a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Form {
-    /// `seconds > hex` to the drive, `seconds < hex` from it.
+    /// `seconds > hex` to the drive, `seconds < hex` from it; frames of a CAN bus.
     Log,
     /// Lines of hex.
     Hex,
@@ -126,7 +127,7 @@ impl Form {
         let opening = input.fill_buf()?;
         let line = opening.split(|octet| *octet == b'\n').find(|line| !line.trim_ascii().is_empty());
         let Some(line) = line.and_then(|line| std::str::from_utf8(line).ok()) else { return Ok(Self::Raw) };
-        Ok(if logged(line).is_some() {
+        Ok(if logged(line).or_else(|| dumped(line)).is_some() {
             Self::Log
         } else if bytes(line).is_ok() {
             Self::Hex
@@ -137,10 +138,22 @@ impl Form {
 }
 
 /// Seconds and direction of a line of a log, and its hex.
-fn logged(line: &str) -> Option<(f64, Direction, &str)> {
+fn logged(line: &str) -> Option<(f64, Direction, String)> {
     let (seconds, rest) = line.trim().split_once(' ')?;
     let (direction, hex) = rest.trim_start().split_once(' ').unwrap_or((rest, ""));
-    Some((seconds.parse().ok()?, Direction::of(direction)?, hex))
+    Some((seconds.parse().ok()?, Direction::of(direction)?, hex.to_owned()))
+}
+
+/// The same of a frame on a CAN bus, as `candump -L` writes them: `(seconds) interface identifier#hex`.
+fn dumped(line: &str) -> Option<(f64, Direction, String)> {
+    let (seconds, rest) = line.trim().strip_prefix('(')?.split_once(')')?;
+    let (id, hex) = rest.trim().split_once(' ')?.1.trim().split_once('#')?;
+    let (id, octets) = (u16::from_str_radix(id, 16).ok()?, bytes(hex).ok()?.try_into().ok()?);
+    let frame = SixpackFrame::try_from(CanFrame { id, octets }).ok()?;
+    // No unit has the address that answers go to.
+    let direction = if frame.address == u8::MAX { Direction::FromDrive } else { Direction::ToDrive };
+    let hex = frame.octets().map(|octet| format!("{octet:02x}")).join(" ");
+    Some((seconds.parse().ok()?, direction, hex))
 }
 
 struct SerialPrinter<W, D> {
@@ -182,11 +195,11 @@ impl<W: Write, D: SerialDecoder> SerialPrinter<W, D> {
         if line.trim().is_empty() {
             return Ok(());
         }
-        let (at, direction, hex) = match logged(line) {
+        let (at, direction, hex) = match logged(line).or_else(|| dumped(line)) {
             Some((at, direction, hex)) if form == Form::Log => (Some(at), Some(direction), hex),
-            _ => (None, None, line),
+            _ => (None, None, line.to_owned()),
         };
-        match bytes(hex) {
+        match bytes(&hex) {
             Ok(octets) => self.octets(at, direction, &octets),
             Err(error) => {
                 let fields = Map::from_iter([("not_hex".to_owned(), json!(error.to_string()))]);

@@ -53,8 +53,13 @@ impl VirtualHall {
             }
             SimFamily::Sixpack2 => {
                 let shaft = ShaftSetup { jump: JUMP_MM_S * MICROSTEPS, ..ShaftSetup::default() };
-                let setup =
-                    SixpackSetup { unit: 1, serial: 1_001, shafts: [shaft; MOTORS], is_two_wires: false };
+                let setup = SixpackSetup {
+                    unit: 1,
+                    serial: 1_001,
+                    shafts: [shaft; MOTORS],
+                    is_two_wires: false,
+                    can_baud: None,
+                };
                 lines(folder, || SixpackBus::waking([setup], now)).map(Self::Sixpack2)
             }
         }

@@ -13,7 +13,6 @@ use super::super::{Exit, Failure, OrExit as _, print};
 use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
-use crate::config::link::LinkWiring;
 use crate::config::{Controller, Link};
 use crate::drive::link::canary;
 use crate::drive::link::{LinkLine, Step, TalkTerms};
@@ -40,12 +39,6 @@ enum HomingFault {
 pub(super) fn explain(driven: &DrivenTargets, troubles: &mut Troubles) -> Vec<HomingResult> {
     let one = |controller: &Controller| {
         let drives = controller.drives().ok_or("it is on no link")?;
-        let is_bus = |link: &Link| link.name == drives.link && link.wiring == LinkWiring::Can;
-        if driven.links.iter().any(is_bus) {
-            return Err(
-                "CAN buses are not supported yet; connect it by a serial line, or home it with its own program",
-            );
-        }
         let list = |numbers: &[u8]| numbers.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
         let who = match &drives.motors {
             Motors::SilverMax(units) => format!("units {}", list(units)),
@@ -229,9 +222,8 @@ impl From<sixpack2::HomeError> for HomingFault {
     fn from(error: sixpack2::HomeError) -> Self {
         use sixpack2::{FindError, HomeError};
         match error {
-            HomeError::Talk(_) | HomeError::Find(FindError::Nowhere { .. } | FindError::Link(_)) => {
-                Self::Silent(error.to_string())
-            }
+            HomeError::Find(FindError::Stays { .. }) => Self::Refused(error.to_string()),
+            HomeError::Talk(_) | HomeError::Find(_) => Self::Silent(error.to_string()),
             _ => Self::Refused(error.to_string()),
         }
     }

@@ -10,11 +10,10 @@ use crate::cli::targets::{DrivenTargets, Troubles};
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::config::drive::DriveFamily;
 use crate::config::drive_controller::Motors;
-use crate::config::link::LinkWiring;
 use crate::config::{Controller, Drives, Link};
 use crate::drive::link::{LinkLine, TalkTerms};
 use crate::drive::{silvermax, sixpack2};
-use crate::sys::serial::SerialError;
+use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::register;
 use crate::wire::silvermax::{Internal, StatusWord as _};
 
@@ -212,11 +211,8 @@ enum PortRefused {
 }
 
 fn open(link: &Link) -> Result<LinkLine, PortRefused> {
-    if link.wiring == LinkWiring::Can {
-        return Err(PortRefused::Other(format!("link {} is a CAN bus: not supported yet", link.name)));
-    }
     LinkLine::open(link).map_err(|error| match error {
-        SerialError::Taken(_) => PortRefused::Taken(anyhow!(
+        SerialError::Taken(_) | SerialError::Can(CanError::Taken(_)) => PortRefused::Taken(anyhow!(
             "{error}. If that is the service, stop it first (`systemctl stop kinocue`); `kinocue preflight` without --config reads them \
              through the service"
         )),

@@ -7,7 +7,7 @@ use crate::plain::escaped;
 const SHOWS: &str = "start,end,took_s,result,hall,cue,sha256,title,playlist,entry,level,vibration,trim_ms,effects_off,\
     seats_total,seats_available,operator,scheduled,out_of_hours,ticks,missed_ticks,sent,asked,acked,refused,lost,\
     send_failed,lateness_p50_us,lateness_p99_us,lateness_max_us,ack_p50_us,ack_p99_us,ack_max_us,events,\
-    film_sources,film_switches,film_error_max_ms";
+    film_sources,film_switches,film_error_max_ms,withdrawn";
 
 /// One record a show; what is not known is empty.
 pub(super) fn shows(report: &JournalReport) -> String {
@@ -65,6 +65,7 @@ fn show(show: &ReportShown) -> Vec<String> {
     cells.push(plain(&film.map_or_else(String::new, |film| film.sources.join(" "))));
     cells.push(film.map_or_else(String::new, |film| film.switches.to_string()));
     cells.push(number(film.and_then(|film| film.greatest_error_ms)));
+    cells.push(outcome.map_or_else(String::new, |outcome| outcome.frames.withdrawn.to_string()));
     cells
 }
 

@@ -22,8 +22,13 @@ pub(super) fn run(args: &Args, path: &Path, signals: SignalSocket) -> Result<Exi
         return Err(refusal).or_exit(Exit::Usage);
     }
     let shafts = [ShaftSetup::default(); MOTORS];
-    let setup =
-        |unit: u8| SixpackSetup { unit, serial: 1_000 + u16::from(unit), shafts, is_two_wires: false };
+    let setup = |unit: u8| SixpackSetup {
+        unit,
+        serial: 1_000 + u16::from(unit),
+        shafts,
+        is_two_wires: false,
+        can_baud: None,
+    };
     let units = args.tty.units::<SixpackBus>();
     let bus = SixpackBus::waking(units.into_iter().map(setup), Monotonic.now());
     tty::run(bus, args, path, signals)

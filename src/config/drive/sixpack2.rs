@@ -7,6 +7,9 @@ use crate::wire::sixpack2::{GREATEST_DIVIDER, MOST_STEPS, greatest_divider};
 
 /// The shares of its peak current that it can be set to, percent (CMD $11).
 pub(crate) const SHARES: [u8; 9] = [100, 75, 50, 38, 25, 19, 13, 9, 0];
+/// Microsteps that an axis and the search for its zero may make together: the counter of a seat that is home begins at 1,000,000, and none that was
+/// restarted, or is not home yet, may look like that.
+const MOST_WAY: f64 = 900_000.0;
 /// The divider that its manual starts with.
 const USUAL_DIVIDER: u8 = 5;
 
@@ -105,6 +108,20 @@ impl Sixpack2Drive {
     /// it is told.
     pub(crate) fn slower_clock(&self, seat: &SeatType) -> Option<u8> {
         greatest_divider(fastest(seat)?.0).filter(|enough| *enough > self.clock_divider)
+    }
+
+    /// Why a counter that is not home could look like one that is.
+    pub(crate) fn ambiguous_for(seat: &SeatType, travel_mm: f64) -> Option<String> {
+        // A search goes a quarter farther than its travel before it is ended.
+        let way = |axis: &AxisGeometry| (axis.stroke() + 1.25 * travel_mm) / axis.lead * axis.pulses_per_rev;
+        let most = seat.own().iter().map(way).fold(0.0, f64::max);
+        (most > MOST_WAY).then(|| {
+            format!(
+                "stroke and search of {} are {most:.0} microsteps, over {MOST_WAY:.0}: a unit that was restarted could look as if it were \
+                 home; lower pulses_per_rev or travel_mm",
+                seat.name
+            )
+        })
     }
 
     /// Why the clock divider is too great for the seat's greatest speed.

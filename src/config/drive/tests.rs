@@ -85,6 +85,8 @@ fn a_seat_on_a_sixpack_reads_as_it_is_written_and_its_link_has_the_rate_that_is_
     let bus = LINK.replace("/dev/ttyUSB0", "can0") + "wiring = \"can\"\n";
     let can = parse(&sixpack_hall(SIX, &bus)).unwrap();
     assert_eq!((can.links[0].wiring, can.links[0].baud), (LinkWiring::Can, 500_000));
+    let slow = only(parse(&sixpack_hall(SIX, &(bus + "baud = 20000\n"))));
+    assert!(slow.contains("baud: 20000 is outside 50000..=1000000, the bit rates of a CAN bus"), "{slow}");
 }
 
 #[test]
@@ -115,6 +117,25 @@ fn a_drive_moves_one_axis() {
     assert!(fault.contains("units: motor 1 of unit 1 of link stalls moves another axis"), "{fault}");
     let other_motors = SIX.replace("B1", "B2").replace("[0, 1, 2]", "[3, 4, 5]");
     assert!(six(&format!("{SIX}{other_motors}"), "").is_ok());
+}
+
+#[test]
+fn seats_on_one_sixpack_share_its_clock_and_their_current() {
+    let other = |drive: &str| {
+        let seat = SEAT.replace("seat.s", "seat.t").replace("4000", "3200");
+        let drive = format!(
+            "[seat.t.drive]\n{drive}\nhome = {{ way = \"switch\", toward = \"down\", travel_mm = 165, zero_mm = -2 }}\n"
+        );
+        let second = SIX.replace("B1", "B2").replace("[0, 1, 2]", "[3, 4, 5]").replace("\"s\"", "\"t\"");
+        six(&format!("{seat}{drive}{SIX}{second}"), "")
+    };
+    assert!(other("clock_divider = 3\ncurrent = { peak = 238, run = \"100%\" }").is_ok());
+    for unlike in
+        ["clock_divider = 2\ncurrent = { peak = 238 }", "clock_divider = 3\ncurrent = { peak = 200 }"]
+    {
+        let fault = only(other(unlike));
+        assert!(fault.contains("unit: unit 1 moves B1, too, with another clock_divider"), "{fault}");
+    }
 }
 
 #[test]
@@ -267,6 +288,8 @@ fn a_seat_says_of_its_motors_what_their_family_needs() {
     assert!(
         six("pulses_per_rev = 3200", "pulses_per_rev = 6400").contains("microsteps a second, over 200000")
     );
+    let long = "stroke_mm = 150\nlead_mm = 5";
+    assert!(six(long, "stroke_mm = 1500\nlead_mm = 5").contains("are 960000 microsteps, over 900000"));
     assert!(six("\"75%\"", "\"70%\"").contains("run: \"70%\" is not one of 100%, 75%, 50%"));
     assert!(six("current = { peak = 9, run = \"75%\" }", "").contains("a SIXpack 2 needs current"));
     assert!(six("[2]", "[4]").contains("reverse: 4 is outside 1..=3"));

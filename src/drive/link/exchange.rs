@@ -18,13 +18,20 @@ pub(crate) struct TalkTerms {
     pub(crate) has_echo: bool,
     /// All share two wires: only one may speak at a time.
     pub(crate) is_two_wires: bool,
+    /// It is a CAN bus: each message is whole by itself and has a sum, and nobody changes its rate.
+    pub(crate) is_bus: bool,
 }
 
 impl TalkTerms {
     /// Those of a link.
     pub(crate) fn of(link: &Link) -> Self {
-        let (octet_bits, is_two_wires) = (9 + u32::from(link.stop_bits), link.wiring == LinkWiring::Rs485);
-        Self { baud: link.baud, octet_bits, has_echo: link.has_echo, is_two_wires }
+        Self {
+            baud: link.baud,
+            octet_bits: link.octet_bits(),
+            has_echo: link.has_echo,
+            is_two_wires: link.wiring == LinkWiring::Rs485,
+            is_bus: link.wiring == LinkWiring::Can,
+        }
     }
 }
 

@@ -1,13 +1,15 @@
-//! A serial line as procedures have it: opened by what the configuration says of a link, and ours alone until it is dropped.
+//! A serial line, or a CAN bus, as procedures have it: opened by what the configuration says of a link, and ours alone until it is dropped.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
+use super::bus::BusPort;
 use super::{LinkFault, LinkPort};
 use crate::config::Link;
 use crate::config::link::LinkWiring;
+#[cfg(test)]
+use crate::sys::can::CanSocket;
 use crate::sys::clock::Monotonic;
-use crate::sys::serial::{SerialError, SerialPort, SerialSettings, StopBits};
+use crate::sys::serial::{CanError, SerialError, SerialPort, SerialSettings, StopBits};
 use crate::time::{Clock as _, MonoTime};
 
 /// How long the driver may take for a message: its buffer holds more than any.
@@ -18,9 +20,14 @@ const LOOKS: Duration = Duration::from_micros(200);
 /// A line. One that fails is closed, so that its name is free for what is plugged in next, and can be opened again.
 #[derive(Debug)]
 pub(crate) struct LinkLine {
-    port: Option<SerialPort>,
-    path: PathBuf,
-    settings: SerialSettings,
+    port: Option<OpenPort>,
+    link: Link,
+}
+
+#[derive(Debug)]
+enum OpenPort {
+    Serial(SerialPort),
+    Bus(BusPort),
 }
 
 impl LinkLine {
@@ -36,34 +43,58 @@ impl LinkLine {
 
     /// The line of a link as long as its port cannot be had.
     pub(crate) fn closed(link: &Link) -> Self {
-        let stop_bits = if link.stop_bits == 2 { StopBits::Two } else { StopBits::One };
-        let is_rs485 = link.wiring == LinkWiring::Rs485;
-        let settings = SerialSettings { baud: link.baud, stop_bits, is_rs485 };
-        Self { port: None, path: link.port.clone(), settings }
+        Self { port: None, link: link.clone() }
+    }
+
+    /// That of a link over a bus that is open.
+    #[cfg(test)]
+    pub(crate) fn over(link: &Link, bus: CanSocket) -> Self {
+        Self { port: Some(OpenPort::Bus(BusPort::over(bus))), link: link.clone() }
+    }
+
+    fn settings(&self) -> SerialSettings {
+        let stop_bits = if self.link.stop_bits == 2 { StopBits::Two } else { StopBits::One };
+        SerialSettings { baud: self.link.baud, stop_bits, is_rs485: self.link.wiring == LinkWiring::Rs485 }
     }
 
     fn open_again(&mut self) -> Result<(), SerialError> {
+        let path = &self.link.port;
         if self.port.is_none() {
-            self.port = Some(SerialPort::open(&self.path, self.settings)?);
+            self.port = Some(match self.link.wiring {
+                LinkWiring::Can => OpenPort::Bus(BusPort::open(path)?),
+                LinkWiring::Rs232 | LinkWiring::Rs485 => {
+                    OpenPort::Serial(SerialPort::open(path, self.settings())?)
+                }
+            });
         }
         Ok(())
     }
 
-    /// All that was sent has left the driver: a break or another rate would make other orders of what is late.
+    /// All that was sent has left the driver: a break or another rate would make other orders of what is late. What waits on a bus that
+    /// nobody acknowledges cannot be taken back; so nothing more is handed over, and its port stays open.
     fn drain(&mut self) -> Result<(), LinkFault> {
         let deadline = self.now() + HAND_OVER;
-        while self.with(|port| port.line().unsent().ok())? > 0 {
-            if self.now() >= deadline {
-                self.port = None;
-                return Err(LinkFault);
+        loop {
+            let has_left = self.with(|port| match port {
+                OpenPort::Serial(port) => Some(port.line().unsent().ok()? == 0),
+                OpenPort::Bus(bus) => bus.drain(deadline).ok(),
+            })?;
+            match self.port {
+                _ if has_left => return Ok(()),
+                Some(OpenPort::Serial(_)) if self.now() < deadline => {
+                    self.sleep_until(self.now() + LOOKS);
+                }
+                Some(OpenPort::Bus(_)) => return Err(LinkFault),
+                _ => {
+                    self.port = None;
+                    return Err(LinkFault);
+                }
             }
-            self.sleep_until(self.now() + LOOKS);
         }
-        Ok(())
     }
 
     /// Does something with the port, which is closed where that fails.
-    fn with<T>(&mut self, does: impl FnOnce(&mut SerialPort) -> Option<T>) -> Result<T, LinkFault> {
+    fn with<T>(&mut self, does: impl FnOnce(&mut OpenPort) -> Option<T>) -> Result<T, LinkFault> {
         let done = self.port.as_mut().and_then(does);
         if done.is_none() {
             self.port = None;
@@ -80,13 +111,19 @@ impl LinkPort for LinkLine {
     fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
         let deadline = self.now() + HAND_OVER;
         self.with(|port| {
-            let taken = port.line().write(octets, deadline).ok()?;
-            (taken == octets.len()).then_some(())
+            let is_taken = match port {
+                OpenPort::Serial(port) => port.line().write(octets, deadline).ok()? == octets.len(),
+                OpenPort::Bus(bus) => bus.send(octets, deadline).ok()?,
+            };
+            is_taken.then_some(())
         })
     }
 
     fn receive(&mut self, buf: &mut [u8], deadline: MonoTime) -> Result<usize, LinkFault> {
-        self.with(|port| port.line().read(buf, deadline).ok())
+        self.with(|port| match port {
+            OpenPort::Serial(port) => port.line().read(buf, deadline).ok(),
+            OpenPort::Bus(bus) => bus.read(buf, deadline).ok(),
+        })
     }
 
     fn flush(&mut self) -> usize {
@@ -98,19 +135,35 @@ impl LinkPort for LinkLine {
         dropped
     }
 
+    /// A frame of a bus begins by itself.
     fn send_break(&mut self, span: Duration) -> Result<(), LinkFault> {
         self.drain()?;
-        self.with(|port| port.send_break(span).ok())
+        self.with(|port| match port {
+            OpenPort::Serial(port) => port.send_break(span).ok(),
+            OpenPort::Bus(_) => Some(()),
+        })
     }
 
     fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault> {
-        self.settings.baud = baud;
+        self.link.baud = baud;
         self.drain()?;
-        let (path, settings) = (self.path.clone(), self.settings);
-        self.with(|port| port.set(&path, settings).ok())
+        let (path, settings) = (self.link.port.clone(), self.settings());
+        self.with(|port| match port {
+            OpenPort::Serial(port) => port.set(&path, settings).ok(),
+            OpenPort::Bus(_) => None, // that of a bus is the system's
+        })
     }
 
-    fn mend(&mut self) -> Result<(), SerialError> {
+    fn mend(&mut self, until: MonoTime) -> Result<(), SerialError> {
+        if let Some(OpenPort::Bus(bus)) = &mut self.port {
+            // What waited is followed at once by what is told next.
+            match bus.drain(until) {
+                Ok(true) => return Ok(()),
+                Ok(false) => return Err(CanError::Unheard(self.link.port.clone()).into()),
+                Err(_) => self.port = None,
+            }
+        }
+        self.sleep_until(until);
         self.open_again()
     }
 

@@ -3,6 +3,7 @@
 //! A lane on a link writes a record of this program's own in place of a datagram, so that everything before the sink stays the same for all
 //! families; the thread of the link makes of poses what its drives are sent.
 
+mod bus;
 mod delays;
 mod exchange;
 mod homing;

@@ -38,11 +38,12 @@ pub(crate) trait LinkPort {
     /// A [`LinkFault`] where the port is gone, or cannot make that rate.
     fn set_baud(&mut self, baud: u32) -> Result<(), LinkFault>;
 
-    /// Tries to have it again where it is gone.
+    /// Tries to have it again where it is gone, once, by then.
     ///
     /// # Errors
     /// Why it cannot be had, with what to do.
-    fn mend(&mut self) -> Result<(), SerialError> {
+    fn mend(&mut self, until: MonoTime) -> Result<(), SerialError> {
+        self.sleep_until(until);
         Ok(())
     }
 
@@ -63,8 +64,8 @@ impl<P: LinkPort + ?Sized> LinkPort for Box<P> {
         (**self).now()
     }
 
-    fn mend(&mut self) -> Result<(), SerialError> {
-        (**self).mend()
+    fn mend(&mut self, until: MonoTime) -> Result<(), SerialError> {
+        (**self).mend(until)
     }
 
     fn send(&mut self, octets: &[u8]) -> Result<(), LinkFault> {
@@ -84,7 +85,7 @@ impl<P: LinkPort + ?Sized> LinkPort for Box<P> {
     }
 }
 
-/// The port is gone: neither what was sent nor what is answered goes over it.
+/// The port is gone, or nobody takes what goes out on it: neither what was sent nor what is answered goes over it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the port has vanished; check the plug and the power of the adapter")]
+#[error("nothing goes out by the port any more; check its plug, and the power of adapter and units")]
 pub(crate) struct LinkFault;

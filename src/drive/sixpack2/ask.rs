@@ -1,19 +1,13 @@
 //! What any procedure asks of a unit: who it is, and where a motor of it is.
 
-use super::talk::{ANSWER, Talk, TalkFault};
+use super::talk::{ANSWER, Talk, TalkFault, waking_baud};
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _};
 use crate::wire::sixpack2::{
-    PositionQuery, PositionTold, SixpackOrder, SixpackReply, UnitQuery, UnitTold, WAKING_DIVISOR, action,
-    baud_of,
+    PositionQuery, PositionTold, SixpackOrder, SixpackReply, UnitQuery, UnitTold, action,
 };
 
 /// How often a unit is asked at a rate before it counts as silent there.
 const TRIES: u32 = 2;
-
-/// The rate with which units wake.
-pub(super) fn waking_baud() -> u32 {
-    baud_of(WAKING_DIVISOR).unwrap_or(19_200)
-}
 
 /// Who it is; asking clears its reset flag.
 pub(super) const WHO: SixpackOrder = SixpackOrder::AskUnit(UnitQuery { response: ANSWER });

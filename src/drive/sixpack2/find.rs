@@ -3,8 +3,8 @@
 
 use std::time::Duration;
 
-use super::ask::{at_waking_rate, waking_baud, who};
-use super::talk::Talk;
+use super::ask::{at_waking_rate, who};
+use super::talk::{Talk, TalkFault};
 use crate::drive::link::{LinkFault, LinkPort};
 use crate::wire::sixpack2::UnitTold;
 
@@ -19,6 +19,9 @@ pub(crate) enum FindError {
     /// The port.
     #[error(transparent)]
     Link(#[from] LinkFault),
+    /// It does not answer at the only rate that there is.
+    #[error(transparent)]
+    Silent(TalkFault),
     /// It answers at neither rate.
     #[error(
         "unit {unit} answers neither at {baud} nor at {waking} baud, its power-on rate; check its number, its power and the \
@@ -53,7 +56,7 @@ pub(crate) enum FindError {
 /// # Errors
 /// A [`FindError`] of the first that cannot be had; the line is back at its own rate.
 pub(crate) fn find<P: LinkPort>(talk: &mut Talk<P>, units: &[u8]) -> Result<Vec<UnitTold>, FindError> {
-    let (baud, waking) = (talk.own_baud(), waking_baud());
+    let (baud, other) = (talk.own_baud(), talk.other_baud());
     let mut first: Vec<Option<UnitTold>> = vec![None; units.len()];
     let mut missing: Vec<usize> = (0..units.len()).collect();
     for _ in 0..ROUNDS {
@@ -61,15 +64,15 @@ pub(crate) fn find<P: LinkPort>(talk: &mut Talk<P>, units: &[u8]) -> Result<Vec<
         if missing.is_empty() {
             return Ok(first.into_iter().flatten().collect());
         }
-        if baud != waking {
+        if other.is_some() {
             at_waking_rate(talk, |talk| wake(talk, units, &missing, &mut first, baud))?;
         }
     }
     let (unit, is_awake) = (units[missing[0]], first[missing[0]].is_some());
-    Err(if is_awake {
-        FindError::Stays { unit, baud, waking }
-    } else {
-        FindError::Nowhere { unit, baud, waking }
+    Err(match other {
+        Some(waking) if is_awake => FindError::Stays { unit, baud, waking },
+        Some(waking) => FindError::Nowhere { unit, baud, waking },
+        None => FindError::Silent(TalkFault::Silent { unit, baud }),
     })
 }
 

@@ -1,6 +1,6 @@
 //! What a unit says of itself; nothing is written and nothing moves. Asking clears its reset flag, and the stop flag of a motor.
 
-use super::ask::{WHO, at_waking_rate, position, searches, waking_baud, who};
+use super::ask::{WHO, at_waking_rate, position, searches, who};
 use super::set_up::{MotorAxis, SeatMotors};
 use super::talk::{ANSWER, Talk, TalkFault};
 use crate::drive::link::{LinkPort, LinkTalk as _};
@@ -79,7 +79,7 @@ pub(crate) fn look_for<P: LinkPort>(
     motors: &[u8],
 ) -> Result<Option<UnitFacts>, TalkFault> {
     let looked = look(talk, unit, motors).map(Some);
-    if talk.own_baud() == waking_baud() || !matches!(looked, Err(TalkFault::Silent { .. })) {
+    if talk.other_baud().is_none() || !matches!(looked, Err(TalkFault::Silent { .. })) {
         return looked;
     }
     let told = at_waking_rate(talk, |talk| who(talk, unit))?;

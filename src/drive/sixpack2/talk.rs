@@ -1,7 +1,8 @@
 //! One exchange at a time, in frames of nine octets: what a unit is told, and what it answers where it is asked.
 //!
 //! Nothing but a question is answered, and no frame carries a sum. So each frame begins behind a break, by which a unit forgets what it
-//! has of another: an octet that is lost or comes twice costs one frame and no more. What has to be taken is sent with a question right
+//! has of another: an octet that is lost or comes twice costs one frame and no more. (On a bus each is whole by itself, and the break is
+//! none.) What has to be taken is sent with a question right
 //! behind it ([`Talk::confirm`]): the question is answered only where what stands before it had nine octets. A bit that is flipped
 //! is obeyed all the same, so what can be read back is.
 
@@ -10,7 +11,7 @@ use std::time::Duration;
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk, Moment, TalkState, TalkTerms};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{
-    BAUD_CLOCK, BaudSwitch, FRAME_LEN, SixpackFrame, SixpackOrder, SixpackReply, baud_of,
+    BAUD_CLOCK, BaudSwitch, FRAME_LEN, SixpackFrame, SixpackOrder, SixpackReply, WAKING_DIVISOR, baud_of,
 };
 
 /// The address of answers: no unit has it, so that none takes an answer on the same wires for a question.
@@ -27,6 +28,11 @@ pub(super) const LONGEST_DELAY: Duration = Duration::from_millis(17);
 const TRIES: u32 = 4;
 /// How long a unit is told to wait before it answers, and to hold the line, in 2 ms: what a host needs to let go of two wires.
 const DELAY: u16 = 1;
+
+/// The rate with which units wake.
+pub(super) fn waking_baud() -> u32 {
+    baud_of(WAKING_DIVISOR).unwrap_or(19_200)
+}
 
 /// Why there is no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -76,6 +82,12 @@ impl<P: LinkPort> Talk<P> {
     /// The rate of the link.
     pub(super) const fn own_baud(&self) -> u32 {
         self.own_baud
+    }
+
+    /// The other rate at which units may be found, as they wake; none where all talk at that of the link for ever.
+    pub(super) fn other_baud(&self) -> Option<u32> {
+        let waking = waking_baud();
+        (!self.state.terms.is_bus && self.own_baud != waking).then_some(waking)
     }
 
     /// When a frame that is sent now has wholly arrived, and how long one takes.

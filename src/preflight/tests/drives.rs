@@ -5,13 +5,12 @@ use std::time::Duration;
 
 use super::super::{Check, DriveSubject, LinkSurvey, judge_driven};
 use crate::config::drive_controller::Motors;
-use crate::config::link::LinkWiring;
 use crate::config::{self, Acceptance, Config};
 use crate::drive::link::TalkCounts;
 use crate::drive::rates::LinkLoad;
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts};
 use crate::drive::sixpack2::{self, MotorFacts};
-use crate::sys::serial::SerialError;
+use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
 use crate::wire::sixpack2::action;
 
@@ -187,6 +186,9 @@ fn a_port_that_cannot_be_had_is_told_by_what_is_wrong_with_it() {
         (SerialError::Taken(port()), Check::PortTaken, "another program has it"),
         (SerialError::Forbidden(port()), Check::PortForbidden, "not allowed to open it"),
         (SerialError::NoLine(port()), Check::PortUnfit, "it is not a serial line"),
+        (CanError::Missing(port()).into(), Check::PortMissing, "there is no such interface"),
+        (CanError::Taken(port()).into(), Check::PortTaken, "another kinocue has it"),
+        (CanError::Off(port()).into(), Check::PortUnfit, "its controller has left the bus"),
     ] {
         let mut case = Case::new();
         case.survey = LinkSurvey::silent(error);
@@ -240,11 +242,4 @@ fn a_sixpack_is_home_where_each_of_its_motors_counts_a_place_of_the_seat() {
     woke.assert_found(Check::NoAnswer, "unit 1 does not answer at 56818 baud");
     woke.survey.sixpacks.clear();
     woke.assert_found(Check::NoAnswer, "unit 1 was not read");
-}
-
-#[test]
-fn of_a_seat_on_a_can_bus_it_is_told_that_nobody_asked() {
-    let mut case = sixpack();
-    case.hall.links.iter_mut().for_each(|link| link.wiring = LinkWiring::Can);
-    case.assert_found(Check::DrivesUnasked, "is a CAN bus, which is not supported yet");
 }

@@ -36,6 +36,8 @@ pub(crate) struct SixpackSetup {
     pub(crate) shafts: [ShaftSetup; MOTORS],
     /// Only one may speak at a time: what it hears while it drives the line is lost.
     pub(crate) is_two_wires: bool,
+    /// It is on a CAN bus of so many bits a second, whatever it is told of its serial line.
+    pub(crate) can_baud: Option<u32>,
 }
 
 /// What can happen to a unit.
@@ -147,7 +149,7 @@ impl SixpackUnit {
 
     /// At which it listens and speaks.
     pub(crate) fn baud(&self) -> u32 {
-        baud_of(self.divisor).unwrap_or(1)
+        self.setup.can_baud.or(baud_of(self.divisor)).unwrap_or(1)
     }
 
     /// Something happens to it.
@@ -239,7 +241,7 @@ impl SixpackUnit {
     }
 
     fn delay(&self) -> Duration {
-        TIME * u32::from(self.delay)
+        if self.setup.can_baud.is_some() { Duration::ZERO } else { TIME * u32::from(self.delay) }
     }
 
     fn obey(&mut self, frame: SixpackFrame, now: MonoTime) {

@@ -63,6 +63,9 @@ pub(crate) enum SerialError {
         plain::path(.0)
     )]
     Rs485(PathBuf),
+    /// It is a bus.
+    #[error(transparent)]
+    Can(#[from] CanError),
     /// Anything else that the system says.
     #[error("{}: cannot set up the line; check the adapter and its driver", plain::path(path))]
     System {
@@ -82,6 +85,75 @@ impl SerialError {
             Errno::ACCESS | Errno::PERM => Self::Forbidden(path),
             Errno::NOTTY | Errno::ISDIR => Self::NoLine(path),
             Errno::NODEV | Errno::NXIO | Errno::IO => Self::Vanished(path),
+            errno => Self::System { path, source: Arc::new(errno.into()) },
+        }
+    }
+}
+
+/// Frames that the interface of a bus has to take at once, more than the motors on it are told in a slice. One without a queue of its own (0) takes
+/// any number.
+pub(in crate::sys) const QUEUE: u32 = 64;
+
+/// Why a bus cannot be had, and what to do.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum CanError {
+    /// The kernel, or the service's sandbox, knows none.
+    #[error(
+        "{at}: this system opens no CAN bus; load the kernel's module can-raw, give the service the drop-in kinocue-drives.conf, or put the \
+         units on a serial line",
+        at = plain::path(.0)
+    )]
+    NoCan(PathBuf),
+    /// Nothing has that name.
+    #[error("{at}: there is no such interface; plug the adapter in, and look for its name by `ip link`", at = plain::path(.0))]
+    Missing(PathBuf),
+    /// It is a network of another kind.
+    #[error("{at}: it is no CAN bus; name the interface of the adapter, such as can0", at = plain::path(.0))]
+    Other(PathBuf),
+    /// Nobody has brought it up.
+    #[error(
+        "{at}: the interface is down; `ip link set {at} up type can bitrate N`, with the bit rate of the units",
+        at = plain::path(.0)
+    )]
+    Down(PathBuf),
+    /// Its controller has made too many faults to take part.
+    #[error(
+        "{at}: its controller has left the bus (bus-off); check wiring, terminating resistors and bit rate, then \
+         `ip link set {at} type can restart`",
+        at = plain::path(.0)
+    )]
+    Off(PathBuf),
+    /// Nobody acknowledges what is sent.
+    #[error(
+        "{at}: nobody on the bus acknowledges what is sent; check plug, terminating resistors, bit rate and the power of the units",
+        at = plain::path(.0)
+    )]
+    Unheard(PathBuf),
+    /// A stop could find no room behind what waits.
+    #[error("{at}: the interface queues {count} frames, {QUEUE} are needed; `ip link set {at} txqueuelen {QUEUE}`", at = plain::path(.0), count = .1)]
+    ShortQueue(PathBuf, u32),
+    /// Another play has it.
+    #[error("{at}: another kinocue has it; end that program: two masters on one bus move each other's seats", at = plain::path(.0))]
+    Taken(PathBuf),
+    /// Anything else that the system says.
+    #[error("{}: cannot open the bus; check the adapter and its driver", plain::path(path))]
+    System {
+        /// The interface.
+        path: PathBuf,
+        /// What it says.
+        source: Arc<io::Error>,
+    },
+}
+
+impl CanError {
+    pub(in crate::sys) fn of(interface: &Path, errno: Errno) -> Self {
+        let path = interface.to_owned();
+        match errno {
+            Errno::AFNOSUPPORT | Errno::PROTONOSUPPORT => Self::NoCan(path),
+            Errno::NODEV | Errno::NXIO | Errno::INVAL => Self::Missing(path),
+            Errno::NETDOWN => Self::Down(path),
+            Errno::ADDRINUSE => Self::Taken(path),
             errno => Self::System { path, source: Arc::new(errno.into()) },
         }
     }

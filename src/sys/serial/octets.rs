@@ -13,7 +13,7 @@ use crate::time::{Clock as _, MonoTime};
 
 /// What octets go out on and come in by.
 #[derive(Debug)]
-pub(crate) struct OctetLine(pub(super) OwnedFd);
+pub(crate) struct OctetLine(pub(in crate::sys) OwnedFd);
 
 impl OctetLine {
     /// Reads what has come, waiting for it until `deadline`; 0 if nothing came by then. A deadline that is past takes what is

@@ -5,6 +5,9 @@ use super::SixpackFrame;
 /// Identifiers of an address, of which it is the first.
 const IDS_OF_AN_ADDRESS: u16 = 8;
 
+/// The bits of an identifier that are 0 in all of theirs.
+pub(crate) const ID_ZEROS: u16 = IDS_OF_AN_ADDRESS - 1;
+
 /// A frame of a CAN bus with an identifier of eleven bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct CanFrame {

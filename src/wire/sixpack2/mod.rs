@@ -16,7 +16,9 @@ mod reply;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use can::{CanFrame, CanFrameError};
+#[cfg(test)]
+pub(crate) use can::CanFrameError;
+pub(crate) use can::{CanFrame, ID_ZEROS};
 pub(crate) use clock::{
     BAUD_CLOCK, GREATEST_DIVIDER, MOST_SPEED, MOST_STEPS, WAKING_DIVISOR, baud_of, greatest_divider,
     steps_of_a_unit,

@@ -33,6 +33,7 @@ pub(crate) enum SixpackOrder {
     /// `$20`.
     AskPosition(PositionQuery),
     /// `$21`.
+    #[cfg_attr(not(test), expect(dead_code, reason = "positions tell as much"))]
     AskVelocity(VelocityQuery),
     /// `$22`.
     Search(ReferenceSearch),

@@ -11,6 +11,8 @@ use crate::wire::silvermax::{Poll, Request, StatusWord, Words};
 
 /// How far a target may be from the model of its segments, mm.
 const OFF_COURSE_MM: f64 = 0.5;
+/// How far a motor is beside the model where its target is asked at once, mm: farther than a servo lags.
+const FAR_MM: f64 = 1.5;
 /// When exactly a unit reads its registers is not known to better than this, seconds.
 const READING: f64 = 0.000_5;
 
@@ -46,6 +48,10 @@ impl<P: LinkPort> Stream<SilverMax, P> {
                 let course = if axis.has_started() { axis.course_at(sent) } else { axis.course };
                 axis.figures.error_mm = scale.mm(f64::from(value) - course.position());
                 let position = axis.figures.position;
+                if axis.figures.error_mm.abs() > FAR_MM {
+                    // A segment that was damaged leads it there, or its load does: the target tells.
+                    axis.polls.hurry(Question::Target, self.talk.now());
+                }
                 if !matches!(self.lanes[l].stage, Stage::Out | Stage::Lost) {
                     let (lane, axis) = (number(l), axis_number(a));
                     self.tell(StreamEvent::Read { lane, axis, position, at: sent });

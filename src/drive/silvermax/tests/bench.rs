@@ -27,7 +27,7 @@ pub(super) fn talk_to(setups: &[UnitSetup]) -> Talk<VirtualPort> {
     let line = SerialLine::new(bus, 11, LineFaults::default(), 7);
     Talk::new(
         VirtualPort::new(line, now),
-        TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false, is_two_wires: false },
+        TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false, is_two_wires: false, is_bus: false },
     )
 }
 

@@ -39,7 +39,7 @@ fn reached(baud: u32, turn: (u64, u16, f64), axes: u8) -> [f64; 2] {
     let setup = |index: u8| UnitSetup { place: 12_000, adl: turn.1, ..UnitSetup::new(16 + index) };
     let setups: Vec<_> = (0..axes).map(setup).collect();
     let line = SerialLine::new(SilverBus::new(&setups, baud, now), 11, LineFaults::default(), 7);
-    let terms = TalkTerms { baud, octet_bits: 11, has_echo: false, is_two_wires: false };
+    let terms = TalkTerms { baud, octet_bits: 11, has_echo: false, is_two_wires: false, is_bus: false };
     let mut talk = Talk::new(VirtualPort::new(line, now), terms);
     let (drive, units) = (drive(SWITCH), (16..16 + axes).collect::<Vec<_>>());
     let (seat, silvermax) =

@@ -64,6 +64,39 @@ fn flipped_bits_never_lead_beyond_the_soft_limits() {
     }
 }
 
+#[expect(clippy::print_stdout, reason = "the figure is for who asks to see it")]
+#[test]
+fn a_segment_that_was_damaged_puts_its_seat_out_within_a_few_readings_of_its_place() {
+    let mut longest = Duration::ZERO;
+    for phase in 0..8 {
+        let mut play = Play::with_ppm([0; 3]);
+        play.judged = false;
+        play.begin(ride);
+        play.play(6.0 + 0.13 * f64::from(phase), 0);
+        // A segment of unit 17 of as many ticks, but as fast as can be.
+        play.stream.talk.port().damage = Some(Box::new(|sent| {
+            let text = String::from_utf8_lossy(sent).into_owned();
+            let words: Vec<_> = text.trim_end().split(' ').collect();
+            let ["@17", "25", ticks, place @ ("2147483647" | "-2147483648"), _, _] = words[..] else {
+                return false;
+            };
+            *sent = format!("@17 25 {ticks} {place} 9999999 2000000000\r").into_bytes();
+            true
+        }));
+        let damaged = play.now();
+        play.play(3.0, 0);
+        assert!(
+            play.stream.talk.port().damage.is_none() && play.has("OffCourse"),
+            "{phase}: {:?}",
+            play.rare()
+        );
+        let out = play.told.iter().find(|(_, event)| matches!(event, StreamEvent::OffCourse { .. }));
+        longest = longest.max(out.unwrap().0.since(damaged));
+    }
+    println!("{longest:?}");
+    assert!(longest < Duration::from_millis(600), "{longest:?}");
+}
+
 #[test]
 fn a_stop_is_on_the_line_after_one_exchange_and_each_unit_has_acked_it() {
     let mut play = Play::with_ppm([0; 3]);

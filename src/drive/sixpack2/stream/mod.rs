@@ -23,10 +23,9 @@ use std::time::Duration;
 use self::axis::Axis;
 use self::lane::{LaneState, SixpackLane};
 use self::track::Track;
-use super::ask::waking_baud;
 use super::home::{Homing, home};
 use super::set_up::{HomeError, SeatMotors};
-use super::talk::Talk;
+use super::talk::{Talk, waking_baud};
 use crate::drive::link::{
     BrakeReason, Family, IDLE, Lead, LedPose, LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent,
     StreamTerms, lane_number as number,

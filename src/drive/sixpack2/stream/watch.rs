@@ -338,13 +338,13 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         Ok(())
     }
 
-    /// Who a unit is, if it is there, asked once. At the rate with which it wakes that is asked by turns, but only while nobody plays; one
+    /// Who a unit is, if it is there, asked once. At the rate with which it wakes, if that is another, that is asked by turns, but only while nobody plays; one
     /// that answers there is switched to the rate of the link.
     fn seek(&mut self, index: usize) -> Result<Option<UnitTold>, LinkFault> {
-        let nobody_plays = !self.lanes.iter().any(SixpackLane::plays);
+        let may_wake = self.talk.other_baud().is_some() && !self.lanes.iter().any(SixpackLane::plays);
         let own = &mut self.lanes[index].own;
         own.probes = own.probes.wrapping_add(1);
-        let (unit, is_waking) = (own.unit, own.probes.is_multiple_of(2) && nobody_plays);
+        let (unit, is_waking) = (own.unit, own.probes.is_multiple_of(2) && may_wake);
         if !is_waking {
             let told = who_now(&mut self.talk, unit)?;
             self.lanes[index].own.was_heard |= told.is_some();

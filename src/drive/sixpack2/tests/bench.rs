@@ -29,7 +29,13 @@ pub(super) fn shaft() -> ShaftSetup {
 }
 
 pub(super) fn unit_with(unit: u8, shaft: ShaftSetup) -> SixpackSetup {
-    SixpackSetup { unit, serial: 1_000 + u16::from(unit), shafts: [shaft; MOTORS], is_two_wires: false }
+    SixpackSetup {
+        unit,
+        serial: 1_000 + u16::from(unit),
+        shafts: [shaft; MOTORS],
+        is_two_wires: false,
+        can_baud: None,
+    }
 }
 
 /// Units that wake, on a line without faults; the host's end is at the rate of the link.
@@ -40,10 +46,13 @@ pub(super) fn talk_to(setups: &[SixpackSetup]) -> Talk<VirtualPort> {
 pub(super) fn talk_at(setups: &[SixpackSetup], baud: u32) -> Talk<VirtualPort> {
     let now = MonoTime::from_nanos(3_000_000_000);
     let bus = SixpackBus::waking(setups.iter().copied(), now);
-    let mut line = SerialLine::new(bus, 10, LineFaults::default(), 7);
+    let is_bus = setups.iter().any(|setup| setup.can_baud.is_some());
+    // Octets of fifteen bits take as long as the frames of a bus.
+    let octet_bits = if is_bus { 15 } else { 10 };
+    let mut line = SerialLine::new(bus, octet_bits, LineFaults::default(), 7);
     line.set_host_baud(Some(baud));
     let is_two_wires = setups.iter().any(|setup| setup.is_two_wires);
-    let terms = TalkTerms { baud, octet_bits: 10, has_echo: false, is_two_wires };
+    let terms = TalkTerms { baud, octet_bits, has_echo: false, is_two_wires, is_bus };
     Talk::new(VirtualPort::new(line, now), terms)
 }
 

@@ -83,7 +83,8 @@ impl Bad {
         let bus = talk_to(&[unit_with(1, shaft())]).port().line.bus().clone();
         let now = MonoTime::from_nanos(3_000_000_000);
         let line = SerialLine::new(bus, 10, LineFaults::default(), 7);
-        let terms = TalkTerms { baud: BAUD, octet_bits: 10, has_echo: false, is_two_wires: false };
+        let terms =
+            TalkTerms { baud: BAUD, octet_bits: 10, has_echo: false, is_two_wires: false, is_bus: false };
         let mut port = VirtualPort::new(line, now);
         port.line.set_host_baud(Some(BAUD));
         Talk::new(Self(port, against, BAUD), terms)
@@ -173,7 +174,7 @@ fn answers_that_are_lost_late_or_doubled_are_counted_and_asked_for_again() {
 fn an_echo_is_taken_back_and_is_no_answer() {
     let mut talk = talk_to(&[unit_with(1, shaft())]);
     find(&mut talk, &[1]).unwrap();
-    let terms = TalkTerms { baud: BAUD, octet_bits: 10, has_echo: true, is_two_wires: true };
+    let terms = TalkTerms { baud: BAUD, octet_bits: 10, has_echo: true, is_two_wires: true, is_bus: false };
     let now = talk.now();
     let bus = talk.port().line.bus().clone();
     let mut line = SerialLine::new(bus, 10, LineFaults { echo: true, ..LineFaults::default() }, 3);

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::bench::*;
+use super::play::Play;
 use crate::config::drive::homing::{HomeWay, Side};
 use crate::config::drive::sixpack2::PropDiv;
 use crate::drive::link::{LinkTalk as _, Step};
@@ -184,6 +185,55 @@ fn wherever_a_homing_is_cut_off_counters_that_have_places_of_the_seat_are_of_mot
         }
     }
     assert!(known > 20 && unknown > 400, "{known} {unknown}");
+}
+
+#[test]
+fn nothing_plays_to_motors_that_a_homing_left_as_it_searches_whether_they_or_their_answers_were_cut_off() {
+    let begins = || {
+        let mut talk = talk_to(&[unit_with(1, shaft())]);
+        assert_eq!(home_as(&mut talk, &drive(SWITCH), &[0, 1, 2]).0, Ok(()));
+        talk
+    };
+    let mut whole = begins();
+    let begun = whole.now();
+    assert_eq!(home_as(&mut whole, &drive(SWITCH), &[0, 1, 2]).0, Ok(()));
+    let lasts = whole.now().since(begun);
+    let (seat, drive) = (seat(), drive(SWITCH));
+    let sixpack2 = drive.sixpack2.clone().unwrap();
+    let of = SeatMotors {
+        seat: &seat,
+        drive: &drive,
+        sixpack2: &sixpack2,
+        unit: 1,
+        motors: &[0, 1, 2],
+        period: PERIOD,
+    };
+    let (mut ready, mut searching) = (0, 0);
+    let near_its_ends = (0..16).map(|step| Duration::from_millis(25 * step));
+    let afters = near_its_ends.clone().chain(near_its_ends.map(|ago| lasts.saturating_sub(ago)));
+    for (after, is_deaf) in
+        afters.chain([lasts / 4, lasts / 2]).flat_map(|after| [(after, false), (after, true)])
+    {
+        let mut talk = begins();
+        let at = talk.now() + after;
+        talk.port().script = Some(if is_deaf {
+            (at, |line, _| line.faults.answer_lost = 1.0)
+        } else {
+            (at, |line, _| line.faults.unplugged = true)
+        });
+        let (homed, _) = home_as(&mut talk, &drive, &[0, 1, 2]);
+        talk.pause(Duration::from_secs(1));
+        talk.port().line.faults = LineFaults::default();
+        let are_set = (0..3).all(|index| is_set_up_for_shows(motor(&mut talk, index)));
+        let passes =
+            look_for(&mut talk, 1, &[0, 1, 2]).unwrap().is_some_and(|it| of.strangers(&it).is_empty());
+        let mut play = Play::to(talk, 1).unwrap();
+        play.wait(2.0);
+        assert!(are_set || !passes && !play.all_ready(), "{after:?} {is_deaf} {homed:?}: {:?}", play.rare());
+        assert_eq!(passes, play.all_ready(), "{after:?} {is_deaf} {homed:?}: {:?}", play.rare());
+        *if passes { &mut ready } else { &mut searching } += 1;
+    }
+    assert!(ready > 2 && searching > 30, "{ready} {searching}");
 }
 
 #[test]

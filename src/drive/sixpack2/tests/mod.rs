@@ -7,6 +7,7 @@
 )]
 
 mod bench;
+mod bus;
 mod finding;
 mod homing;
 mod lost;

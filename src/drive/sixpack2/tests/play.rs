@@ -56,7 +56,7 @@ impl Play {
     }
 
     /// How far the axes are beside where they should be by now.
-    fn judge(&mut self, at: f64) {
+    pub(super) fn judge(&mut self, at: f64) {
         for (index, place) in self.places().into_iter().enumerate() {
             let wanted = (self.course)(at, index % 3);
             // Where a motor is between two loops is that of the first: half a loop late.

@@ -125,7 +125,7 @@ impl Host {
 
 fn setup() -> SixpackSetup {
     let shafts = [ShaftSetup::default(); MOTORS];
-    SixpackSetup { unit: UNIT, serial: 4_660, shafts, is_two_wires: false }
+    SixpackSetup { unit: UNIT, serial: 4_660, shafts, is_two_wires: false, can_baud: None }
 }
 
 fn target(motor: u8, target: i32) -> SixpackOrder {

@@ -34,7 +34,8 @@ pub(super) fn hall_over(
     NOW.set(MonoTime::from_nanos(3_000_000_000));
     let config = Arc::new(read(HALL));
     let shaft = ShaftSetup { switch: Some(-2.0 * MM), ..ShaftSetup::default() };
-    let setup = SixpackSetup { unit: 1, serial: 1_001, shafts: [shaft; MOTORS], is_two_wires: false };
+    let setup =
+        SixpackSetup { unit: 1, serial: 1_001, shafts: [shaft; MOTORS], is_two_wires: false, can_baud: None };
     let line = SharedLine::new(SixpackBus::waking([setup], NOW.get()), 10);
     line.lock().line.set_host_baud(Some(config.links[0].baud));
     let terms = StreamTerms::of(&config.links[0], &config).expect("it plays").expect("there is a seat");
