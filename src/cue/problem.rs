@@ -64,6 +64,12 @@ pub enum Problem {
     /// A column or field that means nothing to us.
     #[error("unknown column; {0}")]
     UnknownColumn(&'static str),
+    /// Columns that something else than commas separates.
+    #[error(
+        "the columns are separated by {0}, not by commas; `sed 's/,/./g; s/{1}/,/g' {2} > OUT.csv` makes a cue of it, with points in \
+         numbers"
+    )]
+    Separator(&'static str, &'static str, String),
     /// A column that was there before.
     #[error("the column occurs twice")]
     ColumnTwice,

@@ -97,5 +97,8 @@ pub(super) fn reload(hall: &HallContext, path: &Path) -> Result<Arc<Config>, Pro
             "the old configuration is kept; take them out, and reload again",
         )
     })?;
-    Ok(Arc::new(config))
+    Ok(Arc::new(match &hall.config.store.kept_in {
+        Some(state) => config.kept_in(state),
+        None => config,
+    }))
 }
