@@ -36,7 +36,7 @@ const YOURS: [&str; 20] = [
 ];
 /// What each page needs beside it, in the order in which they run.
 const STAGES: [(&str, &[&str]); 3] = [
-    ("", &["check", "info", "fit", "decode", "doctor", "token", "completions", "demo", "sim"]),
+    ("", &["check", "info", "fit", "edit", "decode", "doctor", "token", "completions", "demo", "sim"]),
     (
         "sim --safe --count 2",
         &["play", "plot", "convert", "preflight", "home", "register", "sync", "record", "replay", "latency"],
@@ -47,7 +47,6 @@ const STAGES: [(&str, &[&str]); 3] = [
             "status",
             "watch",
             "preflight",
-            "home",
             "sync",
             "record",
             "cues",
@@ -74,6 +73,7 @@ const STAGES: [(&str, &[&str]); 3] = [
             "mark",
             "reload",
             "report",
+            "home",
         ],
     ),
 ];

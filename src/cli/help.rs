@@ -7,7 +7,7 @@ use clap::Command;
 /// What people do, and with which commands.
 const GROUPS: [(&str, &[&str]); 8] = [
     ("Try it, without seats", &["demo", "sim"]),
-    ("Make and check cues", &["check", "info", "plot", "fit", "convert"]),
+    ("Make and check cues", &["check", "info", "plot", "fit", "edit", "convert"]),
     ("Play one cue, or follow a film", &["play", "sync"]),
     ("Set up a hall", &["preflight", "home", "register", "doctor", "latency", "token"]),
     (

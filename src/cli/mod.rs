@@ -20,6 +20,7 @@ mod demo;
 mod doctor;
 mod draw_recording;
 mod drives;
+mod edit;
 mod exit;
 mod figures;
 mod film_player;
@@ -90,6 +91,7 @@ enum ProgramCommand {
     Plot(plot::Args),
     Convert(convert::Args),
     Fit(fit::Args),
+    Edit(edit::Args),
     Decode(decode::Args),
     Preflight(preflight::Args),
     Register(register::Args),
@@ -177,6 +179,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Plot(args) => plot::run(&args),
         ProgramCommand::Convert(args) => convert::run(&args),
         ProgramCommand::Fit(args) => fit::run(&args),
+        ProgramCommand::Edit(args) => edit::run(&args),
         ProgramCommand::Decode(args) => decode::run(&args),
         ProgramCommand::Preflight(args) => preflight::run(&args),
         ProgramCommand::Register(args) => register::run(&args),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 
-use super::load::{self, SeatArgs};
+use super::load::{self, Judge, SeatArgs};
 use super::{Exit, Failure, OrExit as _, convert, exit, figures, plot_recording, print};
 use crate::cue::Source;
 use crate::motion::SeatAxis;
@@ -131,6 +131,16 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     tell(&picture, file, args)?;
     // Drawn all the same; but no seat can play what leaves its stroke.
     Ok(faults.first().map_or(Exit::Done, load::cue_exit))
+}
+
+/// Draws a cue on the terminal, as it is on its seats.
+pub(super) fn draw(timeline: &Timeline, judge: &Judge) -> Result<(), Failure> {
+    let seats = judge.seats(timeline.axes());
+    let facts = facts(timeline, &seats, judge.rate_hz);
+    let columns =
+        Columns::over(ShowTime::ZERO, timeline.duration(), 2 * plot::cells(usize::from(width())) - 1);
+    let subject = Subject { timeline, seats: &seats, rate: Rate::from_hz(judge.rate_hz), facts };
+    print::out(&plot::braille(&plot::of_cue(subject, columns)))
 }
 
 impl Args {

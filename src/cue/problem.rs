@@ -267,6 +267,9 @@ pub enum Problem {
     /// More markers than are kept.
     #[error("more than {MAX_MARKERS} markers, the limit of a cue")]
     TooManyMarkers,
+    /// A marker that no instant of the cue has.
+    #[error("a marker at {0} is outside the cue, which is {1} long")]
+    MarkerOutside(ShowTime, ShowTime),
     /// A marker's name that is too long.
     #[error("a marker's name of {0} bytes; the limit is {MAX_MARKER_NAME}")]
     MarkerName(usize),
