@@ -42,6 +42,7 @@ pub mod wire;
 mod channel;
 mod container;
 pub mod cue;
+mod edit;
 mod timeline;
 
 mod checks;

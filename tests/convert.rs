@@ -1,4 +1,4 @@
-//! `kinocue convert`, as a person runs it: exit codes, messages, and what is on the disk afterwards.
+//! `kinocue convert` and `edit`, as a person runs them: exit codes, messages, and what is on the disk afterwards.
 
 use std::fs;
 use std::path::Path;
@@ -8,9 +8,18 @@ use tempfile::{TempDir, tempdir};
 
 /// Runs `kinocue convert` in a folder; returns its exit code and what it said.
 fn convert(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
+    run("convert", folder, args)
+}
+
+/// The same of `kinocue edit`.
+fn edit(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
+    run("edit", folder, args)
+}
+
+fn run(command: &str, folder: &Path, args: &[&str]) -> (Option<i32>, String) {
     let output = Command::cargo_bin("kinocue")
         .expect("the program is built")
-        .arg("convert")
+        .arg(command)
         .args(args)
         .current_dir(folder)
         .output()
@@ -122,4 +131,68 @@ fn a_cut_file_is_recovered_on_request() {
     let (code, said) = convert(folder.path(), &["--recover", "cut.mcap", "c.csv"]);
     assert!(code == Some(0) && said.contains("the rest is lost"), "{said}");
     assert!(fs::read_to_string(folder.path().join("c.csv")).unwrap().lines().count() > 1000);
+}
+
+/// 30 mm up within two seconds, and there for one.
+const RISE: &str = "# units: mm\n# interpolation: monotone\ntime_ms,a1\n0,0\n1000,15\n2000,30\n3000,30\n";
+
+#[test]
+fn an_edit_writes_a_new_cue_and_never_over_another_unless_told() {
+    let folder = folder_with("rise.csv", RISE);
+    let (code, said) = edit(folder.path(), &["cut", "rise.csv", "--from", "2", "-o", "top.csv"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(
+        said.contains("top.csv: 2 rows, 1 axis, 00:01.000") && said.contains("keeps all limits"),
+        "{said}"
+    );
+    let top = || fs::read_to_string(folder.path().join("top.csv")).unwrap();
+    assert!(top().ends_with("\n0,30\n1000,30\n"), "{}", top());
+    for args in [["cut", "rise.csv", "-o", "top.csv"], ["cut", "rise.csv", "-o", "rise.csv"]] {
+        let (code, said) = edit(folder.path(), &args);
+        assert!(code == Some(64) && said.contains("--force replaces it"), "{said}");
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("rise.csv")).unwrap(), RISE);
+    assert_eq!(
+        edit(folder.path(), &["mirror", "rise.csv", "--axes", "1", "-o", "top.csv", "--force"]).0,
+        Some(0)
+    );
+    assert!(top().contains("\n2000,120\n"), "{}", top());
+}
+
+#[test]
+fn an_edit_says_where_its_cue_jumps_and_which_limits_it_breaks() {
+    let folder = folder_with("rise.csv", RISE);
+    let (code, said) = edit(folder.path(), &["join", "rise.csv", "rise.csv", "-o", "two.csv"]);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(
+        said.contains("two.csv: a1 jumps by 30.000 mm at 00:03.000, where the cues meet; --gap 2s"),
+        "{said}"
+    );
+    assert!(said.contains("two.csv: is written, and breaks limits") && said.contains("a1: jerk"), "{said}");
+    let (code, said) =
+        edit(folder.path(), &["join", "rise.csv", "rise.csv", "--gap", "3s", "-o", "apart.csv"]);
+    assert!(code == Some(0) && !said.contains("jumps"), "{said}");
+    let (code, said) = edit(folder.path(), &["mark", "rise.csv", "top", "--at", "2", "-o", "marked.csv"]);
+    assert!(code == Some(64) && said.contains("CSV has no place for markers"), "{said}");
+    assert_eq!(
+        edit(folder.path(), &["mark", "rise.csv", "top", "--at", "2", "-o", "marked.mcap"]).0,
+        Some(0)
+    );
+    let (code, said) =
+        edit(folder.path(), &["scale", "rise.csv", "--by", "50%", "--axes", "2", "-o", "no.csv"]);
+    assert!(code == Some(64) && said.contains("there is no axis 2; the cue has 1"), "{said}");
+}
+
+#[test]
+fn a_fade_leaves_park_and_comes_back_and_is_within_all_limits() {
+    let folder =
+        folder_with("stand.csv", "# units: mm\ntime_ms,a1,v1_hz,v1_amp\n0,40,20,0.2\n8000,40,20,0.2\n");
+    let (code, said) =
+        edit(folder.path(), &["fade", "stand.csv", "--in", "3s", "--out", "3s", "-o", "soft.csv"]);
+    assert_eq!(code, Some(0), "{said}");
+    let text = fs::read_to_string(folder.path().join("soft.csv")).unwrap();
+    let cells = |at: &str| text.lines().find_map(|line| line.strip_prefix(at)).map(str::to_owned);
+    assert_eq!(cells("0,").as_deref(), Some("0,20,0"), "{text}");
+    assert_eq!(cells("8000,").as_deref(), Some("0,20,0"), "{text}");
+    assert!(cells("5000,").is_some_and(|cells| cells.starts_with("40,20,0.2")), "{text}");
 }

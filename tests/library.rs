@@ -90,14 +90,14 @@ fn a_cue_that_passes_is_taken_in_with_all_that_is_known_of_it() {
 fn a_cue_that_does_not_pass_is_refused_with_every_fault_and_leaves_nothing() {
     let fixture = Fixture::new();
     let problem = fixture.upload("ride", BAD.as_bytes()).unwrap_err();
-    assert_eq!(problem.code, Code::Check);
+    assert_eq!(problem.code, Code::Cue);
     let told = |part: &str| problem.faults.iter().any(|fault| fault.contains(part));
     assert!(told("fx_mist: unknown effect") && told("velocity") && told("jerk"), "{problem}");
     assert!(problem.faults.iter().all(|fault| !fault.contains(".upload")), "{problem}");
     let problem = fixture.upload("ride", b"time_ms,a1\n0,0\n10,2\n20,3\n").unwrap_err();
     assert!(problem.faults[0].starts_with("3:4: a1: 2"), "{problem}");
     assert_eq!(problem.faults.len(), 2, "{problem}");
-    assert_eq!(fixture.upload("ride", b"").unwrap_err().code, Code::Check);
+    assert_eq!(fixture.upload("ride", b"").unwrap_err().code, Code::Cue);
     assert!(fixture.files().is_empty());
     assert!(fixture.library.list().is_empty());
 }
@@ -326,7 +326,7 @@ fn curves_are_drawn_once_until_the_file_changes() {
     assert_eq!(fixture.library.curve(&id, 10).unwrap().axes[0].max[0], 0.1);
     put("time_ms,a1\n0,0.5\n100,7\n");
     let problem = fixture.library.curve(&id, 10).unwrap_err();
-    assert_eq!(problem.code, Code::Check);
+    assert_eq!(problem.code, Code::Cue);
     assert!(problem.faults.concat().contains("ride.csv:3:5: a1"), "{problem}");
 }
 

@@ -249,7 +249,7 @@ fn names_and_rows_choose() {
     assert_eq!(names(&[]), ["S1", "S2", "S3"]);
     assert_eq!(names(&["--row", "A"]), ["S1", "S3"]);
     assert_eq!(names(&["S2"]), ["S2"]);
-    assert_eq!(preflight(9, &["--config", config, "S9"]).exit, 64);
+    assert_eq!(preflight(9, &["--config", config, "S9"]).exit, 66);
 }
 
 #[test]
@@ -349,5 +349,5 @@ fn checks_are_explained_without_any_controller() {
         assert_eq!(exit, Some(0));
         assert!(one.contains(check.why()), "{check}");
     }
-    assert_eq!(explain(&["--explain", "nothing"]).0, Some(64));
+    assert_eq!(explain(&["--explain", "nothing"]).0, Some(66));
 }

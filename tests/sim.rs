@@ -313,7 +313,7 @@ fn the_program_takes_commands_at_its_control_socket_and_removes_it() {
     let host = host();
     assert_eq!([0, 1].map(|index| ask(&host, addresses[index], 1, 0x95)), [0, 6]);
     let second = Program::start(&["--listen", "127.0.0.1:0", "--control", path_arg]).0.wait();
-    assert_eq!(second.expect("it ends").code(), Some(71), "the socket is taken");
+    assert_eq!(second.expect("it ends").code(), Some(75), "the socket is taken");
     assert_eq!(sim.end(rustix::process::Signal::TERM).0, Some(0));
     assert!(!path.exists());
 }

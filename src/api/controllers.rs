@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use super::asker::{Asker, StatusReply};
 use super::input::{Name, Nothing, OrNothing};
 use super::shared::Shared;
-use crate::control::{Code, Command, ControllerStatus, Problem, Status};
+use crate::control::{Command, ControllerStatus, Problem, Status};
 
 /// Why it is taken out.
 #[derive(Debug, Default, Deserialize, ToSchema)]
@@ -40,8 +40,8 @@ pub(super) async fn one(
     let status = shared.handle.status();
     let found = status.controllers.iter().find(|controller| controller.name == name);
     found.cloned().map(JsonReply).ok_or_else(|| {
-        let detail = format!("there is no controller {name:?}");
-        Problem::new(Code::Unknown, detail, "give one of the configuration; the status lists them")
+        let known = status.controllers.iter().map(|one| one.name.as_str());
+        Problem::unknown("controller", &name, known, "the status lists them")
     })
 }
 

@@ -59,12 +59,7 @@ pub(super) async fn one(
     Id(id): Id,
 ) -> Result<JsonReply<CueInfo>, Problem> {
     let library = shared.library.clone();
-    let found = shared.blocking(move || {
-        library.get(&id).ok_or_else(|| {
-            let detail = format!("there is no cue {id} in the library");
-            Problem::new(Code::Unknown, detail, "upload it, or give another")
-        })
-    });
+    let found = shared.blocking(move || library.get(&id).ok_or_else(|| library.unknown(&id)));
     found.await.map(JsonReply)
 }
 

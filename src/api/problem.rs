@@ -88,6 +88,7 @@ const fn title(code: Code) -> &'static str {
         Code::Method => "wrong method",
         Code::Size => "too long",
         Code::Media => "unsupported format",
+        Code::Cue => "a bad cue",
         Code::Check => "it does not pass",
         Code::Late => "too late",
         Code::Origin => "foreign origin",

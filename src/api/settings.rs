@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use super::asker::{Asker, StatusReply};
 use super::input::{Json, Name, Nothing};
 use super::problem::bad_value;
+use crate::config::no_level;
 use crate::control::{Command, LevelsChange, Problem, Status};
 use crate::time::TRIM_FRAMES;
 
@@ -55,7 +56,7 @@ fn trim_ms(offset_s: f64) -> Result<i32, Problem> {
         return Ok((1000.0 * offset_s).round() as i32);
     }
     let detail = format!("offset_s: {offset_s} is outside -{MAX_TRIM_S}..={MAX_TRIM_S}");
-    Err(bad_value(detail, "give the seconds by which the motion is later than the film"))
+    Err(bad_value(detail, "give the seconds by which the motion is later than the film; 80 ms are 0.08"))
 }
 
 /// The source by which the film is followed.
@@ -92,7 +93,7 @@ fn check_levels(change: &LevelsChange) -> Result<(), Problem> {
     let halls = halls.into_iter().filter_map(|(name, level)| Some((name.to_owned(), (*level)?)));
     let rows = rows.iter().map(|(row, &level)| (format!("row {row}"), level));
     let outside = halls.chain(rows).filter(|(_, level)| !(0.0..=1.0).contains(level));
-    let faults: Vec<_> = outside.map(|(name, level)| format!("{name}: {level} is outside 0..=1")).collect();
+    let faults: Vec<_> = outside.map(|(name, level)| format!("{name}: {}", no_level(level))).collect();
     if faults.is_empty() {
         return Ok(());
     }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use super::links;
 use super::recording::{self, PlayRecording};
 use super::refused::PlayError;
+use super::roll_call::RollCall;
 use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeError};
 use super::script::{PlayHandle, PlayScript, off_park};
 use super::staged::{StagedShow, at_any_pace, chasing};
@@ -33,6 +34,8 @@ pub struct Play {
     /// True if nothing may move.
     holds: bool,
     recording: Option<PlayRecording>,
+    /// Who answered.
+    roll: Arc<RollCall>,
     /// What was proved of its links.
     links: Vec<LinkPlay>,
 }
@@ -101,7 +104,7 @@ impl Play {
         let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default())?;
         let desk = runtime.control().desk;
         staged.mixes.iter().enumerate().for_each(|(lane, mix)| desk.set(lane, *mix));
-        Ok(Self { runtime, staged, holds: false, recording: None, links: Vec::new() })
+        Ok(Self { runtime, staged, holds: false, recording: None, roll: Arc::default(), links: Vec::new() })
     }
 
     /// The same play, recorded to a file that is not there yet.
@@ -125,6 +128,11 @@ impl Play {
             PlayRecording::start(path, &about, &runtime.judging(false), seats, staged.show.rate)?;
         runtime.record(taps);
         Ok(Self { recording: Some(recording), ..self })
+    }
+
+    /// The same play, which begins without controllers that do not answer as that says.
+    pub(crate) fn called(self, roll: &Arc<RollCall>) -> Self {
+        Self { roll: Arc::clone(roll), ..self }
     }
 
     /// What it is led and watched by.
@@ -164,14 +172,14 @@ impl Play {
         if !silent {
             self.look_for_others()?;
         }
-        let Self { runtime, staged, holds, links, .. } = self;
+        let Self { runtime, staged, holds, roll, links, .. } = self;
         let (config, ends) = (Arc::clone(runtime.config()), runtime.links().to_vec());
         let (cue, rate) = (staged.timeline.cue().path().display().to_string(), staged.show.rate);
         let (lanes, live) = (staged.lanes.clone(), runtime.control().live);
         let (end, led) = thread::scope(|scope| {
             let mut script = None;
             let end = runtime.run(|handle, _| {
-                let led = PlayScript::new(handle, &staged);
+                let led = PlayScript::new(handle, &staged, Arc::clone(&roll));
                 let thread = Builder::new().name("script".to_owned());
                 // A script that does not begin ends the runtime, too.
                 let thread =
@@ -190,6 +198,7 @@ impl Play {
         let about = SumUp { cue, rate, ending: ending.into(), silent };
         let mut played = sum_up(about, &config.controllers, &led.prepared, &run);
         played.report.links = links::status(&config, &ends, &links);
+        played.miss(roll.silent());
         if ending == Ending::Completed {
             let off_park = off_park(&lanes, &live, run.closed_at).into_iter();
             played.off_park = off_park.map(|(lane, _)| config.controllers[lane].name.clone()).collect();

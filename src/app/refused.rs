@@ -42,6 +42,13 @@ pub enum PlayError {
     /// The frame port cannot be had, or no thread.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
+    /// These controllers answer nothing: all there are, or some of a play that needs all.
+    #[error(
+        "{}: nobody answers, so nothing is played; check address, power, cable, PA15 and PA20 to PA24, and ask `kinocue preflight`. \
+         Controllers that cannot answer are played to with --no-acks",
+        .0.join(", ")
+    )]
+    Silent(Vec<String>),
     /// Somebody else sends to these controllers, so many datagrams within about a second.
     #[error("{}; end the other sender: another kinocue, player or tool", others(.0))]
     OtherMaster(Vec<(String, u16)>),

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use serde::{Deserialize, Serialize};
 
 use crate::config::Controller;
@@ -13,6 +13,7 @@ use crate::motion::{AxisGeometry, AxisUnit, Pulses};
 use crate::observe::ControllerState;
 use crate::rt::Spun;
 use crate::sys::realtime::RealTime;
+use crate::sys::terminal;
 use crate::time::MonoTime;
 
 /// What became of a play. Within one `format` fields are added, never changed.
@@ -245,12 +246,19 @@ impl PlayReport {
         text
     }
 
+    /// The controllers with their counts; what is 0 for all of them is left out.
     fn table(&self) -> Table {
+        let rows: Vec<_> = self.controllers.iter().map(ControllerReport::row).collect();
+        let shows = |column: &usize| !COLUMNS[*column].1 || rows.iter().any(|row| row[*column] != "0");
+        let shown: Vec<usize> = (0..COLUMNS.len()).filter(shows).collect();
         let mut table = Table::new();
         table.load_style(presets::NOTHING);
-        table.set_header(COLUMNS);
-        for one in &self.controllers {
-            table.add_row(one.row());
+        if let Some(width) = terminal::width(std::io::stderr()) {
+            table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
+        }
+        table.set_header(shown.iter().map(|column| COLUMNS[*column].0));
+        for row in &rows {
+            table.add_row(shown.iter().map(|column| &row[*column]));
         }
         for column in table.column_iter_mut().skip(2) {
             column.set_cell_alignment(CellAlignment::Right);
@@ -287,25 +295,25 @@ fn of_link(link: &LinkStatus) -> String {
     text
 }
 
-/// What the table says of each controller.
-const COLUMNS: [&str; 17] = [
-    "controller",
-    "address",
-    "sent",
-    "asked",
-    "acked",
-    "refused",
-    "lost",
-    "park",
-    "dup",
-    "stale",
-    "stray",
-    "failed",
-    "closed",
-    "ack p50 µs",
-    "p99",
-    "p99.9",
-    "max",
+/// What the table says of each controller, and whether that may be left out where it is 0.
+const COLUMNS: [(&str, bool); 17] = [
+    ("controller", false),
+    ("address", false),
+    ("sent", false),
+    ("asked", false),
+    ("acked", false),
+    ("refused", true),
+    ("lost", false),
+    ("park", true),
+    ("dup", true),
+    ("stale", true),
+    ("stray", true),
+    ("failed", true),
+    ("closed", true),
+    ("ack p50 µs", false),
+    ("p99", false),
+    ("p99.9", false),
+    ("max", false),
 ];
 
 impl ControllerReport {

@@ -12,10 +12,12 @@ use std::time::Duration;
 use rtrb::Producer;
 
 use super::refused::PlayError;
+use super::roll_call::{RollCall, lanes_with};
 use super::runtime::RuntimeHandle;
 use super::staged::StagedShow;
 use crate::belief::{FRESH, KnownPose, LaneEvidence, Reading};
 use crate::drive::Lane;
+use crate::engine::Mix;
 use crate::motion::Slot;
 use crate::plan::slow_park_time;
 use crate::rt::{Command, Live, News, NewsIn};
@@ -84,6 +86,7 @@ pub(super) struct PlayScript {
     /// The number of the last frame that each was sent.
     last: Vec<FrameNo>,
     prepared: Prepared,
+    roll: Arc<RollCall>,
     end: EndOfPlay,
 }
 
@@ -97,11 +100,11 @@ impl Drop for EndOfPlay {
 }
 
 impl PlayScript {
-    pub(super) fn new(handle: RuntimeHandle, show: &StagedShow) -> Self {
+    pub(super) fn new(handle: RuntimeHandle, show: &StagedShow, roll: Arc<RollCall>) -> Self {
         let lanes = show.lanes.clone();
         let last = lanes.iter().map(Lane::last_frame).collect();
         let (prepared, end) = (Prepared::nothing(lanes.len()), EndOfPlay(Arc::clone(&handle.leave)));
-        Self { handle, lanes, last, prepared, end }
+        Self { handle, lanes, last, prepared, roll, end }
     }
 
     /// Leads the show from the first look at the seats to its end; `holds` says that nothing may move, and `reads` that seats are asked
@@ -124,6 +127,7 @@ impl PlayScript {
             self.make_sure()?;
         } else {
             self.find_seats()?;
+            self.leave_out_silent(reads)?;
         }
         if !self.is_called_off() {
             let found = Finding { homed: true, at_park: true, crashed: false };
@@ -234,6 +238,27 @@ impl PlayScript {
             return Ok(());
         }
         Err(PlayError::Unplaced(self.names(|lane| unsure.contains(&lane))))
+    }
+
+    /// Leaves out the seats of controllers that have said nothing at all, once somebody agrees where somebody is there; where these are
+    /// all, there is no play.
+    fn leave_out_silent(&self, reads: bool) -> Result<(), PlayError> {
+        let is_silent = |lane: usize| self.known(lane).is_none() && !self.handle.live.has_heard(lane);
+        let silent = self.names(is_silent);
+        if !reads || silent.is_empty() || self.is_called_off() {
+            return Ok(());
+        }
+        if silent.len() == self.lanes.len() || self.roll.requires_all() {
+            return Err(PlayError::Silent(silent));
+        }
+        for lane in lanes_with(&self.handle.config.controllers, is_silent) {
+            self.handle.desk.set(lane, Mix { on: false, ..self.handle.desk.mix(lane) });
+        }
+        self.roll.note(silent);
+        while self.roll.is_open() && !self.is_called_off() {
+            thread::park_timeout(NEWS);
+        }
+        Ok(())
     }
 
     /// Has those seats sent to park by a frame that is slow enough from anywhere; gives those that cannot be known to get there.

@@ -60,6 +60,17 @@ pub struct Played {
     pub(crate) lost_sight_of: Vec<String>,
 }
 
+impl Played {
+    /// Notes who was left out, as it answered nothing. Nothing was played where in the end nobody was there.
+    pub(super) fn miss(&mut self, silent: &[String]) {
+        let missing = silent.iter().filter(|name| !self.silent.contains(name)).cloned().collect::<Vec<_>>();
+        self.silent.extend(missing);
+        if self.silent.len() == self.report.controllers.len() && self.report.result == Ending::Completed {
+            self.report.result = Ending::Lost;
+        }
+    }
+}
+
 /// What is summed up.
 pub(super) struct SumUp {
     /// What was played, as people know it.

@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 
-use super::{Exit, Failure, OrExit as _};
+use super::{Failure, OrExit as _};
 use crate::sys::humble::{self, ProcessBounds};
 
 #[derive(Debug, clap::Args)]
@@ -20,6 +20,6 @@ impl BoundsArgs {
     pub(super) fn lower(&self, what: &'static str) -> Result<(), Failure> {
         let bounds =
             ProcessBounds { memory: self.memory_mib.saturating_mul(1 << 20), cpu_s: self.seconds.max(1) };
-        humble::lower(bounds).with_context(|| format!("cannot bound {what}")).or_exit(Exit::System)
+        humble::lower(bounds).with_context(|| format!("cannot bound {what}")).or_system()
     }
 }

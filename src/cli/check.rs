@@ -28,13 +28,13 @@ const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::Bad
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue check cues/*.csv",
-    "kinocue check hall.toml",
-    "kinocue check cues/voyage.csv --config hall.toml",
-    "kinocue check ride.csv --config hall.toml --level 60%",
-    "kinocue check film.csv --config hall.toml --chase",
-    "kinocue check cues/coaster.csv --config hall.toml --seat platform6 --rate 1000 --json",
-    "kinocue check cues/bench-ride.csv --config hall.toml --drive silvermax --link-rate 30 --drive-vibration 0%",
-    "kinocue check ride.txt --from rows --units percent",
+    "kinocue check examples/hall.toml",
+    "kinocue check cues/bench-ride.csv --config examples/hall.toml",
+    "kinocue check cues/seat-demo.csv --config examples/hall.toml --level 60%",
+    "kinocue check cues/bench-ride.csv --config examples/hall.toml --chase",
+    "kinocue check cues/bench-ride.csv --config examples/hall.toml --seat bench3 --rate 1000 --json",
+    "kinocue check cues/bench-ride.csv --config examples/silvermax.toml --drive silvermax --link-rate 30 --drive-vibration 0%",
+    "kinocue check examples/rows.csv --from rows --units mm",
 ]))]
 pub(super) struct Args {
     /// Cues, CSV or MCAP, and configurations, whose names end in .toml.
@@ -50,11 +50,11 @@ pub(super) struct Args {
     #[command(flatten)]
     drives: DriveArgs,
 
-    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. A cue that passes at one level passes at all lower ones.
+    /// Level of motion and vibration about the seats' neutral pose: 60%, 0.6 or -6dB. A cue that passes at one level passes at all lower ones.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 
-    /// Offset against the film, -500ms to 500ms. It does not change the result: the proof holds at every phase of the frames.
+    /// Trim against the film, -500ms to 500ms. It does not change the result: the proof holds at every phase of the frames.
     #[arg(long, value_name = "MS", value_parser = parse_trim, default_value = "0ms", allow_hyphen_values = true)]
     trim: i32,
 

@@ -8,20 +8,20 @@ use anyhow::{Context as _, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::load::cue_exit;
-use super::record::{open, unread};
+use super::record::{open, seat_in, unread};
 use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
 use crate::record::{FilmTracks, Places, RecordedAxis, tracks};
 
-/// Converts a cue to another format, or the motion of a seat in a recording into a cue.
+/// Converts cues between formats; makes a cue of a recording.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("\
 Examples:
-  kinocue convert storm.csv storm.mcap
-  kinocue convert ride.csv storm.csv --from rows --units mm --title Storm
-  kinocue convert ride.bin storm.csv --from u8 --axes 3 --rate 20
-  kinocue convert --recover cut.mcap saved.mcap
-  kinocue convert tuesday.mcap ride.csv --seat F4 --take sent
+  kinocue convert cues/coaster.csv coaster.mcap
+  kinocue convert examples/rows.csv swell.csv --from rows --units mm --title Swell
+  kinocue convert ride.bin ride.csv --from u8 --axes 3 --rate 20      raw bytes of yours
+  kinocue convert --recover cues/storm.mcap saved.mcap
+  kinocue convert ride.mcap sent.csv --seat c1 --take sent            a recording of yours
 
 A cue may have {}.", limits::IN_WORDS))]
 pub(super) struct Args {
@@ -149,9 +149,7 @@ fn of_recording(
     let from = if take == Take::Sent { Places::Sent } else { Places::Measured };
     let FilmTracks { contents, mut seats, .. } =
         tracks(open(path)?, from).map_err(|error| unread(error, path))?;
-    let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
-    let error = || anyhow!("--seat {name}: the seats are {}", names.join(", "));
-    let lane = contents.seat(name).ok_or_else(error).or_exit(Exit::Usage)?;
+    let lane = seat_in(&contents, name)?;
     let track = seats.remove(name).unwrap_or_default();
     let (Some((first, places)), axes) = (track.first(), contents.seats[lane].axes()) else {
         let error = anyhow!("{}: nothing of {name} was recorded while the film ran", path.display());

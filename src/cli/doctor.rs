@@ -20,7 +20,7 @@ use crate::doctor::measure::measure;
 use crate::doctor::{FindingLine, Hall, Verdict, facts, judge, ready};
 use crate::sys::realtime::normal_priority;
 
-/// Checks if this machine is fit for real-time use, and how to make it so.
+/// Checks if this machine is fit for real-time use.
 ///
 /// The checks come first, each with its finding, a verdict and the exact fix. Then it measures a bare loop with the clock and
 /// scheduling of `play`, at 1,000 ticks per second. It changes nothing and sends nothing.
@@ -44,7 +44,7 @@ Exit codes: 0 ready, 1 not ready: something is bad
 Examples:
   kinocue doctor                                 checks, and measures for 10 s
   kinocue doctor --load --seconds 60             measures again with every processor busy
-  kinocue doctor --config hall.toml --seconds 0  only checks, for the controllers of a hall
+  kinocue doctor --config examples/hall.toml --seconds 0  only checks, for the controllers of a hall
   kinocue doctor --json | jq '.lines[] | select(.verdict != \"ok\")'")]
 pub(super) struct Args {
     /// Duration of each run in seconds, at most an hour; 0 runs none.

@@ -1,10 +1,13 @@
 //! Exit codes (sysexits) and the error that carries one.
 
-use std::fmt;
+use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
+use std::{fmt, io, iter};
 
 use anyhow::anyhow;
+
+use crate::net::NetError;
 
 /// How the program ends; the numbers are those of `sysexits.h`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,13 +15,13 @@ use anyhow::anyhow;
 pub(crate) enum Exit {
     /// Done, also after a requested stop.
     Done = 0,
-    /// A check failed: limits, preflight, doctor.
+    /// A check failed: limits, preflight, doctor, a comparison.
     CheckFailed = 1,
     /// Wrong use of the command line.
     Usage = 64,
     /// A cue that cannot be played.
     BadCue = 65,
-    /// A file that is missing, or a folder where a file belongs.
+    /// A file that is missing, a folder where a file belongs, or a name that is unknown.
     NoInput = 66,
     /// A daemon or controller that does not answer.
     Unavailable = 69,
@@ -28,7 +31,7 @@ pub(crate) enum Exit {
     System = 71,
     /// Reading or writing failed.
     Io = 74,
-    /// Not ready; try again.
+    /// Not ready, or another program holds a port or socket; try again.
     TryAgain = 75,
     /// A controller refused.
     Refused = 76,
@@ -70,11 +73,37 @@ pub(crate) trait OrExit<T> {
     /// # Errors
     /// A [`Failure`] where there was an error.
     fn or_exit(self, exit: Exit) -> Result<T, Failure>;
+
+    /// The same where the system refused something: with 75 where another program holds it, else with 71.
+    ///
+    /// # Errors
+    /// A [`Failure`] where there was an error.
+    fn or_system(self) -> Result<T, Failure>;
 }
 
 impl<T, E: Into<anyhow::Error>> OrExit<T> for Result<T, E> {
     fn or_exit(self, exit: Exit) -> Result<T, Failure> {
         self.map_err(|error| Failure { exit, error: error.into() })
+    }
+
+    fn or_system(self) -> Result<T, Failure> {
+        self.map_err(Into::into).map_err(|error: anyhow::Error| Failure { exit: of_system(&*error), error })
+    }
+}
+
+/// How the program ends where the system refused something: a port or socket that another program holds is free once that has ended.
+pub(super) fn of_system(error: &(dyn Error + 'static)) -> Exit {
+    let causes = iter::successors(Some(error), |error| (*error).source());
+    let mut refused = causes.filter_map(|cause| cause.downcast_ref::<io::Error>());
+    let is_held = refused.any(|cause| cause.kind() == io::ErrorKind::AddrInUse);
+    if is_held { Exit::TryAgain } else { Exit::System }
+}
+
+/// How the program ends where the frame port does not open.
+pub(super) fn of_net(error: &NetError) -> Exit {
+    match error {
+        NetError::Refused { .. } => of_system(error),
+        _ => Exit::Usage,
     }
 }
 

@@ -1,8 +1,9 @@
 //! The figures of a cue as a table and as JSON.
 
-use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+use comfy_table::CellAlignment;
 use serde::Serialize;
 
+use super::table;
 use crate::motion::{AxisGeometry, AxisUnit, SeatAxis};
 use crate::proof::{AxisFigures, AxisProof, Quantity, SLACK, Worst};
 use crate::timeline::Figure;
@@ -120,8 +121,7 @@ pub(super) fn proved(file: &str, axes: &[AxisProof]) -> Vec<AxisReport> {
 
 /// One row a limit: what is worst, what is left, and where; `!` marks what is over its limit.
 pub(super) fn proof_table(axes: &[AxisProof]) -> String {
-    let mut table = Table::new();
-    table.load_style(STYLE);
+    let mut table = table::ruled();
     table.set_header(["axis", "limit", "", "worst", "margin", "at", "row"]);
     for proof in axes {
         let name = format!("a{} {}", proof.axis + 1, proof.on.seat.name);
@@ -179,13 +179,9 @@ pub(super) fn seat_names(seats: &[SeatAxis]) -> String {
     names.join(", ")
 }
 
-/// A line under the header, and no other lines.
-const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
-
 /// One row an axis: the extremes, their part of the limit, and when; `!` marks what is over its limit.
-pub(super) fn table(figures: &[AxisFigures]) -> String {
-    let mut table = Table::new();
-    table.load_style(STYLE);
+pub(super) fn axes_table(figures: &[AxisFigures]) -> String {
+    let mut table = table::ruled();
     table.set_header([
         "axis",
         "lowest mm",

@@ -24,11 +24,11 @@ use crate::timeline::Timeline;
 /// links of the hall cannot carry is reported, not fixed. The result passes `kinocue check` with the same options.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
-    "kinocue fit ride.csv -o fitted.csv",
-    "kinocue fit ride.mcap -o fitted.mcap --config hall.toml --per-axis",
-    "kinocue fit bytes.csv -o smooth.csv --smooth",
-    "kinocue fit film.csv -o fitted.csv --config hall.toml --chase",
-    "kinocue fit ride.txt -o ride.csv --from rows --units mm --smooth --json",
+    "kinocue fit cues/coaster.csv -o fitted.csv",
+    "kinocue fit cues/storm.mcap -o fitted.mcap --config examples/hall.toml --per-axis",
+    "kinocue fit cues/bench-ride.csv -o smooth.csv --smooth",
+    "kinocue fit cues/bench-ride.csv -o film.csv --config examples/hall.toml --chase",
+    "kinocue fit examples/rows.csv -o ride.csv --from rows --units mm --smooth --json",
 ]))]
 pub(super) struct Args {
     /// The cue to read, CSV or MCAP.
@@ -44,7 +44,7 @@ pub(super) struct Args {
     #[command(flatten)]
     seat: SeatArgs,
 
-    /// The level at which the cue will be played: 60% or -6dB.
+    /// The level at which the cue will be played: 60%, 0.6 or -6dB.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 

@@ -31,10 +31,10 @@ use drives::HomingResult;
 #[command(after_help = "\
 Examples:
   kinocue home --seats-empty                            the daemon's own hall
-  kinocue home --config hall.toml
-  kinocue home A1 A2 --config hall.toml
-  kinocue home --config hall.toml --row A --seats-empty
-  kinocue home --to 192.168.15.201:7408 --timeout 120
+  kinocue home --config examples/hall.toml
+  kinocue home A1 B1 --config examples/hall.toml
+  kinocue home --config examples/hall.toml --row A --seats-empty
+  kinocue home --to 127.0.0.1:7408 --timeout 120
 
 PA0e decides what a controller does: 0 searches for zero; 1 goes to zero without a search,
 which is right only if it has found zero since power-on.")]

@@ -27,8 +27,8 @@ const DRAWN: u32 = 64;
 #[command(after_help = load::after_help(&[
     "kinocue info cues/coaster.csv",
     "kinocue info cues/storm.mcap --json",
-    "kinocue info ride.txt --from rows --units mm",
-    "kinocue info cues/voyage.csv --config hall.toml --rate 200",
+    "kinocue info examples/rows.csv --from rows --units mm",
+    "kinocue info cues/bench-ride.csv --config examples/hall.toml --rate 200",
 ]))]
 pub(super) struct Args {
     /// The cue, CSV or MCAP.
@@ -197,7 +197,7 @@ impl Info {
             append(&mut text, format_args!("{word:<14}{value}\n"));
         }
         append(&mut text, format_args!("\nfor seat {} at {} frames a second:\n", self.seat, self.rate_hz));
-        text += &figures::table(&self.figures);
+        text += &figures::axes_table(&self.figures);
         text.push('\n');
         for (axis, curve) in drawn(timeline, &self.figures).iter().enumerate() {
             append(&mut text, format_args!("{:<4}{curve}\n", format!("a{}", axis + 1)));

@@ -59,8 +59,8 @@ Examples:
   kinocue latency --count 64 --seconds 60 --out before.hlog          to 64 of them, written to a file
   kinocue latency --count 64 --seconds 60 --spin-us 100 --out after.hlog
   kinocue latency --compare before.hlog after.hlog                   the effect of spinning
-  kinocue latency --to 192.168.15.201:7408 --rate 250                to a controller of three axes
-  kinocue latency --config hall.toml --ack-every 10 --json | jq .lateness_us")]
+  kinocue latency --to 127.0.0.1:7408 --rate 250                to a controller of three axes
+  kinocue latency --config examples/hall.toml --ack-every 10 --json | jq .lateness_us")]
 pub(super) struct Args {
     /// A controller: HOST:PORT, then optionally, after commas, name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
     /// mbox; repeatable.
@@ -108,7 +108,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let setup = Setup { host_port: 0, ..Setup::default() };
     let setups = vec![setup; usize::from(args.count.unwrap_or(VIRTUAL))];
-    let farm = Farm::start(Options::loopback(setups)).or_exit(Exit::System)?;
+    let farm = Farm::start(Options::loopback(setups)).or_system()?;
     let to: Vec<_> = farm.addresses().iter().map(|address| format!("{address},{AXES}")).collect();
     let mut config = from_to_args(&to, &[], MAX_AXES).or_exit(Exit::Internal)?;
     config.show.bind = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
@@ -169,7 +169,7 @@ fn send(args: &Args, config: Config, about: &str) -> Result<(Times, Played), Fai
     let show = Show { rate, timing: config.show.timing, start: ShowTime::ZERO, plays: 1 };
     let play = Play::holding(config, timeline, show, args.stream.no_acks).map_err(failed)?;
     let control = play.control();
-    leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
+    leave_on_signals(&control.leave).context("signals cannot be handled").or_system()?;
     let live = control.live;
     // Created before anything is measured, so that nobody measures for an hour and then cannot keep it.
     let out = args.out.as_deref().map(UnfinishedFile::create).transpose()?;

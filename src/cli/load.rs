@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::anyhow;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, names};
 use crate::app::staged::{at_any_pace, seat_at_any_pace};
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
@@ -111,14 +111,9 @@ fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
         Some(hall) => hall.seat(name).cloned(),
         None => (name == "bench3").then(|| Arc::new(SeatType::bench3(3))),
     };
-    known.ok_or_else(|| {
-        let names: Vec<_> =
-            hall.map_or(vec!["bench3"], |hall| hall.seats.iter().map(|s| s.name.as_str()).collect());
-        let hint = if hall.is_none() { "; --config FILE adds others" } else { "" };
-        Failure {
-            exit: Exit::Usage,
-            error: anyhow!("--seat {name}: the seat types are {}{hint}", names.join(", ")),
-        }
+    known.ok_or_else(|| match hall {
+        Some(hall) => names::unknown("seat type", name, hall.seats.iter().map(|seat| seat.name.as_str())),
+        None => names::unknown("seat type", name, ["bench3", "and those of --config FILE"].into_iter()),
     })
 }
 

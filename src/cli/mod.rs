@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::process::{self, ExitCode};
 use std::{panic, thread};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::wire::VibrationPort;
 use crate::{api, plain};
@@ -20,15 +20,19 @@ mod demo;
 mod doctor;
 mod draw_recording;
 mod drives;
+mod edit;
 mod exit;
 mod figures;
 mod film_player;
 mod fit;
+mod help;
 mod home;
 mod info;
 mod latency;
 mod load;
 mod man;
+mod names;
+mod places;
 mod play;
 mod plot;
 mod plot_recording;
@@ -37,12 +41,14 @@ mod print;
 mod prove;
 mod record;
 mod register;
+mod rehearsal;
 mod replay;
 mod report;
 mod serve;
 mod sim;
 mod stream;
 mod sync;
+mod table;
 mod targets;
 mod token;
 
@@ -51,9 +57,9 @@ pub(crate) use exit::{Exit, Failure, OrExit};
 const AFTER: &str = "\
 Examples:
   kinocue demo                                  a complete hall, with nothing to set up
-  kinocue check hall.toml                       lists every fault of a configuration
-  kinocue play ride.csv --config hall.toml      plays one cue, controlled by keys
-  kinocue serve --config hall.toml              runs the service; the commands from status to mark control it
+  kinocue check cues/*.csv examples/hall.toml   lists every fault of cues and configurations
+  kinocue play cues/coaster.csv --to 127.0.0.1:7408    plays one cue, controlled by keys
+  kinocue serve --rehearse                      runs a hall of simulated seats, which the commands below Run and Lead control
 
 kinocue COMMAND --help shows the options of each command, with examples.
 
@@ -61,9 +67,9 @@ Exit codes:
   0   done                        70  a fault of kinocue       76   a controller refused
   1   a check failed              71  the system refused       77   not allowed
   64  usage                       74  input or output failed   78   bad configuration
-  65  bad cue                     75  not ready, try again     79   another master sends
-  66  no such file or name                                     130  a second Ctrl-C
-  69  no daemon or no controller answered";
+  65  bad cue                     75  not ready, or held by    79   another master sends
+  66  no such file or name            another program          130  a second Ctrl-C
+  69  nobody answers";
 
 /// Plays motion cues to the seats of a theatre, in time with a film.
 ///
@@ -85,6 +91,7 @@ enum ProgramCommand {
     Plot(plot::Args),
     Convert(convert::Args),
     Fit(fit::Args),
+    Edit(edit::Args),
     Decode(decode::Args),
     Preflight(preflight::Args),
     Register(register::Args),
@@ -116,7 +123,9 @@ enum ProgramCommand {
 #[must_use]
 pub fn main() -> ExitCode {
     end_on_panic();
-    let cli = match Cli::try_parse() {
+    let parsed =
+        help::grouped(Cli::command()).try_get_matches().and_then(|given| Cli::from_arg_matches(&given));
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(error) => {
             let exit = if error.use_stderr() { Exit::Usage } else { Exit::Done };
@@ -170,6 +179,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Plot(args) => plot::run(&args),
         ProgramCommand::Convert(args) => convert::run(&args),
         ProgramCommand::Fit(args) => fit::run(&args),
+        ProgramCommand::Edit(args) => edit::run(&args),
         ProgramCommand::Decode(args) => decode::run(&args),
         ProgramCommand::Preflight(args) => preflight::run(&args),
         ProgramCommand::Register(args) => register::run(&args),
@@ -199,8 +209,6 @@ fn vibration_port(text: &str) -> Result<VibrationPort, String> {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory as _;
-
     use super::*;
     use crate::state::Next;
 

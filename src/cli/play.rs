@@ -10,10 +10,10 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::stream::StreamArgs;
 use super::targets::tell_absent;
-use super::{Exit, Failure, OrExit as _, print};
+use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::app::film::{FilmReader, SourceRules};
 use crate::app::runtime::RuntimeError;
-use crate::app::{Play, PlayError, Played};
+use crate::app::{Play, PlayError, Played, RollCall};
 use crate::config::{Config, from_to_args, parse_level};
 use crate::control::model::Ending;
 use crate::drive::Manner;
@@ -35,14 +35,15 @@ mod progress;
 use messages::Messages;
 use progress::Progress;
 
-const EXAMPLES: [&str; 4] = [
+const EXAMPLES: [&str; 5] = [
     "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408",
-    "kinocue play cues/coaster.csv --to 192.168.15.201:7408,name=A1 --to 192.168.15.202:7408,name=A2 --rate 250",
+    "kinocue play cues/coaster.csv --to 127.0.0.1:7408,name=A1 --to 127.0.0.1:7409,name=A2 --rate 250",
     "kinocue play cues/voyage.csv --to 127.0.0.1:7408,axes=6 --to 127.0.0.1:7409,axes=6,offset=6",
-    "kinocue play storm.mcap --config hall.toml --start 01:30 --json > report.json",
+    "kinocue play cues/bench-ride.csv --config examples/hall.toml --start 0:12 --json > report.json",
+    "kinocue play cues/seat-demo.csv --to 127.0.0.1:7408 --record ride.mcap --record-mode full",
 ];
 
-/// Plays one cue to the controllers, and reports the fate of every frame.
+/// Plays one cue, and reports the fate of every frame.
 ///
 /// Ctrl-C parks the seats and ends with the report. A second Ctrl-C, at least half a second later, ends at once and leaves the
 /// seats where they are. On a terminal, keys control the play; ? lists them. None of this is an emergency stop: that one is
@@ -73,7 +74,7 @@ pub(super) struct Args {
     /// Number of plays; 0 repeats until stopped.
     #[arg(long = "loop", value_name = "N", default_value_t = 1)]
     plays: u32,
-    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB.
+    /// Level of motion and vibration about the seats' neutral pose: 60%, 0.6 or -6dB.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level)]
     level: Option<f64>,
     /// An effect's output Y01 to Y12, for controllers that are not on this machine: NAME=N; repeatable.
@@ -81,6 +82,9 @@ pub(super) struct Args {
     effect: Vec<String>,
     #[command(flatten)]
     stream: StreamArgs,
+    /// Play only if every controller answers; without, those that do not are left out, on a terminal once you agree.
+    #[arg(long, conflicts_with = "no_acks")]
+    require_acks: bool,
     /// Follow a film: the seats wait at park, join it, and rest while it is stopped. mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH,
     /// ltc:alsa:DEVICE, ltc:-, ltc:FILE.wav, sound:INPUT,index=FILE.kidx, mtc:DEVICE, artnet:FROM, osc:FROM, http:FROM or
     /// clock:TIME; repeatable, best first.
@@ -138,7 +142,7 @@ fn film(args: &Args) -> Result<Option<FilmReader>, Failure> {
         return Ok(None);
     }
     let rules = SourceRules { allows_coarse: args.allow_coarse, ..SourceRules::default() };
-    FilmReader::start(&sources, rules).map(Some).or_exit(Exit::System)
+    FilmReader::start(&sources, rules).map(Some).or_system()
 }
 
 /// Plays what is proved to fit, and prints the report.
@@ -173,11 +177,12 @@ fn play(
             .with_context(|| file.display().to_string())
             .or_exit(Exit::Io)?;
     }
+    let roll = Arc::new(RollCall::new(args.require_acks));
+    play = play.called(&roll);
     let control = play.control();
-    let ctrl_c =
-        leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
+    let ctrl_c = leave_on_signals(&control.leave).context("signals cannot be handled").or_system()?;
     let film = film.map(FilmReader::table);
-    let said = Messages { control, ctrl_c, length, join: play.join(), film, names };
+    let said = Messages { control, ctrl_c, length, join: play.join(), film, roll, names };
     let progress = Progress::start(said, for_ever);
     let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();
@@ -207,15 +212,18 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
 
 /// What a play ends with that did not begin.
 fn refused(error: PlayError, cue: &Path) -> Failure {
-    let (exit, names_cue) = (exit_of(&error), !matches!(error, PlayError::Plan(_)));
+    let (code, names_cue) = (exit_of(&error), !matches!(error, PlayError::Plan(_)));
     let error = anyhow::Error::new(error);
-    Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
+    Failure { exit: code, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
 }
 
 /// The exit code of that.
-pub(super) const fn exit_of(error: &PlayError) -> Exit {
+pub(super) fn exit_of(error: &PlayError) -> Exit {
     match error {
-        PlayError::Runtime(RuntimeError::Net(_) | RuntimeError::Thread(_)) => Exit::System,
+        PlayError::Runtime(RuntimeError::Net(error)) => exit::of_net(error),
+        PlayError::Runtime(RuntimeError::Thread(error)) => exit::of_system(error),
+        PlayError::Runtime(RuntimeError::PortTaken(_)) => Exit::TryAgain,
+        PlayError::Runtime(RuntimeError::Link(_)) | PlayError::Silent(_) => Exit::Unavailable,
         PlayError::Limits { .. } => Exit::CheckFailed,
         PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
         PlayError::Unsure(_) | PlayError::Unplaced(_) | PlayError::NotHome(_) | PlayError::UnknownTurn(_) => {

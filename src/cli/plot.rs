@@ -1,16 +1,17 @@
 //! `kinocue plot`.
 
-use std::io::{self, IsTerminal as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 
-use super::load::{self, SeatArgs};
+use super::load::{self, Judge, SeatArgs};
 use super::{Exit, Failure, OrExit as _, convert, exit, figures, plot_recording, print};
 use crate::cue::Source;
 use crate::motion::SeatAxis;
 use crate::plot::{self, Columns, Picture, Subject, Theme};
 use crate::proof::Digest;
+use crate::sys::terminal;
 use crate::time::{Rate, ShowTime, parse_time};
 use crate::timeline::Timeline;
 
@@ -25,9 +26,9 @@ pub(super) const RECORDING_COLUMNS: usize = 900;
 /// The greatest width of a terminal that is used, characters.
 const WIDEST: u16 = 240;
 
-/// Draws a cue, where it goes and what that asks of a seat; or a recording, what a seat was asked and sent, and what went wrong.
+/// Draws a cue or a recording.
 ///
-/// Draws in braille on a terminal; with -o writes a self-contained HTML page or SVG. Speed, acceleration and jerk are those of
+/// Of a cue where it goes and what that asks of a seat; of a recording what a seat was asked and sent, and what went wrong. Draws in braille on a terminal; with -o writes a self-contained HTML page or SVG. Speed, acceleration and jerk are those of
 /// `kinocue info` and `kinocue check`, as fractions of their limits. For a recording, --seat is the name of a seat; without it, one
 /// that fell out is drawn, else the one that the limiter held back farthest.
 #[derive(Debug, clap::Args)]
@@ -35,9 +36,9 @@ const WIDEST: u16 = 240;
     "kinocue plot cues/coaster.csv",
     "kinocue plot cues/storm.mcap -o storm.html",
     "kinocue plot cues/coaster.csv --at 00:32.5 --theme print -o jerk.svg",
-    "kinocue plot cues/voyage.csv --config hall.toml --from 0:10 --to 0:20",
-    "kinocue plot last --seat F4 --at 47:10",
-    "kinocue plot tuesday.mcap monday.mcap --seat F4 -o both.html",
+    "kinocue plot cues/bench-ride.csv --config examples/hall.toml --from 0:10 --to 0:15",
+    "kinocue plot last                                            the newest recording in this folder",
+    "kinocue plot ride.mcap before.mcap --seat c1 -o both.html    two recordings of yours",
 ]))]
 pub(super) struct Args {
     /// The cue, CSV or MCAP; or a recording; or the word last: the newest recording in this folder.
@@ -132,6 +133,16 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     Ok(faults.first().map_or(Exit::Done, load::cue_exit))
 }
 
+/// Draws a cue on the terminal, as it is on its seats.
+pub(super) fn draw(timeline: &Timeline, judge: &Judge) -> Result<(), Failure> {
+    let seats = judge.seats(timeline.axes());
+    let facts = facts(timeline, &seats, judge.rate_hz);
+    let columns =
+        Columns::over(ShowTime::ZERO, timeline.duration(), 2 * plot::cells(usize::from(width())) - 1);
+    let subject = Subject { timeline, seats: &seats, rate: Rate::from_hz(judge.rate_hz), facts };
+    print::out(&plot::braille(&plot::of_cue(subject, columns)))
+}
+
 impl Args {
     /// The ends of what is asked for.
     fn stretch(&self) -> (Option<ShowTime>, Option<ShowTime>) {
@@ -191,7 +202,5 @@ fn tell(picture: &Picture, file: Option<(&Path, PlotFormat)>, args: &Args) -> Re
 
 /// How wide the terminal is, characters.
 fn width() -> u16 {
-    let stdout = io::stdout();
-    let known = stdout.is_terminal().then(|| rustix::termios::tcgetwinsize(&stdout).ok()).flatten();
-    known.map(|size| size.ws_col).filter(|width| *width > 0).unwrap_or(WIDTH).min(WIDEST)
+    terminal::width(io::stdout()).unwrap_or(WIDTH).min(WIDEST)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 
-use super::record::{open, unread};
+use super::record::{open, seat_in, unread};
 use super::{Exit, Failure, OrExit as _};
 use crate::plot::{self, Gathered, Look, Picture, TimeAxis};
 use crate::record::{Contents, Summary, Wanted, beginning, read, summarize};
@@ -63,10 +63,7 @@ pub(super) fn picture(asked: &Asked<'_>) -> Result<(Picture, String, Vec<String>
         Some(path) => {
             let (contents, _) = summarize(open(path)?).map_err(|error| unread(error, path))?;
             let name = &summary.seats[lane].name;
-            let lane = contents
-                .seat(name)
-                .ok_or_else(|| anyhow!("{}: no seat {name}", path.display()))
-                .or_exit(Exit::Usage)?;
+            let lane = seat_in(&contents, name)?;
             Some(self::gathered(path, Look { lane, ..look }, &contents)?)
         }
         None => None,
@@ -86,9 +83,7 @@ fn gathered(path: &Path, look: Look, contents: &Contents) -> Result<Gathered, Fa
 
 fn lane(asked: &Asked<'_>, contents: &Contents, summary: &Summary) -> Result<usize, Failure> {
     if let Some(name) = asked.seat {
-        let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
-        let error = || anyhow!("--seat {name}: the seats are {}", names.join(", "));
-        return contents.seat(name).ok_or_else(error).or_exit(Exit::Usage);
+        return seat_in(contents, name);
     }
     // One that fell out before one that was held back.
     let gravest = summary.seats.iter().enumerate().max_by(|(one_lane, one), (other_lane, other)| {

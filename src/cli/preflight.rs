@@ -36,11 +36,11 @@ use report::{ControllerChecks, PreflightReport};
 #[command(after_help = "\
 Examples:
   kinocue preflight                          the daemon's own hall
-  kinocue preflight --config hall.toml
-  kinocue preflight --config hall.toml --cue cues/voyage.csv --rate 250
-  kinocue preflight A1 A2 --config hall.toml
-  kinocue preflight --config hall.toml --row B --json
-  kinocue preflight --to 192.168.15.201:7408,axes=3
+  kinocue preflight --config examples/hall.toml
+  kinocue preflight --config examples/hall.toml --cue cues/coaster.csv --rate 250
+  kinocue preflight A1 B1 --config examples/hall.toml
+  kinocue preflight --config examples/hall.toml --row B --json
+  kinocue preflight --to 127.0.0.1:7408,axes=3
   kinocue preflight --explain estop-and
 
 To accept a finding, name it with the reason in the configuration, under [show] or under one [[controller]]:
@@ -124,9 +124,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 fn explain(which: Option<&str>) -> Result<Exit, Failure> {
     let text = match which {
         None => explain::all(),
-        Some(id) => {
-            explain::one(id.parse::<Check>().map_err(|error| anyhow!("{id}: {error}")).or_exit(Exit::Usage)?)
-        }
+        Some(id) => explain::one(
+            id.parse::<Check>().map_err(|error| anyhow!("{id}: {error}")).or_exit(Exit::NoInput)?,
+        ),
     };
     print::out(&text)?;
     Ok(Exit::Done)

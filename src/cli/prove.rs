@@ -49,7 +49,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     } else {
         print::out(&verdict.lines().iter().map(|line| format!("{line}\n")).collect::<String>())?;
     }
-    Ok(if verdict.passed { Exit::Done } else { Exit::CheckFailed })
+    Ok(match (verdict.passed, verdict.playable) {
+        (true, _) => Exit::Done,
+        (false, true) => Exit::CheckFailed,
+        (false, false) => Exit::BadCue,
+    })
 }
 
 fn parse_points(text: &str) -> Result<usize, String> {
@@ -77,6 +81,7 @@ fn judge(path: &Path, config: Config) -> io::Result<Verdict> {
     let sha256 = input.finish()?; // reading ends at the first fault of some kinds
     let mut verdict = Verdict {
         passed: false,
+        playable: false,
         faults: Vec::new(),
         more: 0,
         led_faults: Vec::new(),
@@ -109,6 +114,7 @@ fn of_cue(cue: Cue, config: Config, verdict: &mut Verdict) {
         verdict.faults.push(format!("{place}{misfit}").trim_start().to_owned());
     }
     config.fits_stroke(&timeline).faults.iter().for_each(|faults| note(faults, verdict));
+    verdict.playable = verdict.faults.is_empty();
     let rate = Rate::from_hz(config.show.rate_hz);
     let prove = |config: &Config| prove_in(config, &timeline, Terms::of_hall(config, digest, rate, 1.0));
     let lines = |proof: &Proof| -> Vec<String> {

@@ -16,10 +16,10 @@ mod write;
 const EXAMPLES: &str = "\
 Examples:
   kinocue register list PA90..98
-  kinocue register read PA95 dp 06..0b --to 192.168.15.201:7408
-  kinocue register write PA95=6 --to 192.168.15.201:7408 --keep
-  kinocue register save hall-settings.toml --config hall.toml
-  kinocue register diff hall-settings.toml --config hall.toml --name A7
+  kinocue register read PA95 dp 06..0b --to 127.0.0.1:7408
+  kinocue register write PA95=6 --to 127.0.0.1:7408 --keep
+  kinocue register save hall-settings.toml --config examples/hall.toml
+  kinocue register diff hall-settings.toml --config examples/hall.toml --name A1
 
 Registers are named as the manuals name them (PA95, pa 0x95, dp 06..0b, dpf0, servo 1 508),
 as the panel of an integrated controller shows them (CP149, cd 006..011), or by their names in

@@ -15,13 +15,15 @@ use crate::time::ShowTime;
 /// Differences that are printed.
 const PRINTED: usize = 20;
 
-/// Judges a recording in full again: gives its frames and replies, at their instants, to the books of frames, the observer and the health of
-/// a hall in virtual time, and holds what these say against what was recorded: the fate of each reply and its latency, lost frames,
-/// how seats stood, and the report. Nothing is sent.
+/// Judges a full recording again, and says what differs.
+///
+/// Gives its frames and replies, at their instants, to the books of frames, the observer and the health of a hall in virtual time, and
+/// compares what these say with what was recorded: the fate of each reply and its latency, lost frames, how seats stood, and the report.
+/// Nothing is sent.
 ///
 /// Ends with 1 where anything differs.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  kinocue replay tuesday.mcap\n  kinocue replay tuesday.mcap --json")]
+#[command(after_help = "Examples:\n  kinocue replay ride.mcap\n  kinocue replay ride.mcap --json")]
 pub(super) struct Args {
     /// The recording: of a play with --record-mode full, an incident, or a cut with --whole.
     file: PathBuf,

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use jiff::civil::Date;
 
-use super::{Exit, Failure, OrExit as _, load, print};
-use crate::config::Log;
+use super::{Exit, Failure, OrExit as _, load, places, print};
+use crate::config::journal_in;
 use crate::journal::{self, JournalError, JournalReport, ReportBounds};
 use crate::sys::clock::local_now;
 
@@ -39,7 +39,7 @@ pub(super) struct Args {
     /// The last day [default: today].
     #[arg(long, value_name = "DAY", value_parser = parse_day, requires = "from")]
     to: Option<Day>,
-    /// The folder of the journal [default: that of the configuration, else /var/log/kinocue].
+    /// The folder of the journal [default: that of the configuration, else /var/log/kinocue, or of an ordinary user ~/.local/state/kinocue/log].
     #[arg(long, value_name = "DIR", conflicts_with = "config")]
     dir: Option<PathBuf>,
     /// The configuration that names the folder.
@@ -115,12 +115,12 @@ fn days(args: &Args, today: Date) -> Result<(Date, Date), Failure> {
 }
 
 fn folder(args: &Args) -> Result<PathBuf, Failure> {
-    let of_config = |path: &Path| load::config(path).map(|config| config.log.dir);
+    let of_config = |path: &Path| load::config(path).map(|config| config.kept_in(&places::state()).log.dir);
     let named = args
         .dir
         .clone()
         .map_or_else(|| args.config.as_deref().map(of_config).transpose(), |dir| Ok(Some(dir)));
-    Ok(named?.unwrap_or_else(|| Log::default().dir))
+    Ok(named?.unwrap_or_else(|| journal_in(&places::state())))
 }
 
 fn exit(error: &JournalError) -> Exit {

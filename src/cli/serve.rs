@@ -1,14 +1,17 @@
 //! `kinocue serve`: the daemon.
 
+use std::fs;
 use std::path::PathBuf;
 
-use super::{Exit, Failure, OrExit as _, print};
-use crate::app::runtime::RuntimeError;
+use anyhow::Context as _;
+
+use super::rehearsal::Rehearsal;
+use super::{Exit, Failure, OrExit as _, exit, load, places, print};
+use crate::api::ApiError;
 use crate::app::serve::{Parts, Places, ServeError, serve, signals};
-use crate::app::surfaces::Sockets;
+use crate::app::surfaces::{Sockets, SurfaceError};
+use crate::console;
 use crate::log::{Line, Log, Priority};
-use crate::net::NetError;
-use crate::{config, console};
 
 /// Runs the service of a hall.
 ///
@@ -19,36 +22,57 @@ use crate::{config, console};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  kinocue serve --config hall.toml
-  kinocue serve --config hall.toml --socket ./control.sock --state ./state
+  kinocue serve --rehearse                                 two rows of simulated seats, to rehearse on a laptop
+  kinocue serve --config examples/hall.toml --rehearse     the same with a configuration on 127.0.0.1
+  kinocue serve --config /etc/kinocue/kinocue.toml         a hall, as its unit starts it
+
+An ordinary user has settings, library, playlists, journal and recordings in ~/.local/state/kinocue ($XDG_STATE_HOME), and the
+sockets in $XDG_RUNTIME_DIR/kinocue, where the commands look for them; --state moves all but the sockets. Folders that the
+configuration names stay as they are.
 
 Exit codes:
   0   ended by a signal, with the seats parked
+  66  the configuration is missing
   71  the system refused a socket, a thread or a folder
-  75  another program holds the frame port
+  75  another program holds the frame port, a socket or a port of the API
   78  the configuration is bad")]
 pub(super) struct Args {
     /// The configuration of the hall.
-    #[arg(long, value_name = "FILE", env = "KINOCUE_CONFIG")]
-    config: PathBuf,
-    /// The control socket.
-    #[arg(long, value_name = "PATH", default_value = "/run/kinocue/control.sock")]
-    socket: PathBuf,
+    #[arg(long, value_name = "FILE", env = "KINOCUE_CONFIG", required_unless_present = "rehearse")]
+    config: Option<PathBuf>,
+    /// Simulate every controller in this program; nothing leaves the machine. Without --config: two rows of four seats, with two cues
+    /// and a playlist.
+    #[arg(long)]
+    rehearse: bool,
+    /// The control socket [default: /run/kinocue/control.sock, or of an ordinary user $XDG_RUNTIME_DIR/kinocue/control.sock].
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
     /// The stop socket, which takes only a stop [default: stop.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     stop_socket: Option<PathBuf>,
-    /// The folder for settings that outlast a restart.
-    #[arg(long, value_name = "DIR", default_value = "/var/lib/kinocue")]
-    state: PathBuf,
+    /// The folder for settings, library, playlists, journal and recordings [default: /var/lib/kinocue, with the journal in
+    /// /var/log/kinocue; of an ordinary user ~/.local/state/kinocue].
+    #[arg(long, value_name = "DIR")]
+    state: Option<PathBuf>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let config = config::load(&args.config).or_exit(Exit::Config)?;
-    let beside = || args.socket.with_file_name("stop.sock");
-    let sockets =
-        Sockets { control: args.socket.clone(), stop: args.stop_socket.clone().unwrap_or_else(beside) };
-    let places = Places { config: args.config.clone(), state: args.state.clone(), sockets };
-    let log = Log::start(print::tell).or_exit(Exit::System)?;
+    let state = args.state.clone().unwrap_or_else(places::state);
+    // Until the service has ended.
+    let rehearsal = args.rehearse.then(|| Rehearsal::begin(args.config.as_deref(), &state)).transpose()?;
+    let path = rehearsal.as_ref().map(|rehearsal| rehearsal.config.clone()).or_else(|| args.config.clone());
+    let path = path.unwrap_or_default(); // clap requires one of both
+    let config = load::config(&path)?.kept_in(&state);
+    let control = args.socket.clone().unwrap_or_else(places::control_socket);
+    if args.socket.is_none()
+        && let Some(folder) = control.parent()
+    {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string()).or_system()?;
+    }
+    let beside = || control.with_file_name("stop.sock");
+    let sockets = Sockets { stop: args.stop_socket.clone().unwrap_or_else(beside), control };
+    let places = Places { config: path, state, sockets };
+    let log = Log::start(print::tell).or_system()?;
     let parts = Parts { config, places, pages: console::page, signals: signals()?, log: log.clone() };
     serve(parts, |_, addresses| {
         for address in addresses {
@@ -62,12 +86,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 impl From<ServeError> for Failure {
     fn from(error: ServeError) -> Self {
         let exit = match &error {
-            ServeError::Runtime(RuntimeError::Net(NetError::Refused { cause, .. }))
-                if cause.kind() == std::io::ErrorKind::AddrInUse =>
-            {
-                Exit::TryAgain
-            }
-            _ => Exit::System,
+            ServeError::Surface(SurfaceError::Api(ApiError::Served { .. })) => Exit::TryAgain,
+            _ => exit::of_system(&error),
         };
         Self { exit, error: error.into() }
     }

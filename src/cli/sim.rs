@@ -15,7 +15,7 @@ use control::{CarryOut, Control};
 pub(super) use tty::Drives;
 
 use super::print::{self, tell};
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, exit};
 use crate::sim::{Farm, FarmError, LinkFaults, Options, Outcome, Setup};
 use crate::time::parse_duration;
 use crate::wire::Dialect;
@@ -46,7 +46,7 @@ Examples:
   kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      an emergency stop at 2 s, released at 3 s
   kinocue sim --count 8 --script \"5:3@err=12\"        an alarm of axis 3's drive at the third controller
   kinocue sim --dialect silvermax --tty ./stalls --units 16,17,18    three units on a serial line
-  kinocue sim --dialect silvermax --tty ./stalls --faults \"lost=0.001, 17@dead=1\" --script \"9:16@reset\"
+  kinocue sim --dialect silvermax --tty ./stalls --units 16,17 --faults \"lost=0.001, 17@dead=1\" --script \"9:16@reset\"
   kinocue sim --dialect sixpack2 --tty ./stalls --faults \"jump=14400\"    motors lose steps at speed jumps above 22.5 mm/s
 
 Commands of --script, each with TIME: before it (seconds from the start), and of --control:
@@ -173,8 +173,7 @@ pub(super) enum SimFamily {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let signals =
-        SignalSocket::catch().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
+    let signals = SignalSocket::catch().context("cannot wait for Ctrl-C and SIGTERM").or_system()?;
     match (args.dialect, &args.tty.tty) {
         (SimFamily::Silvermax, Some(path)) => silvermax::run(args, path, signals),
         (SimFamily::Sixpack2, Some(path)) => sixpack2::run(args, path, signals),
@@ -199,7 +198,7 @@ fn run_farm(args: &Args, dialect: Dialect, signals: SignalSocket) -> Result<Exit
         return Err(refusal).or_exit(Exit::Usage);
     }
     let farm = Farm::start(options(args, dialect)?).map_err(|error| {
-        let exit = if matches!(error, FarmError::Script(_)) { Exit::Usage } else { Exit::System };
+        let exit = if matches!(error, FarmError::Script(_)) { Exit::Usage } else { exit::of_system(&error) };
         Failure { exit, error: error.into() }
     })?;
     let remote = farm.remote();
@@ -218,7 +217,7 @@ fn run_farm(args: &Args, dialect: Dialect, signals: SignalSocket) -> Result<Exit
 fn control(args: &Args, carry_out: CarryOut) -> Result<Option<Control>, Failure> {
     let open = |path: &PathBuf| {
         let opened = Control::open(path, carry_out);
-        opened.with_context(|| format!("cannot listen at {}", path.display())).or_exit(Exit::System)
+        opened.with_context(|| format!("cannot listen at {}", path.display())).or_system()
     };
     args.control.as_ref().map(open).transpose()
 }
@@ -294,6 +293,6 @@ impl SignalSocket {
     }
 
     fn wait(mut self) -> Result<(), Failure> {
-        self.0.read_exact(&mut [0]).context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)
+        self.0.read_exact(&mut [0]).context("cannot wait for Ctrl-C and SIGTERM").or_system()
     }
 }

@@ -19,15 +19,15 @@ Examples:
   kinocue sync use auto
   kinocue sync send --ltc --film-fps 25 --tc-start 01:00:00:00 --seconds 60 -o reel.wav
   kinocue sync check reel.wav
-  kinocue sync send --artnet 10.0.0.255 --film-fps 24
+  kinocue sync send --artnet 127.0.0.1 --film-fps 24
   kinocue sync index film.mkv -o film.kidx
   kinocue sync watch sound:alsa:hw:2,0,index=film.kidx,index=trailer.kidx
-  kinocue sync watch artnet:10.0.0.20 mtc:/dev/snd/midiC1D0
+  kinocue sync watch artnet:127.0.0.1 mtc:/dev/snd/midiC1D0
   kinocue sync relay ltc:alsa:hw:2,0 --folder /tmp
   kinocue sync calibrate ltc:alsa:hw:2,0 --against mpv:/run/user/1000/film.sock
   kinocue sync send --ltc --seconds 60 | kinocue play cues/bench-ride.csv --to 127.0.0.1:7408 --chase ltc:-";
 
-/// Shows and tests the sync of a hall to its film; makes and checks timecode; makes indexes of films' sound.
+/// Shows and tests film sync; makes timecode and indexes of sound.
 ///
 /// Without a command it shows the film of the running service: each source with its position and quality, which source leads, and
 /// how far the seats are from the film. On a terminal it runs until Ctrl-C, elsewhere it prints once.

@@ -1,5 +1,6 @@
 //! The controllers a command is for, the frame port to reach them, and what to tell of those that fail.
 
+use std::collections::BTreeSet;
 use std::io;
 use std::net::SocketAddrV4;
 use std::path::PathBuf;
@@ -7,12 +8,11 @@ use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
 
-use super::{Exit, Failure, OrExit as _, load, print};
+use super::{Exit, Failure, OrExit as _, exit, load, names, print};
 use crate::config::{Config, Controller, Link, Show, Station, from_to_args};
 use crate::device::{Fault, RegisterAnswer, Request, RequestOutcome, Talk, refusal};
 use crate::drive::rates::LinkLoad;
 use crate::motion::MAX_AXES;
-use crate::net::NetError;
 use crate::wire::ReplyCode;
 
 /// Which controllers are meant.
@@ -130,26 +130,25 @@ impl TargetArgs {
     }
 
     /// Those of the rows and of the names, in the order of the configuration; all where neither chooses.
-    fn choose(&self, all: Vec<Controller>, names: &[String]) -> Result<Vec<Controller>, Failure> {
-        if self.row.is_empty() && names.is_empty() {
+    fn choose(&self, all: Vec<Controller>, chosen: &[String]) -> Result<Vec<Controller>, Failure> {
+        if self.row.is_empty() && chosen.is_empty() {
             return Ok(all);
         }
-        for name in names {
+        for name in chosen {
             if !all.iter().any(|one| one.name == *name) {
-                let known: Vec<_> = all.iter().map(|one| one.name.as_str()).collect();
-                let why = anyhow!("there is no controller {name}; there are {}", known.join(", "));
-                return Err(why).or_exit(Exit::Usage);
+                return Err(names::unknown("controller", name, all.iter().map(|one| one.name.as_str())));
             }
         }
         for row in &self.row {
             if !all.iter().any(|one| one.row.as_ref() == Some(row)) {
-                return Err(anyhow!("no controller is in row {row}")).or_exit(Exit::Usage);
+                let rows: BTreeSet<_> = all.iter().filter_map(|one| one.row.as_deref()).collect();
+                return Err(names::unknown("row", row, rows.iter().copied()));
             }
         }
-        let chosen = |one: &Controller| {
-            names.contains(&one.name) || one.row.as_ref().is_some_and(|row| self.row.contains(row))
+        let is_meant = |one: &Controller| {
+            chosen.contains(&one.name) || one.row.as_ref().is_some_and(|row| self.row.contains(row))
         };
-        Ok(all.into_iter().filter(chosen).collect())
+        Ok(all.into_iter().filter(is_meant).collect())
     }
 }
 
@@ -163,11 +162,7 @@ impl Targets {
     /// Takes the frame port; 75 while another program holds it.
     pub(super) fn open(&self) -> Result<Talk, Failure> {
         Talk::open(self.show.bind, &self.controllers).map_err(|error| {
-            let exit = match &error {
-                NetError::Refused { cause, .. } if cause.kind() == io::ErrorKind::AddrInUse => Exit::TryAgain,
-                NetError::Refused { .. } => Exit::System,
-                _ => Exit::Usage,
-            };
+            let exit = exit::of_net(&error);
             let held = "this needs the frame port, to itself; end the program that holds it, such as the service or a play";
             let error = anyhow::Error::new(error);
             Failure { exit, error: if exit == Exit::TryAgain { error.context(held) } else { error } }

@@ -77,7 +77,7 @@ fn parse_name(name: &str) -> Result<String, String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let token = Token::new(&args.name, args.role.into()).or_exit(Exit::System)?;
+    let token = Token::new(&args.name, args.role.into()).or_system()?;
     if args.json {
         print::json(&token)?;
     } else {

@@ -21,11 +21,15 @@ const MAX_VIBRATING_AXES: usize = 6;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Misfit {
-    /// An axis that no controller takes.
-    #[error("a{axis}: no controller takes this axis; give one an axis_offset and a seat that include it")]
-    UntakenAxis {
-        /// The axis, from 1.
+    /// Axes in a row that no controller takes.
+    #[error("{}", untaken(*axis, *last, *axes))]
+    UntakenAxes {
+        /// The first of them, from 1.
         axis: usize,
+        /// The last.
+        last: usize,
+        /// How many the cue has.
+        axes: usize,
     },
     /// An effect that is no output here.
     #[error("fx_{name}: unknown effect; wire it to an output in [effects], or with --effect {name}=N{hint}")]
@@ -157,7 +161,7 @@ impl Misfit {
     #[must_use]
     pub(crate) fn column(&self) -> String {
         match self {
-            Self::UntakenAxis { axis } => format!("a{axis}"),
+            Self::UntakenAxes { axis, .. } => format!("a{axis}"),
             Self::UnknownEffect { name, .. } => format!("fx_{name}"),
             Self::NoVibration { axis, .. } | Self::WideVibration { axis, .. } => format!("v{axis}_hz"),
             Self::UnsaidAmplitude { axis, .. } | Self::AmplitudePastStroke { axis, .. } => {
@@ -192,7 +196,9 @@ impl Config {
     /// What the hall cannot do of a cue, the stroke left aside; nothing where all of it can be played.
     #[must_use]
     pub(crate) fn misfits(&self, timeline: &Timeline) -> Vec<Misfit> {
-        let untaken = self.untaken_axes(timeline.axes()).into_iter().map(|axis| Misfit::UntakenAxis { axis });
+        let untaken = rows(&self.untaken_axes(timeline.axes()));
+        let untaken =
+            untaken.into_iter().map(|(axis, last)| Misfit::UntakenAxes { axis, last, axes: timeline.axes() });
         let unknown = timeline.effect_names().iter().filter(|name| !self.has_effect(name));
         let unknown = unknown.map(|name| {
             let hint = did_you_mean(name, self.effects.iter().map(|effect| effect.name.as_str()));
@@ -262,6 +268,26 @@ impl Config {
     }
 }
 
+/// Rising numbers as rows of neighbours: the first and the last of each.
+fn rows(numbers: &[usize]) -> Vec<(usize, usize)> {
+    numbers.chunk_by(|one, next| one + 1 == *next).map(|row| (row[0], row[row.len() - 1])).collect()
+}
+
+fn untaken(axis: usize, last: usize, axes: usize) -> String {
+    let (which, what, them) = if axis == last {
+        (format!("a{axis}"), "this axis", "it")
+    } else {
+        (format!("a{axis} to a{last}"), "these axes", "them")
+    };
+    let without = match axis {
+        2.. if last == axes => format!("; `kinocue edit axes CUE 1-{} -o OUT` leaves {them} out", axis - 1),
+        _ => String::new(),
+    };
+    format!(
+        "{which}: no controller takes {what}; give one an axis_offset and a seat that include {them}{without}"
+    )
+}
+
 /// Why the controller cannot shake as the cue asks, named by the first axis that does.
 fn unshakeable(controller: &Controller, timeline: &Timeline) -> Option<Misfit> {
     let (_, axes) = motion_channel_and_slots(controller.frame_axes(timeline.axes()));
@@ -324,6 +350,10 @@ mod tests {
         let found = misfits(&["1,axes=1", "2,axes=1,offset=2"], "a1,a2,a3", "0,0,0");
         assert_eq!(found.len(), 1);
         assert!(found[0].starts_with("a2: no controller takes this axis"), "{found:?}");
+        let found = misfits(&["1,axes=3"], "a1,a2,a3,a4,a5,a6", "0,0,0,0,0,0");
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].starts_with("a4 to a6: no controller takes these axes"), "{found:?}");
+        assert!(found[0].ends_with("`kinocue edit axes CUE 1-3 -o OUT` leaves them out"), "{found:?}");
     }
 
     #[test]

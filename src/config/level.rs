@@ -8,19 +8,30 @@ use super::section::{Entry, Section, did_you_mean};
 use crate::channel;
 use crate::time::TRIM_MS;
 
-/// An intensity, 0 to 1: `60%`, or `-6dB` for 10^(-6/20).
+/// What is wrong with a number that is no level, 0 to 1, in the words of all surfaces.
+pub(crate) fn no_level(number: f64) -> String {
+    let percent = if number > 2.0 && number <= 100.0 {
+        format!("; {number} % is {} or \"{number}%\"", number / 100.0)
+    } else {
+        String::new()
+    };
+    format!("{number} is outside 0..=1{percent}")
+}
+
+/// An intensity, 0 to 1: `0.6`, `60%`, or `-6dB` for 10^(-6/20).
 ///
 /// # Errors
 /// What is wrong with the text, for a person.
 pub(crate) fn parse_level(text: &str) -> Result<f64, String> {
-    let refuse = || "not a level; write 0% to 100%, or 0dB and below, such as -6dB".to_owned();
+    let refuse = || "not a level; write 0% to 100%, 0 to 1, or 0dB and below, such as -6dB".to_owned();
     let level = if let Some(percent) = text.strip_suffix('%') {
         percent.trim_end().parse::<f64>().map_err(|_| refuse())? / 100.0
     } else if let Some(decibel) = text.strip_suffix("dB") {
         let decibel: f64 = decibel.trim_end().parse().map_err(|_| refuse())?;
         10_f64.powf(decibel / 20.0)
     } else {
-        return Err(refuse());
+        let level = text.parse().map_err(|_| refuse())?;
+        return if (0.0..=1.0).contains(&level) { Ok(level) } else { Err(no_level(level)) };
     };
     if (0.0..=1.0).contains(&level) { Ok(level) } else { Err(refuse()) }
 }
@@ -29,7 +40,12 @@ pub(crate) fn parse_level(text: &str) -> Result<f64, String> {
 pub(crate) fn level(section: &mut Section<'_, '_, '_>, key: &'static str) -> Option<f64> {
     let entry = section.get(key)?;
     if !entry.value.is_str() {
-        return entry.number_in(0.0..=1.0, section.faults);
+        let level = entry.number(section.faults)?;
+        if !(0.0..=1.0).contains(&level) {
+            entry.fault(section.faults, &no_level(level));
+            return None;
+        }
+        return Some(level);
     }
     let parsed = parse_level(entry.text(section.faults)?);
     parsed.map_err(|why| entry.fault(section.faults, &why)).ok()
@@ -72,7 +88,10 @@ mod tests {
         assert_eq!(parse_level("60%"), Ok(0.6));
         assert_eq!(parse_level("0dB"), Ok(1.0));
         assert!((parse_level("-6dB").unwrap() - 0.501).abs() < 1e-3);
-        for text in ["60", "0.6", "101%", "1dB", "-1%", "nan%", "inf%", "NaNdB", "%", "é%"] {
+        assert_eq!((parse_level("0.6"), parse_level("1")), (Ok(0.6), Ok(1.0)));
+        let percent = parse_level("60").unwrap_err();
+        assert_eq!(percent, "60 is outside 0..=1; 60 % is 0.6 or \"60%\"");
+        for text in ["60", "-0.1", "1000", "nan", "101%", "1dB", "-1%", "nan%", "inf%", "NaNdB", "%", "é%"] {
             assert!(parse_level(text).is_err(), "{text}");
         }
         assert_eq!(parse_level("-infdB"), Ok(0.0));

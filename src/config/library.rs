@@ -14,11 +14,13 @@ pub(crate) struct Store {
     pub(crate) max_memory_mib: u32,
     /// The folder with the playlists; none for `playlists` beside the library.
     pub(crate) playlists: Option<PathBuf>,
+    /// The folder of what the service keeps, where that is not the package's.
+    pub(crate) kept_in: Option<PathBuf>,
 }
 
 impl Default for Store {
     fn default() -> Self {
-        Self { max_cue_mib: 256, max_memory_mib: 768, playlists: None }
+        Self { max_cue_mib: 256, max_memory_mib: 768, playlists: None, kept_in: None }
     }
 }
 
@@ -30,6 +32,7 @@ pub(super) fn store(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Store> 
         max_cue_mib: section.whole_in("max_cue_mib", 1..=2048).unwrap_or(default.max_cue_mib),
         max_memory_mib: section.whole_in("max_memory_mib", 64..=8192).unwrap_or(default.max_memory_mib),
         playlists: section.text("playlists").map(PathBuf::from),
+        kept_in: None,
     };
     section.finish();
     Some(store)

@@ -1,6 +1,6 @@
 //! `[log]`: the journal of commands and shows.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use jiff::civil::Time;
 
@@ -32,6 +32,11 @@ impl Default for Log {
             hours: None,
         }
     }
+}
+
+/// The journal of a service that keeps what it has in that folder; the package has it elsewhere.
+pub(crate) fn journal_in(state: &Path) -> PathBuf {
+    if state == Path::new("/var/lib/kinocue") { Log::default().dir } else { state.join("log") }
 }
 
 /// The hours of a house, by wall clock; they may reach past midnight.

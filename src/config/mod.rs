@@ -47,14 +47,14 @@ pub(crate) use fault::{ConfigFault, ConfigFaults, Faults};
 pub(crate) use film::{FilmPlayer, OnStop, stays_below};
 pub(crate) use fit::{HallStroke, Misfit};
 pub(crate) use gear::GearWord;
-pub(crate) use level::{level, parse_level, switches, trim};
+pub(crate) use level::{level, no_level, parse_level, switches, trim};
 pub(crate) use library::Store;
 pub(crate) use link::Link;
-pub(crate) use log::Log;
+pub(crate) use log::{Log, journal_in};
 pub(crate) use osc::OscPort;
 pub(crate) use preset::Preset;
 pub(crate) use record::{Record, RecordMode};
-pub(crate) use section::{Entry, Section, did_you_mean};
+pub(crate) use section::{Entry, Section, did_you_mean, there_is_no};
 pub(crate) use sync::FilmSync;
 pub use target::from_to_args;
 pub(crate) use text::TextPort;
@@ -265,6 +265,19 @@ impl Config {
     pub(crate) fn playlists(&self) -> PathBuf {
         let beside = || self.show.library.with_file_name("playlists");
         self.store.playlists.clone().unwrap_or_else(beside)
+    }
+
+    /// The same with library, playlists and journal in the folder of what the service keeps, but for those that it names itself.
+    #[must_use]
+    pub(crate) fn kept_in(mut self, state: &Path) -> Self {
+        if self.show.library == Show::default().library {
+            self.show.library = state.join("cues");
+        }
+        if self.log.dir == Log::default().dir {
+            self.log.dir = journal_in(state);
+        }
+        self.store.kept_in = Some(state.to_owned());
+        self
     }
 
     /// The preset called `name`.

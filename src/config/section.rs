@@ -251,6 +251,11 @@ pub(crate) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>)
         .map_or_else(String::new, |best| format!("; did you mean {best}?"))
 }
 
+/// That there is no `what` of that name, with the one that it may be a slip for.
+pub(crate) fn there_is_no<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> String {
+    format!("there is no {what} {name}{}", did_you_mean(name, known))
+}
+
 fn whole_number(value: &DeValue<'_>) -> Option<i64> {
     let digits = value.as_integer()?;
     i64::from_str_radix(digits.as_str(), digits.radix()).ok()

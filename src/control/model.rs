@@ -85,6 +85,8 @@ words! {
         Completed = "completed",
         /// A person ended it.
         Stopped = "stopped",
+        /// Nobody answered any more when it ended.
+        Lost = "lost",
         /// A fault ended it.
         Fault = "fault",
     }

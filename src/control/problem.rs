@@ -6,6 +6,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::model::words;
+use crate::config::there_is_no;
 use crate::state::Refusal;
 
 words! {
@@ -28,7 +29,9 @@ words! {
         Size = "size",
         /// It is written in a form that is not read here.
         Media = "media",
-        /// The cue, playlist or configuration does not pass.
+        /// The cue cannot be read, or asks for what the hall does not have.
+        Cue = "cue",
+        /// The cue breaks limits; or a playlist or configuration does not pass.
         Check = "check",
         /// It came more than two seconds after it was asked.
         Late = "late",
@@ -76,7 +79,7 @@ impl Code {
             Self::State | Self::Late => 409,
             Self::Size => 413,
             Self::Media => 415,
-            Self::Check => 422,
+            Self::Cue | Self::Check => 422,
             Self::Busy => 429,
             Self::File | Self::Internal => 500,
             Self::Off => 501,
@@ -90,6 +93,16 @@ impl Problem {
     #[must_use]
     pub fn new(code: Code, detail: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { status: code.status(), code, detail: detail.into(), remedy: remedy.into(), faults: Vec::new() }
+    }
+
+    /// That there is no `what` of that name, with the one that it may be a slip for.
+    pub(crate) fn unknown<'a>(
+        what: &str,
+        name: &str,
+        known: impl Iterator<Item = &'a str>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self::new(Code::Unknown, there_is_no(what, name, known), remedy)
     }
 
     /// That no film leads shows here.

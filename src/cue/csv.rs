@@ -14,6 +14,7 @@ use super::unit::DeclaredUnits;
 use super::{Cue, Effects, Interpolation, Origin, Steps, title_of, value};
 use crate::channel::{Samples, TrackId};
 use crate::motion::MAX_AXES;
+use crate::plain;
 use crate::time::ShowTime;
 
 /// Reads a CSV cue; `path` names it in faults.
@@ -24,7 +25,7 @@ pub(super) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
 fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
     let mut lines = Lines::new(input);
     let mut faults = Collector::default();
-    let Some((declared, header)) = read_head(&mut lines, &mut faults) else {
+    let Some((declared, header)) = read_head(path, &mut lines, &mut faults) else {
         return Err(faults.or(path, Problem::Empty));
     };
     let mut rows = CsvRows::new(path, &declared, header);
@@ -56,13 +57,22 @@ struct Declared {
 }
 
 /// Reads up to the header row; nothing where there is none, or rows cannot be understood after what was found.
-fn read_head<R: Read>(lines: &mut Lines<R>, faults: &mut Collector) -> Option<(Declared, Header)> {
+fn read_head<R: Read>(
+    path: &Path,
+    lines: &mut Lines<R>,
+    faults: &mut Collector,
+) -> Option<(Declared, Header)> {
     let mut declared = Declared::default();
     let mut header = None;
     lines.each(faults, |number, line, faults| {
         if let Some(comment) = line.trim_ascii_start().strip_prefix('#') {
             declared.take(number, line, comment, faults);
             return ControlFlow::Continue(());
+        }
+        if let Some((name, separator)) = other_separator(line) {
+            let problem = Problem::Separator(name, separator, plain::path(path).to_string());
+            faults.add(Place::Text { line: number, column: 1 }, None, problem);
+            return ControlFlow::Break(());
         }
         match Splitter::new().split(line) {
             Ok(cells) => header = Some(Header::read(line, number, cells, faults)),
@@ -75,6 +85,15 @@ fn read_head<R: Read>(lines: &mut Lines<R>, faults: &mut Collector) -> Option<(D
         faults.add(place, Some("units"), problem);
     }
     faults.is_empty().then_some((declared, header))
+}
+
+/// What separates the columns of a header without a comma: in words, and for `sed`.
+fn other_separator(line: &str) -> Option<(&'static str, &'static str)> {
+    if line.contains(',') {
+        return None;
+    }
+    let known = [(';', "semicolons", ";"), ('\t', "tabs", "\\t")];
+    known.into_iter().find(|(separator, ..)| line.contains(*separator)).map(|(_, name, sed)| (name, sed))
 }
 
 impl Declared {

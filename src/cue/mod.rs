@@ -17,6 +17,7 @@ mod number;
 mod place;
 mod problem;
 mod rows;
+mod splice;
 mod steps;
 mod table;
 mod tracks;
@@ -32,6 +33,7 @@ pub use mcap::recover;
 pub use mcap::write as write_mcap;
 use place::Origin;
 pub(crate) use problem::Problem;
+pub(crate) use splice::Splice;
 pub(crate) use steps::Steps;
 pub use steps::TrackStep;
 pub(crate) use tracks::{Tracks, Vibration};
@@ -276,6 +278,22 @@ impl Cue {
             *steps = steps.with_values(&values);
         }
         Self { tracks: changed, ..self }
+    }
+
+    /// Sets a marker.
+    ///
+    /// # Errors
+    /// Where it is outside the cue, or its name is too long.
+    pub(crate) fn mark(&mut self, at: ShowTime, name: &str) -> Result<(), Problem> {
+        if at > self.duration() {
+            return Err(Problem::MarkerOutside(at, self.duration()));
+        }
+        if name.len() > limits::MAX_MARKER_NAME {
+            return Err(Problem::MarkerName(name.len()));
+        }
+        let place = self.markers.partition_point(|marker| marker.at <= at);
+        self.markers.insert(place, Marker { at, name: name.to_owned() });
+        Ok(())
     }
 
     fn shrink(&mut self) {

@@ -64,6 +64,12 @@ pub enum Problem {
     /// A column or field that means nothing to us.
     #[error("unknown column; {0}")]
     UnknownColumn(&'static str),
+    /// Columns that something else than commas separates.
+    #[error(
+        "the columns are separated by {0}, not by commas; `sed 's/,/./g; s/{1}/,/g' {2} > OUT.csv` makes a cue of it, with points in \
+         numbers"
+    )]
+    Separator(&'static str, &'static str, String),
     /// A column that was there before.
     #[error("the column occurs twice")]
     ColumnTwice,
@@ -261,6 +267,9 @@ pub enum Problem {
     /// More markers than are kept.
     #[error("more than {MAX_MARKERS} markers, the limit of a cue")]
     TooManyMarkers,
+    /// A marker that no instant of the cue has.
+    #[error("a marker at {0} is outside the cue, which is {1} long")]
+    MarkerOutside(ShowTime, ShowTime),
     /// A marker's name that is too long.
     #[error("a marker's name of {0} bytes; the limit is {MAX_MARKER_NAME}")]
     MarkerName(usize),

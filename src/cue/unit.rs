@@ -107,6 +107,14 @@ impl Units {
         self.0[axis]
     }
 
+    /// Those of some axes, in that order, from 0.
+    #[must_use]
+    pub(super) fn picked(self, axes: &[usize]) -> Self {
+        let mut picked = Self::default();
+        axes.iter().enumerate().for_each(|(axis, from)| picked.0[axis] = self.0[*from]);
+        picked
+    }
+
     /// The word for them in a file: one for all of the axes, or one for each.
     #[must_use]
     pub(crate) fn words(self, axes: usize) -> String {

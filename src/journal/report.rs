@@ -224,7 +224,8 @@ impl Open {
         let result = match &record.outcome {
             Some(outcome) => match outcome.result {
                 Ending::Completed => ShowResult::Completed,
-                Ending::Stopped => ShowResult::Stopped,
+                // No show of a hall ends so: its loss policy ends it before.
+                Ending::Stopped | Ending::Lost => ShowResult::Stopped,
                 Ending::Fault => ShowResult::Fault,
             },
             None if may_run && !outlived => ShowResult::Running,

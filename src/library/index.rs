@@ -78,6 +78,7 @@ mod tests {
     fn verdict() -> Verdict {
         Verdict {
             passed: true,
+            playable: true,
             faults: Vec::new(),
             more: 0,
             led_faults: Vec::new(),

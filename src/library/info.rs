@@ -10,6 +10,9 @@ use super::CueId;
 pub(crate) struct Verdict {
     /// True if it can be read, fits the hall, and keeps all limits at full level.
     pub(crate) passed: bool,
+    /// True if it can be read, and the hall has all that it asks for: only limits stand against it, if anything does.
+    #[serde(default)]
+    pub(crate) playable: bool,
     /// Every fault, each with its place in the file, the first twenty in words.
     pub(crate) faults: Vec<String>,
     /// How many there are beyond those.

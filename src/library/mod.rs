@@ -172,10 +172,20 @@ impl Library {
     /// All cues by their ids, with what is known of them; reads none of them. Empty where the folder cannot be read.
     #[must_use]
     pub fn list(&self) -> Vec<CueInfo> {
-        let names = Folder::open(&self.inner.dir).and_then(|folder| folder.names()).unwrap_or_default();
-        let ids: BTreeSet<CueId> = names.iter().filter_map(|name| id_of(name)).collect();
         let print = self.inner.hall.fingerprint();
-        ids.iter().filter_map(|id| self.info(id, &print)).collect()
+        self.ids().iter().filter_map(|id| self.info(id, &print)).collect()
+    }
+
+    fn ids(&self) -> BTreeSet<CueId> {
+        let names = Folder::open(&self.inner.dir).and_then(|folder| folder.names()).unwrap_or_default();
+        names.iter().filter_map(|name| id_of(name)).collect()
+    }
+
+    /// That there is no such cue.
+    pub(crate) fn unknown(&self, id: &CueId) -> Problem {
+        let ids: Vec<_> = self.ids().iter().map(ToString::to_string).collect();
+        let remedy = "upload it, or give another of the library";
+        Problem::unknown("cue", &id.to_string(), ids.iter().map(String::as_str), remedy)
     }
 
     /// What is known of a cue; reads it not.
@@ -199,7 +209,7 @@ impl Library {
         let inner = &self.inner;
         let _turn = lock(&inner.proving);
         let print = inner.hall.fingerprint();
-        let info = self.info(id, &print).ok_or_else(|| unknown(id))?;
+        let info = self.info(id, &print).ok_or_else(|| self.unknown(id))?;
         if info.proof != Proved::Unknown {
             return Ok(info);
         }
@@ -258,7 +268,7 @@ impl Library {
     /// priority, unless the same was asked before; one at a time.
     ///
     /// # Errors
-    /// As for [`Library::read`]; [`Code::Value`] where `points` is out of range, [`Code::Check`] where the cue is in mm or
+    /// As for [`Library::read`]; [`Code::Value`] where `points` is out of range, [`Code::Cue`] where the cue cannot be read, [`Code::Check`] where it is in mm or
     /// pulses and the configuration cannot be read, or where drawing it takes too much.
     pub fn curve(&self, id: &CueId, points: usize) -> Result<Arc<CurveData>, Problem> {
         if !(1..=MAX_POINTS).contains(&points) {
@@ -322,7 +332,7 @@ impl Library {
             }
             Ok(found)
         };
-        open().map_err(|error| file_problem("open the cue", &error))?.ok_or_else(|| unknown(id))
+        open().map_err(|error| file_problem("open the cue", &error))?.ok_or_else(|| self.unknown(id))
     }
 }
 
@@ -336,13 +346,9 @@ fn id_of(name: &str) -> Option<CueId> {
     name.strip_suffix(".csv").or_else(|| name.strip_suffix(".mcap"))?.parse().ok()
 }
 
-fn unknown(id: &CueId) -> Problem {
-    Problem::new(Code::Unknown, format!("there is no cue {id} in the library"), "upload it, or give another")
-}
-
 fn unplayable(id: &CueId, faults: Vec<String>) -> Problem {
     let detail = format!("the cue {id} cannot be played");
-    Problem::new(Code::Check, detail, "correct these faults, and upload it again").with(faults)
+    Problem::new(Code::Cue, detail, "correct these faults, and upload it again").with(faults)
 }
 
 fn file_problem(what: &str, error: &io::Error) -> Problem {

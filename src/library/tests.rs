@@ -52,7 +52,7 @@ fn a_cue_with_faults_is_a_problem_that_names_each() {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("bad.csv"), "time_ms,a1\n0,2\n100,3\n").unwrap();
     let problem = library(dir.path()).read(&id("bad")).unwrap_err();
-    assert_eq!(problem.code, Code::Check);
+    assert_eq!(problem.code, Code::Cue);
     assert_eq!(problem.faults.len(), 2, "{problem}");
     assert!(problem.faults[1].contains("bad.csv:3:5: a1"), "{problem}");
 }

@@ -98,7 +98,8 @@ impl Upload {
             let faults = verdict.lines();
             let detail = format!("the cue {id} is refused: it does not pass");
             let remedy = "correct these faults, or fit it with kinocue fit";
-            return Err(Problem::new(Code::Check, detail, remedy).with(faults));
+            let code = if verdict.playable { Code::Check } else { Code::Cue };
+            return Err(Problem::new(code, detail, remedy).with(faults));
         }
         let name = file_name(&id, verdict.mcap);
         // From the old whole to the new whole: never a name with half a file.

@@ -44,24 +44,24 @@ impl Shelf {
     /// All playlists by their ids, also those with faults.
     #[must_use]
     pub(crate) fn list(&self) -> Vec<PlaylistInfo> {
-        let names = Folder::open(&self.dir).and_then(|folder| folder.names()).unwrap_or_default();
-        let ids = names.iter().filter_map(|name| name.strip_suffix(ENDING)?.parse::<PlaylistId>().ok());
-        ids.filter_map(|id| match self.read(&id) {
-            Ok(Playlist { title, entries, .. }) => Some(PlaylistInfo {
-                id: id.to_string(),
-                title: Some(title),
-                cues: entries.iter().map(|entry| entry.cue.to_string()).collect(),
-                faults: Vec::new(),
-            }),
-            Err(problem) if problem.code == Code::Unknown => None, // a folder, a symbolic link, or gone since
-            Err(problem) => Some(PlaylistInfo {
-                id: id.to_string(),
-                title: None,
-                cues: Vec::new(),
-                faults: if problem.faults.is_empty() { vec![problem.detail] } else { problem.faults },
-            }),
-        })
-        .collect()
+        self.ids()
+            .into_iter()
+            .filter_map(|id| match self.read(&id) {
+                Ok(Playlist { title, entries, .. }) => Some(PlaylistInfo {
+                    id: id.to_string(),
+                    title: Some(title),
+                    cues: entries.iter().map(|entry| entry.cue.to_string()).collect(),
+                    faults: Vec::new(),
+                }),
+                Err(problem) if problem.code == Code::Unknown => None, // a folder, a symbolic link, or gone since
+                Err(problem) => Some(PlaylistInfo {
+                    id: id.to_string(),
+                    title: None,
+                    cues: Vec::new(),
+                    faults: if problem.faults.is_empty() { vec![problem.detail] } else { problem.faults },
+                }),
+            })
+            .collect()
     }
 
     /// Reads a playlist.
@@ -73,8 +73,8 @@ impl Shelf {
         let path = self.dir.join(&name);
         let text = match self.text(&name) {
             Ok(Some(text)) => text,
-            Ok(None) => return Err(unknown(id)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(unknown(id)),
+            Ok(None) => return Err(self.unknown(id)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(self.unknown(id)),
             Err(error) => {
                 let detail = format!("cannot read {}: {error}", path.display());
                 return Err(Problem::new(Code::File, detail, "check the file; it has to be UTF-8 text"));
@@ -87,6 +87,21 @@ impl Shelf {
         })
     }
 
+    fn ids(&self) -> Vec<PlaylistId> {
+        let names = Folder::open(&self.dir).and_then(|folder| folder.names()).unwrap_or_default();
+        names.iter().filter_map(|name| name.strip_suffix(ENDING)?.parse().ok()).collect()
+    }
+
+    fn unknown(&self, id: &PlaylistId) -> Problem {
+        let ids: Vec<_> = self.ids().iter().map(ToString::to_string).collect();
+        Problem::unknown(
+            "playlist",
+            &id.to_string(),
+            ids.iter().map(String::as_str),
+            "GET /api/v1/playlists lists them",
+        )
+    }
+
     fn text(&self, name: &str) -> io::Result<Option<String>> {
         let Some((file, stamp)) = Folder::open(&self.dir)?.file(name)? else { return Ok(None) };
         if stamp.size > MAX_LEN {
@@ -96,8 +111,4 @@ impl Shelf {
         file.take(MAX_LEN).read_to_string(&mut text)?;
         Ok(Some(text))
     }
-}
-
-fn unknown(id: &PlaylistId) -> Problem {
-    Problem::new(Code::Unknown, format!("there is no playlist {id}"), "give one of the list")
 }

@@ -140,7 +140,7 @@ fn what_only_library_and_hall_can_tell_is_found_when_it_is_loaded() {
     let faults: Vec<_> = day.check(&library, &config).iter().map(ToString::to_string).collect();
     let [preset, cue, effect] = &faults[..] else { panic!("a cue is looked at once: {faults:#?}") };
     assert!(preset.starts_with("day.toml:4:10: preset: there is no [preset.kids]"), "{preset}");
-    assert!(cue.starts_with("day.toml:3:7: cue: there is no cue c in the library"), "{cue}");
+    assert!(cue.starts_with("day.toml:3:7: cue: there is no cue c; upload it"), "{cue}");
     assert!(
         effect.ends_with("watr: is not in [effects] of the configuration; did you mean water?"),
         "{effect}"

@@ -115,6 +115,7 @@ impl Machine {
                 self.enter(State::Playing(PlayMode::Joining), Cause::Asked(Transition::Seek), now);
             }
             State::Armed | State::Paused => {}
+            State::Parked => return Err(Why::NotArmed),
             state => return Err(nothing_plays(state)),
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! The terminal as a keyboard: keys come one by one and unechoed, until it is set back as it was, whatever ends us.
 
 use std::io::{self, ErrorKind};
+use std::os::fd::AsFd;
 use std::panic;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -12,8 +13,14 @@ use rustix::process::getpgrp;
 use rustix::stdio::stdin;
 use rustix::termios::{
     LocalModes, OptionalActions, QueueSelector, SpecialCodeIndex, Termios, isatty, tcflush, tcgetattr,
-    tcgetpgrp, tcsetattr,
+    tcgetpgrp, tcgetwinsize, tcsetattr,
 };
+
+/// How wide the terminal is that a stream goes to, characters; `None` if it goes elsewhere.
+pub(crate) fn width(of: impl AsFd) -> Option<u16> {
+    let size = isatty(&of).then(|| tcgetwinsize(&of).ok()).flatten();
+    size.map(|size| size.ws_col).filter(|width| *width > 0)
+}
 
 /// How the terminal was set before; once set it stays, so that a signal handler can read it.
 static BEFORE: OnceLock<Termios> = OnceLock::new();

@@ -58,12 +58,12 @@ pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     Ok(Duration::from_nanos(nanos))
 }
 
-/// An offset against the film, -500 to 500 ms in whole milliseconds: `40`, `-120ms`.
+/// A trim of the motion against the film, -500 to 500 ms in whole milliseconds: `40`, `-120ms`, `+80 ms`.
 ///
 /// # Errors
 /// What is wrong with the text, for a person.
 pub(crate) fn parse_trim(text: &str) -> Result<i32, String> {
-    let digits = text.strip_suffix("ms").unwrap_or(text);
+    let digits = text.strip_suffix("ms").unwrap_or(text).trim_end();
     let trim = digits.parse().ok().filter(|ms| (-TRIM_MS..=TRIM_MS).contains(ms));
     trim.ok_or_else(|| format!("a trim is -{TRIM_MS}ms to {TRIM_MS}ms, in whole milliseconds"))
 }

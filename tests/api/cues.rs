@@ -41,10 +41,14 @@ fn a_cue_is_taken_in_when_it_is_proved_and_then_listed_and_drawn() {
 fn a_cue_that_does_not_pass_is_refused_with_its_faults_and_leaves_nothing() {
     let hall = Hall::open();
     let reply = upload("wild", WILD).send(&hall.socket());
-    assert_eq!(reply.problem(), problem(422, "check"));
+    assert_eq!(reply.problem(), problem(422, "cue"), "its curve leaves the stroke");
     assert!(!reply.value()["faults"].as_array().unwrap().is_empty());
     let reply = upload("broken", "time_ms,a1\n0,0\n100,7\n200,8\n").send(&hall.socket());
+    assert_eq!(reply.problem(), problem(422, "cue"));
     assert_eq!(reply.value()["faults"].as_array().unwrap().len(), 2, "{}", reply.text());
+    let reply = upload("fast", "# interpolation: linear\ntime_ms,a1\n0,0.2\n100,0.6\n2000,0.2\n")
+        .send(&hall.socket());
+    assert_eq!(reply.problem(), problem(422, "check"), "it breaks limits alone");
     assert!(files(&hall).is_empty());
 }
 

@@ -81,7 +81,7 @@ fn a_second_daemon_is_refused_by_the_port_and_by_the_socket_and_the_first_goes_o
 
     hall.rewrite(|config| config.replace(&port.to_string(), "127.0.0.1:0"));
     let run = serve(&hall, "control.sock");
-    assert_eq!(run.code, Some(71), "{run:?}");
+    assert_eq!(run.code, Some(75), "{run:?}");
     assert!(run.stderr.contains("stop.sock"), "{run:?}");
     hall.done(&["load", "ride"]);
 }
@@ -122,6 +122,6 @@ fn a_configuration_that_is_missing_and_a_library_that_is_none_are_named() {
     assert!(run.stderr.contains("cues/ride.csv"), "{run:?}");
     fs::remove_file(hall.path("hall.toml")).unwrap();
     let run = serve(&hall, "control.sock");
-    assert_eq!(run.code, Some(78), "{run:?}");
+    assert_eq!(run.code, Some(66), "{run:?}");
     assert!(run.stderr.contains("hall.toml"), "{run:?}");
 }

@@ -83,22 +83,35 @@ fn an_emergency_stop_before_the_first_frame_ends_the_play_with_76_and_without_mo
 }
 
 #[test]
-fn a_mute_controller_is_homed_and_unavailable() {
-    let (folder, sim) = (Folder::new(), Sim::one(&["--mute"]));
-    let report = play(&folder.nod(&[0.1]), &sim.to(), &["--json"]).report_of(69);
-    let one = first(&report);
-    assert_eq!(
-        (&one["park_frames"], &one["lost"], &one["port_closed"]),
-        (&1.into(), &one["sent"], &0.into()),
-        "{one}"
-    );
-    let seen = sim.end();
-    assert_eq!(seen.controllers[0]["motion"], one["sent"], "it obeyed all the same");
-    let told =
-        |what: &str| report["events"].as_array().expect("a list").iter().any(|event| event["what"] == what);
-    assert!(told("lost: no ack and no report for too long"), "{report}");
-    let frames = one["sent"].as_u64().expect("a count");
-    assert!(frames < 80, "it gets nothing more once it is given up, and has come to rest: {frames}");
+fn to_a_hall_in_which_nobody_answers_nothing_is_played_and_all_are_named() {
+    let (folder, sim) = (Folder::new(), Sim::start(2, &["--mute"]));
+    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--json"]);
+    assert_eq!((run.code, run.stdout.as_str()), (Some(69), ""), "there is no report: {run:?}");
+    assert!(run.stderr.contains("c1, c2: nobody answers, so nothing is played"), "{run:?}");
+    let frames = sim.end().motion();
+    assert_eq!(frames, 2, "the slow one to park, which they might have acked");
+}
+
+#[test]
+fn a_mute_controller_beside_one_that_answers_is_named_and_left_out() {
+    let (folder, mute, sim) = (Folder::new(), Sim::one(&["--mute"]), Sim::one(&[]));
+    let run = play(&folder.nod(&[0.1]), &[mute.addresses[0].clone(), sim.addresses[0].clone()], &["--json"]);
+    let report = run.report_of(69);
+    assert_eq!(report["result"], "completed");
+    assert_eq!((&first(&report)["sent"], &first(&report)["lost"]), (&1.into(), &1.into()), "{report}");
+    assert!(run.stderr.contains("kinocue: c1: nobody answers; it plays without"), "{run:?}");
+    assert_eq!(mute.end().motion(), 1, "the slow one to park");
+    assert!(sim.end().farthest(0) > 10_000, "the other plays");
+}
+
+#[test]
+fn with_require_acks_a_play_needs_every_controller() {
+    let (folder, mute, sim) = (Folder::new(), Sim::one(&["--mute"]), Sim::one(&[]));
+    let to = [mute.addresses[0].clone(), sim.addresses[0].clone()];
+    let run = play(&folder.nod(&[0.1]), &to, &["--json", "--require-acks"]);
+    assert_eq!((run.code, run.stdout.as_str()), (Some(69), ""), "{run:?}");
+    assert!(run.stderr.contains("c1: nobody answers, so nothing is played"), "{run:?}");
+    assert_eq!(sim.end().motion(), 0, "who answers is not moved either");
 }
 
 #[test]
@@ -150,6 +163,7 @@ fn a_controller_that_goes_silent_mid_show_is_told_by_69() {
     relay.wait_for(|frame| frame.frame.0 == 30);
     drop(sim);
     let report = playing.finish().report_of(69);
+    assert_eq!(report["result"], "lost", "in the end nobody was there");
     let one = first(&report);
     assert!(one["acked"].as_u64() >= Some(20) && one["lost"].as_u64() > Some(3), "{one}");
     assert!(one["sent"].as_u64() < Some(100), "it gets nothing more once it is given up: {one}");
@@ -174,7 +188,7 @@ fn strangers_and_strays_are_counted_and_disturb_nothing() {
 }
 
 #[test]
-fn a_second_kinocue_on_the_same_port_is_refused_with_71_and_the_first_loses_nothing() {
+fn a_second_kinocue_on_the_same_port_is_refused_with_75_and_the_first_loses_nothing() {
     let (folder, sim) = (Folder::new(), Sim::start(2, &[]));
     let cue = folder.nod(&[0.1]);
     let relay = Relay::start(&sim.addresses[0]);
@@ -182,7 +196,7 @@ fn a_second_kinocue_on_the_same_port_is_refused_with_71_and_the_first_loses_noth
     let host = relay.wait_for(|frame| frame.frame.0 == 2).to_string();
     let cue = cue.to_str().expect("text");
     let second = kinocue(&["play", cue, "--bind", &host, "--to", &sim.addresses[1], "--json"]);
-    assert_eq!((second.code, second.stdout.as_str()), (Some(71), ""), "{second:?}");
+    assert_eq!((second.code, second.stdout.as_str()), (Some(75), ""), "{second:?}");
     assert!(second.stderr.contains(&host), "{}", second.stderr);
     let report = playing.finish().report_of(0);
     let one = first(&report);

@@ -28,11 +28,20 @@ struct Terminal {
     text: String,
     playing: Playing,
     sim: Sim,
+    /// Of the cue.
+    _folder: Folder,
 }
 
 impl Terminal {
     /// Plays a minute in which the seat stands 45 mm above its park pose, and waits until it is there.
     fn playing() -> Self {
+        let mut terminal = Self::begun(&[]);
+        terminal.wait_for("playing: the seats are on the cue");
+        terminal
+    }
+
+    /// The same with further controllers, as far as the program is by itself.
+    fn begun(more: &[String]) -> Self {
         let (ours, theirs) = terminal(80);
         let before = tcgetattr(&theirs).expect("it is a terminal");
         let (closed, open) = pipe().expect("a pipe");
@@ -40,10 +49,9 @@ impl Terminal {
         let (folder, sim) = (Folder::new(), Sim::one(&[]));
         let end = || Stdio::from(theirs.try_clone().expect("a handle"));
         let cue = folder.write("stand.csv", "time_ms,a1\n0,0.3\n60000,0.3\n");
-        let playing = Playing::start_with(&cue, &sim.to(), &["--json"], end(), end());
-        let mut terminal = Self { ours, theirs, before, written, open, text: String::new(), playing, sim };
-        terminal.wait_for("playing: the seats are on the cue");
-        terminal
+        let to = [&sim.to(), more].concat();
+        let playing = Playing::start_with(&cue, &to, &["--json"], end(), end());
+        Self { ours, theirs, before, written, open, text: String::new(), playing, sim, _folder: folder }
     }
 
     fn press(&mut self, keys: &str) {
@@ -105,6 +113,23 @@ pub(super) fn read_all(mut terminal: File, open: PipeReader) -> Receiver<String>
         }
     });
     read
+}
+
+#[test]
+fn on_a_terminal_a_play_waits_for_a_word_where_a_controller_does_not_answer() {
+    let mute = Sim::one(&["--mute"]);
+    for (key, motion) in [("y", true), ("q", false)] {
+        let mut terminal = Terminal::begun(&mute.to());
+        terminal.wait_for("c2: nobody answers; press y to play without, or q to end");
+        terminal.press(key);
+        if motion {
+            terminal.wait_for("playing: the seats are on the cue");
+            terminal.press("q");
+        }
+        let (run, sim) = terminal.finish();
+        assert_eq!(run.report_of(69)["result"], "stopped", "{key}");
+        assert_eq!(sim.end().motion() > 0, motion, "{key}");
+    }
 }
 
 #[test]

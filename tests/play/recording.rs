@@ -166,7 +166,7 @@ fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
     let again = folder.path("again.csv");
     of(&["convert", text(&path), text(&again), "--seat", "F4", "--take", "sent"]);
     of(&["info", text(&again)]);
-    assert_eq!(kinocue(&["plot", text(&path), "--seat", "nobody"]).code, Some(64));
+    assert_eq!(kinocue(&["plot", text(&path), "--seat", "nobody"]).code, Some(66));
     drop(sim.end());
 }
 

@@ -59,6 +59,9 @@ pub enum RuntimeError {
     /// A serial link.
     #[error("{0}")]
     Link(String),
+    /// Another program has its port.
+    #[error("{0}")]
+    PortTaken(String),
 }
 
 /// The number of each controller's next frame, by its address: a number never comes twice within one process.

@@ -80,7 +80,7 @@ impl Features {
                     "remove that line from its [[controller]], and reload",
                 )
             } else {
-                no_controller(name)
+                no_controller(name, hall)
             });
         };
         // Between shows arming sees to that.
@@ -141,9 +141,7 @@ fn seek(film: ShowTime, hall: &HallContext) -> Result<Vec<Act>, Problem> {
     // Where the film is shown from here it is wound, and the seats follow.
     let wound = player::seek(film, hall);
     Ok(match (hall.mirror.state, wound) {
-        (State::Armed | State::Parked, wound) => {
-            [Act::Stage(ShowChange::Start(film))].into_iter().chain(wound).collect()
-        }
+        (State::Armed, wound) => [Act::Stage(ShowChange::Start(film))].into_iter().chain(wound).collect(),
         (State::Playing(_) | State::Paused, Some(wound)) => vec![wound],
         _ => vec![Act::Tick(TickCommand::Seek(film))],
     })
@@ -172,8 +170,8 @@ fn trim(ms: i32, hall: &HallContext) -> Result<Vec<Act>, Problem> {
 
 fn preset(name: &str, hall: &HallContext) -> Result<Vec<Act>, Problem> {
     let Some(preset) = hall.config.preset(name) else {
-        let detail = format!("there is no preset {name}");
-        return Err(Problem::new(Code::Unknown, detail, "the status names the presets"));
+        let known = hall.config.presets.iter().map(|preset| preset.name.as_str());
+        return Err(Problem::unknown("preset", name, known, "the status names the presets"));
     };
     set(hall, |settings| settings.change(&LevelsChange::from(preset)))
 }
@@ -184,7 +182,7 @@ fn disable(name: &str, who: &Who, why: Option<&str>, hall: &HallContext) -> Resu
         Problem::new(Code::Value, fault, format!("say it in a line of {LONGEST_WHY} characters at the most"))
     })?;
     let Some(group) = group_of(name, hall) else {
-        return if is_absent(name, hall) { Ok(Vec::new()) } else { Err(no_controller(name)) };
+        return if is_absent(name, hall) { Ok(Vec::new()) } else { Err(no_controller(name, hall)) };
     };
     set(hall, |settings| {
         settings.enable(group, Some(Out::now(who, why)));
@@ -200,9 +198,13 @@ fn is_absent(name: &str, hall: &HallContext) -> bool {
     hall.config.absent.iter().any(|one| one.controller.name == name)
 }
 
-fn no_controller(name: &str) -> Problem {
-    let detail = format!("there is no controller {name}");
-    Problem::new(Code::Unknown, detail, "GET /api/v1/controllers lists them")
+fn no_controller(name: &str, hall: &HallContext) -> Problem {
+    Problem::unknown(
+        "controller",
+        name,
+        hall.config.named().map(|one| one.name.as_str()),
+        "the status lists them",
+    )
 }
 
 /// True if an emergency stop is in effect at a controller of a group: with it the whole hall would stop.

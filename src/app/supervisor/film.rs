@@ -3,7 +3,7 @@
 use super::act::Act;
 use super::hall::HallContext;
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
-use crate::control::{Code, FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
+use crate::control::{FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
 use crate::film::point::FilmState;
 
 /// The film by the source that leads, or by the first while none does.
@@ -40,9 +40,9 @@ pub(super) fn choose(name: Option<&str>, hall: &HallContext) -> Result<Vec<Act>,
     if table.choose(name) {
         return Ok(Vec::new());
     }
-    let detail = format!("this hall has no source {}", name.unwrap_or_default());
     let names: Vec<_> = table.read().sources.into_iter().map(|row| row.source).collect();
-    Err(Problem::new(Code::Unknown, detail, format!("choose one of {}, or none", names.join(", "))))
+    let remedy = format!("choose one of {}, or none", names.join(", "));
+    Err(Problem::unknown("source", name.unwrap_or_default(), names.iter().map(String::as_str), remedy))
 }
 
 /// How long so many frames of the film last, ms.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::channel;
-use crate::config::Config;
+use crate::config::{Config, no_level, there_is_no};
 use crate::control::{Code, Levels, LevelsChange, Problem};
 use crate::engine::Mix;
 use crate::rt::Desk;
@@ -75,17 +75,19 @@ impl HallSettings {
         let levels = levels.into_iter().filter_map(|(name, level)| Some((name.to_owned(), level?)));
         let rows = change.rows.iter().map(|(row, level)| (format!("row {row}"), *level));
         for (name, level) in levels.chain(rows).filter(|(_, level)| !(0.0..=1.0).contains(level)) {
-            faults.push(format!("{name}: {level} is outside 0..=1"));
-        }
-        for row in change.rows.keys().filter(|row| !self.levels.rows.contains_key(*row)) {
-            faults.push(format!("there is no row {row}"));
-        }
-        for name in change.effects.keys().filter(|name| !self.levels.effects.contains_key(*name)) {
-            faults.push(format!("there is no effect {name}"));
+            faults.push(format!("{name}: {}", no_level(level)));
         }
         if !faults.is_empty() {
-            let remedy = "give levels from 0 to 1, and rows and effects of the configuration";
-            return Err(Problem::new(Code::Value, "levels not changed", remedy).with(faults));
+            return Err(
+                Problem::new(Code::Value, "levels not changed", "give levels from 0 to 1").with(faults)
+            );
+        }
+        let rows = unknown("row", change.rows.keys(), self.levels.rows.keys());
+        let effects = unknown("effect", change.effects.keys(), self.levels.effects.keys());
+        let faults: Vec<_> = rows.chain(effects).collect();
+        if !faults.is_empty() {
+            let remedy = "give rows and effects of the configuration; the status lists them";
+            return Err(Problem::new(Code::Unknown, "levels not changed", remedy).with(faults));
         }
         apply(&mut self.levels, change);
         Ok(())
@@ -152,6 +154,18 @@ impl HallSettings {
         }
         desk.set_trim_ms(self.trim_ms);
     }
+}
+
+/// Those of `asked` that are not among `known`, each with the one that it may be a slip for.
+fn unknown<'a>(
+    what: &'static str,
+    asked: impl Iterator<Item = &'a String>,
+    known: impl Iterator<Item = &'a String> + Clone,
+) -> impl Iterator<Item = String> {
+    asked.filter_map(move |name| {
+        let known = || known.clone().map(String::as_str);
+        known().all(|one| one != name).then(|| there_is_no(what, name, known()))
+    })
 }
 
 fn apply(levels: &mut Levels, change: &LevelsChange) {

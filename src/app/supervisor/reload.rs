@@ -90,5 +90,8 @@ pub(super) fn reload(hall: &HallContext, path: &Path) -> Result<Arc<Config>, Pro
         let faults = faults.to_string().lines().map(str::to_owned).collect();
         Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
     })?;
-    Ok(Arc::new(config))
+    Ok(Arc::new(match &hall.config.store.kept_in {
+        Some(state) => config.kept_in(state),
+        None => config,
+    }))
 }

@@ -23,7 +23,8 @@ impl SeatTesting {
         may_test(hall)?;
         if let Some(row) = rows.iter().find(|row| !hall.settings.levels.rows.contains_key(*row)) {
             let remedy = "`kinocue status` lists the rows";
-            return Err(Problem::new(Code::Unknown, format!("there is no row {row}"), remedy));
+            let known = hall.settings.levels.rows.keys().map(String::as_str);
+            return Err(Problem::unknown("row", row, known, remedy));
         }
         hall.is_free()?;
         let only = (!rows.is_empty()).then(|| rows.iter().cloned().collect());

@@ -70,16 +70,15 @@ impl ProvedShow {
         sha256: String,
         film: Option<FilmStart>,
     ) -> Result<Self, Problem> {
-        let refused = |faults: Vec<String>| {
+        let refused = |code, faults: Vec<String>| {
             let when = if film.is_some() { " at every pace that its film may ask for" } else { "" };
             let detail = format!("the cue {id} does not fit this hall{when}");
-            Problem::new(Code::Check, detail, "correct it, or `kinocue fit` it, and load it again")
-                .with(faults)
+            Problem::new(code, detail, "correct it, or `kinocue fit` it, and load it again").with(faults)
         };
         let rate = Rate::from_hz(config.show.rate_hz);
         let faults = faults_of_seats(config, &timeline);
         if !faults.is_empty() {
-            return Err(refused(faults));
+            return Err(refused(Code::Cue, faults));
         }
         let paced = film.map(|film| at_any_pace(config, film.rules.pace, rate));
         let paced = paced.as_ref().unwrap_or(config);
@@ -90,7 +89,7 @@ impl ProvedShow {
             if proof.more > 0 {
                 faults.push(format!("and {} more", proof.more));
             }
-            return Err(refused(faults));
+            return Err(refused(Code::Check, faults));
         }
         let room = headroom(config, &timeline, rate);
         Ok(Self {

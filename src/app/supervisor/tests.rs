@@ -295,9 +295,12 @@ fn an_armed_hall_is_not_asked_for_registers() {
 
 #[test]
 fn a_park_between_shows_leaves_the_next_show_where_it_is_to_begin() {
-    let mut rig = Rig::parked();
+    let mut rig = Rig::armed();
     let start = ShowTime::from_millis(2_000);
     rig.ask(Command::Seek(start)).unwrap();
+    rig.ask(Command::Disarm).unwrap();
+    let refused = rig.ask(Command::Seek(ShowTime::ZERO)).unwrap_err();
+    assert_eq!(refused.to_string(), "cannot seek while parked: the hall is not armed; arm first");
     rig.tell(Event::Astray(true));
     rig.ask(Command::Park).unwrap();
     assert_eq!(rig.state(), State::Parking);

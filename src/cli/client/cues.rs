@@ -13,8 +13,8 @@ use hyper::body::{Body, Bytes, Frame, SizeHint};
 use serde::Deserialize;
 
 use super::server::{ServerArgs, in_path};
-use super::table::table;
 use super::{http, reply, view};
+use crate::cli::table::table;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::sys;
 
@@ -34,10 +34,11 @@ pub(in crate::cli) enum CuesCommand {
     /// The file is checked and proved first; a bad one is rejected.
     #[command(after_help = "\
 Examples:
-  kinocue upload coaster.csv
-  kinocue upload \"New Ride v3.mcap\" --id new-ride
+  kinocue upload cues/bench-ride.csv
+  kinocue upload cues/seat-demo.csv --id demo-2
 
-Exit codes: 0 in the library, 1 it does not pass (every fault is listed), 66 no such file, 77 not allowed")]
+Exit codes: 0 in the library, 1 it breaks limits, 65 it cannot be read or asks for what the hall does not have (every fault is
+listed), 66 no such file, 77 not allowed")]
     Upload(UploadArgs),
 }
 
@@ -119,7 +120,7 @@ fn upload(args: &UploadArgs) -> Result<Exit, Failure> {
     let is_mcap = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
     let media = if is_mcap { "application/vnd.mcap" } else { "text/csv" };
     let request = http::request(Method::PUT, &format!("/api/v1/cues/{}", in_path(&id)), Some(media), body)?;
-    let reply = http::block_on(http::exchange(&server.socket(), request, PATIENCE))?;
+    let reply = http::block_on(http::exchange(&server.socket()?, request, PATIENCE))?;
     server.show(&reply)?;
     reply::done(&reply)?;
     print::tell(&format!("kinocue: {id} is in the library; next: kinocue load {id}"));

@@ -33,7 +33,7 @@ pub(super) struct HttpReply {
 /// Does `work` on a runtime of its own.
 pub(super) fn block_on<T>(work: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-    runtime.context("no runtime could be started").or_exit(Exit::System)?.block_on(work)
+    runtime.context("no runtime could be started").or_system()?.block_on(work)
 }
 
 /// A request to `path` with that body. What changes something carries a key, so that it is done once however often it

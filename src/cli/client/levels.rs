@@ -15,7 +15,7 @@ use crate::time::{TrimChange, parse_trim_change};
 /// The commands that set what lasts.
 #[derive(Debug, clap::Subcommand)]
 pub(in crate::cli) enum LevelsCommand {
-    /// Offsets the motion against the film, later or earlier.
+    /// Trims the motion against the film: later or earlier.
     #[command(
         after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0\n  kinocue trim +2f"
     )]
@@ -29,7 +29,7 @@ Examples:
   kinocue level motion 60%
   kinocue level vibration 40%
   kinocue level 50% --row A             motion and vibration of row A, on top of the hall's
-  kinocue level -6dB --row A-C
+  kinocue level -6dB --row A-B
 
 A row has one level for its motion and its vibration together."
     )]
@@ -47,15 +47,15 @@ Examples:
     /// Puts a seat back into the show.
     ///
     /// The seat joins by a move within its limits, with all controllers that share it.
-    #[command(after_help = "Example:\n  kinocue enable F4")]
+    #[command(after_help = "Example:\n  kinocue enable B2")]
     Enable(NameArgs),
     /// Takes a seat out of the show.
     ///
     /// It parks, with all controllers that share it; the others play on.
     #[command(after_help = "\
 Examples:
-  kinocue disable F4
-  kinocue disable F4 --why \"broken leg\"
+  kinocue disable B2
+  kinocue disable B2 --why \"broken leg\"
 
 It stays out until it is enabled again, even after a restart of the service; `kinocue arm` lists it. To take a controller
 out permanently, set enabled = false in the configuration.")]
@@ -79,7 +79,7 @@ pub(in crate::cli) struct LevelArgs {
     /// `motion` or `vibration` [default: both].
     #[arg(value_name = "WHAT", allow_hyphen_values = true)]
     first: String,
-    /// 0% to 100%, or 0dB and below.
+    /// 0% to 100%, 0 to 1, or 0dB and below.
     #[arg(value_name = "LEVEL", allow_hyphen_values = true)]
     second: Option<String>,
     /// Only these rows: A, or A,C, or A-C [default: the whole hall].
@@ -112,7 +112,7 @@ pub(in crate::cli) struct NameArgs {
     server: ServerArgs,
 }
 
-/// A controller, and why it is taken out.
+/// A controller, and why its seat is disabled.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct DisableArgs {
     /// The controller, as `kinocue status` shows it.

@@ -14,7 +14,6 @@ mod server;
 mod show;
 mod status;
 mod stop;
-mod table;
 mod test;
 mod view;
 mod watch;

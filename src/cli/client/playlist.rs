@@ -3,8 +3,8 @@
 use serde_json::json;
 
 use super::server::ServerArgs;
-use super::table::table;
 use super::view::{percent, time};
+use crate::cli::table::table;
 use crate::cli::{Exit, Failure, print};
 use crate::control::{EntryStatus, PlaylistStatus};
 
@@ -16,17 +16,18 @@ pub(in crate::cli) enum PlaylistCommand {
     /// The cue is read and proved before the command ends.
     #[command(after_help = "\
 Examples:
-  kinocue load coaster
+  kinocue load bench-ride
   kinocue cues
 
-Exit codes: 0 loaded, 1 it does not pass (every fault is listed), 66 no such cue, 75 the hall's state does not allow it")]
+Exit codes: 0 loaded, 1 it breaks limits, 65 it cannot be read or asks for what the hall does not have (every fault is listed),
+66 no such cue, 75 the hall's state does not allow it")]
     Load(LoadArgs),
     /// Loads, unloads or shows a playlist.
     #[command(after_help = "\
 Examples:
-  kinocue playlist saturday
   kinocue playlist
-  kinocue playlist --none")]
+  kinocue playlist --none
+  kinocue playlist today")]
     Playlist(PlaylistArgs),
     /// Selects the playlist entry to play next.
     ///

@@ -12,7 +12,7 @@ use crate::cli::{Exit, Failure, print};
 #[command(after_help = "\
 Examples:
   kinocue mark
-  kinocue mark \"F4 jerked\"
+  kinocue mark \"B2 jerked\"
 
 Exit codes: 0 marked, 75 nothing is being recorded")]
 pub(in crate::cli) struct MarkArgs {

@@ -68,6 +68,7 @@ fn exit(code: &str, status: u16) -> Exit {
         ("state" | "busy" | "timeout" | "late", _) | (_, 409 | 429 | 503) => Exit::TryAgain,
         ("role" | "token" | "origin", _) | (_, 401 | 403) => Exit::NotAllowed,
         ("unknown", _) | (_, 404) => Exit::NoInput,
+        ("cue", _) => Exit::BadCue,
         ("check", _) | (_, 422) => Exit::CheckFailed,
         ("file", _) => Exit::Io,
         ("off", _) => Exit::Config,
@@ -114,6 +115,7 @@ mod tests {
             assert_eq!(exit(code.word(), code.status()), wanted, "{code:?}");
             assert_eq!(exit("", code.status()), wanted, "{code:?} by its status");
         }
+        assert_eq!(exit(Code::Cue.word(), Code::Cue.status()), Exit::BadCue);
         assert_eq!(exit(Code::File.word(), 500), Exit::Io);
         assert_eq!(exit(Code::Off.word(), 501), Exit::Config);
         assert_eq!(exit("", 500), Exit::Internal);

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use anyhow::anyhow;
 use http_body_util::Full;
 use hyper::Method;
 use hyper::body::Bytes;
@@ -10,7 +11,7 @@ use serde_json::Value;
 
 use super::http::{self, HttpReply};
 use super::reply;
-use crate::cli::{Exit, Failure, print};
+use crate::cli::{Exit, Failure, OrExit as _, places, print};
 use crate::control::Status;
 
 /// The environment variable that names the socket. Not clap's to read, for which it would count as an argument.
@@ -23,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(65);
 // Where the daemon is, and how its replies are shown. No documentation: clap would show it as the help of `arm` and others.
 #[derive(Debug, Clone, clap::Args)]
 pub(in crate::cli) struct ServerArgs {
-    /// The control socket of the daemon [default: $KINOCUE_SOCKET, or /run/kinocue/control.sock].
+    /// The control socket of the daemon [default: $KINOCUE_SOCKET, /run/kinocue/control.sock, or that of a service of yours].
     #[arg(long, value_name = "PATH")]
     pub(super) socket: Option<PathBuf>,
     /// Print the reply as JSON, unchanged.
@@ -33,15 +34,36 @@ pub(in crate::cli) struct ServerArgs {
 
 impl ServerArgs {
     /// Where the daemon listens.
-    pub(super) fn socket(&self) -> PathBuf {
+    ///
+    /// # Errors
+    /// Where two do, and nobody says which is meant: one may be a rehearsal, and the other move seats.
+    pub(super) fn socket(&self) -> Result<PathBuf, Failure> {
+        if self.named().is_none()
+            && let [system, own] = &places::control_sockets()[..]
+        {
+            let [system, own] = [system, own].map(|path| path.display());
+            let error =
+                anyhow!("two services run here; say which is meant with --socket {system} or --socket {own}");
+            return Err(error).or_exit(Exit::Usage);
+        }
+        Ok(self.first_socket())
+    }
+
+    /// The same for whoever cannot wait for an answer: of two that of the package.
+    pub(super) fn first_socket(&self) -> PathBuf {
+        let running = || places::control_sockets().into_iter().next();
+        self.named().or_else(running).unwrap_or_else(|| PathBuf::from(SOCKET))
+    }
+
+    fn named(&self) -> Option<PathBuf> {
         let named = || std::env::var_os(SOCKET_VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
-        self.socket.clone().or_else(named).unwrap_or_else(|| PathBuf::from(SOCKET))
+        self.socket.clone().or_else(named)
     }
 
     /// Looks something up.
     pub(super) fn get(&self, path: &str) -> Result<HttpReply, Failure> {
         let request = http::request(Method::GET, path, None, Full::<Bytes>::default())?;
-        http::block_on(http::exchange(&self.socket(), request, PATIENCE))
+        http::block_on(http::exchange(&self.socket()?, request, PATIENCE))
     }
 
     /// The status of the hall.
@@ -94,7 +116,7 @@ impl ServerArgs {
     ) -> Result<Status, Failure> {
         let body = Full::new(Bytes::from(body.to_string()));
         let request = http::request(method, path, Some("application/json"), body)?;
-        let reply = http::exchange(&self.socket(), request, patience).await?;
+        let reply = http::exchange(&self.socket()?, request, patience).await?;
         self.show(&reply)?;
         reply::status(&reply)
     }

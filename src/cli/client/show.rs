@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::server::ServerArgs;
-use super::table::table;
+use crate::cli::table::table;
 use crate::cli::{Exit, Failure, ask, print};
 use crate::control::{ControllerStatus, PreflightStatus, Severity, Status, Warning};
 use crate::time::{ShowTime, parse_time};
@@ -19,7 +19,7 @@ pub(in crate::cli) enum ShowCommand {
     /// A cue has to be loaded and proved, and preflight has to pass. Arming lapses after ten minutes.
     #[command(after_help = "\
 Examples:
-  kinocue load coaster && kinocue arm
+  kinocue load bench-ride && kinocue arm
   kinocue arm --seats-empty              if a controller does not know its position
   kinocue arm --json
 
@@ -36,7 +36,7 @@ Exit codes: 0 armed, or homing first, 69 no daemon, 75 not ready (the message sa
 Examples:
   kinocue go
   kinocue arm && kinocue go
-  kinocue go --from 12:30       after a stop: the seats join the cue there; `kinocue status` shows where it stopped
+  kinocue go --from 0:05       after a stop: the seats join the cue there; `kinocue status` shows where it stopped
 
 A request that arrives more than two seconds late, or a second time, starts nothing.
 
@@ -53,9 +53,9 @@ Exit codes: 0 playing, 69 no daemon, 75 not armed or too late, 77 not allowed")]
     /// The seats reach it by a move within their limits.
     #[command(after_help = "\
 Examples:
-  kinocue seek 12:30
-  kinocue seek 750.5
-  kinocue seek 00:12:30:12@24")]
+  kinocue seek 0:12
+  kinocue seek 7.5
+  kinocue seek 00:00:12:12@24")]
     Seek(SeekArgs),
     /// Brings the seats to their park poses, and ends the show.
     #[command(after_help = "Example:\n  kinocue park")]

@@ -2,8 +2,8 @@
 
 use super::reply;
 use super::server::ServerArgs;
-use super::table::table;
 use super::view::{percent, time, us};
+use crate::cli::table::table;
 use crate::cli::{Exit, Failure, print};
 use crate::control::{ControllerStatus, FilmStatus, Percentiles, PlaylistStatus, ShowStatus, Status, Times};
 

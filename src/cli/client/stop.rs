@@ -39,7 +39,7 @@ pub(in crate::cli) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let beside = || args.server.socket().with_file_name("stop.sock");
+    let beside = || args.server.first_socket().with_file_name("stop.sock");
     let socket = args.stop_socket.clone().unwrap_or_else(beside);
     let path = socket.display();
     match block_on(async { Ok(say_stop(&socket).await) })? {
@@ -76,12 +76,13 @@ async fn say_stop(socket: &Path) -> io::Result<()> {
 }
 
 fn by_control_socket(server: &ServerArgs) -> Result<Exit, Failure> {
+    let server = ServerArgs { socket: Some(server.first_socket()), ..server.clone() };
     let stopped = server.post_within("/api/v1/show/stop", &json!({}), LAST_PATIENCE);
     let status = stopped.map_err(|failure| {
         let error = failure.error.context("THE STOP IS NOT CONFIRMED; use the hard-wired emergency stop");
         Failure { error, ..failure }
     })?;
-    let (line, socket) = (status.line(), server.socket());
+    let (line, socket) = (status.line(), server.first_socket());
     print::tell(&format!("kinocue: {line}; via {}; {NO_EMERGENCY}", socket.display()));
     Ok(Exit::Done)
 }

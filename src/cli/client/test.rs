@@ -10,15 +10,15 @@ use super::events::Events;
 use super::http::block_on;
 use super::rows::parse_rows;
 use super::server::ServerArgs;
-use super::table::table;
 use super::view::us;
 use crate::cli::ask::agreed;
+use crate::cli::table::table;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::control::{Status, TestRow, TestStatus};
 
 /// Tests empty seats and their effects.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  kinocue test sweep --rows A-C")]
+#[command(after_help = "Example:\n  kinocue test sweep --rows A-B")]
 pub(in crate::cli) struct Args {
     #[command(subcommand)]
     what: TestedPart,
@@ -36,8 +36,8 @@ enum TestedPart {
 #[command(after_help = "\
 Examples:
   kinocue test sweep
-  kinocue test sweep --rows A-C
-  kinocue test sweep --rows A,C --seats-empty --json
+  kinocue test sweep --rows A-B
+  kinocue test sweep --rows A,B --seats-empty --json
 
 Exit codes: 0 all passed, 1 something failed, 75 the hall is not armed")]
 struct TestSweep {
@@ -118,7 +118,7 @@ fn follow(server: &ServerArgs, begun: Status) -> Result<TestOutcome, Failure> {
 }
 
 async fn listen(server: &ServerArgs, bar: Option<&ProgressBar>) -> Result<TestOutcome, Failure> {
-    let mut events = Events::open(&server.socket()).await?;
+    let mut events = Events::open(&server.socket()?).await?;
     loop {
         let gone = |why| anyhow!("the daemon is gone: {why}; check the seats, then `kinocue status`");
         // While it says nothing there is nothing to show; the test may well go on.

@@ -45,16 +45,17 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 
 async fn follow(server: &ServerArgs, shown: &mut WatchShown) -> Result<Exit, Failure> {
     // A daemon that is not there at all is a fault; one that goes is waited for.
-    let mut events = Events::open(&server.socket()).await?;
+    let socket = server.socket()?;
+    let mut events = Events::open(&socket).await?;
     loop {
         let why = match listen(&mut events, shown).await? {
             Some(why) => why,
             None => return Ok(Exit::Done),
         };
-        shown.gone(&format!("the daemon at {} is gone: {why}; waiting for it", server.socket().display()));
+        shown.gone(&format!("the daemon at {} is gone: {why}; waiting for it", socket.display()));
         events = loop {
             sleep(AGAIN).await;
-            match Events::open(&server.socket()).await {
+            match Events::open(&socket).await {
                 Ok(events) => break events,
                 Err(failure) if failure.exit == Exit::NotAllowed => return Err(failure),
                 Err(_) => {}

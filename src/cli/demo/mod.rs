@@ -64,14 +64,14 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let film = args.film.as_deref().map(DemoFilm::find).transpose()?;
     let signals = SystemSignals::default();
-    play::leave_on_signals(&signals.leave).context("signals cannot be handled").or_exit(Exit::System)?;
+    play::leave_on_signals(&signals.leave).context("signals cannot be handled").or_system()?;
     let temporary = env::temp_dir();
     let no_folder = || format!("cannot make a folder in {}; set TMPDIR to another", temporary.display());
     let folder = OwnFolder::make(&temporary).with_context(no_folder).or_exit(Exit::Io)?;
-    let port = FreePort::find().context("no port for the frames").or_exit(Exit::System)?;
+    let port = FreePort::find().context("no port for the frames").or_system()?;
     let host = SocketAddrV4::new(Ipv4Addr::LOCALHOST, port.number);
     let seats = VirtualHall::start(args.dialect, host, &folder)?;
-    let token = Token::new("visitor", Role::Engineer).or_exit(Exit::System)?;
+    let token = Token::new("visitor", Role::Engineer).or_system()?;
     let mut hall = seats::hall(args.rate, host, &seats.tables(&folder), &token.config, &folder);
     hall.extend(film.iter().map(DemoFilm::tables));
     let places = furnish(&folder, &hall, film.as_ref(), &seats)?;
@@ -80,7 +80,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let on_terminal = stdin().is_terminal() && stderr().is_terminal();
     let screen = Screen::new();
     let lines = screen.clone();
-    let log = Log::start(move |line| lines.tell(line)).or_exit(Exit::System)?;
+    let log = Log::start(move |line| lines.tell(line)).or_system()?;
     let parts = Parts { config, places, pages: console::page, signals: signals.clone(), log };
     drop(port);
     let mut script = None;
@@ -91,7 +91,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         script = Some(Script::start(handle, signals, screen, on_terminal.then_some(console), show));
     });
     // Over by now, as nothing of the hall is left.
-    let guided = script.transpose().or_exit(Exit::System)?.map_or(Ok(()), Script::finish);
+    let guided = script.transpose().or_system()?.map_or(Ok(()), Script::finish);
     let reported = play::tell(&served?.sum_up(cue_name.to_owned()), args.json);
     seats.stop()?;
     folder.remove().context("the folder of the demo is left").or_exit(Exit::Io)?;

@@ -39,9 +39,7 @@ impl VirtualHall {
     pub(super) fn start(family: SimFamily, host: SocketAddrV4, folder: &OwnFolder) -> Result<Self, Failure> {
         let farm = |dialect| {
             let setups = SEATS.iter().map(|seat| seat.setup(host, dialect)).collect();
-            Farm::start(Options::loopback(setups))
-                .map(|farm| Self::Stations(dialect, farm))
-                .or_exit(Exit::System)
+            Farm::start(Options::loopback(setups)).map(|farm| Self::Stations(dialect, farm)).or_system()
         };
         let now = Monotonic.now();
         match family {
@@ -120,7 +118,7 @@ fn lines<B: Drives>(folder: &OwnFolder, bus: impl Fn() -> B) -> Result<Vec<PtyLo
         PtyLoop::start(line, &port(folder, name), Vec::new())
     };
     let lines: Result<_, _> = DRIVEN.iter().map(line).collect();
-    lines.context("no lines for the virtual drives").or_exit(Exit::System)
+    lines.context("no lines for the virtual drives").or_system()
 }
 
 fn tell_executed<B: Drives>(lines: Vec<PtyLoop<B>>) {

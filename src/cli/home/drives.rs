@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use super::super::play::leave_on_signals;
 use super::super::targets::{DrivenTargets, Troubles};
-use super::super::{Exit, Failure, OrExit as _, print};
+use super::super::{Failure, OrExit as _, print};
 use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
@@ -76,7 +76,7 @@ pub(super) fn home_all(
     troubles: &mut Troubles,
 ) -> Result<bool, Failure> {
     let abort = Arc::new(AtomicBool::new(false));
-    leave_on_signals(&abort).or_exit(Exit::System)?;
+    leave_on_signals(&abort).or_system()?;
     let ready: Vec<usize> = (0..results.len()).filter(|index| results[*index].is_ok()).collect();
     let on = |link: &Link| -> Vec<usize> {
         let is_on =

@@ -74,7 +74,7 @@ impl LatencyWatch {
             diary.end()
         };
         let thread = Builder::new().name("watch".to_owned()).spawn(watch);
-        let thread = thread.context("no thread could be started").or_exit(Exit::System)?;
+        let thread = thread.context("no thread could be started").or_system()?;
         Ok(Self { done, thread, names })
     }
 

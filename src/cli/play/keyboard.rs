@@ -11,8 +11,8 @@ use std::time::Duration;
 use rtrb::Producer;
 
 use super::keys::{HELP, KeyAction, KeyDecoder};
-use crate::app::Control;
 use crate::app::film::SharedTable;
+use crate::app::{Control, RollCall};
 use crate::engine::Mix;
 use crate::rt::Command;
 use crate::state::{State, Transition};
@@ -32,6 +32,7 @@ pub(super) struct Leader {
     length: ShowTime,
     /// What is heard of the film.
     film: SharedTable,
+    roll: Arc<RollCall>,
     /// What was set for the lanes when the play began.
     begun: Vec<Mix>,
     /// The greatest level of a lane, percent.
@@ -44,10 +45,10 @@ pub(super) struct Leader {
 
 impl Leader {
     /// One of a play that has not begun, with its cue's length and what is heard of its film.
-    pub(super) fn new(control: Control, length: ShowTime, film: SharedTable) -> Self {
+    pub(super) fn new(control: Control, length: ShowTime, film: SharedTable, roll: Arc<RollCall>) -> Self {
         let begun: Vec<Mix> = (0..control.desk.lanes()).map(|lane| control.desk.mix(lane)).collect();
         let percent = percent(&begun);
-        Self { control, length, film, begun, percent, commands: None, jumped: None }
+        Self { control, length, film, roll, begun, percent, commands: None, jumped: None }
     }
 
     /// Does it; returns what there is to say at once.
@@ -64,6 +65,10 @@ impl Leader {
             KeyAction::Level(step) => self.level(step),
             KeyAction::Trim(step) => self.trim(step),
             KeyAction::Nudge(frames) => self.trim(self.film.read().frames_ms(frames)),
+            KeyAction::Agree => {
+                self.roll.agree();
+                None
+            }
             KeyAction::Leave => {
                 self.control.leave.store(true, Ordering::Relaxed);
                 None
@@ -184,7 +189,7 @@ mod tests {
         let show = ShowTime::from_millis(30_000);
         control.live.on_show(show);
         let (commands, asked) = RingBuffer::new(4);
-        let mut leader = Leader::new(control, ShowTime::from_millis(60_000), film());
+        let mut leader = Leader::new(control, ShowTime::from_millis(60_000), film(), Arc::default());
         leader.commands = Some(commands);
         (leader, asked)
     }

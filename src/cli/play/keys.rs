@@ -19,6 +19,8 @@ pub(super) enum KeyAction {
     Trim(i32),
     /// The same by frames of the film.
     Nudge(i32),
+    /// Begin without those that do not answer.
+    Agree,
     /// Park as far as the hall may move, and leave.
     Leave,
     /// Say what the keys do.
@@ -39,6 +41,7 @@ p        park the seats, and end
 + -      motion and vibration of all seats 5 % up or down, never above the level at the start
 , .      motion 10 ms earlier or later than the film
 < >      the same by a frame of the film
+y        begin without the controllers that do not answer, where that is asked
 q        park the seats that may move, and end; Ctrl-C does the same, and a second one at
          least half a second later ends at once";
 
@@ -100,6 +103,7 @@ const fn of_letter(byte: u8) -> Option<KeyAction> {
         b',' => KeyAction::Trim(-10),
         b'>' => KeyAction::Nudge(1),
         b'<' => KeyAction::Nudge(-1),
+        b'y' => KeyAction::Agree,
         b'q' => KeyAction::Leave,
         b'?' | b'h' => KeyAction::Help,
         _ => return None,
@@ -128,6 +132,7 @@ mod tests {
             (".", KeyAction::Trim(10)),
             ("<", KeyAction::Nudge(-1)),
             (">", KeyAction::Nudge(1)),
+            ("y", KeyAction::Agree),
             ("q", KeyAction::Leave),
             ("?", KeyAction::Help),
             ("h", KeyAction::Help),

@@ -1,11 +1,12 @@
 //! Messages of a play: from its state, its cause and its current figures.
 
 use std::fmt::{Display, Write as _};
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::{CtrlC, keyboard};
-use crate::app::Control;
 use crate::app::film::SharedTable;
+use crate::app::{Control, RollCall};
 use crate::engine::Unplanned;
 use crate::rt::News;
 use crate::state::{Cause, State, Transition, Whose};
@@ -21,6 +22,8 @@ pub(super) struct Messages {
     pub(super) join: Duration,
     /// What is heard of the film, if one leads the show.
     pub(super) film: Option<SharedTable>,
+    /// Who answered.
+    pub(super) roll: Arc<RollCall>,
     /// The controllers' names.
     pub(super) names: Vec<String>,
 }
@@ -34,6 +37,14 @@ impl Messages {
         }
         let noun = if seats == 1 { "seat" } else { "seats" };
         format!("bringing {seats} {noun} to park (up to {:.1} s)", time.as_secs_f64())
+    }
+
+    /// Who does not answer, and what to do, once that is known.
+    pub(super) fn silent(&self) -> Option<String> {
+        let silent = self.roll.silent();
+        let next =
+            if self.roll.is_open() { "press y to play without, or q to end" } else { "it plays without" };
+        (!silent.is_empty()).then(|| format!("{}: nobody answers; {next}", silent.join(", ")))
     }
 
     /// What has happened: the state with its cause and the next action, or why a request was not taken; `None` if there is
@@ -107,8 +118,6 @@ impl Messages {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::engine::Mix;
     use crate::rt::{Desk, TickReport};
@@ -123,6 +132,7 @@ mod tests {
             length: ShowTime::from_secs_f64(8.0),
             join: Duration::from_millis(1_250),
             film: None,
+            roll: Arc::default(),
             names: vec!["A1".to_owned(), "A2".to_owned()],
         }
     }

@@ -50,11 +50,18 @@ impl Progress {
         let (notes, notes_end) = channel();
         let on_terminal = std::io::stderr().is_terminal();
         let keys = on_terminal.then(Keyboard::take).flatten().and_then(|keyboard| {
-            let leader =
-                Leader::new(said.control.clone(), said.length, said.film.clone().unwrap_or_default());
+            let leader = Leader::new(
+                said.control.clone(),
+                said.length,
+                said.film.clone().unwrap_or_default(),
+                Arc::clone(&said.roll),
+            );
             keyboard::start(leader, keyboard, commands_end, notes, Arc::clone(&over)).ok()
         });
         let led = keys.is_some();
+        if led {
+            said.roll.ask();
+        }
         let mut teller = Teller {
             said,
             news_end,
@@ -62,6 +69,7 @@ impl Progress {
             news: None,
             pressed: 0,
             parks: false,
+            missed: false,
             now: None,
             standings: HealthMessages::default(),
             film: Vec::new(),
@@ -102,6 +110,8 @@ struct Teller {
     pressed: u32,
     /// True if seats are brought to park before the show, and that was said.
     parks: bool,
+    /// True if it was said who does not answer.
+    missed: bool,
     /// The state of the hall and the next action, once it plays.
     now: Option<(State, Next)>,
     /// How the controllers stood when they were looked at last.
@@ -129,6 +139,11 @@ impl Teller {
         if !self.parks && self.said.control.live.parking().0 > 0 {
             self.parks = true;
             lines.push(self.said.preparing());
+        }
+        if !self.missed {
+            let silent = self.said.silent();
+            self.missed = silent.is_some();
+            lines.extend(silent);
         }
         self.news = self.news.take().or_else(|| self.news_end.try_recv().ok());
         while let Some(news) = self.news.as_mut().and_then(|news| news.pop().ok()) {

@@ -1,16 +1,11 @@
 //! The table of checks, for a person.
 
-use comfy_table::{LineStyle, Table, TableStyle};
-
+use crate::cli::table;
 use crate::preflight::Check;
-
-/// A line under the header, and no other lines.
-const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// All checks: what they are called, what about, how grave.
 pub(super) fn all() -> String {
-    let mut table = Table::new();
-    table.load_style(STYLE);
+    let mut table = table::ruled();
     table.set_header(["check", "about", "severity", "can be accepted"]);
     for check in Check::ALL {
         let accepted = if check.can_be_accepted() { "yes" } else { "no" };

@@ -3,15 +3,12 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use comfy_table::{LineStyle, Table, TableStyle};
 use serde::Serialize;
 
+use crate::cli::table;
 use crate::drive::silvermax::UnitFacts;
 use crate::drive::sixpack2;
 use crate::preflight::{Check, DriveSubject, Family, Finding, Severity, Subject, round_trip};
-
-/// A line under the header, and no other lines.
-const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// Of more controllers that have the same mere news, only the number is told.
 const FEW: usize = 8;
@@ -108,8 +105,7 @@ impl PreflightReport {
 
     /// The table of controllers, then the findings.
     pub(super) fn text(&self) -> String {
-        let mut table = Table::new();
-        table.load_style(STYLE);
+        let mut table = table::ruled();
         let titles = Family::ALL.iter().map(|family| family.title());
         table.set_header(
             ["controller", "row", "address"].into_iter().chain(titles).chain(["p50 ms", "max ms"]),

@@ -16,7 +16,7 @@ const PRINTED: usize = 20;
 ///
 /// Exits with 1 if an axis differs by more than the tolerance.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  kinocue record compare monday.mcap tuesday.mcap --tolerance 0.1mm")]
+#[command(after_help = "Example:\n  kinocue record compare before.mcap ride.mcap --tolerance 0.1mm")]
 pub(in super::super) struct Args {
     /// The first recording.
     one: PathBuf,

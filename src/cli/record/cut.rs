@@ -15,14 +15,14 @@ use crate::time::{ShowTime, parse_time};
 /// Cuts a stretch out of a full recording, with every tick as plain topics that any viewer can draw.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  kinocue record cut tuesday.mcap --film 47:00..47:20 --seat F4 -o jerk.mcap
-  kinocue record cut tuesday.mcap --film 47:00..47:20 --seat F4 --csv -o jerk.csv
-  kinocue record cut tuesday.mcap --film 47:00..47:20 --pcap -o jerk.pcap
-  kinocue record cut tuesday.mcap --film 47:00..47:20 --anonymous --whole -o case.mcap")]
+  kinocue record cut ride.mcap --film 0:02..0:06 --seat c1 -o jerk.mcap
+  kinocue record cut ride.mcap --film 0:02..0:06 --seat c1 --csv -o jerk.csv
+  kinocue record cut ride.mcap --film 0:02..0:06 --pcap -o jerk.pcap
+  kinocue record cut ride.mcap --film 0:02..0:06 --anonymous --whole -o case.mcap")]
 pub(in super::super) struct Args {
     /// The recording.
     file: PathBuf,
-    /// The stretch, in show time: 47:00..47:20 [default: all].
+    /// The stretch, in show time: 0:02..0:06 [default: all].
     #[arg(long, value_name = "FROM..TO", value_parser = stretch)]
     film: Option<(ShowTime, ShowTime)>,
     /// The seat [default: all].
@@ -45,7 +45,7 @@ pub(in super::super) struct Args {
 }
 
 fn stretch(text: &str) -> Result<(ShowTime, ShowTime), String> {
-    let (from, to) = text.split_once("..").ok_or("a stretch is FROM..TO, such as 47:00..47:20")?;
+    let (from, to) = text.split_once("..").ok_or("a stretch is FROM..TO, such as 0:02..0:06")?;
     let (from, to) = (parse_time(from)?, parse_time(to)?);
     if from < to { Ok((from, to)) } else { Err(format!("{from} is not before {to}")) }
 }
@@ -82,7 +82,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 
 fn failure(error: CutError, path: &Path) -> Failure {
     let exit = match &error {
-        CutError::Seat(..) | CutError::Nothing(..) | CutError::Sampled => Exit::Usage,
+        CutError::Seat(..) => Exit::NoInput,
+        CutError::Nothing(..) | CutError::Sampled => Exit::Usage,
         CutError::Write(_) => Exit::Io,
         _ => Exit::BadCue,
     };

@@ -20,9 +20,7 @@ const PRINTED: usize = 40;
 ///
 /// Exits with 1 if a seat was sent beyond a limit by more than 1 %.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  kinocue record info tuesday.mcap\n  kinocue record info tuesday.mcap --json"
-)]
+#[command(after_help = "Examples:\n  kinocue record info ride.mcap\n  kinocue record info ride.mcap --json")]
 pub(in super::super) struct Args {
     /// The recording.
     file: PathBuf,

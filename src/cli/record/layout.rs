@@ -6,7 +6,7 @@ use super::super::{Exit, Failure, print};
 
 /// Prints a Foxglove and Lichtblick layout for one seat: asked and sent positions, lateness, states.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  kinocue record layout --seat F4 > f4.json")]
+#[command(after_help = "Example:\n  kinocue record layout --seat c1 > c1.json")]
 pub(in super::super) struct Args {
     /// The seat.
     #[arg(long, value_name = "NAME")]

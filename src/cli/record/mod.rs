@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
 use super::client::{ServerArgs, dump_record as dump};
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, names};
 use crate::plain;
 use crate::record::{Contents, ReadError};
 
@@ -60,6 +60,12 @@ pub(super) fn open(path: &Path) -> Result<BufReader<File>, Failure> {
         return Err(anyhow!("{}: is a folder, not a recording", path.display())).or_exit(Exit::NoInput);
     }
     Ok(BufReader::new(file))
+}
+
+/// The place of a seat in a recording.
+pub(super) fn seat_in(contents: &Contents, name: &str) -> Result<usize, Failure> {
+    let known = || contents.seats.iter().map(|seat| seat.name.as_str());
+    contents.seat(name).ok_or_else(|| names::unknown("seat", name, known()))
 }
 
 /// Why a file is not read, with what ends the program.

@@ -14,7 +14,7 @@ use crate::record::{self, RecoverError, Wanted};
 ///
 /// The new file is read back before it gets its name. The original stays.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  kinocue record recover tuesday.part.mcap")]
+#[command(after_help = "Example:\n  kinocue record recover ride.part.mcap")]
 pub(in super::super) struct Args {
     /// The recording that was not closed.
     file: PathBuf,

@@ -18,10 +18,10 @@ use crate::device::{Address, table};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  kinocue register diff hall-settings.toml --config hall.toml
-  kinocue register diff hall-settings.toml --config hall.toml --name A7
-  kinocue register diff A7.toml --to 192.168.15.207:7408
-  kinocue register diff hall-settings.toml --as A7 --to 192.168.15.207:7408")]
+  kinocue register diff hall-settings.toml --config examples/hall.toml
+  kinocue register diff hall-settings.toml --config examples/hall.toml --name A1
+  kinocue register diff A1.toml --to 127.0.0.1:7408
+  kinocue register diff hall-settings.toml --as A1 --to 127.0.0.1:7408")]
 pub(super) struct Args {
     /// The file of `kinocue register save` to compare with.
     file: PathBuf,

@@ -1,10 +1,10 @@
 //! `kinocue register list`: the one table of registers, printed.
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
 use super::drives::{self, DriveRegister, DriveRegisters};
-use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::cli::{Exit, Failure, OrExit as _, print, table};
 use crate::device::{Family, Flags, Register, selections, table};
 
 /// Lists the registers that the manuals document: unit, range, default, dialect, whether they are saved, and the meaning of
@@ -55,8 +55,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 fn text(registers: &[&Register]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING);
+    let mut table = table::bare();
     table.set_header([
         "register", "name", "unit", "range", "IMAX", "SMC", "dialect", "saved", "notes", "manual", "meaning",
     ]);
@@ -83,8 +82,7 @@ fn text(registers: &[&Register]) -> Table {
 }
 
 fn text_of_drives(drives: &[DriveRegister]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING);
+    let mut table = table::bare();
     table.set_header(["register", "dialect", "name"]);
     for one in drives {
         table.add_row([&one.register, one.dialect, one.name]);

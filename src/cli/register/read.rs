@@ -1,13 +1,13 @@
 //! `kinocue register read`.
 
 use anyhow::anyhow;
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
 use super::drives::{self, DriveFound, DriveRegisters, DriveValue};
 use super::{Found, read_values};
 use crate::cli::targets::{DrivenTargets, TargetArgs, Targets, Troubles};
-use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::cli::{Exit, Failure, OrExit as _, print, table};
 use crate::config::{Controller, Station};
 use crate::device::change::dialect_name;
 use crate::device::{Address, Selection, selections, settings::Values, table};
@@ -17,12 +17,12 @@ use crate::wire::{DP_POSITIONS, position};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  kinocue register read PA95 --to 192.168.15.201:7408
-  kinocue register read pa 0x90..98 dp 06..0b dpf0 --config hall.toml --row A
-  kinocue register read servo 1 508..511 --config hall.toml --name A1
-  kinocue register read R0 R1 R38..40 --config hall.toml --name L1      SilverMax units
-  kinocue register read '$20' '$43' --config hall.toml --name L2        a SIXpack 2
-  kinocue register read --config hall.toml --json")]
+  kinocue register read PA95 --to 127.0.0.1:7408
+  kinocue register read pa 0x90..98 dp 06..0b dpf0 --config examples/hall.toml --row A
+  kinocue register read servo 1 508..511 --config examples/hall.toml --name A1
+  kinocue register read R0 R1 R38..40 --config examples/silvermax.toml --name A1      SilverMax units
+  kinocue register read '$20' '$43' --config examples/sixpack2.toml --name A1        a SIXpack 2
+  kinocue register read --config examples/hall.toml --json")]
 pub(super) struct Args {
     /// What to read: PA95, pa 0x95, dp 06..0b, dpf0, axis-offset, servo 1 508, R38, $20 [default: all PA and DP, and all
     /// that can be read of drives].
@@ -180,8 +180,7 @@ fn says(controller: &Controller<Station>, values: &Values, address: Address, val
 }
 
 fn text(targets: &Targets, found: &[Found]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING);
+    let mut table = table::bare();
     table.set_header(["controller", "register", "value", "unit", "name", "meaning"]);
     for (controller, one) in targets.controllers.iter().zip(found) {
         for register in registers(controller, &one.values) {
@@ -199,8 +198,7 @@ fn text(targets: &Targets, found: &[Found]) -> Table {
 }
 
 fn text_of_drives(driven: &DrivenTargets, found: &[DriveFound]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING);
+    let mut table = table::bare();
     table.set_header(["controller", "register", "value", "name", "meaning"]);
     for (controller, one) in driven.controllers.iter().zip(found) {
         for DriveValue { register, name, value, says } in &one.values {

@@ -15,9 +15,9 @@ use crate::device::settings::{Saved, SavedDrives, parameters, text};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  kinocue register save A7.toml --to 192.168.15.207:7408,name=A7
-  kinocue register save hall-settings.toml --config hall.toml
-  kinocue register save - --config hall.toml --row A")]
+  kinocue register save A1.toml --to 127.0.0.1:7408,name=A1
+  kinocue register save hall-settings.toml --config examples/hall.toml
+  kinocue register save - --config examples/hall.toml --row A")]
 pub(super) struct Args {
     /// The file to write, or `-` for stdout. An existing file is replaced.
     file: PathBuf,

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, anyhow};
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
 use super::{diff, read_values};
 use crate::cli::ask::agreed;
 use crate::cli::targets::{TargetArgs, Targets, Troubles};
-use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::cli::{Exit, Failure, OrExit as _, print, table};
 use crate::config::{Controller, Station};
 use crate::device::change::{check, keeps, moves};
 use crate::device::settings::is_own;
@@ -24,11 +24,11 @@ const KEEP: (Address, u16) = (Address::Pa(0x0f), 2);
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  kinocue register write PA95=6 --to 192.168.15.202:7408
-  kinocue register write PA90=1 PA91=2 PA92=1 PA93=50 --config hall.toml --keep
-  kinocue register write pa 80..85 = 3000 --config hall.toml --row A --yes
-  kinocue register write servo 1 508=7 --config hall.toml --name A1
-  kinocue register write --file hall-settings.toml --config hall.toml --name A7 --keep
+  kinocue register write PA95=6 --to 127.0.0.1:7409
+  kinocue register write PA90=1 PA91=2 PA92=1 PA93=50 --config examples/hall.toml --keep
+  kinocue register write pa 80..85 = 3000 --config examples/hall.toml --row A --yes
+  kinocue register write servo 1 508=7 --config examples/hall.toml --name A1
+  kinocue register write --file hall-settings.toml --config examples/hall.toml --name A1 --keep
 
 Without --keep, a power cycle undoes what is written. To home seats, use `kinocue home`.")]
 pub(super) struct Args {
@@ -297,8 +297,7 @@ fn finish(args: &Args, targets: &Targets, changes: &[RegisterChange], kept: bool
 
 /// The diff: old and new.
 fn text(targets: &Targets, changes: &[RegisterChange]) -> Table {
-    let mut lines = Table::new();
-    lines.load_style(presets::NOTHING);
+    let mut lines = table::bare();
     lines.set_header(["controller", "register", "old", "", "new", "name", "meaning"]);
     for change in changes {
         let register = table().get(change.register);

@@ -1,12 +1,10 @@
 //! A report for people.
 
-use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+use comfy_table::CellAlignment;
 
+use crate::cli::table;
 use crate::control::model::FrameCounts;
 use crate::journal::{FilmProof, JournalReport, ReportShown, Totals};
-
-/// A line under the header, and no other lines.
-const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// One row a show, and a line for all together.
 pub(super) fn shows(report: &JournalReport) -> String {
@@ -14,8 +12,7 @@ pub(super) fn shows(report: &JournalReport) -> String {
     if report.shows.is_empty() {
         return format!("nothing was played {days}\n");
     }
-    let mut table = Table::new();
-    table.load_style(STYLE);
+    let mut table = table::ruled();
     table.set_header([
         "start", "cue", "result", "took", "level", "seats", "sent", "acked", "refused", "lost", "missed",
         "late p99", "ack p99", "by",
@@ -38,8 +35,7 @@ pub(super) fn actions(report: &JournalReport) -> String {
     if report.actions.is_empty() {
         return format!("no commands {}\n", days(report));
     }
-    let mut table = Table::new();
-    table.load_style(STYLE);
+    let mut table = table::ruled();
     table.set_header(["at", "who", "what", "result", "state"]);
     for one in &report.actions {
         let often = if one.times > 1 { format!(" ({} times)", one.times) } else { String::new() };

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::{Args, SignalSocket, control, parse, seed};
 use crate::cli::print::{self, tell};
-use crate::cli::{Exit, Failure, OrExit as _};
+use crate::cli::{Exit, Failure, OrExit as _, exit};
 use crate::sim::serial::{Bus, Deed, LineFaults, PtyError, PtyLoop, SerialLine};
 use crate::time::parse_duration;
 
@@ -73,7 +73,7 @@ pub(super) fn run<B: Drives>(
     script.extend(parse::timed(&args.script, &deed).context("--script").or_exit(Exit::Usage)?);
     let line = SerialLine::new(bus, B::BITS, LineFaults::default(), seed(args));
     let running = PtyLoop::start(line, path, script).map_err(|error| Failure {
-        exit: if matches!(error, PtyError::Taken(_)) { Exit::Usage } else { Exit::System },
+        exit: if matches!(error, PtyError::Taken(_)) { Exit::Usage } else { exit::of_system(&error) },
         error: error.into(),
     })?;
     let remote = running.remote();

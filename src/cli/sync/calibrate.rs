@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     };
     let sources = [of(&args.source)?, of(&args.against)?];
     let rules = SourceRules { allows_coarse: true, ..SourceRules::default() };
-    let reader = FilmReader::start(&sources, rules).or_exit(Exit::System)?;
+    let reader = FilmReader::start(&sources, rules).or_system()?;
     wait_for_both(&reader)?;
     let table = reader.table();
     let (begun, span) = (Monotonic.now(), Duration::from_secs(args.seconds.into()));

@@ -28,7 +28,7 @@ const EVERY: Duration = Duration::from_millis(500);
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sources: Vec<FilmArgs> = args.sources.iter().cloned().map(FilmArgs::of).collect();
-    let reader = FilmReader::relay(&sources, &args.folder).or_exit(Exit::System)?;
+    let reader = FilmReader::relay(&sources, &args.folder).or_system()?;
     let (table, mut said) = (reader.table(), BTreeMap::new());
     let mut at = Monotonic.now();
     loop {

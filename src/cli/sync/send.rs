@@ -15,7 +15,7 @@ use crate::time::Clock as _;
 #[derive(Debug, clap::Args)]
 #[command(
     group = clap::ArgGroup::new("kind").required(true),
-    after_help = "Examples:\n  kinocue sync send --ltc --film-fps 25 --seconds 60 -o reel.wav\n  kinocue sync send --artnet 10.0.0.255"
+    after_help = "Examples:\n  kinocue sync send --ltc --film-fps 25 --seconds 60 -o reel.wav\n  kinocue sync send --artnet 127.0.0.1"
 )]
 pub(in crate::cli) struct Args {
     /// Linear timecode, as a WAV file.
@@ -57,7 +57,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let made = TimecodeSent::new(&args.film_fps, &args.tc_start).or_exit(Exit::Usage)?;
     if let Some(to) = args.artnet {
         let socket = sender(args.from.unwrap_or(Ipv4Addr::UNSPECIFIED), to);
-        let socket = socket.with_context(|| to.to_string()).or_exit(Exit::System)?;
+        let socket = socket.with_context(|| to.to_string()).or_system()?;
         return ended(
             pace(args.seconds, made.artnet(), |bytes| socket.send(bytes).map(drop)),
             &to.to_string(),
@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if let Some(path) = &args.mtc {
         let name = path.display().to_string();
         let line = OpenOptions::new().write(true).open(path);
-        let mut line = line.with_context(|| name.clone()).or_exit(Exit::System)?;
+        let mut line = line.with_context(|| name.clone()).or_system()?;
         return ended(pace(args.seconds, made.mtc(), |bytes| line.write_all(bytes)), &name);
     }
     let mut sound = LtcSound::new(&args.film_fps, &args.tc_start).or_exit(Exit::Usage)?;

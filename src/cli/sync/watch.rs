@@ -11,7 +11,7 @@ use crate::time::{Clock as _, ShowTime};
 
 /// Shows what the sources report of a film, without a hall, cue or seat: position and quality of each, and which would lead.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  kinocue sync watch artnet:10.0.0.20 mtc:/dev/snd/midiC1D0")]
+#[command(after_help = "Example:\n  kinocue sync watch artnet:127.0.0.1 mtc:/dev/snd/midiC1D0")]
 pub(in crate::cli) struct Args {
     /// The sources, best first, as for `play --chase`.
     #[arg(required = true, value_name = "SOURCE")]
@@ -35,7 +35,7 @@ const EVERY: Duration = Duration::from_millis(500);
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sources = args.sources.iter().map(|source| args.labels.of(source)).collect::<Result<Vec<_>, _>>()?;
     let rules = SourceRules { allows_coarse: args.allow_coarse, ..SourceRules::default() };
-    let reader = FilmReader::start(&sources, rules).or_exit(Exit::System)?;
+    let reader = FilmReader::start(&sources, rules).or_system()?;
     let (table, draws) = (reader.table(), io::stdout().is_terminal() && !args.json);
     let mut drawn = 0;
     let mut at = Monotonic.now();

@@ -35,6 +35,15 @@ fn a_whole_cue_is_understood() {
 }
 
 #[test]
+fn columns_between_semicolons_or_tabs_are_one_fault_with_a_command_that_makes_a_cue_of_them() {
+    let told = faults("time_ms;a1;a2\n0;0,5;0\n100;0,6;0\n");
+    assert!(told.starts_with("1:1: the columns are separated by semicolons, not by commas; "), "{told}");
+    assert!(told.contains("`sed 's/,/./g; s/;/,/g' t.csv > OUT.csv`"), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(faults("time_ms\ta1\n0\t0\n").contains("by tabs, not by commas; `sed 's/,/./g; s/\\t/,/g'"));
+}
+
+#[test]
 fn bom_crlf_blank_lines_quotes_and_spaces_are_accepted() {
     let cue = cue("\u{feff}# units: mm\r\n\r\n time_ms , a1 ,io\r\n0,\"0.5\" ,0x5\r\n\r\n\"10\", 1e1 ,7");
     assert_eq!((cue.units().of(0), cue.positions()), (Unit::Millimetre, &[0.5, 10.0][..]));

@@ -13,6 +13,7 @@ use crate::config::{Config, Controller, Link};
 use crate::drive::link::{LedPose, LinkLine, StreamTerms};
 use crate::drive::{Lane, LinkStream};
 use crate::rt::{LinkEnd, LinkLane, LinkLoop, LinkNews, Live, Port, Watch};
+use crate::sys::serial::SerialError;
 
 /// Poses of a lane that wait for the thread of its link: a tenth of a second at 1 kHz.
 const POSES: usize = 128;
@@ -40,7 +41,11 @@ pub(super) fn open(config: &Config, purpose: &Purpose) -> Result<Vec<Port>, Runt
         (Ok(line), _) => Ok(Box::new(line) as Port),
         (Err(_), Purpose::Hall { .. }) => Ok(Box::new(LinkLine::closed(link)) as Port),
         (Err(error), Purpose::Play { .. }) => {
-            Err(RuntimeError::Link(format!("[link.{}]: {error}", link.name)))
+            let why = format!("[link.{}]: {error}", link.name);
+            Err(match error {
+                SerialError::Taken(_) => RuntimeError::PortTaken(why),
+                _ => RuntimeError::Link(why),
+            })
         }
     };
     used(config).map(port).collect()

@@ -1,0 +1,232 @@
+//! Every example of every help page runs as it stands beside the shipped cues and examples, but for those that name what only the reader
+//! has. They run on a machine of their own: a network namespace with nothing but loopback, where ports are free and nothing leaves.
+
+#[path = "common/programs.rs"]
+mod programs;
+
+use std::fmt::Write as _;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::Command;
+
+use programs::is_installed;
+
+/// What only the reader has: devices, films, captures, a packaged service; programs of others.
+const YOURS: [&str; 20] = [
+    "alsa:",
+    "/dev/snd",
+    "film.mkv",
+    "storm.wav",
+    "storm.mkv",
+    "film.sock",
+    "ride.bin",
+    "before.mcap",
+    "ride.part.mcap",
+    "| jq",
+    "show.pcapng",
+    "tcpdump",
+    "xxd",
+    "/etc/kinocue",
+    "~/.local",
+    "/var/lib",
+    "/run/kinocue",
+    "man ",
+    "--config examples/silvermax.toml --name",
+    "--config examples/sixpack2.toml --name",
+];
+/// What each page needs beside it, in the order in which they run.
+const STAGES: [(&str, &[&str]); 3] = [
+    ("", &["check", "info", "fit", "edit", "decode", "doctor", "token", "completions", "demo", "sim"]),
+    (
+        "sim --safe --count 2",
+        &["play", "plot", "convert", "preflight", "home", "register", "sync", "record", "replay", "latency"],
+    ),
+    (
+        "serve --rehearse",
+        &[
+            "status",
+            "watch",
+            "preflight",
+            "sync",
+            "record",
+            "cues",
+            "upload",
+            "load",
+            "playlist",
+            "select",
+            "level",
+            "trim",
+            "effects",
+            "preset",
+            "disable",
+            "enable",
+            "arm",
+            "go",
+            "pause",
+            "resume",
+            "seek",
+            "stop",
+            "clear",
+            "park",
+            "disarm",
+            "test",
+            "mark",
+            "reload",
+            "report",
+            "home",
+        ],
+    ),
+];
+
+/// Pages whose examples are for the service, unless they say with these what they are for.
+const SHARED: [&str; 4] = ["preflight", "home", "sync", "record"];
+const ITSELF: [&str; 14] = [
+    "--to",
+    "--config",
+    "--explain",
+    "sync send",
+    "sync check",
+    "sync index",
+    "sync watch",
+    "sync relay",
+    "record list",
+    "record cut",
+    "record compare",
+    "record info",
+    "record recover",
+    "record layout",
+];
+
+/// Pages whose examples run until they are ended.
+const ENDLESS: [&str; 9] = ["demo", "sim", "latency", "doctor", "play", "watch", "status", "sync", "serve"];
+
+fn kinocue(args: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_kinocue")).args(args).output().expect("kinocue runs");
+    assert!(output.status.success(), "{args:?}");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// The examples of a page and of those below it: each a line, without what is said of it.
+fn examples(page: &[&str]) -> Vec<String> {
+    let help = kinocue(&[page, &["--help"]].concat());
+    let mut found: Vec<String> = Vec::new();
+    let below = help.split_once("\nCommands:\n").map_or("", |(_, after)| after);
+    let below = below.lines().take_while(|line| !line.is_empty());
+    let below = below.filter_map(|line| {
+        line.strip_prefix("  ")?.split_whitespace().next().filter(|_| !line.starts_with("   "))
+    });
+    for name in below.filter(|name| *name != "help") {
+        found.extend(examples(&[page, &[name]].concat()));
+    }
+    let after = help.split_once("\nExample").map_or("", |(_, after)| after);
+    for line in after.lines().skip(1).take_while(|line| line.starts_with("  ")) {
+        match found.last_mut() {
+            // What the width of the page broke.
+            Some(last)
+                if !["kinocue", "tcpdump", "xxd", "printf", "mkdir"]
+                    .iter()
+                    .any(|word| line.trim_start().starts_with(word)) =>
+            {
+                *last += &format!(" {}", line.trim());
+            }
+            _ => found.push(line.trim().to_owned()),
+        }
+    }
+    found
+}
+
+/// The command of an example: what stands before two blanks, outside quotes.
+fn command(example: &str) -> &str {
+    let mut quoted = None;
+    let bytes = example.as_bytes();
+    for (at, byte) in bytes.iter().enumerate() {
+        match (quoted, byte) {
+            (None, b'\'' | b'"') => quoted = Some(*byte),
+            (Some(open), byte) if open == *byte => quoted = None,
+            (None, b' ') if bytes.get(at + 1) == Some(&b' ') => return &example[..at],
+            _ => {}
+        }
+    }
+    example
+}
+
+/// A script that runs each for a few seconds at most, and says how it ended.
+fn script() -> (String, Vec<String>) {
+    let mut script = "ip link set lo up\nexport COLUMNS=100\n".to_owned();
+    let mut all = Vec::new();
+    for (beside, pages) in STAGES {
+        if !beside.is_empty() {
+            let ready = if beside.starts_with("sim") { "ready 127.0.0.1:7409" } else { "parked: " };
+            writeln!(script, "kinocue {beside} >beside.log 2>&1 & beside=$!\nuntil grep -q '{ready}' beside.log; do sleep 0.1; done").expect("memory");
+            // What examples of one page need of another.
+            let first = if beside.starts_with("sim") {
+                "register save hall-settings.toml --config examples/hall.toml"
+            } else {
+                "preflight"
+            };
+            writeln!(script, "kinocue {first} >/dev/null 2>&1").expect("memory");
+        }
+        for page in pages {
+            let longest = if ENDLESS.contains(page) { 3 } else { 30 };
+            for example in examples(&[page]) {
+                let command = command(&example);
+                let of_service =
+                    SHARED.contains(page) && !ITSELF.iter().any(|option| example.contains(option));
+                if SHARED.contains(page) && of_service != beside.starts_with("serve") {
+                    continue;
+                }
+                if YOURS.iter().any(|yours| example.contains(yours)) {
+                    continue;
+                }
+                // On two pages, it runs once.
+                if all.iter().any(|one| one == command) {
+                    continue;
+                }
+                let quoted = command.replace('\'', "'\\''");
+                writeln!(script, "timeout --preserve-status -s INT -k 30 {longest} sh -c '{quoted}' >out.log 2>&1 </dev/null; code=$?; \
+                     grep -q 'Nobody can be asked' out.log && code=0; echo \"$code {page}\" >>ended.log\n\
+                    test -s out.log && tail -c 600 out.log >>said.log; echo '' >>said.log").expect("memory");
+                all.push(command.to_owned());
+            }
+        }
+        if !beside.is_empty() {
+            writeln!(script, "kill -TERM $beside; wait $beside").expect("memory");
+        }
+    }
+    (script, all)
+}
+
+#[test]
+fn every_example_of_every_help_page_runs_as_it_stands() {
+    if !is_installed("unshare") || !is_installed("ip") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["cues", "examples"] {
+        symlink(root.join(name), folder.path().join(name)).expect("it is ours");
+    }
+    symlink(env!("CARGO_BIN_EXE_kinocue"), folder.path().join("kinocue")).expect("it is ours");
+    let (script, all) = script();
+    let path = format!("{}:{}", folder.path().display(), std::env::var("PATH").unwrap_or_default());
+    let mut command = Command::new("unshare");
+    command.args(["--map-root-user", "--net", "sh", "-c", &script]).current_dir(folder.path());
+    for (name, below) in [("HOME", "home"), ("XDG_STATE_HOME", "home/state"), ("XDG_RUNTIME_DIR", "home/run")]
+    {
+        command.env(name, folder.path().join(below));
+    }
+    let ran = command.env("PATH", path).env_remove("KINOCUE_SOCKET").output().expect("unshare runs");
+    let read = |name: &str| {
+        String::from_utf8_lossy(&std::fs::read(folder.path().join(name)).unwrap_or_default()).into_owned()
+    };
+    let (ended, said) = (read("ended.log"), read("said.log"));
+    assert_eq!(ended.lines().count(), all.len(), "{ran:?}\n{}\n{said}", read("beside.log"));
+    // A hall may be in another state than an example needs; what runs for long was ended; a verdict on machine or hall is none here.
+    // The hall of a rehearsal follows no film.
+    let verdicts = ["1 doctor", "1 preflight", "66 sync"];
+    let is_well = |code: &str| {
+        ["0 ", "75 ", "130 "].iter().any(|well| code.starts_with(well)) || verdicts.contains(&code)
+    };
+    let failed: Vec<_> = ended.lines().zip(&all).filter(|(code, _)| !is_well(code)).collect();
+    assert!(failed.is_empty(), "{failed:#?}\n{said}");
+}
