@@ -6,6 +6,7 @@
 
 mod act;
 mod belts;
+mod coded;
 mod commands;
 mod features;
 mod figures;

@@ -5,7 +5,8 @@ import { byId, setAttribute, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress, say } from './press.js';
 import { hall } from './state.js';
-import { clock, timeOfDay } from './words.js';
+import { clock, number, timeOfDay } from './words.js';
+import { words } from './language.js';
 
 const ON = ['waiting', 'joining', 'playing', 'holding', 'paused'];
 const MAY_SEEK = ['armed', 'joining', 'playing', 'holding', 'paused'];
@@ -26,7 +27,7 @@ export function startFilm() {
   new ResizeObserver(drawLanes).observe(byId('lanes'));
   onPress(byId('seek-go'), async (button) => {
     const at = chosen;
-    if (await ask(button, `seek to ${clock(at)}`, () => change('POST', 'show/seek', { position_s: at }))) leave();
+    if (await ask(button, words('seek.to', { at: clock(at) }), () => change('POST', 'show/seek', { position_s: at }))) leave();
   });
 }
 
@@ -49,7 +50,7 @@ function leave() {
 export function showFilm(status) {
   if (!status) return;
   const show = status.show;
-  setText(byId('film-title'), show ? titleOf(show, status.state) : 'Nothing is loaded');
+  setText(byId('film-title'), show ? titleOf(show, status.state) : words('film.none'));
   setText(byId('film-next'), nextOf(status));
   setText(byId('position'), show ? clock(show.position_s, 1, show.length_s) : '–');
   setText(byId('remaining'), show ? `−${clock(Math.max(show.length_s - show.position_s, 0), 0)}` : '');
@@ -60,12 +61,12 @@ export function showFilm(status) {
   }
   showBar(show, maySeek);
   setProperty(byId('seek-ask'), 'hidden', chosen === null);
-  if (chosen !== null) setText(byId('seek-go'), `Seek ${clock(chosen)}`);
+  if (chosen !== null) setText(byId('seek-go'), words('seek.go', { at: clock(chosen) }));
 }
 
 /** What is loaded and how long it is; before it starts, with how long the seats take to get onto it. */
 function titleOf(show, state) {
-  const first = state === 'armed' && show.join_s > 0 ? `, first move ${show.join_s.toFixed(1)} s` : '';
+  const first = state === 'armed' && show.join_s > 0 ? `, ${words('film.first-move', { s: number(show.join_s, 1) })}` : '';
   return `${show.title ?? show.cue}, ${clock(show.length_s, 0)}${first}`;
 }
 
@@ -74,12 +75,12 @@ function nextOf({ playlist, show, state }) {
   if (!playlist) return '';
   const { entries, current, next_start: start } = playlist;
   const isLoaded = show?.cue === entries[current]?.cue;
-  const at = start ? `at ${timeOfDay(start).slice(0, 5)}${state === 'armed' || ON.includes(state) ? '' : ' if armed'}` : '';
-  if (isLoaded && !ON.includes(state)) return at && `starts ${at}`;
+  if (isLoaded && !ON.includes(state)) return start ? words(state === 'armed' ? 'film.starts' : 'film.starts-if-armed', { at: timeOfDay(start).slice(0, 5) }) : '';
   const next = entries[current + 1];
-  if (!next) return isLoaded ? 'the last entry' : '';
+  if (!next) return isLoaded ? words('film.last') : '';
   const title = next.title ?? next.cue;
-  return `then ${title}, ${entries[current].then === 'go' ? 'by itself' : next.at ? `at ${next.at}` : 'by GO'}`;
+  const how = entries[current].then === 'go' ? 'film.then-itself' : next.at ? 'film.then-at' : 'film.then-go';
+  return words(how, { title, at: next.at });
 }
 
 function showBar(show, maySeek) {

@@ -2,11 +2,13 @@
 
 import { showTransport, startTransport } from './transport.js';
 import { showHeadline, startHeadline } from './headline.js';
+import { byId } from './dom.js';
 import { showController } from './controller.js';
 import { showCurves, startCurves } from './curves.js';
 import { showFilm, startFilm } from './film.js';
 import { showFollow, startFollow } from './follow.js';
 import { showHistograms } from './histogram.js';
+import { learn, startLanguage } from './language.js';
 import { showLevels } from './levels.js';
 import { showLinks } from './links.js';
 import { showNext } from './next.js';
@@ -32,6 +34,9 @@ const SHOWS = [
   showLinks, showHistograms, showReports, showCurves, showRecordings,
 ];
 
+// Before it is in one language nothing is shown; STOP works meanwhile.
+await learn();
+startLanguage(byId('language'));
 for (const start of STARTS) start();
 for (const show of SHOWS) watch(show);
 
