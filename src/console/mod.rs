@@ -53,6 +53,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/language.js" JS,
     "js/levels.js" JS,
     "js/links.js" JS,
+    "js/lock.js" JS,
     "js/main.js" JS,
     "js/map.js" JS,
     "js/marks.js" JS,
@@ -74,6 +75,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/trim.js" JS,
     "js/upload.js" JS,
     "js/warnings.js" JS,
+    "js/who.js" JS,
     "js/words.js" JS,
 );
 

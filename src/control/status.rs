@@ -249,6 +249,8 @@ pub(crate) struct EntryStatus {
     pub(crate) then: Then,
     /// The time of day at which it starts, HH:MM or HH:MM:SS; null if a person starts it.
     pub(crate) at: Option<String>,
+    /// What whoever runs the show is told of it; null if the playlist says nothing.
+    pub(crate) note: Option<String>,
 }
 
 /// What the system granted the tick thread.

@@ -153,6 +153,11 @@ impl Browser {
         self.command("/actions", &json!({"actions": [finger]}));
     }
 
+    /// Takes the finger off.
+    pub(crate) fn let_go(&self) {
+        self.ask("DELETE", &format!("{}/actions", self.session), &Value::Null);
+    }
+
     /// Chooses a file in a field for one.
     pub(crate) fn choose(&self, selector: &str, file: &Path) {
         let element = self.find(selector);

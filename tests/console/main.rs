@@ -14,6 +14,7 @@ mod browser;
 mod hall;
 mod languages;
 mod page;
+mod show_mode;
 
 use std::path::Path;
 use std::time::Duration;

@@ -47,7 +47,7 @@ pub(crate) const LARGE: &str = "
     status.film = { state: 'locked', cause: '', next: '', leads: true, source: 'artnet:10.0.0.20', position_s: 1, rate_ppm: 0, error_ms: 0.42,
       timecode: '01:00:00:00', disagrees: null, chosen: null, switches: 0, joins: 1, sources: [] };
     Object.assign(status.levels, { motion: 0.6, effects: { water: false } });
-    const entry = { cue: 'swell', title: 'Swell', length_s: 120, preset: null, level: null, trim_ms: null, movie: null, then: 'hold', at: null };
+    const entry = { cue: 'swell', title: 'Swell', length_s: 120, preset: null, level: null, trim_ms: null, movie: null, then: 'hold', at: null, note: 'Close the doors, then GO after the trailer; row C at half motion only' };
     status.playlist = { id: 'day', title: 'Day', current: 0, next_start: null, entries: [entry, { ...entry, title: 'Kids', at: '23:45' }] };";
 
 /// Those of a selector that are out of reach at a size.

@@ -27,7 +27,7 @@ export function showHeadline(status, link) {
   const asked = !hasSpoken() && !byId('token').hidden;
   setProperty(byId('lost'), 'hidden', link !== 'lost' || asked);
   setText(byId('link'), words(asked ? 'link.log-in' : `link.${link}`));
-  for (const area of document.querySelectorAll('.live')) setProperty(area, 'inert', link === 'lost');
+  for (const area of document.querySelectorAll('.live:not(.panel, .bar, #gravest)')) setProperty(area, 'inert', link === 'lost');
   if (link === 'lost') showSilence();
   if (status) showStatus(status, link);
 }

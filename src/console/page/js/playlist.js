@@ -76,6 +76,11 @@ export function showPlaylist(status) {
   const next = playlist?.next_start ? words('playlist.starts', { at: timeOfDay(playlist.next_start) }) : words('playlist.no-start');
   setText(byId('playlist-head'), playlist ? `${playlist.title}. ${next}` : words('playlist.none'));
   setProperty(byId('playlist-drop'), 'disabled', !playlist);
+  const loaded = playlist?.entries[playlist.current];
+  const note = loaded && loaded.cue === status.show?.cue ? loaded.note : null;
+  setProperty(byId('entry-note'), 'hidden', !note);
+  setText(byId('entry-note'), note ?? '');
+  setProperty(byId('entry-note'), 'title', note ?? '');
   showEntries(playlist ? { entries: playlist.entries, current: playlist.current, cue: status.show?.cue } : { entries: [], current: -1 });
 }
 
@@ -96,6 +101,7 @@ function entryLine(entry, index, isLoaded) {
     words(entry.then === 'go' ? 'entry.then-itself' : 'entry.then-go'),
   ].filter(Boolean);
   const told = make('span', { className: 'entry-words' }, make('b', {}, title), make('span', { className: 'quiet' }, facts.join(', ')));
+  if (entry.note) told.append(make('span', { className: 'note-words' }, entry.note));
   if (isLoaded) {
     return make('li', { className: 'entry current', 'aria-current': 'true' }, told, make('span', { className: 'loaded' }, words('entry.loaded')));
   }

@@ -23,7 +23,7 @@ function onKey(event) {
   if (event.key.toLowerCase() !== 'm' || event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
   // Whoever writes a word with an m in it marks nothing.
   if (event.target.closest('input, textarea, select, [contenteditable]')) return;
-  byId('mark').click();
+  if (!byId('mark').closest('[inert]')) byId('mark').click();
 }
 
 function mark(button) {

@@ -229,6 +229,7 @@ export default {
   "journal.done": "erledigt",
   "journal.times": "{came} ({n} mal)",
   "journal.title": "Journal",
+  "journal.who": "Wer",
   "latency.frames": "{sent} Frames gesendet, {asked} ACKs angefordert, {acked} bestätigt, {refused} abgelehnt, {lost} verloren.",
   "latency.title": "ACK-Latenz",
   "lateness.ticks": "{ticks} Takte mit {rate} Hz, {missed} versäumt. Scheduling: {policy}.",
@@ -277,6 +278,8 @@ export default {
   "load": "Laden",
   "load.choose": "Cue wählen",
   "load.cue": "{cue} laden",
+  "lock.hold": "Diese Seite ist gesperrt: das Schloss gedrückt halten, um sie zu entsperren",
+  "lock.on": "Diese Seite sperren",
   "lost.for": "seit {s} s; {why}.",
   "lost.title": "Keine Verbindung zum Server",
   "lost.token": "er verlangt ein Token",
@@ -467,6 +470,9 @@ export default {
   "remedy.unwatched": "den Sitz beobachten",
   "remedy.wide": "dieser IMAX antwortet, wie sein Handbuch sagt, was kein anderer bekannter tut: ihn abschalten, und eine Aufzeichnung (`kinocue decode --dialect imax`) an die Entwickler dieses Programms senden",
   "result": "Ergebnis",
+  "role.engineer": "Technik",
+  "role.operate": "Bedienung",
+  "role.view": "Ansicht",
   "row": "Reihe {row}",
   "seat": "Sitz",
   "seat.disable": "{which} abschalten",
@@ -614,5 +620,5 @@ export default {
   "warnings.show": "{which} zeigen",
   "what": "Was",
   "when": "Wann",
-  "who": "Wer"
+  "who": "{name}, {role}"
 };

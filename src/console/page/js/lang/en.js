@@ -137,6 +137,7 @@ export default {
   "journal.done": "done",
   "journal.times": "{came} ({n} times)",
   "journal.title": "Journal",
+  "journal.who": "Who",
   "latency.frames": "{sent} frames sent, {asked} acks requested, {acked} acked, {refused} refused, {lost} lost.",
   "latency.title": "Ack latency",
   "lateness.ticks": "{ticks} ticks at {rate} Hz, {missed} missed. Scheduling: {policy}.",
@@ -185,6 +186,8 @@ export default {
   "load": "Load",
   "load.choose": "Choose a cue",
   "load.cue": "Load {cue}",
+  "lock.hold": "This page is locked: hold the lock to unlock it",
+  "lock.on": "Lock this page",
   "lost.for": "for {s} s; {why}.",
   "lost.title": "No connection to the server",
   "lost.token": "it requires a token",
@@ -346,5 +349,5 @@ export default {
   "warnings.show": "Show {which}",
   "what": "What",
   "when": "When",
-  "who": "Who"
+  "who": "{name}, {role}"
 };

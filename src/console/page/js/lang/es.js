@@ -229,6 +229,7 @@ export default {
   "journal.done": "hecho",
   "journal.times": "{came} ({n} veces)",
   "journal.title": "Registro",
+  "journal.who": "Quién",
   "latency.frames": "{sent} tramas enviadas, {asked} ACK solicitados, {acked} confirmadas, {refused} rechazadas, {lost} perdidas.",
   "latency.title": "Latencia de ACK",
   "lateness.ticks": "{ticks} ciclos a {rate} Hz, {missed} perdidos. Planificación: {policy}.",
@@ -277,6 +278,8 @@ export default {
   "load": "Cargar",
   "load.choose": "Elegir un cue",
   "load.cue": "Cargar {cue}",
+  "lock.hold": "Esta página está bloqueada: mantenga pulsado el candado para desbloquearla",
+  "lock.on": "Bloquear esta página",
   "lost.for": "desde hace {s} s; {why}.",
   "lost.title": "Sin conexión con el servidor",
   "lost.token": "exige un token",
@@ -467,6 +470,9 @@ export default {
   "remedy.unwatched": "vigile la butaca",
   "remedy.wide": "este IMAX responde como dice su manual, lo que ningún otro conocido hace: desactívelo y envíe una captura (`kinocue decode --dialect imax`) a los desarrolladores de este programa",
   "result": "Resultado",
+  "role.engineer": "técnico",
+  "role.operate": "operar",
+  "role.view": "ver",
   "row": "Fila {row}",
   "seat": "Butaca",
   "seat.disable": "Desactivar {which}",
@@ -614,5 +620,5 @@ export default {
   "warnings.show": "Mostrar {which}",
   "what": "Qué",
   "when": "Cuándo",
-  "who": "Quién"
+  "who": "{name}, {role}"
 };

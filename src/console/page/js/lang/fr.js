@@ -229,6 +229,7 @@ export default {
   "journal.done": "fait",
   "journal.times": "{came} ({n} fois)",
   "journal.title": "Journal",
+  "journal.who": "Qui",
   "latency.frames": "{sent} trames envoyées, {asked} ACK demandés, {acked} acquittées, {refused} refusées, {lost} perdues.",
   "latency.title": "Latence des ACK",
   "lateness.ticks": "{ticks} cycles à {rate} Hz, {missed} manqués. Ordonnancement : {policy}.",
@@ -277,6 +278,8 @@ export default {
   "load": "Charger",
   "load.choose": "Choisir un cue",
   "load.cue": "Charger {cue}",
+  "lock.hold": "Cette page est verrouillée : maintenir le cadenas appuyé pour la déverrouiller",
+  "lock.on": "Verrouiller cette page",
   "lost.for": "depuis {s} s ; {why}.",
   "lost.title": "Pas de connexion au serveur",
   "lost.token": "il exige un jeton",
@@ -467,6 +470,9 @@ export default {
   "remedy.unwatched": "surveiller le siège",
   "remedy.wide": "cet IMAX répond comme le dit son manuel, ce qu’aucun autre connu ne fait : le désactiver, et envoyer une capture (`kinocue decode --dialect imax`) aux développeurs de ce programme",
   "result": "Résultat",
+  "role.engineer": "technicien",
+  "role.operate": "conduite",
+  "role.view": "vue",
   "row": "Rangée {row}",
   "seat": "Siège",
   "seat.disable": "Désactiver {which}",
@@ -614,5 +620,5 @@ export default {
   "warnings.show": "Afficher {which}",
   "what": "Quoi",
   "when": "Quand",
-  "who": "Qui"
+  "who": "{name}, {role}"
 };

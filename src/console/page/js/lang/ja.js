@@ -229,6 +229,7 @@ export default {
   "journal.done": "完了",
   "journal.times": "{came}（{n} 回）",
   "journal.title": "操作ログ",
+  "journal.who": "操作者",
   "latency.frames": "送信フレーム {sent}、ACK 要求 {asked}、ACK {acked}、拒否 {refused}、喪失 {lost}。",
   "latency.title": "ACK 遅延",
   "lateness.ticks": "{rate} Hz で {ticks} 周期、{missed} 欠落。スケジューリング：{policy}。",
@@ -277,6 +278,8 @@ export default {
   "load": "読み込む",
   "load.choose": "キューを選択",
   "load.cue": "{cue} を読み込む",
+  "lock.hold": "このページはロック中です：錠前を長押しして解除",
+  "lock.on": "このページをロック",
   "lost.for": "{s} 秒間。{why}。",
   "lost.title": "サーバーに接続できません",
   "lost.token": "トークンが必要です",
@@ -467,6 +470,9 @@ export default {
   "remedy.unwatched": "座席を目視で監視",
   "remedy.wide": "この IMAX はマニュアルどおりに応答しますが、他に例がありません：無効にし、キャプチャ（`kinocue decode --dialect imax`）を本プログラムの開発者へ送ってください",
   "result": "結果",
+  "role.engineer": "技術",
+  "role.operate": "操作",
+  "role.view": "閲覧",
   "row": "{row} 列",
   "seat": "座席",
   "seat.disable": "{which} を無効にする",
@@ -614,5 +620,5 @@ export default {
   "warnings.show": "{which} を表示",
   "what": "内容",
   "when": "日時",
-  "who": "操作者"
+  "who": "{name}、{role}"
 };

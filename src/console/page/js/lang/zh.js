@@ -229,6 +229,7 @@ export default {
   "journal.done": "完成",
   "journal.times": "{came}（{n} 次）",
   "journal.title": "日志",
+  "journal.who": "操作者",
   "latency.frames": "已发送 {sent} 帧，请求 ACK {asked}，已应答 {acked}，被拒 {refused}，丢失 {lost}。",
   "latency.title": "ACK 延迟",
   "lateness.ticks": "{rate} Hz 下 {ticks} 个周期，错过 {missed} 个。调度：{policy}。",
@@ -277,6 +278,8 @@ export default {
   "load": "加载",
   "load.choose": "选择 Cue",
   "load.cue": "加载 {cue}",
+  "lock.hold": "此页面已锁定：长按锁形按钮解锁",
+  "lock.on": "锁定此页面",
   "lost.for": "已 {s} 秒；{why}。",
   "lost.title": "与服务器无连接",
   "lost.token": "需要令牌",
@@ -467,6 +470,9 @@ export default {
   "remedy.unwatched": "请人工观察该座椅",
   "remedy.wide": "此 IMAX 按手册方式应答，其他已知设备均非如此：请停用，并将抓包（`kinocue decode --dialect imax`）发给本程序的维护者",
   "result": "结果",
+  "role.engineer": "工程师",
+  "role.operate": "操作",
+  "role.view": "查看",
   "row": "{row} 排",
   "seat": "座椅",
   "seat.disable": "停用 {which}",
@@ -614,5 +620,5 @@ export default {
   "warnings.show": "显示 {which}",
   "what": "内容",
   "when": "时间",
-  "who": "操作者"
+  "who": "{name}，{role}"
 };
