@@ -69,6 +69,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/state.js" JS,
     "js/stop.js" JS,
     "js/stream.js" JS,
+    "js/timeline.js" JS,
     "js/token.js" JS,
     "js/transport.js" JS,
     "js/trace.js" JS,

@@ -25,7 +25,7 @@ pub use problem::{Code, Problem};
 pub(crate) use recordings::is_recording;
 pub use status::{ControllerStatus, JournalLine, Status};
 pub(crate) use status::{
-    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, PlaylistStatus,
-    PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus, TestRow, TestStatus, Warning,
+    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, MarginOf, MarginStatus,
+    PlaylistStatus, PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus, TestRow, TestStatus, Warning,
 };
 pub use who::{Surface, Who};

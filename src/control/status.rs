@@ -7,8 +7,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 mod film;
+mod margin;
 
 pub(crate) use film::{FilmDisagreement, FilmSourceStatus, FilmStatus};
+pub(crate) use margin::{MarginOf, MarginStatus};
 
 use super::Levels;
 use super::links::LinkStatus;
@@ -209,6 +211,8 @@ pub struct ShowStatus {
     pub(crate) axes: usize,
     /// The effects and outputs that it uses, by the names of their switches.
     pub(crate) effects: Vec<String>,
+    /// What it leaves of each limit at full level, where it leaves least.
+    pub(crate) margins: Vec<MarginStatus>,
 }
 
 /// A playlist, and where in it the hall is.

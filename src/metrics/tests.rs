@@ -129,6 +129,7 @@ fn playing() -> Status {
             resume_s: None,
             axes: 6,
             effects: vec![],
+            margins: vec![],
         }),
         playlist: None,
         trim_ms: -80,

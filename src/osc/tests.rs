@@ -114,6 +114,7 @@ fn playing_at(position_s: f64) -> Status {
         resume_s: None,
         axes: 3,
         effects: Vec::new(),
+        margins: vec![],
     };
     Status {
         state: State::Playing(PlayMode::Following).into(),

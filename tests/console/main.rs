@@ -15,6 +15,7 @@ mod hall;
 mod languages;
 mod page;
 mod show_mode;
+mod timeline;
 
 use std::path::Path;
 use std::time::Duration;

@@ -101,7 +101,7 @@ mod tests {
     use super::*;
     use crate::console;
     use crate::control::model::{Ending, Health};
-    use crate::control::{Code, Role};
+    use crate::control::{Code, MarginOf, Role};
     use crate::film::chase::{HoldCause, ParkCause};
     use crate::film::point::FilmState;
     use crate::health::{HealthState, Why as Standing};
@@ -224,6 +224,7 @@ mod tests {
         for state in FilmState::ALL {
             [true, false].iter().for_each(|followed| add("film-next", state.next(*followed).0, 0));
         }
+        MarginOf::ALL.iter().for_each(|of| add("margin", of.word(), 0));
         [Role::View, Role::Operate, Role::Engineer].iter().for_each(|role| add("role", &role.to_string(), 0));
         add("film-means", "runs", 0); // of a film that is locked, for which no cause has words
         keys

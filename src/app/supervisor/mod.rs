@@ -18,6 +18,7 @@ mod homing;
 mod job;
 mod lasting;
 mod list;
+mod margins;
 mod perform;
 mod player;
 mod playlist;

@@ -3,7 +3,7 @@
 
 import { byId, choice, make, setProperty, setText } from './dom.js';
 import { get } from './api.js';
-import { setLanes } from './film.js';
+import { setCue } from './timeline.js';
 import { drawTrace, keepTrace, tracedSeat } from './trace.js';
 import { clock } from './words.js';
 import { words } from './language.js';
@@ -56,7 +56,7 @@ export function showCurves(status) {
 function clearPlot() {
   plot?.destroy();
   plot = null;
-  setLanes([], [], []);
+  setCue({ axes: [], effects: [], markers: [], length: 1 });
   byId('curves').replaceChildren();
 }
 
@@ -95,8 +95,8 @@ const size = () => ({ width: Math.max(byId('curves').clientWidth, 200), height: 
 function build(curve) {
   clearPlot();
   length = curve.length_s;
-  const axes = curve.axes.map(({ min, max }, axis) => ({ min, max, colour: COLOURS[axis % COLOURS.length] }));
-  setLanes(axes, curve.effects, curve.markers.map(({ at_s: at }) => at / length));
+  const axes = curve.axes.map((axis, index) => ({ ...axis, colour: COLOURS[index % COLOURS.length] }));
+  setCue({ axes, effects: curve.effects, markers: curve.markers, length });
   const { series, bands, data } = linesOf(curve);
   const axis = { stroke: NEUTRAL, grid: { stroke: GRID, width: 1 }, ticks: { stroke: GRID } };
   const options = {
