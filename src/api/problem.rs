@@ -26,6 +26,9 @@ pub(super) struct ProblemBody<'p> {
     code: Code,
     /// What went wrong, with the value and the limit.
     detail: &'p str,
+    /// What stands against it, by a stable word, where the state of the hall does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    why: Option<&'static str>,
     /// What to do.
     remedy: &'p str,
     /// Every fault, where there are several.
@@ -48,13 +51,14 @@ impl IntoResponse for Problem {
 /// Gives a problem its body; other replies pass as they are.
 pub(super) fn render(mut response: Response, hall: Option<&Status>) -> Response {
     let Some(problem) = response.extensions_mut().remove::<Problem>() else { return response };
-    let Problem { status, code, detail, remedy, faults } = &problem;
+    let Problem { status, code, detail, why, remedy, faults } = &problem;
     let body = ProblemBody {
         kind: format!("urn:kinocue:problem:{}", code.word()),
         title: title(*code),
         status: *status,
         code: *code,
         detail,
+        why: *why,
         remedy,
         faults,
         hall: hall.map(HallFacts::from),

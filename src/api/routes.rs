@@ -39,6 +39,7 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(service::figures))
         .routes(routes!(service::document))
         .routes(routes!(status::status))
+        .routes(routes!(status::who))
         .routes(routes!(status::events))
         .routes(routes!(show::home))
         .routes(routes!(show::load))

@@ -36,6 +36,12 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<StatusRe
     Ok(StatusReply(shared.write(&shared.handle.status())))
 }
 
+/// Who asks, by their token, and what they may do.
+#[utoipa::path(get, path = "/api/v1/who", tag = "hall", responses((status = 200, body = Who)))]
+pub(super) async fn who(Extension(who): Extension<Who>) -> axum::Json<Who> {
+    axum::Json(who)
+}
+
 /// The film alone, as the status has it; 404 in a hall that follows none.
 #[utoipa::path(get, path = "/api/v1/sync", tag = "hall", responses((status = 200, body = FilmStatus)))]
 pub(super) async fn sync(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {

@@ -1,6 +1,6 @@
 //! The files of the page belong together, ask nobody else for anything, and keep the rules that the server sends with them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest as _, Sha256};
@@ -135,8 +135,52 @@ fn nothing_is_inline_and_no_data_becomes_markup() {
 
 #[test]
 fn the_modules_stay_small() {
-    for (path, asset) in PAGE {
+    for (path, asset) in PAGE.iter().filter(|(path, _)| !path.starts_with(TABLES)) {
         assert!(text(asset).lines().count() < 300, "{path}");
+    }
+}
+
+/// The folder of the tables of texts, one for each language.
+const TABLES: &str = "/js/lang/";
+
+/// The English table, whose keys all others have (`app::supervisor::coded`).
+fn texts() -> BTreeMap<String, String> {
+    let table = text(&asset("/js/lang/en.js").unwrap());
+    let json = table.strip_prefix("export default ").and_then(|rest| rest.strip_suffix(";\n")).unwrap();
+    serde_json::from_str(json).unwrap()
+}
+
+#[test]
+fn the_page_has_no_words_of_its_own_but_those_that_are_the_same_in_every_language() {
+    let html = text(&asset("/").unwrap());
+    let (before, rest) = html.split_once("<noscript>").unwrap();
+    let (_, after) = rest.split_once("</noscript>").unwrap();
+    let words: BTreeSet<&str> = [before, after]
+        .into_iter()
+        .flat_map(|part| part.split('<').filter_map(|tag| tag.split_once('>')))
+        .map(|(_, words)| words.trim())
+        .filter(|words| words.chars().any(char::is_alphabetic))
+        .collect();
+    let same = ["kinocue", "STOP", "GO", "Language", "−10 s", "+10 s", "60 s", "10 s", "−10 ms", "+10 ms"];
+    assert_eq!(words, BTreeSet::from(same));
+}
+
+#[test]
+fn every_text_that_the_page_says_is_in_the_table_and_none_in_the_table_is_never_said() {
+    let texts = texts();
+    let scripts: String = ours(JS).filter(|(path, _)| !path.starts_with(TABLES)).map(|(_, js)| js).collect();
+    let html = text(&asset("/").unwrap());
+    let attributes = ["data-text=\"", "data-aria-label=\"", "data-aria-description=\""];
+    let asked = attributes.into_iter().flat_map(|attribute| between(html, attribute, "\""));
+    for key in asked.chain(between(&scripts, "words('", "'")) {
+        assert!(texts.contains_key(key), "there is no text {key}");
+    }
+    for key in texts.keys() {
+        let counted = key.strip_suffix(".one").or_else(|| key.strip_suffix(".other")).unwrap_or(key);
+        let stem = key.rsplit_once('.').map_or("", |(stem, _)| stem);
+        let said = [format!("'{key}'"), format!("\"{key}\""), format!("'{counted}'"), format!("`{stem}.${{")];
+        let is_said = said.iter().any(|said| scripts.contains(said.as_str()) || html.contains(said.as_str()));
+        assert!(is_said || key.starts_with("band."), "nothing says {key}");
     }
 }
 

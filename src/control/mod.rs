@@ -19,13 +19,13 @@ pub(crate) use handle::{Asked, FRESH, Posted, overtaken};
 pub use handle::{Desired, Handle, Inbox, StatusSource, handle};
 pub(crate) use links::{LinkAxisStatus, LinkStatus};
 pub use model::Health;
-pub(crate) use model::{Histogram, Percentiles, Severity, Then, Times};
+pub(crate) use model::{Coded, Histogram, Percentiles, Severity, Then, Times};
 pub(crate) use places::{Place, Places, network};
 pub use problem::{Code, Problem};
 pub(crate) use recordings::is_recording;
 pub use status::{ControllerStatus, JournalLine, Status};
 pub(crate) use status::{
-    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, PlaylistStatus,
-    PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus, TestRow, TestStatus, Warning,
+    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, MarginOf, MarginStatus,
+    PlaylistStatus, PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus, TestRow, TestStatus, Warning,
 };
 pub use who::{Surface, Who};

@@ -18,6 +18,11 @@ macro_rules! words {
         $vis enum $name { $($(#[$of])* #[serde(rename = $word)] $variant,)+ }
 
         impl $name {
+            /// All of them.
+            #[cfg(test)]
+            #[allow(dead_code, reason = "not all are walked")]
+            $vis const ALL: &[Self] = &[$(Self::$variant,)+];
+
             /// Its word.
             #[must_use]
             $vis const fn word(self) -> &'static str {
@@ -138,6 +143,24 @@ impl<T: fmt::Display> fmt::Display for Word<T> {
             Self::Known(word) => word.fmt(f),
             Self::Other(word) => word.fmt(f),
         }
+    }
+}
+
+/// What is said in words, for programs.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub struct Coded {
+    /// Stable; empty where there is none.
+    pub(crate) code: String,
+    /// What the words name, in their order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) of: Vec<String>,
+}
+
+impl Coded {
+    /// That code, of what the words name.
+    pub(crate) fn new(code: &str, of: impl IntoIterator<Item = String>) -> Self {
+        Self { code: code.to_owned(), of: of.into_iter().collect() }
     }
 }
 

@@ -59,6 +59,9 @@ pub struct Problem {
     pub code: Code,
     /// What went wrong, with the value and the limit; no full stop.
     pub detail: String,
+    /// What stands against it, by a stable word, where the state of the hall does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) why: Option<&'static str>,
     /// What to do.
     pub remedy: String,
     /// Every fault, where there are several.
@@ -92,7 +95,14 @@ impl Problem {
     /// One of that kind.
     #[must_use]
     pub fn new(code: Code, detail: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { status: code.status(), code, detail: detail.into(), remedy: remedy.into(), faults: Vec::new() }
+        Self {
+            status: code.status(),
+            code,
+            detail: detail.into(),
+            why: None,
+            remedy: remedy.into(),
+            faults: Vec::new(),
+        }
     }
 
     /// That there is no `what` of that name, with the one that it may be a slip for.
@@ -121,7 +131,8 @@ impl Problem {
 impl From<Refusal> for Problem {
     fn from(refusal: Refusal) -> Self {
         let Refusal { state, asked, why } = refusal;
-        Self::new(Code::State, format!("cannot {asked} while {state}: {}", why.words()), why.remedy())
+        let detail = format!("cannot {asked} while {state}: {}", why.words());
+        Self { why: Some(why.code()), ..Self::new(Code::State, detail, why.remedy()) }
     }
 }
 

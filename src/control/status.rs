@@ -7,12 +7,14 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 mod film;
+mod margin;
 
 pub(crate) use film::{FilmDisagreement, FilmSourceStatus, FilmStatus};
+pub(crate) use margin::{MarginOf, MarginStatus};
 
 use super::Levels;
 use super::links::LinkStatus;
-use super::model::{FrameCounts, Health, Severity, Then, Times, Word};
+use super::model::{Coded, FrameCounts, Health, Severity, Then, Times, Word};
 use crate::state::{Cause, Next, State};
 
 /// The layout of [`Status`] and of the report of a play: the number goes up when a field changes its name or its meaning. 1 was that
@@ -37,8 +39,12 @@ pub struct Status {
     pub state: Word<State>,
     /// Why it is in that state.
     pub cause: String,
+    /// The code of the cause; it names whose doing that is.
+    pub cause_coded: Coded,
     /// What a person does next.
     pub next: String,
+    /// The code of that.
+    pub next_coded: Coded,
     /// True if arming homes the seats first, which is for empty seats alone.
     pub arm_homes: bool,
     /// True if there is something to clear: the hall, or controllers that wait for it.
@@ -109,7 +115,9 @@ impl Status {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             state: State::Boot.into(),
             cause: Cause::Started.to_string(),
+            cause_coded: Coded::new(Cause::Started.code(), []),
             next: Next::AwaitAnswers.to_string(),
+            next_coded: Coded::new(Next::AwaitAnswers.code(), []),
             levels: Levels { motion: 1.0, vibration: 1.0, ..Levels::default() },
             ..Self::default()
         }
@@ -203,6 +211,8 @@ pub struct ShowStatus {
     pub(crate) axes: usize,
     /// The effects and outputs that it uses, by the names of their switches.
     pub(crate) effects: Vec<String>,
+    /// What it leaves of each limit at full level, where it leaves least.
+    pub(crate) margins: Vec<MarginStatus>,
 }
 
 /// A playlist, and where in it the hall is.
@@ -243,6 +253,8 @@ pub(crate) struct EntryStatus {
     pub(crate) then: Then,
     /// The time of day at which it starts, HH:MM or HH:MM:SS; null if a person starts it.
     pub(crate) at: Option<String>,
+    /// What whoever runs the show is told of it; null if the playlist says nothing.
+    pub(crate) note: Option<String>,
 }
 
 /// What the system granted the tick thread.
@@ -280,6 +292,8 @@ pub struct ControllerStatus {
     pub health: Health,
     /// Why it stands so, and what to do.
     pub why: String,
+    /// The code of why it stands so.
+    pub why_coded: Coded,
     /// Seconds since it was last heard; null if it never was.
     pub heard_s: Option<f64>,
     /// Acks over frames that asked, in the last second; null if none asked.
@@ -385,8 +399,14 @@ pub struct Warning {
     pub(crate) controller: Option<String>,
     /// What is the matter.
     pub(crate) text: String,
+    /// The code of that; of `controller-…` that of why the controller stands so. Left out where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) coded: Option<Coded>,
     /// What to do.
     pub(crate) remedy: String,
+    /// The stable code of that; left out where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) remedy_code: Option<String>,
 }
 
 /// One thing that somebody asked.

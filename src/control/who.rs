@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use super::Role;
 use crate::plain;
@@ -28,11 +29,13 @@ pub enum Surface {
 }
 
 /// Who asks: for the journal, and for what they may do.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Who {
     /// What they may do.
+    #[schema(value_type = String)]
     pub role: Role,
     /// Which way they came.
+    #[schema(value_type = String)]
     pub surface: Surface,
     /// Their name, as well as it is known: the user of the socket's peer, the name of a token, an address.
     pub name: String,

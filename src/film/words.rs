@@ -4,19 +4,24 @@ use super::chase::{HoldCause, ParkCause};
 use super::point::FilmState;
 
 impl FilmState {
-    const fn words(self) -> &'static str {
+    /// Its stable code, and what it means.
+    const fn row(self) -> (&'static str, &'static str) {
         match self {
-            Self::FreeRunning | Self::Locked => "the film is outside the cue, or has just been found",
-            Self::Freewheeling => "no position is received from the film at the moment",
-            Self::Absent => "nothing has been received from the film yet",
-            Self::Acquiring => "the position of the film is not known well enough yet",
-            Self::Stopped => "the film is stopped",
-            Self::Ended => "the film is over",
-            Self::Jumped => "the film has jumped",
-            Self::Reverse => "the film runs backwards",
-            Self::Shuttle => "the film runs at a speed that seats may not follow",
-            Self::Unusable => "what is received from the film makes no sense, or is too coarse",
-            Self::Lost => "no position is received from the film any more",
+            Self::FreeRunning | Self::Locked => {
+                ("film-outside", "the film is outside the cue, or has just been found")
+            }
+            Self::Freewheeling => ("film-freewheeling", "no position is received from the film at the moment"),
+            Self::Absent => ("film-absent", "nothing has been received from the film yet"),
+            Self::Acquiring => ("film-acquiring", "the position of the film is not known well enough yet"),
+            Self::Stopped => ("film-stopped", "the film is stopped"),
+            Self::Ended => ("film-ended", "the film is over"),
+            Self::Jumped => ("film-jumped", "the film has jumped"),
+            Self::Reverse => ("film-reverse", "the film runs backwards"),
+            Self::Shuttle => ("film-shuttle", "the film runs at a speed that seats may not follow"),
+            Self::Unusable => {
+                ("film-unusable", "what is received from the film makes no sense, or is too coarse")
+            }
+            Self::Lost => ("film-lost", "no position is received from the film any more"),
         }
     }
 }
@@ -26,7 +31,7 @@ impl FilmState {
     pub(crate) const fn of_a_source(self) -> &'static str {
         match self {
             Self::FreeRunning | Self::Locked => "the film runs",
-            _ => self.words(),
+            _ => self.row().1,
         }
     }
 }
@@ -50,45 +55,53 @@ impl FilmState {
         }
     }
 
-    /// What a person does next about the film; that depends on whether seats follow it.
-    pub(crate) const fn next(self, is_followed: bool) -> &'static str {
+    /// What a person does next about the film, by a stable code and in words; that depends on whether seats follow it.
+    pub(crate) const fn next(self, is_followed: bool) -> (&'static str, &'static str) {
         match self {
-            Self::FreeRunning | Self::Locked if is_followed => "nothing; the seats follow it",
-            Self::FreeRunning | Self::Locked => "nothing; seats follow it once a person starts the show",
-            Self::Freewheeling | Self::Acquiring | Self::Jumped => "wait a moment",
-            Self::Absent | Self::Lost => "start the film; check that its source is connected",
-            Self::Stopped => "let the film run on",
-            Self::Ended => "nothing; start the next show",
-            Self::Reverse | Self::Shuttle => "let the film run forward at its speed",
-            Self::Unusable => "check what its source sends; allow_coarse permits one that is only coarse",
+            Self::FreeRunning | Self::Locked if is_followed => ("followed", "nothing; the seats follow it"),
+            Self::FreeRunning | Self::Locked => {
+                ("start-show", "nothing; seats follow it once a person starts the show")
+            }
+            Self::Freewheeling | Self::Acquiring | Self::Jumped => ("wait", "wait a moment"),
+            Self::Absent | Self::Lost => ("start-film", "start the film; check that its source is connected"),
+            Self::Stopped => ("run-on", "let the film run on"),
+            Self::Ended => ("next-show", "nothing; start the next show"),
+            Self::Reverse | Self::Shuttle => ("run-forward", "let the film run forward at its speed"),
+            Self::Unusable => {
+                ("check-source", "check what its source sends; allow_coarse permits one that is only coarse")
+            }
         }
     }
 }
 
 impl HoldCause {
-    /// Why the seats wait.
+    /// Its stable code, and why the seats wait.
     #[must_use]
-    pub(crate) const fn words(self) -> &'static str {
+    pub(crate) const fn row(self) -> (&'static str, &'static str) {
         match self {
-            Self::Film(state) => state.words(),
-            Self::Apart => "the film was too far from the seats for them to slew to it",
-            Self::Unstable => "the seats had to join five times in a minute: check its source, and resume",
-            Self::Asks => "each join waits for a person: resume",
+            Self::Film(state) => state.row(),
+            Self::Apart => ("film-apart", "the film was too far from the seats for them to slew to it"),
+            Self::Unstable => (
+                "film-unstable",
+                "the seats had to join five times in a minute: check its source, and resume",
+            ),
+            Self::Asks => ("film-asks", "each join waits for a person: resume"),
         }
     }
 }
 
 impl ParkCause {
-    /// Why the seats park.
+    /// Its stable code, and why the seats park.
     #[must_use]
-    pub(crate) const fn words(self) -> &'static str {
+    pub(crate) const fn row(self) -> (&'static str, &'static str) {
         match self {
-            Self::FilmEnded => "the film is over",
-            Self::FilmCutShort => {
-                "the film is over, and the seats followed it through only a part of the cue"
-            }
-            Self::CueLeft => "the film has left the cue",
-            Self::HeldTooLong => "the film could not be followed for five minutes",
+            Self::FilmEnded => ("film-ended", "the film is over"),
+            Self::FilmCutShort => (
+                "film-cut-short",
+                "the film is over, and the seats followed it through only a part of the cue",
+            ),
+            Self::CueLeft => ("cue-left", "the film has left the cue"),
+            Self::HeldTooLong => ("held-too-long", "the film could not be followed for five minutes"),
         }
     }
 }

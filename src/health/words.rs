@@ -6,6 +6,8 @@ use super::{Change, HealthState, Why};
 use crate::plain;
 use crate::wire::DPFE;
 
+/// In place of the words of what is worded with its figures.
+const ITSELF: &str = "it reports this itself";
 /// What has to be said, loudly, where acks are off.
 pub(crate) const ACKS_OFF: &str = "acks are off: a controller that is lost, refuses frames or has an emergency stop is noticed by \
                             its own reports at best";
@@ -94,59 +96,89 @@ impl fmt::Display for Why {
                 f,
                 "PA02 = {drives}: it drives axes that its seat type does not have; they cannot be read, and frames would move them to 0"
             ),
-            _ => f.write_str(self.plainly()),
+            _ => f.write_str(self.row().1),
         }
     }
 }
 
 impl Why {
-    /// The reason where no figure belongs to it.
-    const fn plainly(self) -> &'static str {
+    /// Its stable code, and the reason where no figure belongs to it.
+    const fn row(self) -> (&'static str, &'static str) {
         match self {
-            Self::Acked => "it answers",
-            Self::AcksOff => "acks are off",
-            Self::AcksMissing(_) => "acks are missing or late",
-            Self::Silent(_) => "no ack and no report for too long",
-            Self::NotSeenYet => "no answer yet",
-            Self::SeenAgain => "back as it was",
-            Self::Moved(_) => "it was moved while no frame was sent to it from here",
-            Self::Unsure(_) => {
-                "frames to it, or its acks, were missing for over 50 ms: its position has to be read"
-            }
-            Self::CutShort(_) => "its drives were stopped: its position is being read",
-            Self::Astray(_) => {
+            Self::Acked => ("acked", "it answers"),
+            Self::AcksOff => ("acks-off", "acks are off"),
+            Self::AcksMissing(_) => ("acks-missing", "acks are missing or late"),
+            Self::Silent(_) => ("silent", "no ack and no report for too long"),
+            Self::NotSeenYet => ("not-seen-yet", "no answer yet"),
+            Self::SeenAgain => ("seen-again", "back as it was"),
+            Self::Moved(_) => ("moved", "it was moved while no frame was sent to it from here"),
+            Self::Unsure(_) => (
+                "unsure",
+                "frames to it, or its acks, were missing for over 50 ms: its position has to be read",
+            ),
+            Self::CutShort(_) => ("cut-short", "its drives were stopped: its position is being read"),
+            Self::Astray(_) => (
+                "astray",
                 "it acks frames but is not where they took it: it homes by itself or is jogged (PA96 to PA98), or its \
-                 filters delay it too much"
-            }
-            Self::Unsteady(_) => {
+                 filters delay it too much",
+            ),
+            Self::Unsteady(_) => (
+                "unsteady",
                 "three times within a minute frames to it or its acks were missing for over 50 ms, or it was not where \
-                 they took it: check the network, and whether it is jogged"
+                 they took it: check the network, and whether it is jogged",
+            ),
+            Self::Ambiguous(_) => (
+                "ambiguous",
+                "its positions are inside the stroke in both word orders, and nothing tells which is true: home it",
+            ),
+            Self::Unread(_) => (
+                "unread",
+                "not all of its axes report their positions: those past the sixth have no register",
+            ),
+            Self::EmergencyStop(_) => ("emergency-stop", "emergency stop"),
+            Self::HeldUntilReset(_) => {
+                ("held-until-reset", "its emergency stop was released, and holds until a reset (PA91 = 2)")
             }
-            Self::Ambiguous(_) => {
-                "its positions are inside the stroke in both word orders, and nothing tells which is true: home it"
+            Self::Refuses(_) => ("refuses", "it refuses frames"),
+            Self::Wide(_) => {
+                ("wide", "it answers with registers of 32 bits, but only those of 16 can be read")
             }
-            Self::Unread(_) => {
-                "not all of its axes report their positions: those past the sixth have no register"
-            }
-            Self::EmergencyStop(_) => "emergency stop",
-            Self::HeldUntilReset(_) => "its emergency stop was released, and holds until a reset (PA91 = 2)",
-            Self::Refuses(_) => "it refuses frames",
-            Self::Wide(_) => "it answers with registers of 32 bits, but only those of 16 can be read",
-            Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) started again",
-            Self::OtherMaster(_) => {
-                "it got more datagrams (DP34) than were sent from here: another machine sends to it"
-            }
-            Self::NotHome(_) => "it is not home: it was reset, or was never homed",
-            Self::Other(_) => "another controller or another work mode (PA00) than before",
-            Self::Gap(_) => {
-                "it was silent for so long that it may have rebooted, and it has no packet counter (DP34) to show it"
-            }
-            Self::Unproved(_) => "it is unknown whether it has rebooted",
-            Self::Outside { .. }
-            | Self::Error { .. }
-            | Self::Drive { .. }
-            | Self::Alarm { .. }
-            | Self::MoreAxes { .. } => "it reports this itself",
+            Self::Rebooted(_) => ("rebooted", "it has rebooted: its packet counter (DP34) started again"),
+            Self::OtherMaster(_) => (
+                "other-master",
+                "it got more datagrams (DP34) than were sent from here: another machine sends to it",
+            ),
+            Self::NotHome(_) => ("not-home", "it is not home: it was reset, or was never homed"),
+            Self::Other(_) => ("other", "another controller or another work mode (PA00) than before"),
+            Self::Gap(_) => (
+                "gap",
+                "it was silent for so long that it may have rebooted, and it has no packet counter (DP34) to show it",
+            ),
+            Self::Unproved(_) => ("unproved", "it is unknown whether it has rebooted"),
+            Self::Outside { .. } => ("outside", ITSELF),
+            Self::Error { .. } => ("error", ITSELF),
+            Self::Drive { .. } => ("drive", ITSELF),
+            Self::Alarm { register: DPFE, .. } => ("drive-alarm", ITSELF),
+            Self::Alarm { .. } => ("alarm", ITSELF),
+            Self::MoreAxes { .. } => ("more-axes", ITSELF),
+        }
+    }
+
+    /// Its stable code, for programs.
+    pub(crate) const fn code(self) -> &'static str {
+        self.row().0
+    }
+
+    /// The figures that belong to it, in the order of its words.
+    pub(crate) fn figures(self) -> Vec<String> {
+        match self {
+            Self::Outside { axis, pulses, .. } => vec![(axis + 1).to_string(), pulses.0.to_string()],
+            Self::Error { error, .. } => vec![crate::wire::DeviceError(error).to_string()],
+            Self::Drive { axis, error, .. } => vec![axis.to_string(), error.to_string()],
+            Self::Alarm { register: DPFE, value, .. } => vec![value.to_string()],
+            Self::Alarm { register, value, .. } => vec![format!("DP{register:02x}"), value.to_string()],
+            Self::MoreAxes { drives, .. } => vec![drives.to_string()],
+            _ => Vec::new(),
         }
     }
 }

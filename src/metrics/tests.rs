@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use super::*;
 use crate::control::model::FrameCounts;
 use crate::control::{
-    ControllerStatus, FilmDisagreement, FilmSourceStatus, FilmStatus, Health, Histogram, Levels,
+    Coded, ControllerStatus, FilmDisagreement, FilmSourceStatus, FilmStatus, Health, Histogram, Levels,
     LinkAxisStatus, LinkStatus, Percentiles, PreflightStatus, RealTimeStatus, RecordStatus, Severity,
     ShowStatus, Times, Warning,
 };
@@ -31,6 +31,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         enabled: true,
         health: Health::Ok,
         why: "it answers".to_owned(),
+        why_coded: Coded::default(),
         heard_s: Some(0.25),
         ack_rate: Some(1.0),
         ack_p50_us: Some(40.0),
@@ -92,6 +93,7 @@ fn playing() -> Status {
         controller: Some(controller.to_owned()),
         text: "silent".to_owned(),
         remedy: "look at its power".to_owned(),
+        ..Warning::default()
     };
     Status {
         test: None,
@@ -107,7 +109,9 @@ fn playing() -> Status {
         uptime_s: 60.5,
         state: State::Playing(PlayMode::Following).into(),
         cause: "somebody asked".to_owned(),
+        cause_coded: Coded::default(),
         next: "nothing".to_owned(),
+        next_coded: Coded::default(),
         arm_homes: false,
         may_clear: false,
         since_s: 5.0,
@@ -125,6 +129,7 @@ fn playing() -> Status {
             resume_s: None,
             axes: 6,
             effects: vec![],
+            margins: vec![],
         }),
         playlist: None,
         trim_ms: -80,

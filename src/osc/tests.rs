@@ -114,6 +114,7 @@ fn playing_at(position_s: f64) -> Status {
         resume_s: None,
         axes: 3,
         effects: Vec::new(),
+        margins: vec![],
     };
     Status {
         state: State::Playing(PlayMode::Following).into(),
@@ -228,6 +229,7 @@ fn a_subscriber_hears_state_position_warnings_and_the_beat() {
         controller: Some("A1".to_owned()),
         text: "no ack".to_owned(),
         remedy: "look at its plug".to_owned(),
+        ..Warning::default()
     };
     stage.source.put(Arc::new(Status { warnings: vec![warning], uptime_s: 1.2, ..playing_at(2.5) }));
     assert_eq!(stage.heard("position"), [OscType::Float(2.5)]);

@@ -65,6 +65,8 @@ pub(crate) struct Entry {
     pub(crate) then: Then,
     /// When it starts by the wall clock; `None` if a person starts it, or the entry before goes on to it.
     pub(crate) at: Option<At>,
+    /// What whoever runs the show is told of it.
+    pub(crate) note: Option<String>,
     /// Where the file says what has to be looked up elsewhere.
     pub(crate) places: EntryPlaces,
 }

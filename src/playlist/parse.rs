@@ -12,6 +12,8 @@ use crate::config::{ConfigFaults, Entry, Faults, Section, level, stays_below, sw
 use crate::film::timecode::Label;
 use crate::library::CueId;
 
+/// Characters of a note at the most.
+const LONGEST_NOTE: usize = 200;
 /// More than any day has.
 const MAX_ENTRIES: usize = 1000;
 /// The days of the week, Monday first.
@@ -113,6 +115,7 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<PlaylistEntry> {
     let effects_at = section.get("effects");
     let then = section.choice("then", &[("hold", Then::Hold), ("go", Then::Go)]);
     let at = at(&mut section);
+    let note = note(&mut section);
     section.finish();
     let effects = effects_at.map(|entry| switches(entry, None, faults)).unwrap_or_default();
     let place = |key: &str| faults.place(table.get(key).map_or(entry.at, |value| value.span().start));
@@ -126,6 +129,7 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<PlaylistEntry> {
         effects,
         then: then.unwrap_or_default(),
         at,
+        note,
         places: EntryPlaces {
             cue: place("cue"),
             preset: place("preset"),
@@ -155,6 +159,16 @@ fn movie(section: &mut Section<'_, '_, '_>, has_begin: bool) -> Option<String> {
             section.faults,
             "its cue begins with it; film = is for a film that another player shows; omit one of them",
         );
+    }
+    Some(text.to_owned())
+}
+
+fn note(section: &mut Section<'_, '_, '_>) -> Option<String> {
+    let entry = section.get("note")?;
+    let text = entry.text(section.faults)?;
+    let length = text.chars().count();
+    if length > LONGEST_NOTE {
+        entry.fault(section.faults, &format!("{length} characters are outside 1..={LONGEST_NOTE}"));
     }
     Some(text.to_owned())
 }

@@ -301,6 +301,16 @@ proptest! {
 }
 
 #[test]
+fn an_entry_may_have_a_note_of_one_line_for_whoever_runs_the_show() {
+    let playlist = parse("title = \"x\"\n[[entry]]\ncue = \"c\"\nnote = \"doors first\"\n").unwrap();
+    assert_eq!(playlist.entries[0].note.as_deref(), Some("doors first"));
+    let faults = faults_of(&format!("cue = \"c\"\nnote = \"{}\"", "x".repeat(201)));
+    assert!(faults.iter().any(|fault| fault.contains("201 characters are outside 1..=200")), "{faults:?}");
+    let faults = faults_of("cue = \"c\"\nnote = \"two\\nlines\"");
+    assert!(faults.iter().any(|fault| fault.contains("has control characters")), "{faults:?}");
+}
+
+#[test]
 fn a_movie_is_a_file_below_the_folder_of_films_and_needs_somebody_to_show_it() {
     let playlist = parse("title = \"x\"\n[[entry]]\ncue = \"c\"\nmovie = \"reel/feature.mkv\"\n").unwrap();
     assert_eq!(playlist.entries[0].film.movie.as_deref(), Some("reel/feature.mkv"));

@@ -51,11 +51,24 @@ impl AxisProof {
     /// past it.
     #[must_use]
     pub(crate) fn position_margin(&self) -> f64 {
-        let low = self.lowest_shaken.map_or(self.lowest.value, |shaken| shaken.value.min(self.lowest.value));
-        let high =
-            self.highest_shaken.map_or(self.highest.value, |shaken| shaken.value.max(self.highest.value));
+        self.position_margin_at().0
+    }
+
+    /// The same, and where that is.
+    #[must_use]
+    pub(crate) fn position_margin_at(&self) -> (f64, ShowTime) {
         let axis = self.on.geometry();
-        (low - axis.low).min(axis.high - high) / axis.stroke()
+        let below = |figure: &Figure| ((figure.value - axis.low) / axis.stroke(), figure.at);
+        let above = |figure: &Figure| ((axis.high - figure.value) / axis.stroke(), figure.at);
+        let shaken = self.lowest_shaken.iter().map(below).chain(self.highest_shaken.iter().map(above));
+        shaken.fold(
+            if below(&self.lowest).0 <= above(&self.highest).0 {
+                below(&self.lowest)
+            } else {
+                above(&self.highest)
+            },
+            |least, one| if one.0 < least.0 { one } else { least },
+        )
     }
 }
 

@@ -70,42 +70,65 @@ plain::displayed!(Transition {
     Self::Clear => "clear",
 });
 
-plain::displayed!(Next {
-    Self::AwaitAnswers =>
-        "wait until every controller has answered, or disable the one that does not",
-    Self::AwaitPositions => "wait until the positions are read, then park",
-    Self::AwaitHome => "wait until the seats are home, and keep clear of them",
-    Self::AwaitRest => "wait until the seats are at rest",
-    Self::ParkOrHome => "park, or home",
-    Self::ParkOrStart => "park, or start a show: it joins slowly",
-    Self::Home => "home, with nobody on the seats; or disable the seat whose position is unknown",
-
-    Self::Load => "load a cue, then arm",
-    Self::Prove => "check the cue against the seats, then arm",
-    Self::Preflight => "run preflight, then arm",
-    Self::Arm => "arm",
-    Self::ArmAndHome => "arm, with nobody on the seats: they home first",
-    Self::Go => "go, or disarm",
-    Self::Watch => "nothing; pause, park or stop as needed",
-    Self::AwaitJoin => "nothing; the seats rejoin by themselves",
-    Self::AwaitFilm => "check the film; the seats join it then, by themselves or when a person resumes (rejoin)",
-    Self::LetJoin => "check the film, then resume; or park",
-    Self::Resume => "resume, or park",
-    Self::Release =>
-        "release the emergency-stop button, then clear; or disable a seat that cannot report it",
-
-    Self::PutRight => "clear the error at the controller, then clear the hall; or disable its seat",
-
-    Self::AwaitStandstill => "wait until the seats stand still, then clear and home",
-    Self::CheckCue => "check the cue against the seats, then clear",
-    Self::LookAtSeat => "inspect the seat, then clear and home again",
-    Self::StopOtherMaster => "stop the other master, then clear",
-    Self::Clear => "clear, then park or home",
-    Self::Restart =>
-        "clear, then park; if the positions are still not read, restart the service",
-});
-
 impl Next {
+    /// Its stable code, and what it says.
+    const fn row(self) -> (&'static str, &'static str) {
+        match self {
+            Self::AwaitAnswers => (
+                "await-answers",
+                "wait until every controller has answered, or disable the one that does not",
+            ),
+            Self::AwaitPositions => ("await-positions", "wait until the positions are read, then park"),
+            Self::AwaitHome => ("await-home", "wait until the seats are home, and keep clear of them"),
+            Self::AwaitRest => ("await-rest", "wait until the seats are at rest"),
+            Self::ParkOrHome => ("park-or-home", "park, or home"),
+            Self::ParkOrStart => ("park-or-start", "park, or start a show: it joins slowly"),
+            Self::Home => {
+                ("home", "home, with nobody on the seats; or disable the seat whose position is unknown")
+            }
+
+            Self::Load => ("load", "load a cue, then arm"),
+            Self::Prove => ("prove", "check the cue against the seats, then arm"),
+            Self::Preflight => ("preflight", "run preflight, then arm"),
+            Self::Arm => ("arm", "arm"),
+            Self::ArmAndHome => ("arm-and-home", "arm, with nobody on the seats: they home first"),
+            Self::Go => ("go", "go, or disarm"),
+            Self::Watch => ("watch", "nothing; pause, park or stop as needed"),
+            Self::AwaitJoin => ("await-join", "nothing; the seats rejoin by themselves"),
+            Self::AwaitFilm => (
+                "await-film",
+                "check the film; the seats join it then, by themselves or when a person resumes (rejoin)",
+            ),
+            Self::LetJoin => ("let-join", "check the film, then resume; or park"),
+            Self::Resume => ("resume", "resume, or park"),
+            Self::Release => (
+                "release",
+                "release the emergency-stop button, then clear; or disable a seat that cannot report it",
+            ),
+
+            Self::PutRight => {
+                ("put-right", "clear the error at the controller, then clear the hall; or disable its seat")
+            }
+
+            Self::AwaitStandstill => {
+                ("await-standstill", "wait until the seats stand still, then clear and home")
+            }
+            Self::CheckCue => ("check-cue", "check the cue against the seats, then clear"),
+            Self::LookAtSeat => ("look-at-seat", "inspect the seat, then clear and home again"),
+            Self::StopOtherMaster => ("stop-other-master", "stop the other master, then clear"),
+            Self::Clear => ("clear", "clear, then park or home"),
+            Self::Restart => {
+                ("restart", "clear, then park; if the positions are still not read, restart the service")
+            }
+        }
+    }
+
+    /// Its stable code, for programs.
+    #[must_use]
+    pub(crate) const fn code(self) -> &'static str {
+        self.row().0
+    }
+
     /// The same where a play in the foreground is led by keys, which neither home nor take out a seat.
     #[must_use]
     pub(crate) const fn by_keys(self) -> Option<&'static str> {
@@ -120,6 +143,12 @@ impl Next {
             Self::Restart => "quit, then start the play again",
             _ => return None,
         })
+    }
+}
+
+impl fmt::Display for Next {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.row().1)
     }
 }
 
@@ -139,78 +168,92 @@ impl Refusal {
 }
 
 impl Trouble {
-    const fn words(self) -> &'static str {
+    const fn row(self) -> (&'static str, &'static str) {
         match self {
-            Self::Limiter => "the limiter held motion back three times in a second",
-            Self::Planner => "a move could not be planned",
-            Self::Deaf => "replies were not read for too long; an emergency stop would have gone unnoticed",
-            Self::Homing(_) => "a seat failed to home",
-            Self::HomingTime => "homing took too long",
-            Self::ParkingTime => "parking took too long",
-            Self::OtherMaster(_) => "another master sends frames to a controller",
+            Self::Limiter => ("limiter", "the limiter held motion back three times in a second"),
+            Self::Planner => ("planner", "a move could not be planned"),
+            Self::Deaf => {
+                ("deaf", "replies were not read for too long; an emergency stop would have gone unnoticed")
+            }
+            Self::Homing(_) => ("homing", "a seat failed to home"),
+            Self::HomingTime => ("homing-time", "homing took too long"),
+            Self::ParkingTime => ("parking-time", "parking took too long"),
+            Self::OtherMaster(_) => ("other-master", "another master sends frames to a controller"),
         }
     }
 }
 
 impl Readiness {
-    const fn words(self) -> &'static str {
+    const fn row(self) -> (&'static str, &'static str) {
         match self {
-            Self::NoCue => "no cue is loaded",
-            Self::NotProved => "the cue is not proved for these seats",
-            Self::NotPreflighted => "preflight has not passed",
-            Self::Ready => "the cue is ready",
+            Self::NoCue => ("no-cue", "no cue is loaded"),
+            Self::NotProved => ("not-proved", "the cue is not proved for these seats"),
+            Self::NotPreflighted => ("not-preflighted", "preflight has not passed"),
+            Self::Ready => ("ready", "the cue is ready"),
         }
     }
 }
 
 impl Cause {
+    /// Its stable code, and the cause in words, without the name of whom it speaks of.
+    const fn row(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Started => ("started", "the program has started"),
+            Self::Crashed => ("crashed", "the program ended without parking the last time"),
+            Self::AwayFromPark => ("away-from-park", "a seat is not at its park pose"),
+            Self::FoundParked => ("found-parked", "all seats were found at their park poses"),
+            Self::Asked(request) => asked(request),
+            Self::StoppedHoming => (
+                "stopped-homing",
+                "stopped by the operator; the controllers finish their homing by themselves, which only the hard-wired \
+                 emergency stop can end",
+            ),
+            Self::Homed => ("homed", "the seats are home"),
+            Self::ArrivedAtPark => ("arrived-at-park", "the seats have parked"),
+            Self::ArmLapsed => ("arm-lapsed", "nobody started within ten minutes of arming"),
+            Self::NotReady(readiness) => readiness.row(),
+            Self::Rebooted(_) => ("rebooted", "a controller has rebooted; its position is unknown"),
+            Self::GapOver => ("gap-over", "the seats join after a gap"),
+            Self::Joined => ("joined", "the seats are on the cue"),
+            Self::Late => ("late", "a frame came more than 50 ms late"),
+            Self::CueEnded => ("cue-ended", "the cue is over"),
+            Self::FilmLeads => ("film-leads", "the seats join the film"),
+            Self::FilmAwaited(why) => why.row(),
+            Self::FilmOver(why) => why.row(),
+            Self::PausedTooLong => ("paused-too-long", "the pause lasted more than five minutes"),
+            Self::GroupOut(_) => ("group-out", "a group of seats is out"),
+            Self::EmergencyStop(_) => ("emergency-stop", "emergency stop"),
+            Self::Trouble(trouble) => trouble.row(),
+            Self::Cleared => ("cleared", "cleared by the operator"),
+            Self::Slept => ("slept", "the machine slept, or the program was suspended, for more than 2 s"),
+        }
+    }
+
+    /// Its stable code, for programs.
+    #[must_use]
+    pub(crate) const fn code(self) -> &'static str {
+        self.row().0
+    }
+
     /// The cause in words, without the name of whom it speaks of.
     #[must_use]
     pub(crate) const fn words(self) -> &'static str {
-        match self {
-            Self::Started => "the program has started",
-            Self::Crashed => "the program ended without parking the last time",
-            Self::AwayFromPark => "a seat is not at its park pose",
-            Self::FoundParked => "all seats were found at their park poses",
-            Self::Asked(request) => asked(request),
-            Self::StoppedHoming => {
-                "stopped by the operator; the controllers finish their homing by themselves, which only the hard-wired \
-                 emergency stop can end"
-            }
-            Self::Homed => "the seats are home",
-            Self::ArrivedAtPark => "the seats have parked",
-            Self::ArmLapsed => "nobody started within ten minutes of arming",
-            Self::NotReady(readiness) => readiness.words(),
-            Self::Rebooted(_) => "a controller has rebooted; its position is unknown",
-            Self::GapOver => "the seats join after a gap",
-            Self::Joined => "the seats are on the cue",
-            Self::Late => "a frame came more than 50 ms late",
-            Self::CueEnded => "the cue is over",
-            Self::FilmLeads => "the seats join the film",
-            Self::FilmAwaited(why) => why.words(),
-            Self::FilmOver(why) => why.words(),
-            Self::PausedTooLong => "the pause lasted more than five minutes",
-            Self::GroupOut(_) => "a group of seats is out",
-            Self::EmergencyStop(_) => "emergency stop",
-            Self::Trouble(trouble) => trouble.words(),
-            Self::Cleared => "cleared by the operator",
-            Self::Slept => "the machine slept, or the program was suspended, for more than 2 s",
-        }
+        self.row().1
     }
 }
 
-const fn asked(request: Transition) -> &'static str {
+const fn asked(request: Transition) -> (&'static str, &'static str) {
     match request {
-        Transition::Home => "homed by the operator",
-        Transition::Arm | Transition::HomeAndArm => "armed by the operator",
-        Transition::Disarm => "disarmed by the operator",
-        Transition::Go => "started by the operator",
-        Transition::Pause => "paused by the operator",
-        Transition::Resume => "resumed by the operator",
-        Transition::Seek => "moved to another place by the operator",
-        Transition::Stop => "stopped by the operator",
-        Transition::Park => "parked by the operator",
-        Transition::Clear => "cleared by the operator",
+        Transition::Home => ("asked-home", "homed by the operator"),
+        Transition::Arm | Transition::HomeAndArm => ("asked-arm", "armed by the operator"),
+        Transition::Disarm => ("asked-disarm", "disarmed by the operator"),
+        Transition::Go => ("asked-go", "started by the operator"),
+        Transition::Pause => ("asked-pause", "paused by the operator"),
+        Transition::Resume => ("asked-resume", "resumed by the operator"),
+        Transition::Seek => ("asked-seek", "moved to another place by the operator"),
+        Transition::Stop => ("asked-stop", "stopped by the operator"),
+        Transition::Park => ("asked-park", "parked by the operator"),
+        Transition::Clear => ("asked-clear", "cleared by the operator"),
     }
 }
 
@@ -221,33 +264,48 @@ impl fmt::Display for Cause {
 }
 
 impl Why {
+    /// Its stable code, and what stands against the request.
+    const fn row(self) -> (&'static str, &'static str) {
+        match self {
+            Self::NotIdentified => ("not-identified", "not every controller has been identified"),
+            Self::PositionsNotRead => {
+                ("positions-not-read", "the seats' positions have not been read since they stopped")
+            }
+            Self::PositionUnknown => ("position-unknown", "a controller does not know its position"),
+            Self::HomesFirst => {
+                ("homes-first", "the seats have to home first, and move over their whole stroke")
+            }
+            Self::NoCue => Readiness::NoCue.row(),
+            Self::NotProved => Readiness::NotProved.row(),
+            Self::NotPreflighted => Readiness::NotPreflighted.row(),
+            Self::NotArmed => ("not-armed", "the hall is not armed"),
+            Self::PlaysAlready => ("plays-already", "the cue is already playing"),
+            Self::PausedNow => ("paused-now", "the cue is paused"),
+            Self::FilmLeads => ("film-leads", "the film leads"),
+            Self::Riding => ("riding", "the cue is under way"),
+            Self::NothingPlays => ("nothing-plays", "nothing is playing"),
+            Self::HomingNow => ("homing-now", "the seats are homing"),
+            Self::ParkingNow => ("parking-now", "the seats are on their way to park"),
+            Self::StoppingNow => ("stopping-now", "the seats are coming to rest"),
+            Self::Latched => ("latched", "it is latched"),
+            Self::SeatsAnywhere => ("seats-anywhere", "the seats may be anywhere"),
+            Self::ArmedNow => ("armed-now", "the hall is armed"),
+            Self::StillPressed => ("still-pressed", "an emergency stop is still in effect"),
+            Self::StillWrong => ("still-wrong", "a controller or a drive still has an error"),
+            Self::NothingToClear => ("nothing-to-clear", "there is nothing to clear"),
+        }
+    }
+
+    /// Its stable code, for programs.
+    #[must_use]
+    pub(crate) const fn code(self) -> &'static str {
+        self.row().0
+    }
+
     /// What stands against the request.
     #[must_use]
     pub(crate) const fn words(self) -> &'static str {
-        match self {
-            Self::NotIdentified => "not every controller has been identified",
-            Self::PositionsNotRead => "the seats' positions have not been read since they stopped",
-            Self::PositionUnknown => "a controller does not know its position",
-            Self::HomesFirst => "the seats have to home first, and move over their whole stroke",
-            Self::NoCue => Readiness::NoCue.words(),
-            Self::NotProved => Readiness::NotProved.words(),
-            Self::NotPreflighted => Readiness::NotPreflighted.words(),
-            Self::NotArmed => "the hall is not armed",
-            Self::PlaysAlready => "the cue is already playing",
-            Self::PausedNow => "the cue is paused",
-            Self::FilmLeads => "the film leads",
-            Self::Riding => "the cue is under way",
-            Self::NothingPlays => "nothing is playing",
-            Self::HomingNow => "the seats are homing",
-            Self::ParkingNow => "the seats are on their way to park",
-            Self::StoppingNow => "the seats are coming to rest",
-            Self::Latched => "it is latched",
-            Self::SeatsAnywhere => "the seats may be anywhere",
-            Self::ArmedNow => "the hall is armed",
-            Self::StillPressed => "an emergency stop is still in effect",
-            Self::StillWrong => "a controller or a drive still has an error",
-            Self::NothingToClear => "there is nothing to clear",
-        }
+        self.row().1
     }
 
     /// What would have to be done first.

@@ -87,6 +87,7 @@ fn playing() -> Status {
         resume_s: None,
         axes: 3,
         effects: Vec::new(),
+        margins: vec![],
     };
     Status {
         state: crate::state::State::Playing(crate::state::PlayMode::Following).into(),

@@ -11,6 +11,18 @@ fn as_role(hall: &Hall, role: Role, method: &str, path: &str) -> Reply {
 }
 
 #[test]
+fn whoever_asks_is_told_who_they_are_and_what_they_may() {
+    let hall = Hall::open();
+    for role in [Role::View, Role::Operate, Role::Engineer] {
+        let who = as_role(&hall, role, "GET", "/api/v1/who").value();
+        assert_eq!(
+            who,
+            serde_json::json!({"name": format!("{role}'s"), "role": role.to_string(), "surface": "http"})
+        );
+    }
+}
+
+#[test]
 fn each_role_may_do_what_is_its_own_and_no_more() {
     let hall = Hall::open();
     let least = [

@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::client::{Request, problem};
 use crate::hall::Hall;
 
-const GETS: [&str; 17] = [
+const GETS: [&str; 18] = [
     "/api/v1/controllers",
     "/api/v1/controllers/{name}",
     "/api/v1/cues",
@@ -20,6 +20,7 @@ const GETS: [&str; 17] = [
     "/api/v1/reports/{day}",
     "/api/v1/status",
     "/api/v1/sync",
+    "/api/v1/who",
     "/healthz",
     "/metrics",
     "/readyz",

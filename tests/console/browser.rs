@@ -83,6 +83,14 @@ impl Browser {
         self.command("/url", &json!({"url": url}));
     }
 
+    /// Asks for these languages from the next page on, the best first.
+    pub(crate) fn speak(&self, languages: &[&str]) {
+        let source =
+            format!("Object.defineProperty(navigator, 'languages', {{ value: {} }})", json!(languages));
+        let command = json!({"cmd": "Page.addScriptToEvaluateOnNewDocument", "params": {"source": source}});
+        self.command("/goog/cdp/execute", &command);
+    }
+
     /// Gives the page that size, px.
     pub(crate) fn resize(&self, width: u32, height: u32) {
         let size = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
@@ -143,6 +151,11 @@ impl Browser {
         let finger = json!({"type": "pointer", "id": "finger", "parameters": {"pointerType": "touch"},
             "actions": [there, {"type": "pointerDown", "button": 0}]});
         self.command("/actions", &json!({"actions": [finger]}));
+    }
+
+    /// Takes the finger off.
+    pub(crate) fn let_go(&self) {
+        self.ask("DELETE", &format!("{}/actions", self.session), &Value::Null);
     }
 
     /// Chooses a file in a field for one.

@@ -12,7 +12,10 @@ mod serving;
 
 mod browser;
 mod hall;
+mod languages;
 mod page;
+mod show_mode;
+mod timeline;
 
 use std::path::Path;
 use std::time::Duration;
@@ -96,13 +99,13 @@ fn a_show_is_armed_played_paused_turned_down_and_stopped_from_the_page() {
     browser.reads("state", "playing");
 
     browser.press("[aria-label='Motion less']");
-    browser.reads("levels-reply", "motion 95 %: done");
+    browser.reads("levels-reply", "motion 95%: done");
     browser.press("#presets button");
     browser.wait("document.getElementById('level-motion').value === '60'");
     browser.wait("document.querySelector('[data-effect=water]').getAttribute('aria-checked') === 'false'");
     browser.press("[data-trim='10']");
     browser.reads("levels-reply", "trim +10 ms: done");
-    browser.reads("settings-badge", "motion 60 %, vibration 50 %, water off, trim +10 ms");
+    browser.reads("settings-badge", "motion 60%, vibration 50%, water off, trim +10 ms");
     browser.shot("06-levels");
 
     browser.press("[data-controller=A2]");

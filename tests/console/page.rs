@@ -24,7 +24,7 @@ const OUT_OF_REACH: &str = "
     return all.filter((one) => !reached(one)).map((one) => one.id || one.textContent);";
 
 /// Has the page see each status as a script makes it, a body of a function of `status`.
-fn pretend(browser: &Browser, script: &str) {
+pub(crate) fn pretend(browser: &Browser, script: &str) {
     browser.eval(&format!(
         "const parse = window.honest ??= JSON.parse;
          JSON.parse = (text) => {{
@@ -36,7 +36,7 @@ fn pretend(browser: &Browser, script: &str) {
 }
 
 /// A hall of 64 seats in eight rows that follows a film, nine seats of it lost, and that is not as planned.
-const LARGE: &str = "
+pub(crate) const LARGE: &str = "
     const [first] = status.controllers;
     status.controllers = [...'ABCDEFGH'].flatMap((row) => Array.from({ length: 8 }, (_, seat) => ({
       ...first, name: row + (seat + 1), row, group: row + (seat + 1), health: row === 'A' || row + seat === 'B0' ? 'lost' : 'ok',
@@ -47,11 +47,11 @@ const LARGE: &str = "
     status.film = { state: 'locked', cause: '', next: '', leads: true, source: 'artnet:10.0.0.20', position_s: 1, rate_ppm: 0, error_ms: 0.42,
       timecode: '01:00:00:00', disagrees: null, chosen: null, switches: 0, joins: 1, sources: [] };
     Object.assign(status.levels, { motion: 0.6, effects: { water: false } });
-    const entry = { cue: 'swell', title: 'Swell', length_s: 120, preset: null, level: null, trim_ms: null, movie: null, then: 'hold', at: null };
+    const entry = { cue: 'swell', title: 'Swell', length_s: 120, preset: null, level: null, trim_ms: null, movie: null, then: 'hold', at: null, note: 'Close the doors, then GO after the trailer; row C at half motion only' };
     status.playlist = { id: 'day', title: 'Day', current: 0, next_start: null, entries: [entry, { ...entry, title: 'Kids', at: '23:45' }] };";
 
 /// Those of a selector that are out of reach at a size.
-fn out_of_reach(browser: &Browser, (width, height): (u32, u32), selector: &str) -> Value {
+pub(crate) fn out_of_reach(browser: &Browser, (width, height): (u32, u32), selector: &str) -> Value {
     browser.resize(width, height);
     browser.wait(&format!("innerWidth === {width} && document.fonts.status === 'loaded'"));
     browser.shot(&format!("80-large-{width}x{height}"));
@@ -77,7 +77,7 @@ fn sixty_four_seats_the_film_the_buttons_and_the_gravest_warning_are_in_view_tog
         assert_eq!(wide, json!(false), "{size:?}");
     }
     browser.reads("in-play", "55 of 64 seats");
-    browser.reads("settings-badge", "motion 60 %, water off");
+    browser.reads("settings-badge", "motion 60%, water off");
     browser.reads("follow-badge", "film locked, artnet, +0.4 ms");
     browser.reads("film-next", "then Kids, at 23:45");
     browser.reads("remaining", "−01:");

@@ -3,9 +3,10 @@
 
 use std::time::Duration;
 
+use super::coded::{NextCode, RemedyCode, WarningCode};
 use super::hall::HallContext;
 use crate::config::{Belts, Controller};
-use crate::control::{Code, Problem, Severity, Warning};
+use crate::control::{Code, Coded, Problem, Severity, Warning};
 use crate::observe::ControllerState;
 use crate::rt::Row;
 use crate::state::State;
@@ -42,17 +43,24 @@ impl Unbuckled<'_> {
     }
 
     fn warning(&self) -> Warning {
-        let text = match self.open {
-            Some(_) => format!("not buckled: {}", self.words()),
-            None => self.words(),
+        let words = self.words();
+        let (text, coded) = match self.open {
+            Some(_) => (format!("not buckled: {words}"), Coded::new(WarningCode::BeltOpen.word(), [words])),
+            None => (words, Coded::new(WarningCode::BeltUntold.word(), [])),
         };
-        let remedy = if self.holds { "GO waits for it: " } else { "" };
+        let (code, remedy) = if self.holds {
+            (RemedyCode::BuckleFirst, "GO waits for it: ")
+        } else {
+            (RemedyCode::Buckle, "")
+        };
         Warning {
-            id: "belt-open".to_owned(),
+            id: WarningCode::BeltOpen.to_string(),
             severity: if self.holds { Severity::Warning } else { Severity::Info },
             controller: Some(self.controller.name.clone()),
             text,
+            coded: Some(coded),
             remedy: format!("{remedy}buckle it, or disable the seat if nobody sits there"),
+            remedy_code: Some(code.to_string()),
         }
     }
 }
@@ -99,9 +107,9 @@ fn awaited(hall: &HallContext, table: &[Row]) -> Option<String> {
 }
 
 /// What a person does first, where GO waits for belts.
-pub(super) fn next_action(hall: &HallContext, table: &[Row]) -> Option<String> {
+pub(super) fn next_action(hall: &HallContext, table: &[Row]) -> Option<(String, Coded)> {
     let who = (hall.mirror.state == State::Armed).then(|| awaited(hall, table)).flatten()?;
-    Some(format!("GO waits until these are buckled: {who}"))
+    Some((format!("GO waits until these are buckled: {who}"), Coded::new(NextCode::Belts.word(), [who])))
 }
 
 pub(super) fn warnings(hall: &HallContext, table: &[Row]) -> Vec<Warning> {

@@ -3,7 +3,7 @@
 use super::act::Act;
 use super::hall::HallContext;
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
-use crate::control::{FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
+use crate::control::{Code, Coded, FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
 use crate::film::point::FilmState;
 
 /// The film by the source that leads, or by the first while none does.
@@ -13,10 +13,12 @@ pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
     let best = table.leads.or(Some(0)).and_then(|place| table.sources.get(place));
     let state = best.map_or(FilmState::Absent, |row| row.state);
     let error_ms = hall.live.film_error_s().map(|error_s| error_s * 1e3);
+    let (code, next) = state.next(error_ms.is_some());
     FilmStatus {
         state: state.word().to_owned(),
         cause: best.map(cause).unwrap_or_default(),
-        next: state.next(error_ms.is_some()).to_owned(),
+        next: next.to_owned(),
+        next_coded: Coded::new(code, []),
         leads: follows.is_some(),
         source: table.leads.and(best).map(|row| row.source.clone()),
         position_s: best.and_then(|row| row.media_s).map(|at| at - begin_s),
@@ -55,6 +57,7 @@ fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {
         source: row.source.clone(),
         state: row.state.word().to_owned(),
         cause: cause(row),
+        trouble: trouble(row),
         position_s: row.media_s.map(|at| at - begin_s),
         timecode: row.timecode.clone(),
         rate_ppm: row.rate_ppm,
@@ -72,6 +75,12 @@ fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {
 
 /// What the state of a source means, and what is wrong with it.
 fn cause(row: &SourceRow) -> String {
-    let troubles = [&row.notes.trouble, &row.notes.refused].into_iter().flatten();
-    troubles.fold(row.words.to_owned(), |text, why| format!("{text}: {why}"))
+    trouble(row).map_or_else(|| row.words.to_owned(), |why| format!("{}: {why}", row.words))
+}
+
+/// What is wrong with a source.
+fn trouble(row: &SourceRow) -> Option<String> {
+    let troubles: Vec<&str> =
+        [&row.notes.trouble, &row.notes.refused].into_iter().flatten().map(|one| &**one).collect();
+    (!troubles.is_empty()).then(|| troubles.join(": "))
 }

@@ -172,15 +172,14 @@ impl HallContext {
     /// Why the hall is in its state, with the name of whom that is about.
     pub(super) fn cause(&self) -> String {
         let cause = self.mirror.cause;
-        match cause.whose() {
-            Some(Whose::Controller(index)) => match self.config.controllers.get(index) {
-                Some(controller) => format!("{}: {cause}", controller.name),
-                None => cause.to_string(),
-            },
-            Some(Whose::Group(index)) => {
-                format!("{}: {cause}", Groups::of(&self.config.controllers).name(index))
-            }
-            None => cause.to_string(),
+        self.whose().map_or_else(|| cause.to_string(), |whose| format!("{whose}: {cause}"))
+    }
+
+    /// The name of whom that is about; `None` if it is the hall.
+    pub(super) fn whose(&self) -> Option<String> {
+        match self.mirror.cause.whose()? {
+            Whose::Controller(index) => Some(self.config.controllers.get(index)?.name.clone()),
+            Whose::Group(index) => Some(Groups::of(&self.config.controllers).name(index).to_owned()),
         }
     }
 

@@ -4,9 +4,10 @@
 use jiff::Zoned;
 
 use super::act::{Act, Feature, SupervisorEvent};
+use super::coded::{RemedyCode, WarningCode};
 use super::hall::{HallContext, SetAside};
 use super::job::{Again, Job, JobResult};
-use crate::control::{Command, Desired, Severity, Warning, Who};
+use crate::control::{Coded, Command, Desired, Severity, Warning, Who};
 use crate::journal::{PlaylistPlace, stamp};
 use crate::log::{Line, Priority};
 use crate::settings::{LoadedShow, Out, Settings, seats_out};
@@ -81,24 +82,28 @@ impl Lasting {
     /// What is worth a word of it.
     pub(super) fn warnings(&self, hall: &HallContext) -> Vec<Warning> {
         let now = Zoned::now();
-        let note = |id: &str, controller, text, remedy: &str| Warning {
-            id: id.to_owned(),
+        let note = |id: RemedyCode, controller, text, remedy: &str| Warning {
+            id: id.to_string(),
             severity: Severity::Info,
             controller,
             text,
             remedy: remedy.to_owned(),
+            remedy_code: Some(id.to_string()),
+            ..Warning::default()
         };
         let mut notes = Vec::new();
         for (group, out) in &hall.settings.out {
             let remedy = "enable it once it is repaired";
-            notes.extend(
-                hall.names_of(group)
-                    .map(|name| note("seat-out", Some(name.to_owned()), out.words(&now), remedy)),
-            );
+            let code = if out.why.is_some() { WarningCode::SeatOutWhy } else { WarningCode::SeatOut };
+            let coded = Coded::new(code.word(), [&out.at, &out.who].into_iter().chain(&out.why).cloned());
+            notes.extend(hall.names_of(group).map(|name| Warning {
+                coded: Some(coded.clone()),
+                ..note(RemedyCode::SeatOut, Some(name.to_owned()), out.words(&now), remedy)
+            }));
         }
         notes.extend(self.came_back.as_ref().map(|words| {
             let remedy = "change what should be different today";
-            note("kept", None, format!("restored from before the start: {words}"), remedy)
+            note(RemedyCode::Kept, None, format!("restored from before the start: {words}"), remedy)
         }));
         notes
     }

@@ -115,6 +115,7 @@ impl List {
             movie: entry.film.movie.clone(),
             then: entry.then,
             at: entry.at.as_ref().map(|at| at.time.to_string()),
+            note: entry.note.clone(),
         };
         PlaylistStatus {
             id: self.id.clone(),

@@ -6,6 +6,7 @@
 
 mod act;
 mod belts;
+mod coded;
 mod commands;
 mod features;
 mod figures;
@@ -17,6 +18,7 @@ mod homing;
 mod job;
 mod lasting;
 mod list;
+mod margins;
 mod perform;
 mod player;
 mod playlist;

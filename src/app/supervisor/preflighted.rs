@@ -107,7 +107,14 @@ fn told(controller: &str, finding: preflight::Finding) -> Option<Warning> {
     };
     let remedy = finding.accepted.map_or(finding.remedy, |why| format!("accepted: {why}"));
     let controller = Some(controller.to_owned());
-    Some(Warning { id: id(finding.check), severity, controller, text: finding.found, remedy })
+    Some(Warning {
+        id: id(finding.check),
+        severity,
+        controller,
+        text: finding.found,
+        remedy,
+        ..Warning::default()
+    })
 }
 
 fn id(check: Check) -> String {

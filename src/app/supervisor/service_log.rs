@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::warnings::NOTE;
+use super::coded::WarningCode;
 use crate::control::{Severity, Status, Warning};
 use crate::journal::Action;
 use crate::log::{Line, Log, Priority};
@@ -35,7 +35,8 @@ impl ServiceLog {
     fn warn(&mut self, warnings: &[Warning]) {
         let key = |warning: &Warning| (warning.id.clone(), warning.controller.clone());
         let now: BTreeMap<_, _> = warnings.iter().map(|warning| (key(warning), warning.severity)).collect();
-        let news = |warning: &&Warning| warning.severity > Severity::Info && warning.id != NOTE;
+        let news =
+            |warning: &&Warning| warning.severity > Severity::Info && warning.id != WarningCode::Note.word();
         for warning in warnings.iter().filter(news) {
             if self.warned.get(&key(warning)) == Some(&warning.severity) {
                 continue;
@@ -86,7 +87,7 @@ impl ServiceLog {
 
     /// Says something that no state says: one such thing hides none that comes after it.
     pub(super) fn say_note(&self, note: &str) {
-        self.say(Priority::Warning, NOTE, note);
+        self.say(Priority::Warning, WarningCode::Note.word(), note);
     }
 
     /// Says how the journal goes.

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::hall_settings::HallSettings;
+use super::margins;
 use crate::app::StagedShow;
 use crate::app::staged::{at_any_pace, chasing, headroom};
 use crate::config::{Config, Misfit};
-use crate::control::{Code, Problem, ShowStatus};
+use crate::control::{Code, MarginStatus, Problem, ShowStatus};
 use crate::engine::{Headroom, Show};
 use crate::film::chase::ChaseRules;
 use crate::library::{CueId, IdError, Library};
@@ -46,6 +47,8 @@ pub(super) struct ProvedShow {
     pub(super) movie: Option<Movie>,
     /// What the links of the hall execute of it.
     pub(super) links: Vec<LinkPlay>,
+    /// What it leaves of the limits.
+    margins: Vec<MarginStatus>,
 }
 
 impl ProvedShow {
@@ -106,6 +109,7 @@ impl ProvedShow {
             join_s: 0.0,
             film,
             movie: None,
+            margins: margins::least(&proof),
             links: proof.links,
         })
     }
@@ -122,6 +126,7 @@ impl ProvedShow {
             resume_s: self.left_at.map(ShowTime::as_secs_f64),
             axes: self.timeline.axes(),
             effects: self.timeline.switch_names(),
+            margins: self.margins.clone(),
         }
     }
 

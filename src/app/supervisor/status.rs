@@ -2,6 +2,7 @@
 
 use jiff::Zoned;
 
+use super::coded::{NextCode, StandingCode};
 use super::features::Features;
 use super::hall::HallContext;
 use super::seat_places::SeatPlaces;
@@ -10,11 +11,11 @@ use crate::app::links;
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
-    ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
+    Coded, ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
 use crate::rt::Row;
 use crate::state::Next;
-use crate::time::MonoTime;
+use crate::time::{MonoTime, ShowTime};
 use crate::tracker;
 
 /// The least and the greatest bound of the buckets, µs.
@@ -55,6 +56,7 @@ impl StatusParts<'_> {
         let moving = mirror.state.may_send_motion();
         let preflighted = &features.readiness.preflighted;
         let position = |cued: &super::show::ProvedShow| if moving { live.show() } else { cued.start };
+        let (next, next_coded) = belts::next_action(hall, table).unwrap_or_else(|| self.next());
         Status {
             hall: hall.config.show.name.clone(),
             format: FORMAT,
@@ -62,7 +64,9 @@ impl StatusParts<'_> {
             uptime_s: now.since(began).as_secs_f64(),
             state: mirror.state.into(),
             cause: hall.cause(),
-            next: belts::next_action(hall, table).unwrap_or_else(|| self.next()),
+            cause_coded: Coded::new(mirror.cause.code(), hall.whose()),
+            next,
+            next_coded,
             arm_homes: mirror.next == Next::ArmAndHome,
             may_clear: mirror.state.is_latched() || mirror.next == Next::Clear,
             since_s: now.since(mirror.since).as_secs_f64(),
@@ -102,12 +106,19 @@ impl StatusParts<'_> {
     }
 
     /// What a person does next; where a show was left in its midst, also how it goes on from there.
-    fn next(&self) -> String {
+    fn next(&self) -> (String, Coded) {
         let next = self.hall.mirror.next;
-        match self.hall.cued.as_ref().and_then(|cued| cued.left_at) {
-            Some(film) if next == Next::Go => format!("{next}; or go from {film}, where it was left"),
-            Some(film) if next == Next::Arm => format!("{next}; it can go from {film}, where it was left"),
-            _ => next.to_string(),
+        let left = self.hall.cued.as_ref().and_then(|cued| cued.left_at);
+        let from = |code: NextCode, words: &str, film: ShowTime| {
+            (
+                format!("{next}; {words} {film}, where it was left"),
+                Coded::new(code.word(), [film.to_string()]),
+            )
+        };
+        match left {
+            Some(film) if next == Next::Go => from(NextCode::GoFrom, "or go from", film),
+            Some(film) if next == Next::Arm => from(NextCode::ArmFrom, "it can go from", film),
+            _ => (next.to_string(), Coded::new(next.code(), [])),
         }
     }
 
@@ -137,6 +148,10 @@ impl StatusParts<'_> {
                 Some(out) => format!("{}; {why}", out.words(&Zoned::now())),
                 None => why,
             },
+            why_coded: row.map_or_else(
+                || Coded::new(StandingCode::NotPolled.word(), []),
+                |row| Coded::new(row.why.code(), row.why.figures()),
+            ),
             heard_s: state.heard_at.map(|at| now.since(at).as_secs_f64()),
             ack_rate: features.figures.rates.of(index),
             ack_p50_us: ack.map(|ack| us(ack.p50)),
@@ -178,6 +193,7 @@ fn absent(controller: &Controller) -> ControllerStatus {
     ControllerStatus {
         health: Health::Out,
         why: "disabled in the configuration: enabled = false".to_owned(),
+        why_coded: Coded::new(StandingCode::ConfiguredOut.word(), []),
         ..nameplate(controller)
     }
 }

@@ -3,18 +3,17 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use super::coded::{RemedyCode, WarningCode};
 use super::status::StatusParts;
 use super::{belts, player, recorded};
 use crate::app::links;
-use crate::control::{Health, Severity, Warning};
+use crate::control::{Coded, Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
 use crate::state::{Next, State};
 
 /// In a new state all controllers have this long to be looked at before one that was not is worth a word.
 const FIRST_LOOK: Duration = Duration::from_secs(1);
-/// What the warnings are called that say what no state says.
-pub(super) const NOTE: &str = "note";
 
 impl From<HealthState> for Health {
     fn from(standing: HealthState) -> Self {
@@ -48,27 +47,31 @@ impl StatusParts<'_> {
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
         let of_the_film = hall.film.iter().flat_map(|table| table.read().warnings());
-        warnings.extend(of_the_film.map(|sentence| in_two("film", &sentence)));
-        warnings.extend(player::warnings(hall).iter().map(|trouble| in_two("player", trouble)));
-        warnings.extend(links::troubles(&hall.links).map(|trouble| in_two("link", &trouble)));
+        warnings.extend(of_the_film.map(|sentence| in_two(WarningCode::Film.word(), &sentence)));
+        warnings
+            .extend(player::warnings(hall).iter().map(|trouble| in_two(WarningCode::Player.word(), trouble)));
+        warnings
+            .extend(links::troubles(&hall.links).map(|trouble| in_two(WarningCode::Link.word(), &trouble)));
         warnings.extend(features.lasting.warnings(hall));
         let troubles = hall.recorder.status().troubles;
         warnings.extend(troubles.iter().map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));
-        warnings.extend(recorded::lacks_room(hall).map(|trouble| in_two("record-room", &trouble)));
-        warnings.extend(settings_file.map(|trouble| in_two("settings", &trouble)));
+        warnings.extend(
+            recorded::lacks_room(hall).map(|trouble| in_two(WarningCode::RecordRoom.word(), &trouble)),
+        );
+        warnings.extend(settings_file.map(|trouble| in_two(WarningCode::Settings.word(), &trouble)));
         warnings.extend(features.records.trouble().map(|trouble| Warning {
-            id: "journal".to_owned(),
+            id: WarningCode::Journal.to_string(),
             severity: Severity::Warning,
             controller: None,
             text: trouble,
-            remedy: String::new(),
+            ..Warning::default()
         }));
         warnings.extend(notes.iter().rev().map(|note| Warning {
-            id: NOTE.to_owned(),
+            id: WarningCode::Note.to_string(),
             severity: Severity::Warning,
             controller: None,
             text: note.clone(),
-            remedy: String::new(),
+            ..Warning::default()
         }));
         warnings.sort_by_key(|warning| std::cmp::Reverse(warning.severity));
         warnings
@@ -89,12 +92,18 @@ impl StatusParts<'_> {
                 _ if !hall.settings.is_on(lane) => Severity::Info,
                 _ => Severity::Error,
             };
+            let (code, remedy) = match row.why.next() {
+                Some(remedy) => (row.why.code().to_owned(), remedy),
+                None => (row.standing.to_string(), row.standing.next()),
+            };
             Some(Warning {
                 id: format!("controller-{}", Health::from(row.standing)),
                 severity,
                 controller: Some(controller.name.clone()),
                 text: format!("{}: {}", row.standing, row.why),
-                remedy: row.why.next().unwrap_or_else(|| row.standing.next()).to_owned(),
+                coded: Some(Coded::new(row.why.code(), row.why.figures())),
+                remedy: remedy.to_owned(),
+                remedy_code: Some(code),
             })
         };
         controllers.filter_map(of).collect::<Vec<_>>().into_iter()
@@ -105,34 +114,42 @@ impl StatusParts<'_> {
         controllers.filter_map(|(lane, controller)| {
             let answers = self.features.figures.strangers.of(lane)?;
             Some(Warning {
-                id: "another-master".to_owned(),
+                id: WarningCode::AnotherMaster.to_string(),
                 severity: Severity::Error,
                 controller: Some(controller.name.clone()),
                 text: format!("{answers} acks within a minute of frames that were not sent from here"),
                 remedy: "another machine may drive this seat: find it and stop it, before anybody sits down"
                     .to_owned(),
+                coded: Some(Coded::new(WarningCode::AnotherMaster.word(), [answers.to_string()])),
+                remedy_code: Some(RemedyCode::AnotherMaster.to_string()),
             })
         })
     }
 
     fn of_the_machine(&self) -> impl Iterator<Item = Warning> {
-        self.hall.granted.refusals.iter().map(|refusal| in_two("not-real-time", refusal))
+        self.hall.granted.refusals.iter().map(|refusal| in_two(WarningCode::NotRealTime.word(), refusal))
     }
 
     fn of_preflight(&self) -> Option<Warning> {
-        let (text, severity) = match &self.features.readiness.preflighted {
-            None => ("preflight has not been run since the program started", Severity::Info),
+        let (code, text, severity) = match &self.features.readiness.preflighted {
+            None => (
+                WarningCode::PreflightNever,
+                "preflight has not been run since the program started",
+                Severity::Info,
+            ),
             Some(it) if !it.has_passed(|lane| self.hall.settings.is_on(lane)) => {
-                ("preflight failed", Severity::Error)
+                (WarningCode::PreflightFailed, "preflight failed", Severity::Error)
             }
             Some(_) => return None,
         };
         Some(Warning {
-            id: "preflight".to_owned(),
+            id: RemedyCode::Preflight.to_string(),
             severity,
-            controller: None,
             text: text.to_owned(),
+            coded: Some(Coded::new(code.word(), [])),
             remedy: "run preflight".to_owned(),
+            remedy_code: Some(RemedyCode::Preflight.to_string()),
+            ..Warning::default()
         })
     }
 }
@@ -143,9 +160,9 @@ fn in_two(id: &str, trouble: &str) -> Warning {
     Warning {
         id: id.to_owned(),
         severity: Severity::Warning,
-        controller: None,
         text: text.to_owned(),
         remedy: remedy.to_owned(),
+        ..Warning::default()
     }
 }
 
@@ -156,8 +173,10 @@ fn nobody(table: &[Row], state: State, takes_part: impl FnMut((usize, &Row)) -> 
         return None;
     }
     Some(Warning {
-        id: "no-seat".to_owned(),
+        id: WarningCode::NoSeat.to_string(),
         severity: Severity::Error,
+        coded: Some(Coded::new(WarningCode::NoSeat.word(), [])),
+        remedy_code: Some(RemedyCode::NoSeat.to_string()),
         controller: None,
         text: format!("no seat takes part: the hall is {state}, its seats are not"),
         remedy: "enable seats (`kinocue enable`), or see at each why it is out".to_owned(),

@@ -122,5 +122,10 @@ fn entries(playlist: &PlaylistStatus) -> String {
     let PlaylistStatus { id, title, entries, next_start, .. } = playlist;
     let next =
         next_start.as_ref().map_or_else(String::new, |at| format!("; the next starts by itself at {at}"));
-    format!("{id}: {title}{next}\n\n{}", table(header, entries.iter().enumerate().map(row)))
+    let notes = entries
+        .iter()
+        .zip(1..)
+        .filter_map(|(entry, place)| Some(format!("\n{place}: {}", entry.note.as_ref()?)));
+    let notes: String = notes.collect();
+    format!("{id}: {title}{next}\n\n{}{notes}", table(header, entries.iter().enumerate().map(row)))
 }

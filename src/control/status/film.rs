@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::super::model::Coded;
+
 /// The film of a hall, by the best of its sources.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
@@ -14,6 +16,8 @@ pub struct FilmStatus {
     pub(crate) cause: String,
     /// What a person does next about it.
     pub(crate) next: String,
+    /// The code of that.
+    pub(crate) next_coded: Coded,
     /// True if the show that is loaded follows it.
     pub(crate) leads: bool,
     /// The source that leads, as it is configured; null while none can.
@@ -58,6 +62,8 @@ pub(crate) struct FilmSourceStatus {
     pub(crate) state: String,
     /// What that means, and what is wrong with the source.
     pub(crate) cause: String,
+    /// What is wrong with it; null if nothing is.
+    pub(crate) trouble: Option<String>,
     /// Where the film is in the cue by this source, s.
     pub(crate) position_s: Option<f64>,
     /// The label of the frame that it is at, if it has labels.

@@ -2,6 +2,7 @@
 
 import { sentAt, hear } from './clock.js';
 import { askForAnother, askForToken, token } from './token.js';
+import { said, words } from './language.js';
 
 const PATIENCE_MS = 65_000; // the hall may take 60 s over a cue of two hours
 const UPLOAD_MS = 600_000; // it is written, checked and proved, beside a show with what time that leaves
@@ -17,15 +18,18 @@ let reading = Promise.resolve();
 
 /** Why something was not done, as the server or the browser says. */
 export class Problem extends Error {
-  constructor({ status = 0, code = 'unreachable', detail, remedy, faults = [] }) {
+  constructor({ status = 0, code = '', why = '', detail, remedy, faults = [] }) {
     super(detail);
-    Object.assign(this, { status, code, detail, remedy, faults });
+    Object.assign(this, { status, code, why, detail, remedy, faults });
   }
 
   /** In one line. */
   get words() {
+    const { code, why, detail, remedy } = this;
+    const kind = said('problem', { code }, null);
+    const what = said('refusal', { code: why }, kind === null ? detail : words('pair', { of: kind, text: detail }));
     const faults = this.faults.length > 0 ? ` (${this.faults.join('; ')})` : '';
-    return `${this.detail}${faults}${this.remedy ? `; ${this.remedy}` : ''}`;
+    return `${what}${faults}${remedy ? `; ${said('refusal-remedy', { code: why }, remedy)}` : ''}`;
   }
 }
 
@@ -59,7 +63,7 @@ export function upload(id, file) {
 
 async function inTurn(request) {
   if (changing >= CHANGES) {
-    throw new Problem({ detail: `${CHANGES} requests are already under way`, remedy: 'wait until they are done' });
+    throw new Problem({ detail: words('api.busy', { n: CHANGES }), remedy: words('api.busy.remedy') });
   }
   changing += 1;
   try {
@@ -106,17 +110,17 @@ async function request(method, path, body, more, patience) {
   if (reply.code === 'role') askForAnother();
   throw new Problem({
     status: response.status,
-    detail: `the server replied ${response.status}`,
-    remedy: 'see its log',
+    detail: words('api.replied', { status: response.status }),
+    remedy: words('api.replied.remedy'),
     ...reply,
   });
 }
 
 function unreachable(error, patience) {
   if (error.name === 'TimeoutError') {
-    return new Problem({ detail: `no reply within ${patience / 1000} s`, remedy: 'check the seats and the server' });
+    return new Problem({ detail: words('api.late', { s: patience / 1000 }), remedy: words('api.late.remedy') });
   }
-  return new Problem({ detail: 'the server cannot be reached', remedy: 'check the network and the server' });
+  return new Problem({ detail: words('api.away'), remedy: words('api.away.remedy') });
 }
 
 function parsed(text) {

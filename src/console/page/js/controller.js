@@ -4,37 +4,44 @@ import { byId, make, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress, onTwoPresses } from './press.js';
 import { hall } from './state.js';
-import { mark, healthOf } from './marks.js';
+import { healthOf, mark } from './marks.js';
 import { makePose, showPose } from './pose.js';
-import { ackRate, bits, micros, sentence, whole } from './words.js';
+import { ackRate, bits, lasting, micros, number, sentence, whole } from './words.js';
+import { said, words } from './language.js';
+import { healthName, textOf } from './said.js';
 
 const FIGURES = {
-  'Last answer': ({ heard_s: s }) => (s === null ? 'never' : s < 1 ? 'just now' : `${s.toFixed(0)} s ago`),
-  'Acks, last second': ({ ack_rate: rate }) => ackRate(rate),
-  'Ack latency, median': ({ ack_p50_us: us }) => micros(us),
-  'Ack latency, p99': ({ ack_p99_us: us }) => micros(us),
-  'Frames sent': ({ sent }) => whole(sent),
-  'Acks requested': ({ asked }) => whole(asked),
-  'Acked': ({ acked }) => whole(acked),
-  'Refused': ({ refused }) => whole(refused),
-  'Lost': ({ lost }) => whole(lost),
-  'Not sent': ({ send_failed: failed }) => whole(failed),
-  'Held back by the limiter': ({ clamps }) => whole(clamps),
-  'Knows its position': ({ homed }) => (homed === null ? 'unknown' : homed ? 'yes' : 'no: home it'),
-  'Emergency stop': ({ emergency_stop: stop }) => (stop ? 'IN EFFECT' : 'no'),
-  'Error': ({ error }) => (error === null ? 'unknown' : error === 0 ? 'none' : `number ${error}`),
-  'Drive errors': ({ servo_errors: errors }) => drives(errors),
-  'Belts open': ({ belts_open: belts }) => (belts === null ? 'unknown' : belts.length === 0 ? 'none' : belts.map((input) => `X${String(input).padStart(2, '0')}`).join(', ')),
-  'Inputs on': ({ inputs }) => bits(inputs, 'X'),
-  'Outputs on': ({ outputs }) => bits(outputs, 'Y'),
-  'Positions': ({ positions_mm: places, rotary_axis: rotary }) => positions(places, rotary),
+  'figure.heard': ({ heard_s: s }) => (s === null ? words('figure.never') : s < 1 ? words('figure.just-now') : words('figure.ago', { time: lasting(s) })),
+  'figure.ack-rate': ({ ack_rate: rate }) => ackRate(rate),
+  'figure.ack-median': ({ ack_p50_us: us }) => micros(us),
+  'figure.ack-p99': ({ ack_p99_us: us }) => micros(us),
+  'figure.sent': ({ sent }) => whole(sent),
+  'figure.asked': ({ asked }) => whole(asked),
+  'figure.acked': ({ acked }) => whole(acked),
+  'figure.refused': ({ refused }) => whole(refused),
+  'figure.lost': ({ lost }) => whole(lost),
+  'figure.not-sent': ({ send_failed: failed }) => whole(failed),
+  'figure.clamps': ({ clamps }) => whole(clamps),
+  'figure.homed': ({ homed }) => words(homed === null ? 'figure.unknown' : homed ? 'figure.yes' : 'figure.not-homed'),
+  'figure.emergency-stop': ({ emergency_stop: stop }) => words(stop ? 'figure.in-effect' : 'figure.no'),
+  'figure.error': ({ error }) => (error === null ? words('figure.unknown') : error === 0 ? words('figure.none') : words('figure.number', { n: error })),
+  'figure.drive-errors': ({ servo_errors: errors }) => drives(errors),
+  'figure.belts': ({ belts_open: belts }) => belted(belts),
+  'figure.inputs': ({ inputs }) => bits(inputs, 'X'),
+  'figure.outputs': ({ outputs }) => bits(outputs, 'Y'),
+  'figure.positions': ({ positions_mm: places, rotary_axis: rotary }) => positions(places, rotary),
 };
+
+function belted(belts) {
+  if (belts === null) return words('figure.unknown');
+  return belts.length === 0 ? words('figure.none') : belts.map((input) => `X${String(input).padStart(2, '0')}`).join(', ');
+}
 
 /** Where axes are, with the unit of each where one of them turns. */
 function positions(places, rotary) {
-  if (places === null) return 'unknown';
+  if (places === null) return words('figure.unknown');
   const unit = (index) => (index + 1 === rotary ? '°' : ' mm');
-  const figures = places.map((each) => each.toFixed(1));
+  const figures = places.map((each) => number(each, 1));
   return rotary ? figures.map((each, index) => each + unit(index)).join(', ') : `${figures.join(', ')} mm`;
 }
 
@@ -77,19 +84,28 @@ export function showController(status) {
   }
   showPose(parts.pose, controller);
   const forGood = controller.health === 'out';
-  setText(parts.word, controller.enabled || forGood ? controller.health : `disabled, ${controller.health}`);
-  setText(parts.why, sentence(controller.why));
+  const word = healthName(controller.health);
+  setText(parts.word, controller.enabled || forGood ? word : `${healthName('disabled')}, ${word}`);
+  setText(parts.why, sentence(whyOf(controller, status.warnings)));
   for (const [label, figure] of Object.entries(FIGURES)) setText(parts.figures[label], figure(controller));
   setProperty(parts.out, 'hidden', !controller.enabled);
   setProperty(parts.reason, 'hidden', !controller.enabled);
   setProperty(parts.in, 'hidden', controller.enabled || forGood);
 }
 
-const takeOut = (button, which, body = {}) => ask(button, `disable ${which}`, () => change('POST', `controllers/${encodeURIComponent(which)}/disable`, body));
+/** Why it stands so; of one that a person took out, since when, who and why. */
+function whyOf({ name: which, why, why_coded: coded }, warnings) {
+  const known = said('standing', coded ?? {}, null);
+  if (known === null) return why;
+  const out = warnings.find(({ id, controller }) => id === 'seat-out' && controller === which);
+  return out ? `${textOf(out)}; ${known}` : known;
+}
+
+const takeOut = (button, which, body = {}) => ask(button, words('seat.disable', { which }), () => change('POST', `controllers/${encodeURIComponent(which)}/disable`, body));
 
 /** Has a button that stands apart from its seat disable that, upon a second press. */
 export function disable(button, which) {
-  onTwoPresses(button, { asks: 'SURE?', label: () => button, action: () => takeOut(button, which) });
+  onTwoPresses(button, { asks: words('sure'), label: () => button, action: () => takeOut(button, which) });
   return button;
 }
 
@@ -102,34 +118,34 @@ function build({ name: which, row, seat, address, group }) {
   const list = make('dl', { className: 'controller-figures' });
   for (const label of Object.keys(FIGURES)) {
     figures[label] = make('dd');
-    list.append(make('div', {}, make('dt', {}, label), figures[label]));
+    list.append(make('div', {}, make('dt', {}, words(label)), figures[label]));
   }
   const companions = hall().controllers.filter((each) => each.group === group && each.name !== which).map((each) => each.name);
-  const together = companions.length > 0 ? ` with ${companions.join(', ')}` : '';
-  const out = make('button', { type: 'button', id: 'controller-disable', className: 'strong' }, `Disable ${which}${together}`);
-  const reason = make('input', { type: 'text', id: 'controller-why', maxLength: 200, placeholder: 'reason, for the next operator', 'aria-label': `Reason to disable ${which}` });
-  const back = make('button', { type: 'button', id: 'controller-enable', className: 'strong' }, `Enable ${which}${together}`);
-  const close = make('button', { type: 'button' }, 'Close');
+  const together = companions.length > 0 ? words('seat.with', { others: companions.join(', ') }) : '';
+  const out = make('button', { type: 'button', id: 'controller-disable', className: 'strong' }, words('seat.disable', { which: which + together }));
+  const reason = make('input', { type: 'text', id: 'controller-why', maxLength: 200, placeholder: words('seat.reason'), 'aria-label': words('seat.reason-of', { which }) });
+  const back = make('button', { type: 'button', id: 'controller-enable', className: 'strong' }, words('seat.enable', { which: which + together }));
+  const close = make('button', { type: 'button' }, words('close'));
   onPress(out, (button) => {
     const why = reason.value.trim();
     takeOut(button, which, why ? { why } : {});
     reason.value = '';
   });
   onTwoPresses(back, {
-    asks: 'It may move: press again',
+    asks: words('seat.may-move'),
     label: () => back,
-    action: (button) => ask(button, `enable ${which}`, () => change('POST', `controllers/${encodeURIComponent(which)}/enable`)),
+    action: (button) => ask(button, words('seat.enable', { which }), () => change('POST', `controllers/${encodeURIComponent(which)}/enable`)),
   });
   onPress(close, () => select(null));
   const pose = makePose('large');
-  setText(byId('controller-title'), `Seat ${which}${row ? `, row ${row}` : ''}`);
-  const where = make('p', { className: 'quiet' }, `seat ${seat}, at ${address}${together ? `, one seat${together}` : ''}`);
+  setText(byId('controller-title'), row ? words('seat.title-row', { which, row }) : words('seat.title', { which }));
+  const where = make('p', { className: 'quiet' }, words('seat.where', { seat, address }) + (together ? `, ${words('seat.one')}${together}` : ''));
   const buttons = make('div', { className: 'row' }, out, reason, back, close);
   return { all: [where, health, why, buttons, pose, list], pose, health, picture, word, why, figures, out, reason, in: back, shape: '' };
 }
 
 function drives(errors) {
-  if (errors === null) return 'unknown';
+  if (errors === null) return words('figure.unknown');
   const bad = errors.map((error, drive) => [drive + 1, error]).filter(([, error]) => error !== 0);
-  return bad.length === 0 ? 'none' : bad.map(([drive, error]) => `drive ${drive}: ${error}`).join(', ');
+  return bad.length === 0 ? words('figure.none') : bad.map(([drive, error]) => words('figure.drive', { drive, error })).join(', ');
 }

@@ -3,9 +3,10 @@
 
 import { byId, choice, make, setProperty, setText } from './dom.js';
 import { get } from './api.js';
-import { setLanes } from './film.js';
+import { setCue } from './timeline.js';
 import { drawTrace, keepTrace, tracedSeat } from './trace.js';
 import { clock } from './words.js';
+import { words } from './language.js';
 
 const POINTS = 1500;
 const HEIGHT = 240;
@@ -43,7 +44,7 @@ export function showCurves(status) {
     drawn = wanted;
     clearPlot();
     if (show) read(show, wanted);
-    else setText(byId('curves-note'), 'No cue is loaded.');
+    else setText(byId('curves-note'), words('curves.none'));
   }
   if (!show) return;
   lastPosition = show.position_s;
@@ -55,12 +56,12 @@ export function showCurves(status) {
 function clearPlot() {
   plot?.destroy();
   plot = null;
-  setLanes([], [], []);
+  setCue({ axes: [], effects: [], markers: [], length: 1 });
   byId('curves').replaceChildren();
 }
 
 async function read(show, wanted) {
-  setText(byId('curves-note'), 'Reading …');
+  setText(byId('curves-note'), words('curves.reading'));
   try {
     const curve = await get(`cues/${encodeURIComponent(show.cue)}/curve?points=${POINTS}`);
     if (drawn !== wanted) return;
@@ -70,7 +71,7 @@ async function read(show, wanted) {
     if (drawn !== wanted) return;
     failed = { wanted, at: performance.now() };
     drawn = null;
-    setText(byId('curves-note'), `The curves cannot be shown: ${error.words ?? error.message}`);
+    setText(byId('curves-note'), words('curves.failed', { why: error.words ?? error.message }));
   }
 }
 
@@ -82,7 +83,7 @@ function showTrace() {
   if (plot && (seat !== traced || (seat !== null && performance.now() - redrawn > REDRAW_MS))) {
     traced = seat;
     redrawn = performance.now();
-    setText(byId('curves-note'), seat === null ? '' : `The points are where ${seat} was.`);
+    setText(byId('curves-note'), seat === null ? '' : words('curves.points', { seat }));
     plot.redraw(false, false);
   }
 }
@@ -94,8 +95,8 @@ const size = () => ({ width: Math.max(byId('curves').clientWidth, 200), height: 
 function build(curve) {
   clearPlot();
   length = curve.length_s;
-  const axes = curve.axes.map(({ min, max }, axis) => ({ min, max, colour: COLOURS[axis % COLOURS.length] }));
-  setLanes(axes, curve.effects, curve.markers.map(({ at_s: at }) => at / length));
+  const axes = curve.axes.map((axis, index) => ({ ...axis, colour: COLOURS[index % COLOURS.length] }));
+  setCue({ axes, effects: curve.effects, markers: curve.markers, length });
   const { series, bands, data } = linesOf(curve);
   const axis = { stroke: NEUTRAL, grid: { stroke: GRID, width: 1 }, ticks: { stroke: GRID } };
   const options = {

@@ -2,7 +2,8 @@
 // the greatest of them, so that half a millisecond is seen where nothing is worse, and says its unit.
 
 import { byId, setAttribute, setProperty, setText } from './dom.js';
-import { minus } from './words.js';
+import { number, plus } from './words.js';
+import { words } from './language.js';
 
 const MINUTE_MS = 60_000;
 const HEIGHT = 150;
@@ -41,17 +42,16 @@ function greatestOf(all) {
 }
 
 function showWords(error, greatest) {
-  setText(byId('error-now'), error === null ? '–' : figure(error, '+'));
+  setText(byId('error-now'), error === null ? '–' : figure(error, true));
   setText(byId('error-greatest'), greatest === null ? '–' : figure(greatest));
-  setText(byId('error-scale'), greatest === null ? 'No error is known for the last minute.' : `Scale ±${end} ms; positive: the seats are ahead of the film.`);
-  setAttribute(byId('error-curve'), 'aria-label', `Error over the last minute, largest ${greatest === null ? 'unknown' : figure(greatest)}`);
+  setText(byId('error-scale'), words(greatest === null ? 'error.none' : 'error.scale', { end: number(end) }));
+  setAttribute(byId('error-curve'), 'aria-label', words('error.label', { figure: greatest === null ? words('figure.unknown') : figure(greatest) }));
 }
 
 /** With two places, so that half a millisecond is told from none. */
-function figure(ms, plus = '') {
-  const digits = Math.abs(ms).toFixed(2);
-  const sign = Number(digits) === 0 ? '' : ms < 0 ? '−' : plus;
-  return `${sign}${digits} ms`;
+function figure(ms, isSigned = false) {
+  const rounded = Math.round(ms * 100) / 100 || 0;
+  return `${isSigned ? plus(rounded) : ''}${number(rounded, 2)} ms`;
 }
 
 const size = () => ({ width: Math.max(byId('error-curve').clientWidth, 200), height: HEIGHT });
@@ -74,8 +74,8 @@ function options() {
     cursor: { show: false },
     scales: { x: { time: false, range: () => [-MINUTE_MS / 1000, 0] }, y: { range: () => [-end, end] } },
     axes: [
-      { ...axis, splits: () => [-60, -45, -30, -15, 0], values: (_, all) => all.map((value) => (value === 0 ? 'now' : `${minus(value)} s`)) },
-      { ...axis, size: 74, splits: () => [-end, -end / 2, 0, end / 2, end], values: (_, all) => all.map((value) => `${minus(value)} ms`) },
+      { ...axis, splits: () => [-60, -45, -30, -15, 0], values: (_, all) => all.map((value) => (value === 0 ? words('error.now') : `${number(value)} s`)) },
+      { ...axis, size: 74, splits: () => [-end, -end / 2, 0, end / 2, end], values: (_, all) => all.map((value) => `${number(value, Number.isInteger(value) ? 0 : 1)} ms`) },
     ],
   };
 }

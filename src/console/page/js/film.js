@@ -1,17 +1,18 @@
 // Where the film is: the position in large figures, and a bar on which a place to seek to is chosen. Choosing moves nothing:
 // the seek is a press of its own.
 
-import { byId, setAttribute, setProperty, setText } from './dom.js';
+import { byId, make, onChange, setAttribute, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress, say } from './press.js';
+import { keepInView, onView, startTimeline, view } from './timeline.js';
 import { hall } from './state.js';
-import { clock, timeOfDay } from './words.js';
+import { clock, number, percent, timeOfDay } from './words.js';
+import { said, words } from './language.js';
 
 const ON = ['waiting', 'joining', 'playing', 'holding', 'paused'];
 const MAY_SEEK = ['armed', 'joining', 'playing', 'holding', 'paused'];
 /** A place that was chosen and left alone is forgotten, so that the bar follows the film again. */
 const FORGET_MS = 15_000;
-const EFFECT_COLOUR = '#d9dfe6';
 let chosen = null;
 let timer = null;
 
@@ -23,10 +24,11 @@ export function startFilm() {
     onPress(step, () => choose((chosen ?? 0) + Number(step.dataset.step)));
   }
   onPress(byId('seek-leave'), leave);
-  new ResizeObserver(drawLanes).observe(byId('lanes'));
+  startTimeline();
+  onView(() => hall() && showFilm(hall()));
   onPress(byId('seek-go'), async (button) => {
     const at = chosen;
-    if (await ask(button, `seek to ${clock(at)}`, () => change('POST', 'show/seek', { position_s: at }))) leave();
+    if (await ask(button, words('seek.to', { at: clock(at) }), () => change('POST', 'show/seek', { position_s: at }))) leave();
   });
 }
 
@@ -49,7 +51,7 @@ function leave() {
 export function showFilm(status) {
   if (!status) return;
   const show = status.show;
-  setText(byId('film-title'), show ? titleOf(show, status.state) : 'Nothing is loaded');
+  setText(byId('film-title'), show ? titleOf(show, status.state) : words('film.none'));
   setText(byId('film-next'), nextOf(status));
   setText(byId('position'), show ? clock(show.position_s, 1, show.length_s) : '–');
   setText(byId('remaining'), show ? `−${clock(Math.max(show.length_s - show.position_s, 0), 0)}` : '');
@@ -59,13 +61,14 @@ export function showFilm(status) {
     say(byId('seek'), '');
   }
   showBar(show, maySeek);
+  showMargins(show?.margins ?? []);
   setProperty(byId('seek-ask'), 'hidden', chosen === null);
-  if (chosen !== null) setText(byId('seek-go'), `Seek ${clock(chosen)}`);
+  if (chosen !== null) setText(byId('seek-go'), words('seek.go', { at: clock(chosen) }));
 }
 
 /** What is loaded and how long it is; before it starts, with how long the seats take to get onto it. */
 function titleOf(show, state) {
-  const first = state === 'armed' && show.join_s > 0 ? `, first move ${show.join_s.toFixed(1)} s` : '';
+  const first = state === 'armed' && show.join_s > 0 ? `, ${words('film.first-move', { s: number(show.join_s, 1) })}` : '';
   return `${show.title ?? show.cue}, ${clock(show.length_s, 0)}${first}`;
 }
 
@@ -74,68 +77,37 @@ function nextOf({ playlist, show, state }) {
   if (!playlist) return '';
   const { entries, current, next_start: start } = playlist;
   const isLoaded = show?.cue === entries[current]?.cue;
-  const at = start ? `at ${timeOfDay(start).slice(0, 5)}${state === 'armed' || ON.includes(state) ? '' : ' if armed'}` : '';
-  if (isLoaded && !ON.includes(state)) return at && `starts ${at}`;
+  if (isLoaded && !ON.includes(state)) return start ? words(state === 'armed' ? 'film.starts' : 'film.starts-if-armed', { at: timeOfDay(start).slice(0, 5) }) : '';
   const next = entries[current + 1];
-  if (!next) return isLoaded ? 'the last entry' : '';
+  if (!next) return isLoaded ? words('film.last') : '';
   const title = next.title ?? next.cue;
-  return `then ${title}, ${entries[current].then === 'go' ? 'by itself' : next.at ? `at ${next.at}` : 'by GO'}`;
+  const how = entries[current].then === 'go' ? 'film.then-itself' : next.at ? 'film.then-at' : 'film.then-go';
+  return words(how, { title, at: next.at });
 }
 
 function showBar(show, maySeek) {
   const bar = byId('seek');
-  const length = show ? show.length_s : 1;
   const at = chosen ?? (show ? Math.max(show.position_s, 0) : 0);
+  keepInView(at);
+  const [from, to] = view();
   setProperty(bar, 'disabled', !maySeek);
-  setProperty(bar, 'max', String(length));
+  setProperty(bar, 'min', String(from));
+  setProperty(bar, 'max', String(to));
   setProperty(bar, 'value', String(Math.round(at * 10) / 10));
   setAttribute(bar, 'aria-valuetext', clock(at));
-  bar.style.setProperty('--part', String(show ? Math.min(Math.max(show.position_s / length, 0), 1) : 0));
+  bar.style.setProperty('--part', String(show ? Math.min(Math.max((show.position_s - from) / (to - from), 0), 1) : 0));
 }
 
-/** How much of the height a lane of an axis takes, and one of an effect. */
-const AXIS = 3;
-const EFFECT = 1;
-const MARKER = '#ffffff';
-let lanes = [];
-let marks = [];
-
-/**
- * Takes what is drawn behind the bar: a lane for each axis, from the least to the greatest of each stretch of time, one for each
- * effect, and the markers, as parts of the length.
- */
-export function setLanes(axes, effects, markers) {
-  lanes = [
-    ...axes.map(({ colour, min, max }) => ({ colour, tall: AXIS, ends: (at) => [min[at], max[at]], count: min.length })),
-    ...effects.map(({ on }) => ({ colour: EFFECT_COLOUR, tall: EFFECT, ends: (at) => (on[at] ? [0, 1] : null), count: on.length })),
-  ];
-  marks = markers;
-  drawLanes();
-}
-
-function drawLanes() {
-  const canvas = byId('lanes');
-  const scale = window.devicePixelRatio;
-  canvas.width = canvas.clientWidth * scale;
-  canvas.height = canvas.clientHeight * scale;
-  const pen = canvas.getContext('2d');
-  const unit = canvas.height / lanes.reduce((all, { tall }) => all + tall, 0);
-  let top = 0;
-  for (const lane of lanes) {
-    drawLane(pen, lane, { top, height: lane.tall * unit, scale });
-    top += lane.tall * unit;
-  }
-  pen.fillStyle = MARKER;
-  for (const part of marks) pen.fillRect(part * canvas.width, 0, scale, canvas.height / 3);
-}
-
-function drawLane(pen, { colour, ends, count }, { top, height, scale }) {
-  const { width } = pen.canvas;
-  pen.fillStyle = colour;
-  for (let x = 0; x < width; x += scale) {
-    const found = ends(Math.min(Math.floor((x / width) * count), count - 1));
-    if (found === null) continue;
-    const [low, high] = found.map((part) => top + (0.92 - 0.84 * part) * height);
-    pen.fillRect(x, high, scale, Math.max(low - high, scale));
-  }
-}
+/** What the cue leaves of the limits; a press chooses the place where it leaves least. */
+const showMargins = onChange((margins) => {
+  const parts = margins.map(({ of, axis, part, at_s: at }) => {
+    const what = said('margin', { code: of }, of);
+    const button = make('button', { type: 'button' }, make('span', { className: 'quiet' }, what), make('b', {}, percent(part)));
+    setAttribute(button, 'aria-label', words('margins.spoken', { what, part: percent(part), axis: `a${axis}`, at: clock(at) }));
+    setProperty(button, 'title', `a${axis}, ${clock(at)}`);
+    onPress(button, () => MAY_SEEK.includes(hall()?.state) && choose(at));
+    return button;
+  });
+  byId('margins').replaceChildren(...parts);
+  setProperty(byId('margins-title'), 'hidden', parts.length === 0);
+});

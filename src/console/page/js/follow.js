@@ -8,6 +8,8 @@ import { filmLook, mark } from './marks.js';
 import { showSources } from './sources.js';
 import { linkState } from './state.js';
 import { clock, sentence, signed, span } from './words.js';
+import { words } from './language.js';
+import { filmCause, filmName, filmNext } from './said.js';
 
 const AGE_MS = 1000;
 
@@ -27,14 +29,17 @@ export function showFollow(status, link) {
   const look = filmLook(film.state);
   setProperty(byId('follow-state'), 'className', `follow-state look-${look.look}`);
   showMark(look.mark);
-  setText(byId('follow-word'), film.state);
-  setText(byId('follow-source'), film.source === null ? 'no source leads' : `by ${film.source}`);
-  setText(byId('follow-cause'), sentence(film.cause));
-  setText(byId('follow-next'), sentence(film.next));
+  setText(byId('follow-word'), filmName(film.state));
+  setText(byId('follow-source'), film.source === null ? words('follow.no-source') : words('follow.by', { source: film.source }));
+  setText(byId('follow-cause'), sentence(causeOf(film)));
+  setText(byId('follow-next'), sentence(filmNext(film)));
   setText(byId('follow-apart'), apart(film));
   showSources(film);
   addError(link === 'live' ? film.error_ms : null);
 }
+
+/** What the source that leads says of it, or the first while none does. */
+const causeOf = ({ source, sources, cause }) => sources.length === 0 ? cause : filmCause(sources.find((one) => one.source === source) ?? sources[0]);
 
 const showMark = onChange((name) => byId('follow-mark').replaceChildren(mark(name)));
 
@@ -42,8 +47,8 @@ const showMark = onChange((name) => byId('follow-mark').replaceChildren(mark(nam
 function showBadge(film) {
   if (film === null) return badge('follow-badge', '', 'away');
   const { state, source, error_ms: error } = film;
-  const words = [`film ${state}`, source && source.split(':')[0], error !== null && signed(Number(error.toFixed(1)))];
-  badge('follow-badge', words.filter(Boolean).join(', '), filmLook(state).look, film.cause);
+  const parts = [words('follow.badge', { state: filmName(state) }), source && source.split(':')[0], error !== null && signed(Number(error.toFixed(1)))];
+  badge('follow-badge', parts.filter(Boolean).join(', '), filmLook(state).look, causeOf(film));
 }
 
 /** The label of the frame; of a film without labels its place in the cue. */
@@ -51,15 +56,15 @@ function showTimecode({ timecode, position_s: position }) {
   const labelled = timecode !== null;
   const known = labelled || position !== null;
   setText(byId('timecode'), labelled ? timecode : clock(position, 1, 3600));
-  const what = labelled ? 'timecode of the film' : 'position in the cue; the source has no timecode';
-  setText(byId('timecode-of'), known ? what : 'the position of the film is unknown');
+  const what = labelled ? 'follow.timecode' : 'follow.position';
+  setText(byId('timecode-of'), words(known ? what : 'follow.unknown'));
   setAttribute(byId('timecode'), 'data-known', String(known));
 }
 
 function apart({ leads, disagrees }) {
   if (disagrees !== null) {
     const { source, ahead_s: ahead } = disagrees;
-    return `${source} says ${span(ahead)}: select the right one.`;
+    return words('follow.apart', { source, span: span(ahead) });
   }
-  return leads ? '' : 'The loaded show does not follow it.';
+  return leads ? '' : words('follow.not-led');
 }

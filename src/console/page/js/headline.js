@@ -5,10 +5,11 @@ import { byId, setAttribute, setProperty, setText } from './dom.js';
 import { takesPart } from './marks.js';
 import { hasSpoken, refusal, silence } from './stream.js';
 import { linkState } from './state.js';
-import { lasting, percent, sentence, signed, timeOfDay } from './words.js';
+import { words } from './language.js';
+import { causeOf, nextOf, stateName } from './said.js';
+import { lasting, number, percent, sentence, signed, timeOfDay } from './words.js';
 
 const BLINK_MS = 250;
-const LINK_WORDS = { live: 'connected', lost: 'no data', connecting: 'connecting' };
 let spoken = '';
 
 /** Keeps the time of day and the seconds of silence true while nothing comes. */
@@ -25,34 +26,34 @@ export function showHeadline(status, link) {
   // Whoever is asked for a token has lost nothing yet.
   const asked = !hasSpoken() && !byId('token').hidden;
   setProperty(byId('lost'), 'hidden', link !== 'lost' || asked);
-  setText(byId('link'), asked ? 'log in' : LINK_WORDS[link]);
-  for (const area of document.querySelectorAll('.live')) setProperty(area, 'inert', link === 'lost');
+  setText(byId('link'), words(asked ? 'link.log-in' : `link.${link}`));
+  for (const area of document.querySelectorAll('.live:not(.panel, .bar, #gravest)')) setProperty(area, 'inert', link === 'lost');
   if (link === 'lost') showSilence();
   if (status) showStatus(status, link);
 }
 
 function showSilence() {
-  const why = refusal() ?? 'trying to reach it';
-  const since = hasSpoken() ? `for ${silence().toFixed(0)} s; ${why}.` : `yet; ${why}.`;
-  setText(byId('lost-since'), since);
+  const why = refusal() ?? words('lost.trying');
+  setText(byId('lost-since'), words(hasSpoken() ? 'lost.for' : 'lost.yet', { s: number(silence()), why }));
 }
 
 function showStatus(status, link) {
   setAttribute(document.documentElement, 'data-state', status.state);
   setText(byId('hall'), status.hall);
-  setText(byId('version'), `kinocue ${status.version}, up ${lasting(status.uptime_s)}`);
-  setText(byId('state'), link === 'lost' ? `${status.state}?` : status.state);
-  setText(byId('cause'), sentence(status.cause));
+  setText(byId('version'), words('page.version', { version: status.version, time: lasting(status.uptime_s) }));
+  const state = stateName(status.state);
+  setText(byId('state'), link === 'lost' ? `${state}?` : state);
+  setText(byId('cause'), sentence(causeOf(status)));
   setText(byId('since'), times(status));
-  setText(byId('next'), sentence(status.next));
+  setText(byId('next'), sentence(nextOf(status)));
   showInPlay(status.controllers);
   const start = status.state === 'armed' ? status.playlist?.next_start : null;
-  badge('starts', start ? `starts by itself at ${timeOfDay(start)}` : '', 'weak', 'disarm to prevent it');
-  badge('realtime', status.realtime.refusals.length > 0 ? 'not real-time' : '', 'weak', status.realtime.refusals.join('; '));
-  const { words, planned } = settings(status);
-  badge('settings-badge', words, planned ? 'calm' : 'weak', planned ? 'as the playlist has it' : 'not as planned');
-  setProperty(document, 'title', `${status.state} – ${status.hall} – kinocue`);
-  const now = `${status.state}. ${sentence(status.cause)}. Next: ${status.next}.`;
+  badge('starts', start ? words('badge.starts', { at: timeOfDay(start) }) : '', 'weak', words('badge.starts.why'));
+  badge('realtime', status.realtime.refusals.length > 0 ? words('badge.not-real-time') : '', 'weak', status.realtime.refusals.join('; '));
+  const { text, planned } = settings(status);
+  badge('settings-badge', text, planned ? 'calm' : 'weak', words(planned ? 'badge.planned' : 'badge.not-planned'));
+  setProperty(document, 'title', `${state} – ${status.hall} – kinocue`);
+  const now = `${state}. ${sentence(causeOf(status))}. ${words('next.label')}${nextOf(status)}.`;
   if (now !== spoken) {
     spoken = now;
     setText(byId('spoken'), now);
@@ -60,8 +61,8 @@ function showStatus(status, link) {
 }
 
 function times(status) {
-  const lapses = status.lapses_s === null ? '' : `; lapses in ${lasting(status.lapses_s)}`;
-  return `for ${lasting(status.since_s)}${lapses}`;
+  const lapses = status.lapses_s === null ? '' : `; ${words('since.lapses', { time: lasting(status.lapses_s) })}`;
+  return `${words('since.for', { time: lasting(status.since_s) })}${lapses}`;
 }
 
 /** Seats that take part, of all that the configuration has; a seat of several controllers needs them all. */
@@ -75,7 +76,7 @@ function showInPlay(controllers) {
   const failed = controllers.some((controller) => controller.enabled && !takesPart(controller) && controller.health !== 'out');
   setProperty(byId('in-play'), 'hidden', seats.size === 0);
   setProperty(byId('in-play'), 'className', `in-play look-${playing === seats.size ? 'good' : failed ? 'bad' : 'weak'}`);
-  setText(byId('in-play'), `${playing} of ${seats.size} seats`);
+  setText(byId('in-play'), words('in-play', { playing, all: seats.size }));
 }
 
 /** What is less or other than the whole cue in time with the film, and whether the entry that is loaded plans just that. */
@@ -85,14 +86,14 @@ function settings({ levels, trim_ms: trim, playlist, show }) {
   // What a preset holds only the server knows: it may hold all but the trim.
   const byPreset = entry.preset !== null;
   const parts = [
-    { words: `motion ${percent(levels.motion)}`, usual: levels.motion === 1, planned: entry.level === null ? byPreset : entry.level === levels.motion },
-    { words: `vibration ${percent(levels.vibration)}`, usual: levels.vibration === 1, planned: byPreset },
-    ...Object.entries(levels.rows).map(([row, level]) => ({ words: `row ${row} ${percent(level)}`, usual: level === 1, planned: byPreset })),
-    ...Object.entries(levels.effects).map(([name, on]) => ({ words: `${name} off`, usual: on, planned: byPreset })),
-    { words: `trim ${signed(trim)}`, usual: trim === 0, planned: entry.trim_ms === trim },
+    { text: words('badge.motion', { level: percent(levels.motion) }), usual: levels.motion === 1, planned: entry.level === null ? byPreset : entry.level === levels.motion },
+    { text: words('badge.vibration', { level: percent(levels.vibration) }), usual: levels.vibration === 1, planned: byPreset },
+    ...Object.entries(levels.rows).map(([row, level]) => ({ text: words('badge.row', { row, level: percent(level) }), usual: level === 1, planned: byPreset })),
+    ...Object.entries(levels.effects).map(([name, on]) => ({ text: words('badge.off', { name }), usual: on, planned: byPreset })),
+    { text: words('trim.to', { trim: signed(trim) }), usual: trim === 0, planned: entry.trim_ms === trim },
   ];
   const told = parts.filter(({ usual }) => !usual);
-  return { words: told.map(({ words }) => words).join(', '), planned: told.every(({ planned }) => planned) };
+  return { text: told.map(({ text }) => text).join(', '), planned: told.every(({ planned }) => planned) };
 }
 
 /** A short word in view at all times; none where the text is empty. */

@@ -2,6 +2,7 @@
 
 import { byId, draw, make, onChange, setAttribute, setText } from './dom.js';
 import { micros, whole } from './words.js';
+import { words } from './language.js';
 
 const WIDTH = 480;
 const HEIGHT = 150;
@@ -17,19 +18,19 @@ export function showHistograms(status) {
   showFigures(byId('latency-figures'), status.ack_latency);
   drawLateness(status.lateness.histogram);
   drawLatency(status.ack_latency.histogram);
-  const missed = status.missed_ticks === 0 ? 'none missed' : `${whole(status.missed_ticks)} missed`;
+  const missed = whole(status.missed_ticks);
   const { policy, priority } = status.realtime;
-  setText(byId('ticks'), `${whole(status.ticks)} ticks at ${status.rate_hz} Hz, ${missed}. Scheduling: ${policy} ${priority}.`);
+  setText(byId('ticks'), words('lateness.ticks', { ticks: whole(status.ticks), rate: status.rate_hz, missed, policy: `${policy} ${priority}` }));
   setText(byId('frames'), framesOf(status.controllers));
 }
 
 function framesOf(controllers) {
   const sum = (figure) => whole(controllers.reduce((all, each) => all + each[figure], 0));
-  return `${sum('sent')} frames sent, ${sum('asked')} acks requested, ${sum('acked')} acked, ${sum('refused')} refused, ${sum('lost')} lost.`;
+  return words('latency.frames', { sent: sum('sent'), asked: sum('asked'), acked: sum('acked'), refused: sum('refused'), lost: sum('lost') });
 }
 
 function showFigures(place, { p50_us: p50, p99_us: p99, p999_us: p999, max_us: max }) {
-  const figures = [['p50', p50], ['p99', p99], ['p99.9', p999], ['max', max]];
+  const figures = [['p50', p50], ['p99', p99], ['p99.9', p999], [words('histogram.max'), max]];
   if (place.children.length === 0) {
     place.append(...figures.map(([title]) => make('span', { className: 'figure-pair' }, make('span', { className: 'quiet' }, title), make('b'))));
   }
@@ -39,8 +40,8 @@ function showFigures(place, { p50_us: p50, p99_us: p99, p999_us: p999, max_us: m
 function drawInto(place, { bounds_us: bounds, counts }) {
   const first = counts.findIndex((count) => count > 0);
   if (first < 0) {
-    place.replaceChildren(make('p', { className: 'quiet' }, 'Nothing counted yet.'));
-    setAttribute(place, 'aria-label', 'Nothing counted yet');
+    place.replaceChildren(make('p', { className: 'quiet' }, words('histogram.none')));
+    setAttribute(place, 'aria-label', words('histogram.none'));
     return;
   }
   const from = Math.max(first - 1, 0);
@@ -51,7 +52,7 @@ function drawInto(place, { bounds_us: bounds, counts }) {
   const every = Math.ceil(buckets.length / 7);
   const parts = buckets.flatMap(({ count, upTo }, index) => bar(count, upTo, index, { step, most, labelled: index % every === 0 }));
   const picture = draw('svg', { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: 'bars' }, ...parts);
-  place.replaceChildren(picture, make('p', { className: 'quiet scale' }, 'Up to this long; the height is the logarithm of how many.'));
+  place.replaceChildren(picture, make('p', { className: 'quiet scale' }, words('histogram.scale')));
   setAttribute(place, 'aria-label', spoken(buckets));
 }
 
@@ -64,13 +65,13 @@ function bar(count, upTo, index, { step, most, labelled }) {
   })];
   if (labelled || upTo === undefined) {
     const label = draw('text', { x: x + step / 2, y: HEIGHT - 7, class: 'bar-label' });
-    label.textContent = upTo === undefined ? 'more' : micros(upTo);
+    label.textContent = upTo === undefined ? words('histogram.more') : micros(upTo);
     parts.push(label);
   }
   return parts;
 }
 
 function spoken(buckets) {
-  const words = buckets.filter(({ count }) => count > 0).map(({ count, upTo }) => `${whole(count)} up to ${upTo === undefined ? 'more' : micros(upTo)}`);
-  return words.join(', ');
+  const parts = buckets.filter(({ count }) => count > 0).map(({ count, upTo }) => words('histogram.bucket', { n: whole(count), time: upTo === undefined ? words('histogram.more') : micros(upTo) }));
+  return parts.join(', ');
 }

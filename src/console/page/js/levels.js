@@ -4,6 +4,7 @@ import { byId, make, onChange, setAttribute, setProperty, setText } from './dom.
 import { change } from './api.js';
 import { ask, onPress } from './press.js';
 import { percent, titled } from './words.js';
+import { words } from './language.js';
 
 const STEP = 5;
 /** A level is sent when it has been left alone for so long, so that a drag is one change. */
@@ -28,7 +29,7 @@ export function showLevels(status) {
     const name = button.dataset.effect;
     const on = levels.effects[name] ?? true;
     setAttribute(button, 'aria-checked', String(on));
-    setText(button.lastChild, `${on ? 'on' : 'off'}${show && !used.includes(name) ? ', not in this cue' : ''}`);
+    setText(button.lastChild, words(on ? 'levels.on' : 'levels.off') + (show && !used.includes(name) ? `, ${words('levels.unused')}` : ''));
   }
   showPresets(presets);
 }
@@ -36,17 +37,17 @@ export function showLevels(status) {
 const showRulers = onChange((rows) => {
   rulers.clear();
   byId('levels').replaceChildren(
-    ruler('motion', 'Motion', (value) => ({ motion: value })),
-    ruler('vibration', 'Vibration', (value) => ({ vibration: value })),
+    ruler('motion', words('levels.motion'), (value) => ({ motion: value })),
+    ruler('vibration', words('levels.vibration'), (value) => ({ vibration: value })),
   );
-  byId('row-levels').replaceChildren(...rows.map((row) => ruler(`row ${row}`, `Row ${row}`, (value) => ({ rows: { [row]: value } }))));
+  byId('row-levels').replaceChildren(...rows.map((row) => ruler(`row ${row}`, words('row', { row }), (value) => ({ rows: { [row]: value } }))));
   setProperty(byId('rows'), 'hidden', rows.length === 0);
 });
 
 /** The rows are folded away; which of them make less is in view all the same. */
 function showRows(levels) {
   const less = Object.entries(levels).filter(([, level]) => level < 1).map(([row, level]) => `${row} ${percent(level)}`);
-  setText(byId('rows-words'), less.length > 0 ? less.join(', ') : 'all 100 %');
+  setText(byId('rows-words'), less.length > 0 ? less.join(', ') : words('levels.all', { level: percent(1) }));
 }
 
 /** A slider with steps at its ends; it shows the hall's level, but never pulls away from under a finger. */
@@ -56,26 +57,26 @@ function ruler(name, title, body) {
   const value = make('output', { className: 'figure', 'for': id });
   let timer = null;
   let busy = false;
-  const words = () => {
-    setText(value, `${slider.value} %`);
-    setAttribute(slider, 'aria-valuetext', `${slider.value} percent`);
+  const show = () => {
+    setText(value, percent(slider.value / 100));
+    setAttribute(slider, 'aria-valuetext', percent(slider.value / 100));
     slider.style.setProperty('--part', String(slider.value / 100));
   };
   const send = async () => {
     timer = null;
     busy = true;
     const wanted = Number(slider.value) / 100;
-    await ask(slider, `${title.toLowerCase()} ${percent(wanted)}`, () => change('PUT', 'levels', body(wanted)));
+    await ask(slider, `${title} ${percent(wanted)}`, () => change('PUT', 'levels', body(wanted)));
     setTimeout(() => { busy = timer !== null; }, SETTLE_MS);
   };
   const later = () => {
-    words();
+    show();
     clearTimeout(timer);
     timer = setTimeout(send, QUIET_MS);
   };
   slider.addEventListener('input', later);
   const stepper = (step) => {
-    const button = make('button', { type: 'button', 'aria-label': `${title} ${step > 0 ? 'more' : 'less'}` }, step > 0 ? '+' : '−');
+    const button = make('button', { type: 'button', 'aria-label': words(step > 0 ? 'levels.more' : 'levels.less', { title }) }, step > 0 ? '+' : '−');
     onPress(button, () => {
       slider.value = String(Number(slider.value) + step);
       later();
@@ -86,7 +87,7 @@ function ruler(name, title, body) {
     show(level) {
       if (busy || timer !== null) return;
       setProperty(slider, 'value', String(Math.round(level * 100)));
-      words();
+      show();
     },
   });
   return make('div', { className: 'ruler' }, make('label', { 'for': id }, title), stepper(-STEP), slider, stepper(STEP), value);
@@ -94,13 +95,13 @@ function ruler(name, title, body) {
 
 const showEffects = onChange((names) => {
   const buttons = names.map((name) => {
-    const words = make('span', { className: 'switch-words' });
+    const state = make('span', { className: 'switch-words' });
     const button = make('button', { type: 'button', role: 'switch', className: 'switch', 'aria-checked': 'false' },
-      make('span', { className: 'switch-light', 'aria-hidden': 'true' }), make('b', {}, titled(name)), words);
+      make('span', { className: 'switch-light', 'aria-hidden': 'true' }), make('b', {}, titled(name)), state);
     button.dataset.effect = name;
     onPress(button, () => {
       const on = button.getAttribute('aria-checked') !== 'true';
-      ask(button, `${name} ${on ? 'on' : 'off'}`, () => change('PUT', 'levels', { effects: { [name]: on } }));
+      ask(button, `${name} ${words(on ? 'levels.on' : 'levels.off')}`, () => change('PUT', 'levels', { effects: { [name]: on } }));
     });
     return button;
   });
@@ -110,7 +111,7 @@ const showEffects = onChange((names) => {
 const showPresets = onChange((names) => {
   const buttons = names.map((name) => {
     const button = make('button', { type: 'button', className: 'preset' }, titled(name));
-    onPress(button, () => ask(button, `preset ${name}`, () => change('POST', `presets/${encodeURIComponent(name)}`)));
+    onPress(button, () => ask(button, words('levels.preset', { name }), () => change('POST', `presets/${encodeURIComponent(name)}`)));
     return button;
   });
   byId('presets').replaceChildren(...buttons);

@@ -2,36 +2,38 @@
 
 import { byId, make, onChange, setProperty, setText } from './dom.js';
 import { healthOf, healthWord, mark } from './marks.js';
-import { micros, whole } from './words.js';
+import { micros, number, whole } from './words.js';
+import { words } from './language.js';
+import { healthName } from './said.js';
 
-const OPEN = { look: 'good', mark: 'disc', word: 'open' };
-const GONE = { look: 'bad', mark: 'cross', word: 'missing' };
+const OPEN = { look: 'good', mark: 'disc', word: 'links.open' };
+const GONE = { look: 'bad', mark: 'cross', word: 'links.gone' };
 
 /** What is said of a link. */
 const FIGURES = {
-  'Rate': ({ rate_hz: hz }) => `${hz.toFixed(1)} Hz`,
-  'Ahead of the film': ({ lead_ms: ms }) => `${Math.round(ms)} ms`,
-  'Off this cue at most': ({ deviation_mm: mm }) => (mm === null ? 'no cue' : millimetres(mm, 2)),
-  'Answer delay, p99': ({ delay_p99_us: us }) => micros(us),
-  'Requests answered': ({ asked, answered }) => `${whole(answered)} of ${whole(asked)}`,
-  'Late answers, stray ones': ({ late, stray }) => `${whole(late)}, ${whole(stray)}`,
+  'links.rate': ({ rate_hz: hz }) => `${number(hz, 1)} Hz`,
+  'links.lead': ({ lead_ms: ms }) => `${number(ms)} ms`,
+  'links.deviation': ({ deviation_mm: mm }) => (mm === null ? words('links.no-cue') : millimetres(mm)),
+  'links.delay': ({ delay_p99_us: us }) => micros(us),
+  'links.answered': ({ asked, answered }) => words('of', { n: whole(answered), all: whole(asked) }),
+  'links.late': ({ late, stray }) => `${whole(late)}, ${whole(stray)}`,
 };
 
 /** What is said of an axis; a drive without a queue has none that waits or runs dry, and confirms nothing. */
 const COLUMNS = {
-  'Queue': ({ queued }, confirms) => (confirms ? String(queued) : '–'),
-  'Dry': ({ dry }, confirms) => (confirms ? whole(dry) : '–'),
-  'Error': ({ error_mm: mm }) => millimetres(mm, 2),
-  'Position error': ({ off_course_mm: mm }) => millimetres(mm, 2),
-  'Segments': (axis, confirms) => (confirms ? segments(axis) : `${whole(axis.unconfirmed)} unconfirmed`),
-  'Temperature': ({ hot }) => (hot ? 'TOO HOT' : 'fine'),
+  'links.queue': ({ queued }, confirms) => (confirms ? String(queued) : '–'),
+  'links.dry': ({ dry }, confirms) => (confirms ? whole(dry) : '–'),
+  'links.error': ({ error_mm: mm }) => millimetres(mm),
+  'links.off-course': ({ off_course_mm: mm }) => millimetres(mm),
+  'links.segments': (axis, confirms) => (confirms ? segments(axis) : words('links.unconfirmed', { n: whole(axis.unconfirmed) })),
+  'links.temperature': ({ hot }) => words(hot ? 'links.hot' : 'links.cool'),
 };
 
-const millimetres = (mm, digits) => `${mm.toFixed(digits)} mm`;
+const millimetres = (mm) => `${number(mm, 2)} mm`;
 
 function segments({ made, acked, refused, in_doubt: doubt }) {
-  const bad = [[refused, 'refused'], [doubt, 'in doubt']].filter(([count]) => count > 0);
-  return [`${whole(acked)} of ${whole(made)}`, ...bad.map(([count, word]) => `${whole(count)} ${word}`)].join(', ');
+  const bad = [[refused, 'links.refused'], [doubt, 'links.in-doubt']].filter(([count]) => count > 0);
+  return [words('of', { n: whole(acked), all: whole(made) }), ...bad.map(([count, word]) => words(word, { n: whole(count) }))].join(', ');
 }
 
 let parts = [];
@@ -56,11 +58,11 @@ function build({ name, port, dialect, axes }) {
   const list = make('dl', { className: 'controller-figures' });
   for (const label of Object.keys(FIGURES)) {
     figures[label] = make('dd');
-    list.append(make('div', {}, make('dt', {}, label), figures[label]));
+    list.append(make('div', {}, make('dt', {}, words(label)), figures[label]));
   }
-  const heads = ['Axis', 'State', ...Object.keys(COLUMNS)].map((head) => make('th', { scope: 'col' }, head));
+  const heads = ['links.axis', 'links.state', ...Object.keys(COLUMNS)].map((head) => make('th', { scope: 'col' }, words(head)));
   const lines = axes.map(axisOf);
-  const table = make('table', { 'aria-label': `Axes on link ${name}` },
+  const table = make('table', { 'aria-label': words('links.axes', { name }) },
     make('thead', {}, make('tr', {}, ...heads)), make('tbody', {}, ...lines.map(({ row }) => row)));
   const all = make('div', { className: 'link' },
     make('h3', {}, `${name}, ${dialect}`), make('p', { className: 'quiet link-port' }, port), state, list, make('div', { className: 'scroll' }, table));
@@ -76,13 +78,13 @@ function axisOf(name) {
 
 function showLink({ state, figures, lines }, link, controllers) {
   const port = link.fault === null ? OPEN : GONE;
-  showMark(state, `link-state look-${port.look}`, port, link.fault === null ? port.word : `${port.word}: ${link.fault}`);
+  showMark(state, `link-state look-${port.look}`, port, link.fault === null ? words(port.word) : words('pair', { of: words(port.word), text: link.fault }));
   for (const [label, figure] of Object.entries(FIGURES)) setText(figures[label], figure(link));
   for (const [place, axis] of link.axes.entries()) {
     const { state: told, cells } = lines[place];
     const seat = controllers.find(({ name }) => name === axis.controller);
     const look = seat ? healthOf(seat) : { look: 'away', mark: 'what' };
-    showMark(told, `grave look-${look.look}`, look, seat ? healthWord(seat) : 'unknown');
+    showMark(told, `grave look-${look.look}`, look, healthName(seat ? healthWord(seat) : 'unknown'));
     for (const [column, figure] of Object.values(COLUMNS).entries()) setText(cells[column], figure(axis, link.dialect === 'silvermax'));
   }
 }

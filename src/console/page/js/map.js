@@ -2,12 +2,14 @@
 
 import { byId, choice, make, setAttribute, setProperty, setStyle, setText } from './dom.js';
 import { BANDS, HEALTH, ackBand, healthOf, healthWord, latencyBand, mark } from './marks.js';
-import { ackRate, micros } from './words.js';
+import { ackRate, micros, percent } from './words.js';
 import { hall } from './state.js';
 import { selected, select } from './controller.js';
 import { makePose, showPose } from './pose.js';
+import { said, words } from './language.js';
+import { healthName } from './said.js';
 
-const NO_ROW = 'no row';
+const NO_ROW = '';
 /** Names of rows up to so long stand beside their seats, longer ones above them; longer names of seats need wider fields. */
 const SHORT_ROW = 2;
 const SHORT_SEAT = 6;
@@ -52,11 +54,10 @@ function layOut(controllers) {
   const widest = Math.max(...rows.map((seats) => seats.length));
   setStyle(byId('map'), '--widest', String(widest));
   const lines = [...named].map(([row, seats]) => {
-    const title = row === NO_ROW ? '' : row;
     const isWide = seats.some((seat) => seat.dataset.controller.length > SHORT_SEAT);
-    const line = make('div', { className: isWide ? 'seats wide-names' : 'seats', role: 'group', 'aria-label': row === NO_ROW ? 'Seats without a row' : `Row ${row}` });
+    const line = make('div', { className: isWide ? 'seats wide-names' : 'seats', role: 'group', 'aria-label': row === NO_ROW ? words('map.no-row') : words('row', { row }) });
     line.append(...seats);
-    return make('div', { className: title.length > SHORT_ROW ? 'map-row long' : 'map-row' }, make('span', { className: 'row-name', 'aria-hidden': 'true' }, title), line);
+    return make('div', { className: row.length > SHORT_ROW ? 'map-row long' : 'map-row' }, make('span', { className: 'row-name', 'aria-hidden': 'true' }, row), line);
   });
   byId('map').replaceChildren(...lines);
 }
@@ -83,9 +84,9 @@ function showField(field, controller) {
     field.picture.replaceChildren(mark(look.mark));
   }
   showPose(field.pose, controller);
-  setText(field.figure, look.figure ?? healthWord(controller));
+  setText(field.figure, look.figure ?? healthName(healthWord(controller)));
   setAttribute(field.button, 'aria-label', spoken(controller));
-  setProperty(field.button, 'title', controller.why);
+  setProperty(field.button, 'title', said('standing', controller.why_coded ?? {}, controller.why));
 }
 
 function lookOf(controller) {
@@ -93,24 +94,20 @@ function lookOf(controller) {
   // A controller that takes no part has no figures worth a colour.
   if (by === 'health' || ['away', 'bad', 'fault', 'held', 'homeless'].includes(health.look)) return health;
   const { ack_rate: rate, ack_p99_us: p99 } = controller;
-  return by === 'acks' ? { ...ackBand(rate), figure: `acks ${ackRate(rate)}` } : { ...latencyBand(p99), figure: `p99 ${micros(p99, 2)}` };
+  return by === 'acks' ? { ...ackBand(rate), figure: words('map.acks-figure', { rate: ackRate(rate) }) } : { ...latencyBand(p99), figure: `p99 ${micros(p99, 2)}` };
 }
 
 function spoken(controller) {
   const { name, row, ack_rate: acks, ack_p99_us: p99 } = controller;
-  const place = row ? `, row ${row}` : '';
-  return `${name}${place}: ${healthWord(controller)}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
+  const place = row ? `${name}, ${words('row', { row })}` : name;
+  return words('map.spoken', { place, health: healthName(healthWord(controller)), acks: ackRate(acks), latency: micros(p99) });
 }
 
 function showLegend() {
   const entry = (look, text) => make('li', { className: `look-${look.look}` }, mark(look.mark), ` ${text}`);
-  const bands = {
-    acks: ['99.5 % or more acked', '95 % or more', 'less', 'no acks requested'],
-    latency: ['p99 up to 2 ms', 'up to 10 ms', 'longer', 'no acks'],
-  }[by];
-  const entries = bands
-    ? Object.values(BANDS).map((look, index) => entry(look, bands[index]))
-    : Object.entries(HEALTH).map(([name, look]) => entry(look, `${name}: ${look.means}`));
+  const entries = by === 'health'
+    ? Object.entries(HEALTH).map(([name, look]) => entry(look, words('pair', { of: healthName(name), text: words(`means.${name}`) })))
+    : Object.entries(BANDS).map(([band, look]) => entry(look, words(`band.${by}.${band}`, { good: percent(0.995, 1), weak: percent(0.95) })));
   byId('legend').replaceChildren(...entries);
 }
 

@@ -2,19 +2,19 @@
 
 import { draw } from './dom.js';
 
-/** Every health: its class of colour, its mark and what it means. */
+/** Every health: its class of colour and its mark. */
 export const HEALTH = {
-  ok: { look: 'good', mark: 'disc', means: 'answers' },
-  unwatched: { look: 'calm', mark: 'ring', means: 'not monitored: acks are off' },
-  degraded: { look: 'weak', mark: 'half', means: 'some answers late or missing' },
-  rejoining: { look: 'calm', mark: 'turn', means: 'rejoins' },
-  lost: { look: 'bad', mark: 'cross', means: 'does not answer' },
-  error: { look: 'fault', mark: 'peak', means: 'has an error' },
-  stopped: { look: 'held', mark: 'block', means: 'emergency stop' },
-  excluded: { look: 'homeless', mark: 'house', means: 'has to be homed' },
-  disabled: { look: 'away', mark: 'dash', means: 'by a person' },
-  out: { look: 'away', mark: 'gap', means: 'disabled in the configuration' },
-  unknown: { look: 'away', mark: 'what', means: 'no answer yet' },
+  ok: { look: 'good', mark: 'disc' },
+  unwatched: { look: 'calm', mark: 'ring' },
+  degraded: { look: 'weak', mark: 'half' },
+  rejoining: { look: 'calm', mark: 'turn' },
+  lost: { look: 'bad', mark: 'cross' },
+  error: { look: 'fault', mark: 'peak' },
+  stopped: { look: 'held', mark: 'block' },
+  excluded: { look: 'homeless', mark: 'house' },
+  disabled: { look: 'away', mark: 'dash' },
+  out: { look: 'away', mark: 'gap' },
+  unknown: { look: 'away', mark: 'what' },
 };
 
 /** The word for how a controller stands; one that a person took out is called that, however well it answers. */

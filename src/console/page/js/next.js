@@ -6,6 +6,7 @@ import { healthWord } from './marks.js';
 import { chosenCue, loadCue } from './playlist.js';
 import { onPress } from './press.js';
 import { runPreflight } from './reports.js';
+import { words } from './language.js';
 
 /** Seats that are offered to be disabled; of more the map and the warnings are the place. */
 const OFFERED = 2;
@@ -13,8 +14,8 @@ const SILENT = ['lost', 'unknown', 'error'];
 
 /** What arming still waits for; null where it waits for nothing. */
 export function armNeeds({ show, preflight }) {
-  if (!show) return 'load a cue first';
-  return preflight?.passed ? null : 'preflight first';
+  if (!show) return words('arm.load');
+  return preflight?.passed ? null : words('arm.preflight');
 }
 
 /** Shows both. */
@@ -43,8 +44,10 @@ function inTheWay({ controllers, preflight }) {
 const showActions = onChange((actions) => byId('next-actions').replaceChildren(...actions.map(buttonOf)));
 
 function buttonOf({ what, of }) {
-  const words = { load: of ? `Load ${of}` : 'Choose a cue', preflight: 'Run preflight', disable: `Disable ${of}` }[what];
-  const button = make('button', { type: 'button', className: 'strong', 'data-do': what }, words);
+  const text = {
+    load: of ? words('load.cue', { cue: of }) : words('load.choose'), preflight: words('preflight.run'), disable: words('seat.disable', { which: of }),
+  }[what];
+  const button = make('button', { type: 'button', className: 'strong', 'data-do': what }, text);
   if (what === 'disable') return disable(button, of);
   const actions = { load: () => (of ? loadCue(button) : byId('upload-file').focus()), preflight: () => runPreflight(button) };
   onPress(button, actions[what]);

@@ -2,6 +2,7 @@
 
 import { byId, make, setProperty, setText } from './dom.js';
 import { get } from './api.js';
+import { words } from './language.js';
 
 let shown = { name: null, seat: null };
 let url = null;
@@ -23,7 +24,7 @@ export function showPicture(name, title) {
 async function draw(name, seat) {
   const mine = { name, seat };
   shown = mine;
-  setText(byId('picture-sentence'), 'Drawing …');
+  setText(byId('picture-sentence'), words('picture.drawing'));
   try {
     const query = seat === null ? '' : `?seat=${encodeURIComponent(seat)}`;
     const picture = await get(`recordings/${encodeURIComponent(name)}/picture${query}`);
@@ -31,7 +32,7 @@ async function draw(name, seat) {
   } catch (error) {
     if (shown !== mine) return;
     setProperty(byId('picture'), 'hidden', true);
-    setText(byId('picture-sentence'), `It cannot be drawn: ${error.words ?? error.message}`);
+    setText(byId('picture-sentence'), words('picture.failed', { why: error.words ?? error.message }));
   }
 }
 

@@ -5,6 +5,7 @@ import { change, get } from './api.js';
 import { ask, onPress, say } from './press.js';
 import { onToken } from './token.js';
 import { clock, percent, signed, timeOfDay } from './words.js';
+import { words } from './language.js';
 
 let cues = [];
 
@@ -12,9 +13,9 @@ let cues = [];
 export function startPlaylist() {
   onPress(byId('playlist-load'), (button) => {
     const id = byId('playlists').value;
-    if (id) ask(button, `playlist ${id}`, () => change('PUT', 'playlist', { id }));
+    if (id) ask(button, words('playlist.load', { id }), () => change('PUT', 'playlist', { id }));
   });
-  onPress(byId('playlist-drop'), (button) => ask(button, 'unload the playlist', () => change('PUT', 'playlist', { id: null })));
+  onPress(byId('playlist-drop'), (button) => ask(button, words('playlist.unload'), () => change('PUT', 'playlist', { id: null })));
   onPress(byId('cue-load'), loadCue);
   onPress(byId('lists-again'), () => readLists());
   byId('cues').addEventListener('change', showCueNote);
@@ -28,7 +29,7 @@ export const chosenCue = () => byId('cues').value;
 export function loadCue(button) {
   const cue = chosenCue();
   // Only reading a cue shows its title and length, or its faults.
-  if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(() => readLists());
+  if (cue) ask(button, words('load.cue', { cue }), () => change('POST', 'show/load', { cue })).then(() => readLists());
 }
 
 /** Whether the library has a cue of that id, as far as is known. */
@@ -44,7 +45,7 @@ export async function readLists(cue) {
     if (holds(cue)) byId('cues').value = cue;
     showCueNote();
   } catch (error) {
-    say(byId('cues'), `The lists cannot be read: ${error.words ?? error.message}`, true);
+    say(byId('cues'), words('playlist.unread', { why: error.words ?? error.message }), true);
   }
 }
 
@@ -52,12 +53,12 @@ function fill(list, entries) {
   const before = list.value;
   const options = entries.map((entry) => {
     const length = entry.length_s ? ` (${clock(entry.length_s, 0)})` : '';
-    const failed = faultsOf(entry).length > 0 ? ' – has faults' : '';
+    const failed = faultsOf(entry).length > 0 ? ` – ${words('playlist.faults')}` : '';
     return make('option', { value: entry.id }, `${entry.title ?? entry.id}${length}${failed}`);
   });
   list.replaceChildren(...options);
   if (entries.some((entry) => entry.id === before)) list.value = before;
-  if (entries.length === 0) list.append(make('option', { value: '' }, 'none'));
+  if (entries.length === 0) list.append(make('option', { value: '' }, words('figure.none')));
 }
 
 /** The faults of a playlist's file, or those that the proof of a cue against the hall's limits found. */
@@ -72,9 +73,14 @@ function showCueNote() {
 export function showPlaylist(status) {
   if (!status) return;
   const { playlist } = status;
-  const next = playlist?.next_start ? `Next automatic start at ${timeOfDay(playlist.next_start)}, if armed` : 'No automatic start';
-  setText(byId('playlist-head'), playlist ? `${playlist.title}. ${next}.` : 'No playlist is loaded.');
+  const next = playlist?.next_start ? words('playlist.starts', { at: timeOfDay(playlist.next_start) }) : words('playlist.no-start');
+  setText(byId('playlist-head'), playlist ? `${playlist.title}. ${next}` : words('playlist.none'));
   setProperty(byId('playlist-drop'), 'disabled', !playlist);
+  const loaded = playlist?.entries[playlist.current];
+  const note = loaded && loaded.cue === status.show?.cue ? loaded.note : null;
+  setProperty(byId('entry-note'), 'hidden', !note);
+  setText(byId('entry-note'), note ?? '');
+  setProperty(byId('entry-note'), 'title', note ?? '');
   showEntries(playlist ? { entries: playlist.entries, current: playlist.current, cue: status.show?.cue } : { entries: [], current: -1 });
 }
 
@@ -88,17 +94,18 @@ function entryLine(entry, index, isLoaded) {
   const title = entry.title ?? entry.cue;
   const facts = [
     clock(entry.length_s, 0),
-    entry.at && `at ${entry.at}`,
+    entry.at && words('entry.at', { at: entry.at }),
     entry.preset,
-    entry.level !== null && `level ${percent(entry.level)}`,
-    entry.trim_ms !== null && `trim ${signed(entry.trim_ms)}`,
-    entry.then === 'go' ? 'then continues automatically' : 'then waits for GO',
+    entry.level !== null && words('entry.level', { level: percent(entry.level) }),
+    entry.trim_ms !== null && words('trim.to', { trim: signed(entry.trim_ms) }),
+    words(entry.then === 'go' ? 'entry.then-itself' : 'entry.then-go'),
   ].filter(Boolean);
-  const words = make('span', { className: 'entry-words' }, make('b', {}, title), make('span', { className: 'quiet' }, facts.join(', ')));
+  const told = make('span', { className: 'entry-words' }, make('b', {}, title), make('span', { className: 'quiet' }, facts.join(', ')));
+  if (entry.note) told.append(make('span', { className: 'note-words' }, entry.note));
   if (isLoaded) {
-    return make('li', { className: 'entry current', 'aria-current': 'true' }, words, make('span', { className: 'loaded' }, 'loaded'));
+    return make('li', { className: 'entry current', 'aria-current': 'true' }, told, make('span', { className: 'loaded' }, words('entry.loaded')));
   }
-  const button = make('button', { type: 'button', 'aria-label': `Select ${title} as the next entry` }, 'Select');
-  onPress(button, () => ask(button, `select ${title}`, () => change('POST', 'playlist/select', { entry: index })));
-  return make('li', { className: 'entry' }, words, button);
+  const button = make('button', { type: 'button', 'aria-label': words('entry.select-as', { title }) }, words('entry.select'));
+  onPress(button, () => ask(button, words('entry.select-as', { title }), () => change('POST', 'playlist/select', { entry: index })));
+  return make('li', { className: 'entry' }, told, button);
 }

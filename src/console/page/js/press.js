@@ -4,6 +4,8 @@ import { byId, setAttribute, setText } from './dom.js';
 import { Problem } from './api.js';
 import { hall, watch } from './state.js';
 import { sentence } from './words.js';
+import { words } from './language.js';
+import { stateName } from './said.js';
 
 const SURE_WITHIN_MS = 3000;
 const BOUNCE_MS = 250;
@@ -43,11 +45,12 @@ export async function ask(near, what, request) {
   say(near, `${sentence(what)} …`);
   try {
     const status = await request();
-    say(near, `${sentence(what)}: done${status?.state ? `, ${status.state}` : ''}`);
+    const done = words('press.done', { what: sentence(what) });
+    say(near, status?.state ? `${done}, ${stateName(status.state)}` : done);
     return true;
   } catch (error) {
-    const problem = error instanceof Problem ? error.words : `the page failed: ${error.message}`;
-    say(near, `${sentence(what)}: not done. ${sentence(problem)}`, true);
+    const problem = error instanceof Problem ? error.words : words('press.page', { why: error.message });
+    say(near, words('press.failed', { what: sentence(what), why: sentence(problem) }), true);
     return false;
   } finally {
     near.removeAttribute('aria-busy');
@@ -84,7 +87,7 @@ export function onTwoPresses(button, { asks, label, action }) {
       since = now;
       button.classList.add('sure');
       setText(label(), asks);
-      say(button, `${button.dataset.word}: press again within three seconds`);
+      say(button, words('press.again', { what: button.dataset.word }));
       timer = setTimeout(() => {
         relax();
         say(button, '');

@@ -6,10 +6,12 @@ import { change, get } from './api.js';
 import { ask, onPress } from './press.js';
 import { hall } from './state.js';
 import { showPicture } from './picture.js';
-import { clock, whole } from './words.js';
+import { endingName } from './said.js';
+import { clock, dayOf, number, whole } from './words.js';
+import { words } from './language.js';
 
 const SHOWN = 20;
-const KINDS = { show: 'show', test: 'test of seats', homing: 'homing', incident: 'incident' };
+const KINDS = ['show', 'test', 'homing', 'incident'];
 
 /** Makes the button and the key work. */
 export function startRecordings() {
@@ -21,12 +23,12 @@ function onKey(event) {
   if (event.key.toLowerCase() !== 'm' || event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
   // Whoever writes a word with an m in it marks nothing.
   if (event.target.closest('input, textarea, select, [contenteditable]')) return;
-  byId('mark').click();
+  if (!byId('mark').closest('[inert]')) byId('mark').click();
 }
 
 function mark(button) {
   const at = hall()?.show?.position_s ?? null;
-  ask(button, at === null ? 'mark' : `mark at ${clock(at)}`, () => change('POST', 'record/mark'));
+  ask(button, at === null ? words('mark') : words('mark.at', { at: clock(at) }), () => change('POST', 'record/mark'));
 }
 
 /** Shows whether anything is recorded, and what was. */
@@ -34,7 +36,7 @@ export function showRecordings(status, link) {
   if (!status?.record) return;
   const { recording, flight_s: flight, troubles } = status.record;
   const trouble = troubles.show;
-  badge('record-badge', trouble ? 'not recorded' : recording ? 'recording' : '', trouble ? 'weak' : 'calm', trouble ?? '');
+  badge('record-badge', trouble ? words('badge.not-recorded') : recording ? words('badge.recording') : '', trouble ? 'weak' : 'calm', trouble ?? '');
   setProperty(byId('mark'), 'disabled', link !== 'live' || (flight === 0 && !recording));
   readList(status.record.last);
 }
@@ -47,27 +49,28 @@ const readList = onChange(() => {
 function showList(list) {
   const lines = list.slice(0, SHOWN).map((recording) => {
     const { when, kind, what } = parts(recording.name);
-    const look = make('button', { type: 'button', 'aria-label': `Picture of ${kind} ${what}, ${when}` }, 'Picture');
+    const look = make('button', { type: 'button', 'aria-label': words('picture.of', { kind, what, when }) }, words('picture'));
     look.addEventListener('click', () => showPicture(recording.name, `${kind} ${what}, ${when}`));
     const cells = [when, kind, what, outcome(recording), size(recording.bytes), look].map((cell) => make('td', {}, cell));
     return make('tr', { title: recording.name }, ...cells);
   });
   setProperty(byId('recordings'), 'hidden', lines.length === 0);
-  setText(byId('recordings-none'), lines.length === 0 ? 'Nothing was recorded yet.' : '');
+  setText(byId('recordings-none'), lines.length === 0 ? words('recordings.none') : '');
   byId('recordings').tBodies[0].replaceChildren(...lines);
 }
 
 /** How a show ended; of what is no show, or was not closed, nothing is known. */
 function outcome({ result, lost, missed_ticks: missed }) {
   if (result === undefined) return '–';
-  const faults = [lost > 0 && `${whole(lost)} lost`, missed > 0 && `${whole(missed)} ticks missed`].filter(Boolean);
-  return [result, ...(faults.length > 0 ? faults : ['nothing lost'])].join(', ');
+  const faults = [lost > 0 && words('recordings.lost', { n: whole(lost) }), missed > 0 && words('recordings.missed', { n: whole(missed) })].filter(Boolean);
+  return [endingName(result), ...(faults.length > 0 ? faults : [words('recordings.all')])].join(', ');
 }
 
 /** 2026-01-31T19-00-00-show-coaster.mcap. */
 function parts(name) {
   const [, day, time, kind, what] = name.match(/^(\d{4}-\d\d-\d\d)T(\d\d-\d\d-\d\d)-([a-z]+)-(.*)\.mcap$/) ?? [null, '', '', '', name];
-  return { when: `${day} ${time.replaceAll('-', ':')}`, kind: KINDS[kind] ?? kind, what };
+  const when = day && `${dayOf(day)} ${time.replaceAll('-', ':')}`;
+  return { when, kind: KINDS.includes(kind) ? words(`recordings.${kind}`) : kind, what };
 }
 
-const size = (bytes) => (bytes < 1e6 ? `${Math.ceil(bytes / 1000)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
+const size = (bytes) => (bytes < 1e6 ? `${number(Math.ceil(bytes / 1000))} kB` : `${number(bytes / 1e6, 1)} MB`);

@@ -5,7 +5,9 @@ import { change } from './api.js';
 import { ask, onPress } from './press.js';
 import { SEVERITIES, alike } from './warnings.js';
 import { mark } from './marks.js';
+import { remedyOf, textOf } from './said.js';
 import { lasting, sentence, timeOfDay } from './words.js';
+import { words } from './language.js';
 
 /** Makes preflight run. */
 export function startReports() {
@@ -13,7 +15,7 @@ export function startReports() {
 }
 
 /** Has every seat asked whether it is fit for a show. */
-export const runPreflight = (button) => ask(button, 'preflight', () => change('POST', 'preflight'));
+export const runPreflight = (button) => ask(button, words('preflight.title'), () => change('POST', 'preflight'));
 
 /** Shows both tables. */
 export function showReports(status) {
@@ -27,34 +29,34 @@ function showPreflight({ preflight, controllers }) {
   setProperty(byId('preflight'), 'hidden', !preflight || preflight.findings.length === 0);
   if (!preflight) {
     setProperty(verdict, 'className', 'verdict');
-    setText(verdict, 'Not run yet.');
+    setText(verdict, words('preflight.never'));
     return;
   }
   setProperty(verdict, 'className', `verdict ${preflight.passed ? 'look-good' : 'look-bad'}`);
-  const outcome = preflight.passed ? 'PASSED' : 'NOT PASSED';
+  const outcome = words(preflight.passed ? 'preflight.passed' : 'preflight.failed');
   const all = controllers.filter(({ health }) => health !== 'out').length;
-  const answered = `${preflight.answered} of ${all} controllers answered`;
-  setText(verdict, `${outcome}: ${answered}, ${lasting(preflight.age_s)} ago`);
+  setText(verdict, words('preflight.answered', { outcome, n: preflight.answered, all, time: lasting(preflight.age_s) }));
   showFindings({ findings: preflight.findings, all });
 }
 
 const showFindings = onChange(({ findings, all }) => {
-  const lines = alike(findings).map(({ severity, text, remedy, controllers }) => {
+  const lines = alike(findings).map(({ severity, controllers, ...found }) => {
     const look = SEVERITIES[severity] ?? SEVERITIES.warning;
-    const grave = make('span', { className: `grave look-${look.look}` }, mark(look.mark), look.word);
-    return row([grave, whose(controllers, all), sentence(text), sentence(remedy)]);
+    const grave = make('span', { className: `grave look-${look.look}` }, mark(look.mark), words(look.word));
+    return row([grave, whose(controllers, all), sentence(textOf(found)), sentence(remedyOf(found))]);
   });
   byId('preflight').tBodies[0].replaceChildren(...lines);
 });
 
 function whose(controllers, all) {
-  if (controllers.length === 0) return 'hall';
-  return controllers.length === all && all > 1 ? `all ${all}` : controllers.join(', ');
+  if (controllers.length === 0) return words('hall');
+  return controllers.length === all && all > 1 ? words('preflight.all', { n: all }) : controllers.join(', ');
 }
 
 const showJournal = onChange((journal) => {
   const lines = journal.map(({ at, who, what, result, times }) => {
-    const line = row([timeOfDay(at), who, what, times > 1 ? `${result} (${times} times)` : result]);
+    const came = result === 'done' ? words('journal.done') : result;
+    const line = row([timeOfDay(at), who, what, times > 1 ? words('journal.times', { came, n: times }) : came]);
     line.classList.toggle('refused', result !== 'done');
     return line;
   });

@@ -5,7 +5,9 @@ import { byId, make, onChange, setAttribute, setProperty, setText } from './dom.
 import { change } from './api.js';
 import { filmLook, mark } from './marks.js';
 import { ask, onTwoPresses } from './press.js';
-import { minus, sentence, whole } from './words.js';
+import { filmCause, filmName } from './said.js';
+import { number, plus, sentence, whole } from './words.js';
+import { words } from './language.js';
 
 let lines = [];
 
@@ -18,7 +20,7 @@ export function showSources({ sources, source: leading, chosen }) {
 
 /** Makes the button for the ranking work. */
 export function startSources() {
-  asksTwice(byId('by-rank'), 'follow the film by rank', null);
+  asksTwice(byId('by-rank'), words('sources.follow-rank'), null);
 }
 
 const layOut = onChange((names) => {
@@ -31,8 +33,8 @@ function lineOf(name) {
   const word = make('b');
   const figures = make('span', { className: 'quiet source-figures' });
   const cause = make('span', { className: 'quiet' });
-  const button = make('button', { type: 'button', 'aria-label': `Follow ${name}` }, 'Use');
-  asksTwice(button, `follow ${name}`, name);
+  const button = make('button', { type: 'button', 'aria-label': words('sources.follow', { name }) }, words('sources.use'));
+  asksTwice(button, words('sources.follow', { name }), name);
   const head = make('p', {}, picture, word, ` ${name}`);
   const item = make('li', { className: 'source' }, make('div', { className: 'source-words' }, head, figures, cause), button);
   return { item, picture, word, figures, cause, button, shape: '' };
@@ -40,7 +42,7 @@ function lineOf(name) {
 
 function asksTwice(button, what, source) {
   const action = () => ask(button, what, () => change('PUT', 'sync/source', { source }));
-  onTwoPresses(button, { asks: 'SURE?', label: () => button, action });
+  onTwoPresses(button, { asks: words('sure'), label: () => button, action });
 }
 
 function showLine(line, source, { leading, chosen }) {
@@ -51,9 +53,9 @@ function showLine(line, source, { leading, chosen }) {
     line.shape = look.mark;
     line.picture.replaceChildren(mark(look.mark));
   }
-  setText(line.word, leads ? `${source.state}, leads:` : `${source.state}:`);
+  setText(line.word, leads ? words('sources.leads', { state: filmName(source.state) }) : `${filmName(source.state)}:`);
   setText(line.figures, figuresOf(source));
-  setText(line.cause, source.state === 'locked' && source.may_lead ? '' : sentence(source.cause));
+  setText(line.cause, source.state === 'locked' && source.may_lead ? '' : sentence(filmCause(source)));
   showPressed(line.button, source.source === chosen);
 }
 
@@ -63,13 +65,13 @@ function showPressed(button, pressed) {
 
 function figuresOf({ rate_ppm: rate, sigma_ms: sigma, level_dbfs: level, dropouts, rejected, jumps, may_lead: mayLead, state }) {
   const figures = [
-    level === null ? null : `level ${minus(level.toFixed(0))} dBFS`,
-    `${whole(dropouts)} dropouts`,
-    rate === null ? null : `${rate > 0 ? '+' : ''}${minus(rate.toFixed(0))} ppm`,
-    sigma === null ? null : `sigma ${sigma.toFixed(2)} ms`,
-    jumps === 0 ? null : `${whole(jumps)} jumps`,
-    rejected === 0 ? null : `${whole(rejected)} rejected`,
-    state === 'locked' && !mayLead ? 'too coarse to follow' : null,
+    level === null ? null : words('sources.level', { db: number(level) }),
+    words('sources.dropouts', { n: whole(dropouts) }),
+    rate === null ? null : `${plus(rate)}${number(rate)} ppm`,
+    sigma === null ? null : `σ ${number(sigma, 2)} ms`,
+    jumps === 0 ? null : words('sources.jumps', { n: whole(jumps) }),
+    rejected === 0 ? null : words('sources.rejected', { n: whole(rejected) }),
+    state === 'locked' && !mayLead ? words('sources.coarse') : null,
   ];
   return figures.filter((figure) => figure !== null).join(', ');
 }

@@ -4,11 +4,12 @@
 import { byId, setProperty, setText } from './dom.js';
 import { sendStop } from './api.js';
 import { hall, linkState, watch } from './state.js';
+import { words } from './language.js';
+import { stateName } from './said.js';
 
 const TRIES = 4;
 const PATIENCE_MS = 1000;
 const BETWEEN_MS = 150;
-const HARD_WIRED = 'In danger press the hard-wired emergency stop.';
 
 let sending = false;
 /** Whether nothing was heard of the server at some time since the last word about a stop. */
@@ -34,22 +35,22 @@ async function stop() {
   byId('stop').classList.add('pressed');
   if (sending) return;
   sending = true;
-  tell('STOP is sent …', 'sent');
+  tell(words('stop.sent'), 'sent');
   let problem = null;
   for (let attempt = 0; attempt < TRIES; attempt += 1) {
     try {
       await sendStop(PATIENCE_MS);
       problem = null;
-      tell('STOP was received: the seats are coming to rest.', 'received');
+      tell(words('stop.received'), 'received');
       break;
     } catch (error) {
       problem = error;
-      tell(`STOP has not been delivered yet: ${error.message}. Trying again … ${HARD_WIRED}`, 'failed');
+      tell(words('stop.trying', { why: error.message }), 'failed');
       if (error.status !== 0 && error.status < 500) break; // they heard and refused: again would be the same
       await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
     }
   }
-  if (problem) tell(`STOP COULD NOT BE DELIVERED: ${problem.words ?? problem.message}. ${HARD_WIRED}`, 'failed');
+  if (problem) tell(words('stop.failed', { why: problem.words ?? problem.message }), 'failed');
   byId('stop').classList.remove('pressed');
   sending = false;
 }
@@ -74,7 +75,7 @@ function forget() {
   const received = place.classList.contains('received');
   const over = received ? state !== 'stopping' && state !== 'stopped' : state === 'stopped' || (wasGone && !moving);
   if (over) setProperty(place, 'hidden', true);
-  else if (!received && wasGone) setText(place, `STOP was not delivered, and the hall is ${state}: press STOP again. ${HARD_WIRED}`);
+  else if (!received && wasGone) setText(place, words('stop.again', { state: stateName(state) }));
 }
 
 start();

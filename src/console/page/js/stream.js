@@ -5,6 +5,7 @@ import { headers } from './api.js';
 import { hear } from './clock.js';
 import { setLost, setStatus } from './state.js';
 import { askForToken, onToken } from './token.js';
+import { words } from './language.js';
 
 const SILENCE_MS = 1500;
 const WATCH_MS = 100;
@@ -78,10 +79,10 @@ async function read() {
 async function refusalOf(response) {
   if (response.status === 401) {
     askForToken({ pressed: false });
-    return 'it requires a token';
+    return words('lost.token');
   }
   const problem = await response.json().catch(() => ({}));
-  return problem.detail ?? `it replied ${response.status}`;
+  return problem.detail ?? words('api.replied', { status: response.status });
 }
 
 /** The data of an event: its data lines, joined. Comments have none. */

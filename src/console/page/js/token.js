@@ -2,6 +2,7 @@
 // bring it as `#token=…`: what is behind the # is never sent to a server, and it is taken out of the address bar at once.
 
 import { byId, setProperty, setText } from './dom.js';
+import { words } from './language.js';
 
 const KEY = 'kinocue-token';
 const IN_LINK = /^#token=([\w.~-]{1,256})$/;
@@ -17,11 +18,11 @@ export const onToken = (listener) => given.push(listener);
 /** The server does not know who asks. Whoever left the dialog is asked again only when they press something. */
 export function askForToken({ pressed }) {
   if (left && !pressed) return;
-  open(token() ? 'The server does not know this token, or it was removed.' : 'This server requires a token.');
+  open(token() ? 'token.unknown' : 'token.required');
 }
 
 /** The server knows who asks, and they may not. */
-export const askForAnother = () => open('This needs a token with more permissions.');
+export const askForAnother = () => open('token.more');
 
 /** Takes the token of the link that led here; says whether there was one. */
 function takeFromLink() {
@@ -40,7 +41,7 @@ takeFromLink();
 /** Opens the dialog. It leaves the rest of the page usable: STOP must stay in reach. */
 function open(why) {
   const form = byId('token');
-  setText(byId('token-why'), `${why} Ask the engineer of this hall for one.`);
+  setText(byId('token-why'), words(why));
   if (!form.hidden) return;
   setProperty(form, 'hidden', false);
   byId('token-text').focus();

@@ -6,6 +6,8 @@ import { armNeeds } from './next.js';
 import { ask, onPress, onTwoPresses, say } from './press.js';
 import { hall } from './state.js';
 import { clock } from './words.js';
+import { words } from './language.js';
+import { stateName, textOf } from './said.js';
 
 const BETWEEN_GOS_MS = 1000;
 /** A button that has just changed its meaning is dead for so long: a double tap must not do the opposite. */
@@ -25,7 +27,7 @@ const may = (what, state) => MAY[what].includes(state);
 const post = (what) => change('POST', `show/${what}`);
 
 let lastGo = -Infinity;
-let armIs = 'arm';
+let armIs = null;
 let armSince = -Infinity;
 let relaxGo = () => {};
 let relaxGoFrom = () => {};
@@ -33,32 +35,32 @@ let relaxGoFrom = () => {};
 /** Makes the buttons work. */
 export function startTransport() {
   for (const what of ['pause', 'resume', 'park', 'clear']) {
-    onPress(byId(what), (button) => ask(button, what, () => post(what)));
+    onPress(byId(what), (button) => ask(button, words(`button.${what}`), () => post(what)));
   }
   onPress(byId('arm'), (button) => {
     if (performance.now() - armSince < SETTLE_MS) return;
     const what = armIs;
-    ask(button, what, () => post(what)).then((done) => done && what === 'arm' && sayOut(button));
+    ask(button, words(`button.${what}`), () => post(what)).then((done) => done && what === 'arm' && sayOut(button));
   });
   onTwoPresses(byId('home'), {
-    asks: 'SEATS EMPTY?',
+    asks: words('home.empty'),
     label: () => byId('home'),
-    action: (button) => ask(button, 'home', () => post('home')),
+    action: (button) => ask(button, words('button.home'), () => post('home')),
   });
   onTwoPresses(byId('home-arm'), {
-    asks: 'SEATS EMPTY?',
+    asks: words('home.empty'),
     label: () => byId('home-arm'),
-    action: (button) => ask(button, 'arm', () => change('POST', 'show/arm', { seats_empty: true })),
+    action: (button) => ask(button, words('button.home-arm'), () => change('POST', 'show/arm', { seats_empty: true })),
   });
   relaxGoFrom = onTwoPresses(byId('go-from'), {
-    asks: 'SURE?',
+    asks: words('sure'),
     label: () => byId('go-from'),
     action: (button) => {
       const at = left(hall());
-      if (at !== null) letGo(button, `go from ${clock(at)}`, () => change('POST', 'show/go', { from_s: at }));
+      if (at !== null) letGo(button, words('go-from', { at: clock(at) }), () => change('POST', 'show/go', { from_s: at }));
     },
   });
-  relaxGo = onTwoPresses(byId('go'), { asks: 'SURE?', label: () => byId('go-word'), action: (button) => letGo(button, 'go', () => post('go')) });
+  relaxGo = onTwoPresses(byId('go'), { asks: words('sure'), label: () => byId('go-word'), action: (button) => letGo(button, 'GO', () => post('go')) });
 }
 
 /** Where the show was left; null where there is nothing to go on from. */
@@ -67,12 +69,12 @@ const left = (status) => status?.show?.resume_s ?? null;
 /** Whoever arms hears who is out, since when and why. */
 function sayOut(button) {
   const out = (hall()?.warnings ?? []).filter(({ id }) => id === 'seat-out');
-  if (out.length > 0) say(button, `Arm: done. ${out.map(({ controller, text }) => `${controller}: ${text}`).join('; ')}`);
+  if (out.length > 0) say(button, `${words('press.done', { what: words('button.arm') })}. ${out.map((one) => words('pair', { of: one.controller, text: textOf(one) })).join('; ')}`);
 }
 
 function letGo(button, what, request) {
   if (performance.now() - lastGo < BETWEEN_GOS_MS) {
-    say(button, 'Go: not done. The last one was less than a second ago', true);
+    say(button, words('press.failed', { what, why: words('go.too-soon') }), true);
     return;
   }
   if (!may('go', hall()?.state)) return;
@@ -85,7 +87,7 @@ export function showTransport(status, link) {
   const state = link === 'live' ? status.state : null;
   for (const what of ['pause', 'resume', 'park', 'go']) setProperty(byId(what), 'disabled', !may(what, state));
   showArm(state, status);
-  showGo(state, status);
+  showGo(state);
   showGoFrom(state, status);
   // What a press would need is in the next action; these two show only where they are one.
   showWhere('home', may('home', status?.state), state !== null);
@@ -105,7 +107,7 @@ function showArm(state, status) {
   if (now !== armIs) {
     armIs = now;
     armSince = performance.now();
-    setText(byId('arm-word'), now.toUpperCase());
+    setText(byId('arm-word'), words(`button.${now}`));
     setAttribute(button, 'data-is', now);
   }
   setProperty(button, 'disabled', !may(now, state) || needs !== null);
@@ -116,11 +118,11 @@ function showArm(state, status) {
   setProperty(byId('home-arm'), 'disabled', !may('arm', state));
 }
 
-function showGo(state, status) {
+function showGo(state) {
   const live = may('go', state);
   if (!live) relaxGo();
   const sure = byId('go').classList.contains('sure');
-  setText(byId('go-note'), sure ? 'press again' : goNote(state, status));
+  setText(byId('go-note'), sure ? words('go.again') : goNote(state));
 }
 
 /** After a stop the place of RESUME is that of a button that begins where the show was left. */
@@ -134,13 +136,13 @@ function showGoFrom(state, status) {
     relaxGoFrom();
     return;
   }
-  button.dataset.word = `FROM ${clock(at, 0)}`;
+  button.dataset.word = words('button.go-from', { at: clock(at, 0) });
   if (!button.classList.contains('sure')) setText(button, button.dataset.word);
 }
 
-function goNote(state, status) {
-  if (state === null) return 'no data';
-  if (may('go', state)) return 'press twice';
-  if (may('pause', state)) return 'the show is running';
-  return state === 'parked' ? 'arm first' : `not while ${state}`;
+function goNote(state) {
+  if (state === null) return words('link.lost');
+  if (may('go', state)) return words('go.twice');
+  if (may('pause', state)) return words('go.runs');
+  return state === 'parked' ? words('go.arm') : words('go.not-while', { state: stateName(state) });
 }

@@ -5,6 +5,7 @@ import { change } from './api.js';
 import { ask, onPress } from './press.js';
 import { hall } from './state.js';
 import { signed } from './words.js';
+import { words } from './language.js';
 
 const MOST_MS = 500;
 const SETTLE_MS = 400;
@@ -27,7 +28,7 @@ async function press(button, step) {
   const mine = (asked += 1);
   const to = wanted;
   show(to);
-  await ask(button, `trim ${signed(to)}`, () => change('PUT', 'trim', { offset_s: to / 1000 }));
+  await ask(button, words('trim.to', { trim: signed(to) }), () => change('PUT', 'trim', { offset_s: to / 1000 }));
   forget(mine);
 }
 
@@ -43,7 +44,7 @@ const nudges = () => document.querySelectorAll('[data-nudge]');
 /** Only the server knows how long a frame is: what it makes of the press is what the next goes on from. */
 async function nudge(button, frames) {
   const mine = (asked += 1);
-  await ask(button, `trim ${frames > 0 ? 'a frame later' : 'a frame earlier'}`, async () => {
+  await ask(button, words(frames > 0 ? 'trim.nudged-later' : 'trim.nudged-earlier'), async () => {
     const status = await change('PUT', 'trim', { frames });
     if (mine === asked) show((wanted = status.trim_ms));
     return status;
@@ -59,6 +60,6 @@ export function showTrim(status) {
 
 function show(ms) {
   setText(byId('trim'), signed(ms));
-  const words = ms === 0 ? 'motion in sync with the film' : `motion ${Math.abs(ms)} ms ${ms > 0 ? 'later' : 'earlier'} than the film`;
-  setText(byId('trim-words'), words);
+  const how = ms === 0 ? 'trim.in-sync' : ms > 0 ? 'trim.is-later' : 'trim.is-earlier';
+  setText(byId('trim-words'), words(how, { ms: Math.abs(ms) }));
 }

@@ -4,6 +4,7 @@ import { byId, make, setProperty, setText } from './dom.js';
 import { upload } from './api.js';
 import { ask, onPress } from './press.js';
 import { holds, readLists } from './playlist.js';
+import { words } from './language.js';
 
 /** Faults that are listed; of a broken file there may be thousands. */
 const FIRST = 20;
@@ -30,14 +31,14 @@ export function idOf(name) {
 function showButton() {
   const id = chosen() ? idOf(chosen().name) : '';
   setProperty(byId('upload'), 'disabled', id === '');
-  setText(byId('upload'), id === '' ? 'Upload' : `${holds(id) ? 'Replace' : 'Upload as'} ${id}`);
+  setText(byId('upload'), words(id === '' ? 'upload' : holds(id) ? 'upload.replace' : 'upload.as', { id }));
 }
 
 async function send(button) {
   const file = chosen();
   const id = idOf(file.name);
   showFaults([]);
-  const taken = await ask(button, `upload ${id}, checked and proved`, async () => {
+  const taken = await ask(button, words('upload.proved', { id }), async () => {
     try {
       return await upload(id, file);
     } catch (problem) {
@@ -53,6 +54,6 @@ async function send(button) {
 
 function showFaults(faults) {
   const lines = faults.slice(0, FIRST);
-  if (faults.length > FIRST) lines.push(`and ${faults.length - FIRST} more`);
+  if (faults.length > FIRST) lines.push(words('and-more', { n: faults.length - FIRST }));
   byId('upload-faults').replaceChildren(...lines.map((fault) => make('li', {}, fault)));
 }

@@ -4,13 +4,15 @@ import { byId, make, onChange, setProperty, setText } from './dom.js';
 import { mark } from './marks.js';
 import { hall } from './state.js';
 import { disable, select } from './controller.js';
-import { sentence } from './words.js';
+import { counted, words } from './language.js';
+import { remedyOf, textOf } from './said.js';
+import { sentence, whole } from './words.js';
 
 /** How each severity is marked and called. */
 export const SEVERITIES = {
-  error: { look: 'bad', mark: 'peak', word: 'Error' },
-  warning: { look: 'weak', mark: 'half', word: 'Warning' },
-  info: { look: 'calm', mark: 'info', word: 'Note' },
+  error: { look: 'bad', mark: 'peak', word: 'severity.error' },
+  warning: { look: 'weak', mark: 'half', word: 'severity.warning' },
+  info: { look: 'calm', mark: 'info', word: 'severity.info' },
 };
 
 const FIRST = 4;
@@ -36,12 +38,12 @@ export function showWarnings(status) {
   setProperty(byId('warnings-panel'), 'hidden', told.length === 0);
   setText(byId('warnings-title'), titleOf(warnings));
   setProperty(byId('warnings-more'), 'hidden', told.length <= FIRST);
-  setText(byId('warnings-more'), all ? 'Only the most severe' : `Show ${told.length - FIRST} more`);
+  setText(byId('warnings-more'), words(all ? 'warnings.fewer' : 'warnings.more', { n: told.length - FIRST }));
   const shown = all ? told : told.slice(0, FIRST);
   layOut(shown.map(({ id, severity, controllers: [first] }) => ({ id, severity, first })));
   for (const [index, warning] of shown.entries()) {
     setText(lines[index].text, ` ${matter(warning)}`);
-    setText(lines[index].remedy, sentence(warning.remedy));
+    setText(lines[index].remedy, sentence(remedyOf(warning)));
   }
   showGravest(warnings);
 }
@@ -50,24 +52,25 @@ export function showWarnings(status) {
 export function alike(warnings) {
   const told = new Map();
   for (const { controller = null, ...warning } of warnings) {
-    const words = JSON.stringify([warning.severity, warning.text, warning.remedy, controller === null]);
-    if (!told.has(words)) told.set(words, { ...warning, controllers: [] });
-    if (controller !== null) told.get(words).controllers.push(controller);
+    const key = JSON.stringify([warning.severity, warning.text, warning.remedy, controller === null]);
+    if (!told.has(key)) told.set(key, { ...warning, controllers: [] });
+    if (controller !== null) told.get(key).controllers.push(controller);
   }
   return [...told.values()];
 }
 
 /** How many there are; where none of them warns of anything, they are notes. */
 function titleOf(warnings) {
-  const word = warnings.every(({ severity }) => severity === 'info') ? 'note' : 'warning';
-  return `${warnings.length} ${word}${warnings.length === 1 ? '' : 's'}`;
+  const kind = warnings.every(({ severity }) => severity === 'info') ? 'notes' : 'warnings';
+  return counted(kind, warnings.length, whole(warnings.length));
 }
 
 /** What is the matter, beginning with whose it is. */
-function matter({ controllers, text }) {
+function matter({ controllers, ...warning }) {
+  const text = textOf(warning);
   if (controllers.length === 0) return sentence(text);
-  const more = controllers.length > NAMED ? ` and ${controllers.length - NAMED} more` : '';
-  return `${controllers.slice(0, NAMED).join(', ')}${more}: ${text}`;
+  const more = controllers.length > NAMED ? ` ${words('and-more', { n: controllers.length - NAMED })}` : '';
+  return words('pair', { of: controllers.slice(0, NAMED).join(', ') + more, text });
 }
 
 function showGravest(warnings) {
@@ -77,8 +80,8 @@ function showGravest(warnings) {
   const { look, mark: name, word } = SEVERITIES[grave[0].severity] ?? SEVERITIES.warning;
   setProperty(byId('gravest'), 'className', `gravest live look-${look}`);
   showMark(name);
-  setText(byId('gravest-words'), `${word}: ${matter(grave[0])}`);
-  setText(byId('gravest-more'), grave.length > 1 ? `and ${grave.length - 1} more` : '');
+  setText(byId('gravest-words'), words('pair', { of: words(word), text: matter(grave[0]) }));
+  setText(byId('gravest-more'), grave.length > 1 ? words('and-more', { n: grave.length - 1 }) : '');
 }
 
 const showMark = onChange((name) => byId('gravest-mark').replaceChildren(mark(name)));
@@ -93,15 +96,15 @@ function line({ severity, first }) {
   const look = SEVERITIES[severity] ?? SEVERITIES.warning;
   const text = make('span');
   const remedy = make('span');
-  const words = make('div', { className: 'warning-words' },
-    make('p', {}, make('b', { className: 'severity' }, look.word), text),
-    make('p', { className: 'remedy' }, make('span', { className: 'off-screen' }, 'What to do: '), remedy));
-  const item = make('li', { className: `warning look-${look.look}` }, mark(look.mark), words);
+  const told = make('div', { className: 'warning-words' },
+    make('p', {}, make('b', { className: 'severity' }, words(look.word)), text),
+    make('p', { className: 'remedy' }, make('span', { className: 'off-screen' }, words('warnings.remedy')), remedy));
+  const item = make('li', { className: `warning look-${look.look}` }, mark(look.mark), told);
   if (first) {
-    const button = make('button', { type: 'button' }, `Show ${first}`);
+    const button = make('button', { type: 'button' }, words('warnings.show', { which: first }));
     button.addEventListener('click', () => select(first));
     item.append(button);
-    if (severity === 'error') item.append(disable(make('button', { type: 'button' }, `Disable ${first}`), first));
+    if (severity === 'error') item.append(disable(make('button', { type: 'button' }, words('seat.disable', { which: first })), first));
   }
   return { item, text, remedy };
 }
