@@ -10,7 +10,9 @@ impl FilmState {
             Self::FreeRunning | Self::Locked => {
                 ("film-outside", "the film is outside the cue, or has just been found")
             }
-            Self::Freewheeling => ("film-freewheeling", "no position is received from the film at the moment"),
+            Self::Freewheeling => {
+                ("film-freewheeling", "no position is received from the film at the moment")
+            }
             Self::Absent => ("film-absent", "nothing has been received from the film yet"),
             Self::Acquiring => ("film-acquiring", "the position of the film is not known well enough yet"),
             Self::Stopped => ("film-stopped", "the film is stopped"),

@@ -3,7 +3,7 @@
 use super::act::Act;
 use super::hall::HallContext;
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
-use crate::control::{Code, Coded, FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
+use crate::control::{Coded, FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
 use crate::film::point::FilmState;
 
 /// The film by the source that leads, or by the first while none does.
