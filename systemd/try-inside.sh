@@ -43,7 +43,7 @@ systemctl reset-failed kinocue.service
 echo "== no configuration"
 systemctl start kinocue.service 2> /dev/null
 sleep 1
-check "exit code" "$(prop ExecMainStatus)" 78
+check "exit code" "$(prop ExecMainStatus)" 66
 check "restarts" "$(prop NRestarts)" 0
 systemctl reset-failed kinocue.service
 

@@ -234,3 +234,31 @@ fn a_folder_that_is_not_there_takes_no_manual_pages() {
     let output = kinocue(&["man", "/nonexistent/folder"]);
     assert_eq!(output.status.code(), Some(74), "{}", said(&output));
 }
+
+/// A stranger can run any fault by its number.
+#[test]
+fn each_test_that_the_page_of_faults_names_is_there() {
+    let sources = rust_under("tests") + &rust_under("src");
+    let page = text("docs/faults.md");
+    let commands = page.split('`').filter(|code| code.starts_with("cargo test "));
+    let names: Vec<&str> = commands.filter_map(|command| command.split_whitespace().last()).collect();
+    assert!(names.len() > 100, "{}", names.len());
+    for name in names {
+        assert!(sources.contains(&format!("fn {name}(")), "docs/faults.md: there is no test {name}");
+    }
+}
+
+/// All sources below a folder, one behind the other.
+fn rust_under(folder: &str) -> String {
+    let entries = fs::read_dir(root().join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
+    let each = |entry: Result<fs::DirEntry, std::io::Error>| {
+        let name = entry.expect("the folder can be read").file_name();
+        let path = format!("{folder}/{}", name.to_string_lossy());
+        match root().join(&path) {
+            below if below.is_dir() => rust_under(&path),
+            _ if path.ends_with(".rs") => text(&path),
+            _ => String::new(),
+        }
+    };
+    entries.map(each).collect()
+}
