@@ -16,7 +16,7 @@ fn serve(hall: &Hall, socket: &str) -> Run {
 fn a_start_goes_from_boot_to_parked_and_moves_nothing() {
     let mut hall = Hall::open();
     let parked = hall.lives_on(100);
-    assert_eq!(parked["cause"], "all seats were found at their park poses");
+    assert_eq!(parked["cause"], "all seats that take part were found at their park poses");
     let lines = hall.close();
     let states = lines.iter().filter(|line| line.contains("(state-")).count();
     assert_eq!(states, 1, "boot to parked at once: {lines:?}");

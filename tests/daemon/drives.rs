@@ -100,7 +100,7 @@ fn evening(dialect: &str) -> Vec<Value> {
     hall.comes_to("parked");
 
     hall.play("ride");
-    hall.wait(|status| status["cause"] == "the seats have parked");
+    hall.wait(|status| status["cause"] == "the seats that take part have parked");
     let parked = hall.wait(|status| of_lift(status)["acked"] == of_lift(status)["asked"]);
     let lift = of_lift(&parked);
     assert_eq!((&lift["health"], &lift["lost"]), (&"ok".into(), &0.into()), "{lift}");

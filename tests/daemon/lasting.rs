@@ -122,7 +122,7 @@ fn a_folder_that_takes_no_settings_is_told_of_and_harms_nothing() {
     hall.wait(|status| status["warnings"].as_array().unwrap().iter().any(|one| one["id"] == "settings"));
     hall.arm("ride");
     hall.done(&["go"]);
-    hall.wait(|status| status["cause"] == "the seats have parked");
+    hall.wait(|status| status["cause"] == "the seats that take part have parked");
     let said = hall.serving().lines();
     let told = said.iter().filter(|line| line.contains("cannot be kept over a restart")).count();
     assert_eq!(told, 1, "{said:?}");

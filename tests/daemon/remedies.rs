@@ -157,6 +157,6 @@ fn an_emergency_stop_that_its_controller_holds_until_a_reset_is_cleared_and_its_
     hall.wait(|status| status["state"] == "parked" && health(status, 0) == "ok");
     hall.arm("ride");
     hall.done(&["go"]);
-    hall.wait(|status| status["cause"] == "the seats have parked");
+    hall.wait(|status| status["cause"] == "the seats that take part have parked");
     assert!(hall.end().rest_in_park());
 }

@@ -16,7 +16,7 @@ fn a_whole_show_ends_parked_and_its_record_says_what_the_controllers_counted() {
     let mut hall = Hall::open();
     hall.arm("ride");
     hall.done(&["go"]);
-    let parked = hall.wait(|status| status["cause"] == "the seats have parked");
+    let parked = hall.wait(|status| status["cause"] == "the seats that take part have parked");
     assert_eq!(parked["state"], "parked");
     let lines = hall.close();
     assert!(lines.len() <= 20, "{} lines: {lines:#?}", lines.len());

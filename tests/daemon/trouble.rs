@@ -172,7 +172,7 @@ fn a_controller_that_reboots_in_mid_show_is_out_until_a_person_homes_it() {
     hall.arm("ride");
     hall.done(&["go"]);
     hall.relay(1).wait_for(|_| true);
-    hall.wait(|status| status["cause"] == "the seats have parked");
+    hall.wait(|status| status["cause"] == "the seats that take part have parked");
 }
 
 #[test]

@@ -116,7 +116,7 @@ fn assert_all_acked(report: &Value) {
 fn the_demo_serves_the_console_while_it_plays_and_ends_by_itself_with_every_frame_acked() {
     let folder = Folder::new();
     let mut demo = demo(&folder);
-    let console = Console::told(&demo.wait_for("playing: the seats are on the cue"));
+    let console = Console::told(&demo.wait_for("playing: the seats that take part are on the cue"));
     let files = only(&folder.path("")).metadata().expect("it is ours");
     assert_eq!(files.permissions().mode() & 0o777, 0o700, "others may not look into it");
 
@@ -166,9 +166,9 @@ fn the_demo_of_a_film_says_what_to_install_where_there_is_no_player() {
 fn ctrl_c_parks_the_seats_of_the_demo_and_ends_it_with_the_report() {
     let folder = Folder::new();
     let mut demo = demo(&folder);
-    demo.wait_for("playing: the seats are on the cue");
+    demo.wait_for("playing: the seats that take part are on the cue");
     demo.signal(Signal::INT);
-    demo.wait_for("parked: the seats have parked");
+    demo.wait_for("parked: the seats that take part have parked");
     let report = demo.finish().report_of(0);
     assert_eq!(report["result"], "stopped");
     assert_all_acked(&report);
@@ -187,7 +187,7 @@ fn on_a_terminal_the_console_stays_after_the_ride_to_go_again_until_ctrl_c() {
     while !said.contains("the console stays up: arm and go again there; Ctrl-C ends: http://") {
         said += &written.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("it is silent: {said}"));
     }
-    assert!(said.contains("parked: the seats have parked"), "{said}");
+    assert!(said.contains("parked: the seats that take part have parked"), "{said}");
     let console = Console::told(&said);
     for step in ["arm", "go"] {
         let sent = wall_now_ns() / 1_000_000;
@@ -216,7 +216,7 @@ fn ridden(dialect: &str) -> (Run, Folder) {
         let mut demo = Playing::demo(&folder.path(""), &args, Stdio::null(), Stdio::piped());
         let begun = demo.wait_for("homing: homed by the operator");
         assert!(begun.contains("the demo does both"), "{begun}");
-        demo.wait_for("playing: the seats are on the cue");
+        demo.wait_for("playing: the seats that take part are on the cue");
         let run = demo.finish();
         if tries == 2 || run.code != Some(75) {
             return (run, folder);

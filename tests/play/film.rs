@@ -53,7 +53,9 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
     );
     assert!(seen.rest_in_park());
     let said = |what: &str| run.stderr.find(what).unwrap_or_else(|| panic!("{what}: {}", run.stderr));
-    assert!(said("joining: the seats join the film") < said("playing: the seats are on the cue"));
+    assert!(
+        said("joining: the seats join the film") < said("playing: the seats that take part are on the cue")
+    );
     let (count, spread_s) = followed(&seen, 4, 0.1);
     // A frame of the film lasts 40 ms: it stays nearer to its own than to any other. How near is judged in virtual time and, on a
     // machine of which more is known, by `benches/film`.

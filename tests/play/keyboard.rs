@@ -36,7 +36,7 @@ impl Terminal {
     /// Plays a minute in which the seat stands 45 mm above its park pose, and waits until it is there.
     fn playing() -> Self {
         let mut terminal = Self::begun(&[]);
-        terminal.wait_for("playing: the seats are on the cue");
+        terminal.wait_for("playing: the seats that take part are on the cue");
         terminal
     }
 
@@ -123,7 +123,7 @@ fn on_a_terminal_a_play_waits_for_a_word_where_a_controller_does_not_answer() {
         terminal.wait_for("c2: nobody answers; press y to play without, or q to end");
         terminal.press(key);
         if motion {
-            terminal.wait_for("playing: the seats are on the cue");
+            terminal.wait_for("playing: the seats that take part are on the cue");
             terminal.press("q");
         }
         let (run, sim) = terminal.finish();
@@ -144,9 +144,9 @@ fn space_pauses_and_resumes_and_q_parks_and_leaves_the_terminal_as_it_was() {
     terminal.wait_for("paused: paused by the operator; next: resume, or park");
     terminal.press(" ");
     terminal.wait_for("joining: resumed by the operator");
-    terminal.wait_for("playing: the seats are on the cue");
+    terminal.wait_for("playing: the seats that take part are on the cue");
     terminal.press("q");
-    terminal.wait_for("parked: the seats have parked");
+    terminal.wait_for("parked: the seats that take part have parked");
     let (run, sim) = terminal.finish();
     assert_eq!(run.report_of(0)["result"], "stopped");
     assert!(sim.end().rest_in_park());
@@ -179,7 +179,7 @@ fn a_stop_stays_until_it_is_cleared_and_the_seats_park_once_they_have_been_read_
     terminal.press("c");
     terminal.wait_for("recovering: cleared by the operator; next: park");
     terminal.press("p");
-    terminal.wait_for("parked: the seats have parked");
+    terminal.wait_for("parked: the seats that take part have parked");
     let (run, sim) = terminal.finish();
     assert_eq!(run.report_of(0)["result"], "stopped");
     assert!(sim.end().rest_in_park());
@@ -200,7 +200,7 @@ fn a_second_ctrl_c_that_ends_at_once_leaves_the_terminal_as_it_was() {
 fn sigterm_parks_the_seats_and_leaves_the_terminal_as_it_was() {
     let mut terminal = Terminal::playing();
     terminal.playing.signal(Signal::TERM);
-    terminal.wait_for("parked: the seats have parked");
+    terminal.wait_for("parked: the seats that take part have parked");
     let (run, sim) = terminal.finish();
     assert_eq!(run.report_of(0)["result"], "stopped");
     assert!(sim.end().rest_in_park());

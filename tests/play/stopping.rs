@@ -34,9 +34,9 @@ fn ctrl_c_and_sigterm_park_the_seats_turn_effects_off_and_report_a_stop() {
                 let one = &report["controllers"][0];
                 assert_eq!(report["result"], "stopped");
                 for line in [
-                    "playing: the seats are on the cue; next: nothing; pause, park or stop as needed",
+                    "playing: the seats that take part are on the cue; next: nothing; pause, park or stop as needed",
                     "parking: parked by the operator; next: wait until the seats are at rest",
-                    "parked: the seats have parked",
+                    "parked: the seats that take part have parked",
                 ] {
                     let line = format!("kinocue: {line}\n");
                     assert_eq!(run.stderr.matches(&line).count(), 1, "{line}: {}", run.stderr);

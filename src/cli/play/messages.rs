@@ -169,7 +169,11 @@ mod tests {
             "fault: a seat failed to home (A1); next: inspect the seat, then clear and home again"
         );
         let parked = entered(State::Parked, Cause::ArrivedAtPark, Next::Arm);
-        assert_eq!(said.news(&parked).unwrap(), "parked: the seats have parked", "the play is over");
+        assert_eq!(
+            said.news(&parked).unwrap(),
+            "parked: the seats that take part have parked",
+            "the play is over"
+        );
     }
 
     #[test]
