@@ -36,7 +36,7 @@ impl HealthState {
             Self::Error => {
                 "clear the error at the controller; then, with the seats parked or stopped, clear the hall"
             }
-            Self::Excluded => "park, then home it with nobody on the seat",
+            Self::Excluded => "home it with nobody on the seat, while the hall is parked or recovering",
             Self::Unwatched => "watch the seat",
         }
     }
@@ -64,8 +64,12 @@ impl Why {
                 "this IMAX answers as its manual says, which no other known one does: disable it, and send a capture \
                  (`kinocue decode --dialect imax`) to the maintainers of this program",
             ),
+            Self::Refuses(_) => Some(
+                "clear the error at the controller; or correct its dialect (smc, mbox): a controller refuses frames of the other; \
+                 then, with the seats parked or stopped, clear the hall",
+            ),
             Self::CutShort(_) => Some("wait until its position has been read"),
-            Self::MoreAxes { .. } => Some(
+            Self::OtherAxes { .. } => Some(
                 "set PA02 to the axes of the seat, or give the seat a type with as many; with the seats parked or stopped, clear",
             ),
             _ => None,
@@ -92,9 +96,10 @@ impl fmt::Display for Why {
             Self::Alarm { register, value, .. } => {
                 write!(f, "it reports a fault (0x1001): DP{register:02x} is {value}")
             }
-            Self::MoreAxes { drives, .. } => write!(
+            Self::OtherAxes { drives, .. } => write!(
                 f,
-                "PA02 = {drives}: it drives axes that its seat type does not have; they cannot be read, and frames would move them to 0"
+                "it works with {drives} axes (PA02), its seat type with others: those that it has beyond would be moved to 0, those \
+                 that it lacks would not move"
             ),
             _ => f.write_str(self.row().1),
         }
@@ -160,7 +165,7 @@ impl Why {
             Self::Drive { .. } => ("drive", ITSELF),
             Self::Alarm { register: DPFE, .. } => ("drive-alarm", ITSELF),
             Self::Alarm { .. } => ("alarm", ITSELF),
-            Self::MoreAxes { .. } => ("more-axes", ITSELF),
+            Self::OtherAxes { .. } => ("other-axes", ITSELF),
         }
     }
 
@@ -177,7 +182,7 @@ impl Why {
             Self::Drive { axis, error, .. } => vec![axis.to_string(), error.to_string()],
             Self::Alarm { register: DPFE, value, .. } => vec![value.to_string()],
             Self::Alarm { register, value, .. } => vec![format!("DP{register:02x}"), value.to_string()],
-            Self::MoreAxes { drives, .. } => vec![drives.to_string()],
+            Self::OtherAxes { drives, .. } => vec![drives.to_string()],
             _ => Vec::new(),
         }
     }
@@ -193,6 +198,13 @@ impl fmt::Display for Change {
 mod tests {
     use super::*;
     use crate::motion::Pulses;
+
+    #[test]
+    fn a_remedy_can_be_done_where_it_is_told() {
+        let next = HealthState::Excluded.next();
+        assert!(!next.contains("park,"), "a hall without its zero cannot park: {next}");
+        assert!(Why::Refuses(0).next().is_some_and(|next| next.contains("dialect")));
+    }
 
     #[test]
     fn a_seat_that_says_it_is_where_it_cannot_be_is_homed_and_nobody_is_sent_to_its_cables() {

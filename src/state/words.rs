@@ -320,7 +320,7 @@ impl Why {
             }
             Self::NoCue => "load one",
             Self::NotProved => "check it against the seats",
-            Self::NotPreflighted => "run it",
+            Self::NotPreflighted => "run it, after correcting what it found",
             Self::NotArmed => "arm first",
             Self::PlaysAlready => "seek to another position in it",
             Self::PausedNow => "resume, or park first",
@@ -333,7 +333,9 @@ impl Why {
             Self::Latched => "clear it first",
             Self::SeatsAnywhere => "park or home first",
             Self::ArmedNow => "disarm first",
-            Self::StillPressed => "release its button, or disable a seat that cannot report it",
+            Self::StillPressed => {
+                "release its button; where none is pressed, reset the controller, or disable a seat that cannot report it"
+            }
             Self::StillWrong => "clear the error at the controller, or disable its seat",
             Self::NothingToClear => "go on",
         }

@@ -11,6 +11,8 @@ words! {
         GoFrom = "go-or-from",
         /// Arm, and it can go from there.
         ArmFrom = "arm-or-from",
+        /// What preflight found is corrected first.
+        Correct = "correct-findings",
     }
 }
 
@@ -47,6 +49,10 @@ words! {
         NotRealTime = "not-real-time",
         /// Of the film.
         Film = "film",
+        /// The cue follows none.
+        NoFilm = "no-film",
+        /// An entry of the playlist did not start.
+        Playlist = "playlist",
         /// Of what shows it.
         Player = "player",
         /// Of a serial link.
@@ -81,6 +87,8 @@ words! {
         NoSeat = "no-seat",
         /// Run preflight.
         Preflight = "preflight",
+        /// Correct what it found.
+        Correct = "correct-findings",
         /// Enable it once it is repaired.
         SeatOut = "seat-out",
         /// Change what should be different.
@@ -170,7 +178,7 @@ mod tests {
             Acked, AcksOff, AcksMissing(0), Silent(0), NotSeenYet, SeenAgain, Moved(0), Unsure(0), CutShort(0), Astray(0), Unsteady(0),
             Unread(0), Ambiguous(0), Outside { controller: 0, axis: 1, pulses: Pulses(2) }, EmergencyStop(0), HeldUntilReset(0),
             Error { controller: 0, error: 21 }, Drive { controller: 0, axis: 1, error: 2 },
-            Alarm { controller: 0, register: 0x30, value: 1 }, Refuses(0), Wide(0), MoreAxes { controller: 0, drives: 6 },
+            Alarm { controller: 0, register: 0x30, value: 1 }, Refuses(0), Wide(0), OtherAxes { controller: 0, drives: 6 },
             Rebooted(0), OtherMaster(0), NotHome(0), Other(0), Gap(0), Unproved(0),
         });
         all.push(Standing::Alarm { controller: 0, register: crate::wire::DPFE, value: 1 });
@@ -198,7 +206,9 @@ mod tests {
         Ending::ALL.iter().for_each(|ending| add("ending", ending.word(), 0));
         Code::ALL.iter().for_each(|code| add("problem", code.word(), 0));
         Next::ALL.into_iter().for_each(|next| add("next", next.code(), 0));
-        NextCode::ALL.iter().for_each(|next| add("next", next.word(), 1));
+        NextCode::ALL
+            .iter()
+            .for_each(|next| add("next", next.word(), usize::from(*next != NextCode::Correct)));
         causes().into_iter().for_each(|cause| add("cause", cause.code(), 0)); // whose it is goes before it
         for why in refusals() {
             add("refusal", why.code(), 0);

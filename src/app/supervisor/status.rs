@@ -5,6 +5,7 @@ use jiff::Zoned;
 use super::coded::{NextCode, StandingCode};
 use super::features::Features;
 use super::hall::HallContext;
+use super::readiness::CORRECT;
 use super::seat_places::SeatPlaces;
 use super::{belts, film};
 use crate::app::links;
@@ -14,7 +15,7 @@ use crate::control::{
     Coded, ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
 use crate::rt::Row;
-use crate::state::Next;
+use crate::state::{Next, PlayMode, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker;
 
@@ -37,6 +38,9 @@ const BOUNDS_US: [f64; 16] = [
     200_000.0,
     1_000_000.0,
 ];
+
+/// So many seats are named that will not move.
+const FEW: usize = 8;
 
 /// What the status is made of.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +67,7 @@ impl StatusParts<'_> {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             uptime_s: now.since(began).as_secs_f64(),
             state: mirror.state.into(),
-            cause: hall.cause(),
+            cause: self.cause(table),
             cause_coded: Coded::new(mirror.cause.code(), hall.whose()),
             next,
             next_coded,
@@ -105,6 +109,25 @@ impl StatusParts<'_> {
         }
     }
 
+    /// Why the hall is in its state; of one that is armed also which seats that are on will not move, of one that waits where the film is.
+    fn cause(&self, table: &[Row]) -> String {
+        let (hall, cause) = (self.hall, self.hall.cause());
+        if hall.mirror.state == State::Playing(PlayMode::Waiting) {
+            let outside = film::outside(hall);
+            return outside
+                .map_or(cause.clone(), |side| format!("{cause}: {side}; kinocue sync shows where"));
+        }
+        let stays = |&lane: &usize| table.get(lane).is_some_and(|row| !row.standing.may_move());
+        let word = |lane: usize| format!("{} {}", hall.config.controllers[lane].name, table[lane].standing);
+        let stay: Vec<String> = hall.lanes_on().filter(stays).map(word).collect();
+        if hall.mirror.state != State::Armed || stay.is_empty() {
+            return cause;
+        }
+        let (on, named) = (hall.lanes_on().count(), stay.len().min(FEW));
+        let more = if named < stay.len() { " ..." } else { "" };
+        format!("{cause}, with {} of {on} seats: {}{more}", on - stay.len(), stay[..named].join(", "))
+    }
+
     /// What a person does next; where a show was left in its midst, also how it goes on from there.
     fn next(&self) -> (String, Coded) {
         let next = self.hall.mirror.next;
@@ -116,6 +139,9 @@ impl StatusParts<'_> {
             )
         };
         match left {
+            _ if next == Next::Preflight && self.features.readiness.has_failed(self.hall) => {
+                (CORRECT.to_owned(), Coded::new(NextCode::Correct.word(), []))
+            }
             Some(film) if next == Next::Go => from(NextCode::GoFrom, "or go from", film),
             Some(film) if next == Next::Arm => from(NextCode::ArmFrom, "it can go from", film),
             _ => (next.to_string(), Coded::new(next.code(), [])),

@@ -6,11 +6,14 @@ use std::thread::JoinHandle;
 
 use super::homing::Homing;
 use super::job::{Job, JobResult};
-use super::testing::Rig;
+use super::preflighted::Preflighted;
+use super::testing::{Rig, row};
 use super::*;
+use crate::app::film::{FilmTable, SharedTable};
 use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
-use crate::rt::News;
+use crate::health::HealthState;
+use crate::rt::{News, Row};
 use crate::state::{Event, Next, PlayMode, Trouble};
 use crate::time::ShowTime;
 
@@ -391,4 +394,39 @@ fn an_entry_that_is_about_to_start_by_itself_does_not_in_a_hall_that_begins_to_c
     rig.supervisor.hall.leave.store(false, Ordering::Release);
     rig.does(go());
     assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
+}
+
+#[test]
+fn whoever_arms_is_told_which_seats_will_not_move() {
+    let mut rig = Rig::parked();
+    let at = rig.supervisor.hall.now;
+    let rows = |standing| vec![row(at), Row { standing, ..row(at) }];
+    rig.supervisor.hall.live.on_table(|table| *table = rows(HealthState::Lost));
+    let status = rig.ask(Command::Arm { seats_empty: false }).unwrap();
+    assert_eq!(status.cause, "armed by the operator, with 1 of 2 seats: B1 lost");
+    rig.supervisor.hall.live.on_table(|table| *table = rows(HealthState::Rejoining));
+    assert_eq!(rig.supervisor.status().cause, "armed by the operator");
+}
+
+#[test]
+fn after_a_preflight_that_failed_the_next_is_to_correct_what_it_found_and_not_to_run_it_again() {
+    let mut rig = Rig::parked();
+    rig.supervisor.features.readiness.preflighted = Some(Preflighted::failing_at(1, 2));
+    rig.supervisor.procedures.add(Vec::new());
+    rig.settle();
+    let status = rig.supervisor.status();
+    assert!(status.next.starts_with("correct each error that preflight found"), "{}", status.next);
+    rig.supervisor.features.readiness.preflighted = None;
+    assert_eq!(rig.supervisor.status().next, "run preflight, then arm");
+}
+
+#[test]
+fn a_cue_that_follows_no_film_in_a_hall_that_has_one_is_worth_a_warning() {
+    let mut rig = Rig::parked();
+    let warned = |rig: &Rig| rig.supervisor.status().warnings.iter().any(|one| one.id == "no-film");
+    assert!(!warned(&rig), "there is no [sync]");
+    rig.supervisor.hall.film = Some(SharedTable::of(FilmTable::default()));
+    assert!(warned(&rig));
+    rig.supervisor.hall.cued = None;
+    assert!(!warned(&rig));
 }

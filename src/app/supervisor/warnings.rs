@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::coded::{RemedyCode, WarningCode};
+use super::readiness::CORRECT;
 use super::status::StatusParts;
 use super::{belts, player, recorded};
 use crate::app::links;
@@ -50,6 +51,9 @@ impl StatusParts<'_> {
         warnings.extend(of_the_film.map(|sentence| in_two(WarningCode::Film.word(), &sentence)));
         warnings
             .extend(player::warnings(hall).iter().map(|trouble| in_two(WarningCode::Player.word(), trouble)));
+        warnings.extend(self.of_no_film());
+        let failed = features.onward.failed.iter();
+        warnings.extend(failed.map(|trouble| in_two(WarningCode::Playlist.word(), trouble)));
         warnings
             .extend(links::troubles(&hall.links).map(|trouble| in_two(WarningCode::Link.word(), &trouble)));
         warnings.extend(features.lasting.warnings(hall));
@@ -130,16 +134,41 @@ impl StatusParts<'_> {
         self.hall.granted.refusals.iter().map(|refusal| in_two(WarningCode::NotRealTime.word(), refusal))
     }
 
+    /// A cue that follows nothing in a hall whose film others show: it starts as soon as it is let go.
+    fn of_no_film(&self) -> Option<Warning> {
+        let Self { hall, features, .. } = *self;
+        let entries = features.onward.list.iter().flat_map(|list| &list.playlist.entries);
+        let is_meant =
+            features.seats.test.is_some() || entries.into_iter().any(|entry| entry.film.begin.is_some());
+        let follows = |cued: &super::show::ProvedShow| cued.film.is_some();
+        if hall.film.is_none() || hall.player.is_some() || is_meant || hall.cued.as_ref().is_none_or(follows)
+        {
+            return None;
+        }
+        let text = "the cue that is loaded follows no film, and starts at once when it is let go: [sync] has no start";
+        Some(in_two(
+            WarningCode::NoFilm.word(),
+            &format!("{text}; set start in [sync], or film in its entry of the playlist"),
+        ))
+    }
+
     fn of_preflight(&self) -> Option<Warning> {
-        let (code, text, severity) = match &self.features.readiness.preflighted {
+        let readiness = &self.features.readiness;
+        let (code, text, remedy, of, severity) = match &readiness.preflighted {
             None => (
                 WarningCode::PreflightNever,
                 "preflight has not been run since the program started",
+                "run preflight",
+                RemedyCode::Preflight,
                 Severity::Info,
             ),
-            Some(it) if !it.has_passed(|lane| self.hall.settings.is_on(lane)) => {
-                (WarningCode::PreflightFailed, "preflight failed", Severity::Error)
-            }
+            Some(_) if readiness.has_failed(self.hall) => (
+                WarningCode::PreflightFailed,
+                "preflight failed",
+                CORRECT,
+                RemedyCode::Correct,
+                Severity::Error,
+            ),
             Some(_) => return None,
         };
         Some(Warning {
@@ -147,8 +176,8 @@ impl StatusParts<'_> {
             severity,
             text: text.to_owned(),
             coded: Some(Coded::new(code.word(), [])),
-            remedy: "run preflight".to_owned(),
-            remedy_code: Some(RemedyCode::Preflight.to_string()),
+            remedy: remedy.to_owned(),
+            remedy_code: Some(of.to_string()),
             ..Warning::default()
         })
     }

@@ -126,7 +126,13 @@ pub(super) fn run(command: &ShowCommand) -> Result<Exit, Failure> {
         ShowCommand::Seek(SeekArgs { at, server }) => {
             return server.act("/api/v1/show/seek", &json!({ "position_s": at.as_secs_f64() }));
         }
-        ShowCommand::Reload(server) => return server.act("/api/v1/reload", &json!({})),
+        ShowCommand::Reload(server) => {
+            let exit = server.act("/api/v1/reload", &json!({}))?;
+            print::tell(
+                "kinocue: the hall now opens with the new configuration; kinocue watch shows when it is ready",
+            );
+            return Ok(exit);
+        }
     };
     server.act(&format!("/api/v1/show/{word}"), &json!({}))
 }
@@ -161,11 +167,12 @@ pub(in crate::cli) fn preflight(server: &ServerArgs) -> Result<Exit, Failure> {
     Ok(if *passed { Exit::Done } else { Exit::CheckFailed })
 }
 
-/// A row for each thing that was found, with those of whom it was. Of more than a few the number is enough, unless it fails.
+/// A row for each thing that was found, with those of whom it was: one with its place, several by their names. Of more than a few the
+/// number is enough, unless it fails.
 fn findings(status: &Status, all: &[Warning]) -> String {
     let mut rows: Vec<(&Warning, Vec<String>)> = Vec::new();
     for one in all {
-        let who = who(status, one);
+        let who = one.controller.clone().unwrap_or_else(|| "-".to_owned());
         let same = |(first, _): &&mut (&Warning, Vec<String>)| {
             first.severity == one.severity && first.id == one.id && first.text == one.text
         };
@@ -177,6 +184,7 @@ fn findings(status: &Status, all: &[Warning]) -> String {
     let row = |(one, of): &(&Warning, Vec<String>)| {
         let Warning { severity, id, text, remedy, .. } = one;
         let of = match of.len() {
+            1 => who(status, one),
             FEW.. if *severity != Severity::Error => format!("{} controllers", of.len()),
             _ => of.join(", "),
         };
