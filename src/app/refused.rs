@@ -54,6 +54,9 @@ pub enum PlayError {
         .0.join(", ")
     )]
     Moving(Vec<String>),
+    /// Controllers that drive other axes than their seats have: name, what they drive, what the seat has.
+    #[error("{}; nothing was sent", axes(.0))]
+    Axes(Vec<(String, u16, usize)>),
     /// Seats that do not tell where all of their axes are, and cannot be known to have come to park.
     #[error(
         "{}: does not report the positions of all its axes, and cannot be brought to park for certain: it does not ack, or its longest \
@@ -82,6 +85,16 @@ fn others(found: &[(String, u16)]) -> String {
         format!("{name} got {more} datagrams (DP34) that were not sent from here")
     };
     found.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+fn axes(found: &[(String, u16, usize)]) -> String {
+    let one = |(name, drives, axes): &(String, u16, usize)| {
+        format!(
+            "{name} works with {drives} axes (PA02), but its seat here has {axes}: give it axes={drives} and a cue for as many (--to), \
+             a seat type of {drives} (--config), or set PA02 = {axes} if it has the motors"
+        )
+    };
+    found.iter().map(one).collect::<Vec<_>>().join("\n")
 }
 
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {

@@ -16,9 +16,10 @@ use super::runtime::RuntimeHandle;
 use super::staged::StagedShow;
 use crate::belief::{FRESH, KnownPose, LaneEvidence, Reading};
 use crate::drive::Lane;
+use crate::health::Why;
 use crate::motion::Slot;
 use crate::plan::slow_park_time;
-use crate::rt::{Command, Live, News, NewsIn};
+use crate::rt::{Command, Live, News, NewsIn, Row};
 use crate::state::{Event, Finding, Readiness, State, Transition};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
@@ -119,6 +120,7 @@ impl PlayScript {
         let _ = realtime::normal_priority();
         if reads {
             self.read_positions();
+            self.look_at_axes()?;
         }
         if holds {
             self.make_sure()?;
@@ -193,6 +195,19 @@ impl PlayScript {
             self.handle.live.want(now);
             self.wait_until(now + READ_WAIT, all_rest);
         }
+    }
+
+    /// Refuses controllers that said that they drive other axes than their seats have.
+    fn look_at_axes(&self) -> Result<(), PlayError> {
+        let config = &self.handle.config;
+        let other = |(lane, row): (usize, Row)| match row.why {
+            Why::OtherAxes { controller, drives } if controller == lane => {
+                Some((config.controllers[lane].name.clone(), drives, config.controllers[lane].seat.axes))
+            }
+            _ => None,
+        };
+        let other: Vec<_> = self.handle.live.table().into_iter().enumerate().filter_map(other).collect();
+        if other.is_empty() { Ok(()) } else { Err(PlayError::Axes(other)) }
     }
 
     /// Moves nothing: only makes sure that every seat tells that it stands at its park pose, to a pulse.

@@ -92,6 +92,8 @@ pub(crate) enum Evidence {
     Count(u16),
     /// It speaks in a way that nobody here can read.
     Unreadable,
+    /// It drives so many axes (PA02), which are not those that its frames lead.
+    OtherAxes(u16),
     /// What it is.
     Seen(Seen),
     /// The reply code of its answer.
@@ -145,8 +147,6 @@ pub(crate) struct Seen {
     pub(crate) sways: bool,
     /// It stands at park, to a pulse.
     pub(crate) at_park: bool,
-    /// Frames would lead axes that nobody here reads.
-    pub(crate) leads_more_axes: bool,
 }
 
 impl Peer {

@@ -54,9 +54,9 @@ impl FaultLatch {
         }
     }
 
-    /// It drives more axes than its seat type has.
-    pub(super) fn on_more_axes(&mut self, drives: u16) {
-        self.on_fault(Why::MoreAxes { controller: self.controller, drives });
+    /// It drives other axes than its frames lead.
+    pub(super) fn on_other_axes(&mut self, drives: u16) {
+        self.on_fault(Why::OtherAxes { controller: self.controller, drives });
     }
 
     /// It answers with registers that nobody here can read.

@@ -110,8 +110,8 @@ pub enum Why {
     Refuses(usize),
     /// This controller answers with registers of 32 bits.
     Wide(usize),
-    /// This controller drives more axes than its seat type has (PA02): frames would lead those, too.
-    MoreAxes {
+    /// This controller drives fewer axes than its seat type has, or more, which frames would lead, too (PA02).
+    OtherAxes {
         /// Which.
         controller: usize,
         /// How many it drives.
@@ -145,7 +145,7 @@ impl Why {
             | Self::Unsteady(controller)
             | Self::Unread(controller)
             | Self::Ambiguous(controller)
-            | Self::MoreAxes { controller, .. }
+            | Self::OtherAxes { controller, .. }
             | Self::Outside { controller, .. }
             | Self::EmergencyStop(controller)
             | Self::HeldUntilReset(controller)

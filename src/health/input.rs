@@ -32,8 +32,8 @@ pub(crate) enum HealthInput {
     Wide(usize),
     /// [`HealthTable::on_sighting`].
     Seen(usize, Sighting, MonoTime),
-    /// [`HealthTable::on_more_axes`].
-    MoreAxes(usize, u16),
+    /// [`HealthTable::on_other_axes`].
+    OtherAxes(usize, u16),
     /// [`HealthTable::on_count`].
     Count(usize, u16),
     /// [`HealthTable::on_moved`].
@@ -69,7 +69,7 @@ impl HealthInput {
             | Self::LostZero(of)
             | Self::Wide(of)
             | Self::Seen(of, ..)
-            | Self::MoreAxes(of, _)
+            | Self::OtherAxes(of, _)
             | Self::Count(of, _)
             | Self::Moved(of)
             | Self::FellOut(of, _)
@@ -96,7 +96,7 @@ impl HealthTable {
             HealthInput::LostZero(controller) => self.on_lost_zero(controller),
             HealthInput::Wide(controller) => self.on_wide_registers(controller),
             HealthInput::Seen(controller, sighting, at) => self.on_sighting(controller, &sighting, at),
-            HealthInput::MoreAxes(controller, drives) => self.on_more_axes(controller, drives),
+            HealthInput::OtherAxes(controller, drives) => self.on_other_axes(controller, drives),
             HealthInput::Count(controller, packets) => self.on_count(controller, packets),
             HealthInput::Moved(controller) => self.on_moved(controller),
             HealthInput::FellOut(controller, why) => self.on_fell_out(controller, why),

@@ -199,9 +199,9 @@ impl HealthTable {
         self.members[controller].on_sighting(sighting, at);
     }
 
-    /// A controller drives more axes than its seat type has, and frames have places for them.
-    pub(crate) fn on_more_axes(&mut self, controller: usize, drives: u16) {
-        self.members[controller].faults.on_more_axes(drives);
+    /// A controller drives so many axes, which are not those that its frames lead.
+    pub(crate) fn on_other_axes(&mut self, controller: usize, drives: u16) {
+        self.members[controller].faults.on_other_axes(drives);
     }
 
     /// The packet counter of a controller, which was read while frames go there. To be told before the sending of all that it

@@ -63,7 +63,7 @@ impl Why {
                  (`kinocue decode --dialect imax`) to the maintainers of this program",
             ),
             Self::CutShort(_) => Some("wait until its position has been read"),
-            Self::MoreAxes { .. } => Some(
+            Self::OtherAxes { .. } => Some(
                 "set PA02 to the axes of the seat, or give the seat a type with as many; with the seats parked or stopped, clear",
             ),
             _ => None,
@@ -90,9 +90,10 @@ impl fmt::Display for Why {
             Self::Alarm { register, value, .. } => {
                 write!(f, "it reports a fault (0x1001): DP{register:02x} is {value}")
             }
-            Self::MoreAxes { drives, .. } => write!(
+            Self::OtherAxes { drives, .. } => write!(
                 f,
-                "PA02 = {drives}: it drives axes that its seat type does not have; they cannot be read, and frames would move them to 0"
+                "it works with {drives} axes (PA02), its seat type with others: those that it has beyond would be moved to 0, those \
+                 that it lacks would not move"
             ),
             _ => f.write_str(self.plainly()),
         }
@@ -146,7 +147,7 @@ impl Why {
             | Self::Error { .. }
             | Self::Drive { .. }
             | Self::Alarm { .. }
-            | Self::MoreAxes { .. } => "it reports this itself",
+            | Self::OtherAxes { .. } => "it reports this itself",
         }
     }
 }

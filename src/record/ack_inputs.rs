@@ -4,7 +4,7 @@ use super::ack_words::{FALLS, of, place};
 use super::cursor::Cursor;
 use crate::health::HealthInput::{
     self, Alive, Ambiguous, Answered, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew, LostZero,
-    MoreAxes, Moved, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+    Moved, OtherAxes, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
 };
 use crate::health::{Continuity, Identity, Sighting};
 use crate::motion::Pulses;
@@ -38,7 +38,7 @@ pub(super) fn write_input(out: &mut Vec<u8>, input: HealthInput) {
             put(43, controller, &of_sighting(&sighting));
             out.extend_from_slice(&at.as_nanos().to_le_bytes());
         }
-        MoreAxes(controller, drives) => put(44, controller, &drives.to_le_bytes()),
+        OtherAxes(controller, drives) => put(44, controller, &drives.to_le_bytes()),
         Count(controller, packets) => put(45, controller, &packets.to_le_bytes()),
         Moved(controller) => put(46, controller, &[]),
         FellOut(controller, why) => put(47, controller, &[place(&FALLS, &why)]),
@@ -68,7 +68,7 @@ pub(super) fn read_input(kind: u8, of: usize, from: &mut Cursor<'_>) -> Option<H
         41 => LostZero(of),
         42 => Wide(of),
         43 => Seen(of, sighting(from)?, from.time()?),
-        44 => MoreAxes(of, from.u16()?),
+        44 => OtherAxes(of, from.u16()?),
         45 => Count(of, from.u16()?),
         46 => Moved(of),
         47 => FellOut(of, *FALLS.get(usize::from(from.u8()?))?),

@@ -197,7 +197,7 @@ mod tests {
     fn what_health_was_told_reads_as_it_was() {
         use HealthInput::{
             Alive, Ambiguous, Answered, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew, LostZero,
-            MoreAxes, Moved, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+            Moved, OtherAxes, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
         };
         let (mut tap, mut ring) = ack_tap(3, Rate::from_hz(100.0));
         let identity = Identity { version: 7, minor_version: 8, work_mode: 2, axes: 3 };
@@ -217,7 +217,7 @@ mod tests {
             Seen(1, sighting(Continuity::Packets(65_535)), AT),
             Seen(1, sighting(Continuity::Answers), AT),
             Seen(1, sighting(Continuity::Mark), AT),
-            MoreAxes(1, 6),
+            OtherAxes(1, 6),
             Count(1, 40_000),
             Moved(1),
             FellOut(1, Fall::Stale),

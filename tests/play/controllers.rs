@@ -65,6 +65,19 @@ fn a_seat_that_stands_elsewhere_is_led_to_park_and_then_rides_though_another_con
 }
 
 #[test]
+fn nothing_is_sent_to_a_controller_that_drives_other_axes_than_the_cue_has_for_its_seat() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let run = play(&folder.nod(&[0.1; 6]), &sim.to(), &[]);
+    assert_eq!(run.code, Some(65), "{run:?}");
+    let told =
+        "c1 works with 3 axes (PA02), but its seat here has 6: give it axes=3 and a cue for as many (--to)";
+    assert!(run.stderr.contains(told), "{run:?}");
+    assert!(!run.stderr.contains("lost"), "{run:?}");
+    let seen = sim.end();
+    assert_eq!(seen.controllers[0]["motion"], 0, "{:?}", seen.controllers);
+}
+
+#[test]
 fn an_emergency_stop_is_told_by_whatever_answers_first_and_ends_the_play_with_76() {
     // It has looked for other masters for 0.8 s by then.
     let (folder, sim) = (Folder::new(), Sim::one(&["--estop-at", "1.3"]));

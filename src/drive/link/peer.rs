@@ -218,7 +218,6 @@ impl LinkPeer {
             rests: rests.is_some() || !self.homed,
             sways: false,
             at_park: rests.is_some_and(|reading| self.is_at_park(&reading)),
-            leads_more_axes: false,
         }
     }
 }

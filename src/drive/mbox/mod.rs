@@ -23,7 +23,7 @@ use pending::Pending;
 use position::Positions;
 use probe::Probe;
 use reads::{
-    MonitorRead::{self, FirstPositions, Inputs, MorePositions, Packets, Zero},
+    MonitorRead::{self, FirstPositions, Inputs, Mode, MorePositions, Packets, Zero},
     ZERO_KNOWN,
 };
 
@@ -49,6 +49,8 @@ pub(crate) struct MboxPeer {
     /// Axes for which its frames have places, and those of them whose registers are read.
     places: usize,
     axes: usize,
+    /// The axes that it drives, as it said last (PA02): while it has not, or they are others than its frames lead, no motion begins.
+    drives: Option<u16>,
     /// Somebody waits for a belt: its inputs are asked for while nothing moves as well.
     has_belts: bool,
     pub(super) pending: Pending,
@@ -78,6 +80,7 @@ impl MboxPeer {
             park: lane.window.park(),
             places,
             axes,
+            drives: None,
             has_belts: controller.belt_inputs != 0,
             pending: Pending::new(),
             position: Positions::new(Arc::clone(seat), first_slot, led),
@@ -97,7 +100,7 @@ impl MboxPeer {
             Need::Identity if read.first_axis().is_some() => !is_behind,
             Need::Identity => self.probe.asks(read),
             Need::Count => read == Packets && self.probe.asks(read),
-            Need::Position => read.first_axis().is_some(),
+            Need::Position => read.first_axis().is_some() || (read == Mode && self.drives.is_none()),
             Need::KeepAlive { .. } | Need::Dark => next == Some(read),
         });
         if need == Need::Identity {
@@ -178,6 +181,10 @@ impl MboxPeer {
                 out.push(Evidence::Position(self.whereabouts(Some(passing), at)));
             }
             (FirstPositions | MorePositions, None) if !others_ask => self.position.on_repeated(at),
+            (Mode, Some(_)) => {
+                self.drives = reply.values(self.dialect).get(2).or(self.drives);
+                out.extend(self.drives.filter(|drives| !self.leads_all(*drives)).map(Evidence::OtherAxes));
+            }
             (Zero, _) => out.extend(word.map(|state| Evidence::Homed(state == ZERO_KNOWN))),
             (Packets, Some(claim)) if claim.is_count => out.extend(word.map(Evidence::Count)),
             _ => {}
@@ -195,12 +202,12 @@ impl MboxPeer {
             rests: reading.rests,
             sways: reading.sways > 0.0,
             at_park: self.is_parked(&reading.pose),
-            leads_more_axes: self.leads_more_axes(sighting.identity.axes),
         })
     }
 
     fn whereabouts(&self, passing: Option<Reading>, at: MonoTime) -> Whereabouts {
-        let reading = self.position.reading(at);
+        let leads_all = self.drives.is_some_and(|drives| self.leads_all(drives));
+        let reading = self.position.reading(at).filter(|_| leads_all);
         Whereabouts {
             passing,
             told: self.position.told(),
@@ -225,9 +232,10 @@ impl MboxPeer {
         self.whereabouts(None, at)
     }
 
-    /// True if frames would lead axes of a controller that nobody here reads: it takes as many as it drives (PA02).
-    fn leads_more_axes(&self, drives: u16) -> bool {
-        usize::from(drives).min(self.places) > self.axes.max(self.seat.axes)
+    /// True if a controller that drives so many axes (PA02) takes all that its seat has of a frame, and none that nobody here reads.
+    fn leads_all(&self, drives: u16) -> bool {
+        let drives = usize::from(drives).min(self.places);
+        (self.seat.axes..=self.axes.max(self.seat.axes)).contains(&drives)
     }
 
     /// Whether a seat in that pose stands at park, to a pulse.

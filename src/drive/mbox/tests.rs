@@ -91,6 +91,7 @@ fn one_thing_at_a_time_is_asked_for_as_a_sign_of_life_and_its_zero_while_frames_
 #[test]
 fn an_answer_to_a_position_read_tells_of_three_axes_and_no_other_answer_is_one() {
     let mut peer = peer(Dialect::Smc, 6);
+    peer.drives = Some(6);
     asked(&mut peer, Need::Position, 0);
     let told = hear(&mut peer, answer(DP_POSITIONS[3], &[4, 0, 5, 0, 6, 0]), 1);
     let Some(Evidence::Position(place)) = told.get(2) else { panic!("{told:?}") };
@@ -155,12 +156,37 @@ fn its_packet_counter_is_told_where_that_alone_was_asked_for() {
 }
 
 #[test]
-fn axes_that_a_controller_drives_and_nobody_reads_are_led_where_its_frames_have_places_for_them() {
+fn a_controller_has_to_drive_the_axes_of_its_seat_and_none_that_nobody_reads_and_its_frames_have_places_for()
+{
     let mut peer = peer(Dialect::Smc, 1);
     (peer.places, peer.axes) = (3, 3);
-    assert!([1, 3, 12].into_iter().all(|drives| !peer.leads_more_axes(drives)));
+    assert_eq!([0, 1, 3, 12].map(|drives| peer.leads_all(drives)), [false, true, true, true]);
     (peer.places, peer.axes) = (10, 6);
-    assert_eq!([6, 7, 12].map(|drives| peer.leads_more_axes(drives)), [false, true, true]);
+    assert_eq!([6, 7, 12].map(|drives| peer.leads_all(drives)), [true, false, false]);
+}
+
+#[test]
+fn where_a_seat_is_counts_only_once_its_controller_has_told_that_it_drives_its_axes() {
+    let place = |told: &[Evidence]| {
+        let found =
+            told.iter().find_map(|one| if let Evidence::Position(place) = one { Some(place) } else { None });
+        found.expect("it told its positions").reading
+    };
+    let mut peer = peer(Dialect::Smc, 3);
+    assert_eq!(asked(&mut peer, Need::Position, 0), [(1, 0, 3), (0, DP_POSITIONS[0], 6)]);
+    assert_eq!(place(&hear(&mut peer, position(DP_POSITIONS[0]), 1)), None);
+    for (drives, tells) in [(2, true), (3, false)] {
+        let words = [0, 0, drives];
+        let mode = RegisterReply { channel: 1, ..answer(0, &words) };
+        asked(&mut peer, Need::Identity, 2);
+        assert_eq!(hear(&mut peer, mode, 3).contains(&Evidence::OtherAxes(drives)), tells);
+        assert_eq!(place(&hear(&mut peer, position(DP_POSITIONS[0]), 4)).is_none(), tells);
+    }
+    assert_eq!(
+        asked(&mut peer, Need::Position, 5),
+        [(0, DP_POSITIONS[0], 6)],
+        "that does not change by itself"
+    );
 }
 
 #[test]

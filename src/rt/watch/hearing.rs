@@ -66,6 +66,7 @@ impl Watch {
             Evidence::Homed(_) => {}
             Evidence::Count(packets) => self.judge(HealthInput::Count(controller, packets)),
             Evidence::Unreadable => self.judge(HealthInput::Wide(controller)),
+            Evidence::OtherAxes(drives) => self.judge(HealthInput::OtherAxes(controller, drives)),
             Evidence::Seen(seen) => self.on_seen(controller, seen, at),
             Evidence::Code(code) => {
                 observer.on_code(controller, code, at);
@@ -103,10 +104,7 @@ impl Watch {
     }
 
     fn on_seen(&mut self, controller: usize, seen: Seen, at: MonoTime) {
-        let Seen { sighting, rests, sways, leads_more_axes, .. } = seen;
-        if leads_more_axes {
-            self.judge(HealthInput::MoreAxes(controller, sighting.identity.axes));
-        }
+        let Seen { sighting, rests, sways, .. } = seen;
         // A vibration ends with the next frame, and none goes to a seat while the hall sends none.
         if rests || (sways && self.live.is_moving()) || !self.stands(controller).is_looked_at() {
             self.judge(HealthInput::Seen(controller, sighting, at));
