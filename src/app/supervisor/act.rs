@@ -51,6 +51,8 @@ pub(super) enum Act {
     Tick(TickCommand),
     /// Changes what is loaded or set, and has the tick thread take up the show made of it; what it does not take is changed back.
     Stage(ShowChange),
+    /// Drops the cue.
+    Unload,
     /// A failure from here on has these done.
     Otherwise(Vec<Self>),
     /// Fails.

@@ -48,6 +48,7 @@ impl Supervisor {
         match act {
             Act::Tick(command) => self.give(command, Undo::Nothing),
             Act::Stage(change) => self.stage(change),
+            Act::Unload => self.hall.cued = None,
             Act::TellReadiness => {
                 if let Some(readiness) = self.features.readiness.tell(&self.hall) {
                     self.give(TickCommand::Event(Event::Readiness(readiness)), Undo::Readiness);

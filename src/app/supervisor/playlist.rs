@@ -38,6 +38,8 @@ pub(super) struct Onward {
     follows: bool,
     /// It came while the seats moved once more: it is taken up when they rest.
     waits: Option<(usize, Box<ProvedShow>)>,
+    /// Why an entry is not loaded that was to follow or to start by itself, until something is loaded or starts.
+    pub(super) failed: Option<String>,
     /// The entry in whose part of the reel the film was when that was heeded last: it is entered once.
     reel: Option<usize>,
 }
@@ -112,7 +114,11 @@ impl Onward {
         hall: &HallContext,
     ) -> Result<Vec<Act>, Problem> {
         let start = self.start.take();
-        let cued = cued?;
+        let cued = match cued {
+            Ok(cued) => cued,
+            Err(problem) if start.is_none() && !self.follows => return Err(problem),
+            Err(problem) => return Ok(self.fail(entry, start, &problem, hall)),
+        };
         if start.is_none()
             && let Err(problem) = hall.may("load")
         {
@@ -127,6 +133,24 @@ impl Onward {
         let mut acts = vec![Act::Stage(ShowChange::Cue(cued, Some(entry_settings(list, hall)?)))];
         acts.extend(start.into_iter().flat_map(starting));
         Ok(acts)
+    }
+
+    /// An entry that nobody selected has no cue: what played before it is not to be played again in its place.
+    fn fail(
+        &mut self,
+        entry: usize,
+        start: Option<Start>,
+        problem: &Problem,
+        hall: &HallContext,
+    ) -> Vec<Act> {
+        let Some(list) = &mut self.list else { return Vec::new() };
+        let what = if start.is_some() { "did not start" } else { "is not loaded" };
+        self.failed = Some(format!("entry {} of {} {what}: {problem}", entry + 1, list.id));
+        if hall.may("load").is_err() {
+            return Vec::new();
+        }
+        list.current = entry;
+        vec![Act::Unload]
     }
 
     /// True if what is loaded is that entry of the playlist.
@@ -233,10 +257,18 @@ impl Feature for Onward {
                 let ready = self.waits.take_if(|_| hall.may("load").is_ok());
                 out.extend(ready.map(|(entry, cued)| Act::Take(JobResult::Entry(entry, Ok(cued)))));
             }
-            SupervisorEvent::Begun(_) => (self.start, self.held, self.waits) = (None, false, None),
+            SupervisorEvent::Begun(_) => {
+                (self.start, self.held, self.waits, self.failed) = (None, false, None, None);
+            }
             SupervisorEvent::Clock(wall) => out.extend(self.heed_schedule(wall, hall)),
             SupervisorEvent::Round(_) => out.extend(self.heed_reel(hall)),
-            SupervisorEvent::Done(_) => {}
+            SupervisorEvent::Done(desired) => {
+                let loads = matches!(
+                    desired.ask,
+                    Command::Load { .. } | Command::Playlist { .. } | Command::Select { .. }
+                );
+                self.failed.take_if(|_| loads);
+            }
         }
     }
 }

@@ -50,6 +50,7 @@ impl StatusParts<'_> {
         let of_the_film = hall.film.iter().flat_map(|table| table.read().warnings());
         warnings.extend(of_the_film.map(|sentence| in_two("film", &sentence)));
         warnings.extend(player::warnings(hall).iter().map(|trouble| in_two("player", trouble)));
+        warnings.extend(features.onward.failed.iter().map(|trouble| in_two("playlist", trouble)));
         warnings.extend(links::troubles(&hall.links).map(|trouble| in_two("link", &trouble)));
         warnings.extend(features.lasting.warnings(hall));
         let troubles = hall.recorder.status().troubles;

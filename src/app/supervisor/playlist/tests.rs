@@ -77,6 +77,28 @@ fn an_entry_goes_on_to_the_next_once_its_cue_or_the_film_that_led_it_came_to_its
 }
 
 #[test]
+fn an_entry_whose_cue_has_gone_is_named_until_something_is_loaded_and_the_one_before_is_not_played_again() {
+    let mut rig = playing();
+    let [two, away] = ["cues/two.csv", "two.csv"].map(|name| rig.folder.path().join(name));
+    std::fs::rename(&two, &away).unwrap();
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    rig.settle();
+    let status = rig.supervisor.status();
+    let warning = status.warnings.iter().find(|one| one.id == "playlist").map(|one| one.text.clone());
+    assert_eq!(warning.as_deref(), Some("entry 2 of day did not start: there is no cue two in the library"));
+    assert_eq!((rig.state(), cue(&rig), status.playlist.unwrap().current), (State::Parked, None, 1));
+    assert_eq!(
+        rig.ask(Command::Arm { seats_empty: false }).unwrap_err().detail,
+        "cannot arm while parked: no cue is loaded"
+    );
+    std::fs::rename(&away, &two).unwrap();
+    let status = rig.ask(Command::Select { entry: 1 }).unwrap();
+    assert!(status.warnings.iter().all(|one| one.id != "playlist"), "{:?}", status.warnings);
+    assert_eq!(cue(&rig), Some("two"));
+}
+
+#[test]
 fn an_entry_whose_film_ended_or_left_in_the_midst_of_its_cue_goes_on_to_nothing() {
     for why in [ParkCause::FilmCutShort, ParkCause::CueLeft, ParkCause::HeldTooLong] {
         let mut rig = playing();
