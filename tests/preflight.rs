@@ -125,6 +125,7 @@ fn settings_of_the_factory_are_refused_in_sentences() {
     let said = preflight(2, &tos.iter().map(String::as_str).collect::<Vec<_>>());
     assert_eq!(said.exit, 1);
     for sentence in [
+        "`kinocue register write PA93=20 --keep` and the same --to or --config, while no service runs",
         "FAIL estop-disabled: all 2: PA90 = 0: bit 0 is clear, so the controller ignores its emergency stop inputs",
         "FAIL estop-no-input: all 2: PA92 = 0: no input is an emergency stop",
         "FAIL estop-resumes: all 2: PA91 = 0: the seat holds when the button is pressed, and moves on by itself",

@@ -262,7 +262,7 @@ impl Why {
             }
             Self::NoCue => "load one",
             Self::NotProved => "check it against the seats",
-            Self::NotPreflighted => "run it",
+            Self::NotPreflighted => "run it, after correcting what it found",
             Self::NotArmed => "arm first",
             Self::PlaysAlready => "seek to another position in it",
             Self::PausedNow => "resume, or park first",

@@ -4,6 +4,10 @@ use super::hall::HallContext;
 use super::preflighted::Preflighted;
 use crate::state::Readiness;
 
+/// What is next where preflight failed.
+pub(super) const CORRECT: &str = "correct each error that preflight found, or accept it by name in the configuration \
+                                  (accept_findings), or disable its seat; then run preflight again";
+
 /// What preflight came to, and what the tick thread was told.
 #[derive(Debug, Default)]
 pub(super) struct ReadinessCheck {
@@ -16,6 +20,11 @@ impl ReadinessCheck {
     pub(super) fn has_passed(&self, group: &str, hall: &HallContext) -> bool {
         let of_group = |lane: usize| hall.config.controllers[lane].group == group;
         self.preflighted.as_ref().is_some_and(|it| it.has_passed(of_group))
+    }
+
+    /// True if it found what fails at a seat that takes part.
+    pub(super) fn has_failed(&self, hall: &HallContext) -> bool {
+        self.preflighted.as_ref().is_some_and(|it| !it.has_passed(|lane| hall.settings.is_on(lane)))
     }
 
     /// What the tick thread is to be told; `None` if it knows.

@@ -4,6 +4,7 @@ use jiff::Zoned;
 
 use super::features::Features;
 use super::hall::HallContext;
+use super::readiness::CORRECT;
 use super::seat_places::SeatPlaces;
 use super::{belts, film};
 use crate::app::links;
@@ -105,6 +106,9 @@ impl StatusParts<'_> {
     fn next(&self) -> String {
         let next = self.hall.mirror.next;
         match self.hall.cued.as_ref().and_then(|cued| cued.left_at) {
+            _ if next == Next::Preflight && self.features.readiness.has_failed(self.hall) => {
+                CORRECT.to_owned()
+            }
             Some(film) if next == Next::Go => format!("{next}; or go from {film}, where it was left"),
             Some(film) if next == Next::Arm => format!("{next}; it can go from {film}, where it was left"),
             _ => next.to_string(),

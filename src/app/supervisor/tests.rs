@@ -6,6 +6,7 @@ use std::thread::JoinHandle;
 
 use super::homing::Homing;
 use super::job::{Job, JobResult};
+use super::preflighted::Preflighted;
 use super::testing::Rig;
 use super::*;
 use crate::control::{Code, Command, LevelsChange};
@@ -388,4 +389,16 @@ fn an_entry_that_is_about_to_start_by_itself_does_not_in_a_hall_that_begins_to_c
     rig.supervisor.hall.leave.store(false, Ordering::Release);
     rig.does(go());
     assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
+}
+
+#[test]
+fn after_a_preflight_that_failed_the_next_is_to_correct_what_it_found_and_not_to_run_it_again() {
+    let mut rig = Rig::parked();
+    rig.supervisor.features.readiness.preflighted = Some(Preflighted::failing_at(1, 2));
+    rig.supervisor.procedures.add(Vec::new());
+    rig.settle();
+    let status = rig.supervisor.status();
+    assert!(status.next.starts_with("correct each error that preflight found"), "{}", status.next);
+    rig.supervisor.features.readiness.preflighted = None;
+    assert_eq!(rig.supervisor.status().next, "run preflight, then arm");
 }

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use super::readiness::CORRECT;
 use super::status::StatusParts;
 use super::{belts, player, recorded};
 use crate::app::links;
@@ -121,11 +122,10 @@ impl StatusParts<'_> {
     }
 
     fn of_preflight(&self) -> Option<Warning> {
-        let (text, severity) = match &self.features.readiness.preflighted {
-            None => ("preflight has not been run since the program started", Severity::Info),
-            Some(it) if !it.has_passed(|lane| self.hall.settings.is_on(lane)) => {
-                ("preflight failed", Severity::Error)
-            }
+        let readiness = &self.features.readiness;
+        let (text, remedy, severity) = match &readiness.preflighted {
+            None => ("preflight has not been run since the program started", "run preflight", Severity::Info),
+            Some(_) if readiness.has_failed(self.hall) => ("preflight failed", CORRECT, Severity::Error),
             Some(_) => return None,
         };
         Some(Warning {
@@ -133,7 +133,7 @@ impl StatusParts<'_> {
             severity,
             controller: None,
             text: text.to_owned(),
-            remedy: "run preflight".to_owned(),
+            remedy: remedy.to_owned(),
         })
     }
 }

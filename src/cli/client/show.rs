@@ -161,11 +161,12 @@ pub(in crate::cli) fn preflight(server: &ServerArgs) -> Result<Exit, Failure> {
     Ok(if *passed { Exit::Done } else { Exit::CheckFailed })
 }
 
-/// A row for each thing that was found, with those of whom it was. Of more than a few the number is enough, unless it fails.
+/// A row for each thing that was found, with those of whom it was: one with its place, several by their names. Of more than a few the
+/// number is enough, unless it fails.
 fn findings(status: &Status, all: &[Warning]) -> String {
     let mut rows: Vec<(&Warning, Vec<String>)> = Vec::new();
     for one in all {
-        let who = who(status, one);
+        let who = one.controller.clone().unwrap_or_else(|| "-".to_owned());
         let same = |(first, _): &&mut (&Warning, Vec<String>)| {
             first.severity == one.severity && first.id == one.id && first.text == one.text
         };
@@ -177,6 +178,7 @@ fn findings(status: &Status, all: &[Warning]) -> String {
     let row = |(one, of): &(&Warning, Vec<String>)| {
         let Warning { severity, id, text, remedy, .. } = one;
         let of = match of.len() {
+            1 => who(status, one),
             FEW.. if *severity != Severity::Error => format!("{} controllers", of.len()),
             _ => of.join(", "),
         };

@@ -36,6 +36,8 @@ pub(super) struct ControllerChecks {
     name: String,
     row: Option<String>,
     address: String,
+    #[serde(skip)]
+    is_on_link: bool,
     answered: bool,
     /// Of reads; null if none was answered.
     round_trip_us: Option<RoundTrip>,
@@ -118,13 +120,17 @@ impl PreflightReport {
             table.add_row(controller.row());
         }
         let list: String = self.groups().iter().map(|group| group.text(self.controllers.len())).collect();
-        let hint = if self.failed + self.warned > 0 {
-            "\nSet registers with `kinocue register write PA93=20 --keep`; `kinocue preflight --explain CHECK` says why \
-             each matters.\n"
+        let set = if self.controllers.iter().any(|one| !one.is_on_link && one.finds()) {
+            "\nSet registers with `kinocue register write PA93=20 --keep` and the same --to or --config, while no service runs."
         } else {
             ""
         };
-        format!("{}\n\n{list}{hint}", table.trim_fmt())
+        let why = if self.failed + self.warned > 0 {
+            "\n`kinocue preflight --explain CHECK` says why each matters.\n"
+        } else {
+            ""
+        };
+        format!("{}\n\n{list}{set}{why}", table.trim_fmt())
     }
 
     /// Findings that are alike, with all whom they are about; the gravest first, what is accepted behind all.
@@ -151,6 +157,7 @@ impl ControllerChecks {
             name: controller.name.clone(),
             row: controller.row.clone(),
             address: controller.connection.address.to_string(),
+            is_on_link: false,
             answered: subject.answered(),
             round_trip_us: subject.survey.and_then(|survey| {
                 let (p50, max) = round_trip(&survey.round_trips)?;
@@ -170,6 +177,7 @@ impl ControllerChecks {
             name: controller.name.clone(),
             row: controller.row.clone(),
             address: controller.address(),
+            is_on_link: true,
             answered: subject.answered(),
             round_trip_us: None,
             registers: subject
@@ -195,6 +203,11 @@ impl ControllerChecks {
         findings: Vec<Vec<Finding>>,
     ) -> impl Iterator<Item = Self> {
         subjects.iter().zip(findings).map(|(subject, found)| Self::on_link(subject, found))
+    }
+
+    /// True if something was found that nobody accepted.
+    fn finds(&self) -> bool {
+        self.findings.iter().any(|one| one.severity > Severity::Info && one.finding.accepted.is_none())
     }
 
     /// Its line of the table.
