@@ -14,7 +14,7 @@ use crate::control::{
     ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
 use crate::rt::Row;
-use crate::state::Next;
+use crate::state::{Next, State};
 use crate::time::MonoTime;
 use crate::tracker;
 
@@ -37,6 +37,9 @@ const BOUNDS_US: [f64; 16] = [
     200_000.0,
     1_000_000.0,
 ];
+
+/// So many seats are named that will not move.
+const FEW: usize = 8;
 
 /// What the status is made of.
 #[derive(Debug, Clone, Copy)]
@@ -62,7 +65,7 @@ impl StatusParts<'_> {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             uptime_s: now.since(began).as_secs_f64(),
             state: mirror.state.into(),
-            cause: hall.cause(),
+            cause: self.cause(table),
             next: belts::next_action(hall, table).unwrap_or_else(|| self.next()),
             arm_homes: mirror.next == Next::ArmAndHome,
             may_clear: mirror.state.is_latched() || mirror.next == Next::Clear,
@@ -100,6 +103,20 @@ impl StatusParts<'_> {
             record: hall.recorder.status(),
             journal: features.records.newest(),
         }
+    }
+
+    /// Why the hall is in its state; of one that is armed also which seats that are on will not move.
+    fn cause(&self, table: &[Row]) -> String {
+        let (hall, cause) = (self.hall, self.hall.cause());
+        let stays = |&lane: &usize| table.get(lane).is_some_and(|row| !row.standing.may_move());
+        let word = |lane: usize| format!("{} {}", hall.config.controllers[lane].name, table[lane].standing);
+        let stay: Vec<String> = hall.lanes_on().filter(stays).map(word).collect();
+        if hall.mirror.state != State::Armed || stay.is_empty() {
+            return cause;
+        }
+        let (on, named) = (hall.lanes_on().count(), stay.len().min(FEW));
+        let more = if named < stay.len() { " ..." } else { "" };
+        format!("{cause}, with {} of {on} seats: {}{more}", on - stay.len(), stay[..named].join(", "))
     }
 
     /// What a person does next; where a show was left in its midst, also how it goes on from there.

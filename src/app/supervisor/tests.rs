@@ -7,11 +7,12 @@ use std::thread::JoinHandle;
 use super::homing::Homing;
 use super::job::{Job, JobResult};
 use super::preflighted::Preflighted;
-use super::testing::Rig;
+use super::testing::{Rig, row};
 use super::*;
 use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
-use crate::rt::News;
+use crate::health::HealthState;
+use crate::rt::{News, Row};
 use crate::state::{Event, Next, PlayMode, Trouble};
 use crate::time::ShowTime;
 
@@ -389,6 +390,18 @@ fn an_entry_that_is_about_to_start_by_itself_does_not_in_a_hall_that_begins_to_c
     rig.supervisor.hall.leave.store(false, Ordering::Release);
     rig.does(go());
     assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
+}
+
+#[test]
+fn whoever_arms_is_told_which_seats_will_not_move() {
+    let mut rig = Rig::parked();
+    let at = rig.supervisor.hall.now;
+    let rows = |standing| vec![row(at), Row { standing, ..row(at) }];
+    rig.supervisor.hall.live.on_table(|table| *table = rows(HealthState::Lost));
+    let status = rig.ask(Command::Arm { seats_empty: false }).unwrap();
+    assert_eq!(status.cause, "armed by the operator, with 1 of 2 seats: B1 lost");
+    rig.supervisor.hall.live.on_table(|table| *table = rows(HealthState::Rejoining));
+    assert_eq!(rig.supervisor.status().cause, "armed by the operator");
 }
 
 #[test]
