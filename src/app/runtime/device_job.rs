@@ -106,7 +106,10 @@ impl Devices<'_> {
             DeviceJob::Survey => {
                 let told = links::survey(links, config);
                 let wanted: Vec<_> = controllers.iter().map(wanted).collect();
-                let surveys = survey(&mut talk, &controllers, &wanted, &mut |_| {});
+                let reports = || live.table().iter().map(|row| row.state.reports).collect::<Vec<_>>();
+                let before = reports();
+                let mut surveys = survey(&mut talk, &controllers, &wanted, &mut |_| {});
+                count_reports(&mut surveys, &before, &reports());
                 let mut told: BTreeMap<_, _> = told.iter().collect();
                 for link in &config.links {
                     // The thread of a link that told nothing has ended.
@@ -128,6 +131,13 @@ impl Devices<'_> {
         line.open(false);
         line.hush(false);
         finding
+    }
+}
+
+/// The ack thread keeps what controllers report unasked: a survey counts what came meanwhile. Those on the network come first.
+fn count_reports(surveys: &mut [Survey], before: &[u64], now: &[u64]) {
+    for ((survey, before), now) in surveys.iter_mut().zip(before).zip(now) {
+        survey.reported.reports += now - before;
     }
 }
 
@@ -174,6 +184,13 @@ mod tests {
     use crate::net::Ports;
     use crate::rt;
     use crate::wire::{Code, MAX_LEN, ReadRequest};
+
+    #[test]
+    fn reports_that_came_to_the_ack_thread_while_controllers_were_asked_are_counted() {
+        let mut surveys = vec![Survey::default(); 2];
+        count_reports(&mut surveys, &[7, 9], &[10, 9]);
+        assert_eq!([0, 1].map(|lane| surveys[lane].reported.reports), [3, 0]);
+    }
 
     #[test]
     fn once_a_homing_is_called_off_no_order_goes_out_and_its_seats_are_still_watched() {
