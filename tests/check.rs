@@ -495,3 +495,21 @@ fn the_bench_ride_fits_the_seats_of_all_examples() {
         assert_eq!(run.code, Some(0), "{example}: {}{}", run.stdout, run.stderr);
     }
 }
+
+#[test]
+fn a_film_that_leads_no_cue_is_worth_a_note() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hall = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/systemd/simulated.toml"))
+        .expect("it ships");
+    let checked = |name: &str, sync: &str| {
+        kinocue(&["check", &write(folder.path(), name, &format!("{hall}\n[sync]\n{sync}\n"))])
+    };
+    let run = checked("without.toml", "sources = [\"mpv:/run/film.sock\"]");
+    assert_eq!(run.code, Some(0), "{}", run.stdout);
+    assert!(run.stdout.contains("[sync] has no start: a cue follows the film only where"), "{}", run.stdout);
+    let run = checked(
+        "with.toml",
+        "sources = [\"mpv:/run/film.sock\"]\nstart = \"00:00:00:00\"\nfilm_fps = \"25\"",
+    );
+    assert!(run.code == Some(0) && !run.stdout.contains("[sync] has no start"), "{}", run.stdout);
+}

@@ -206,6 +206,10 @@ impl CheckReport {
     fn hall(&mut self, path: &Path, hall: &Config) {
         let before = self.exits.len();
         self.links(path, hall);
+        if hall.film.is_none() && hall.sync.as_ref().is_some_and(|sync| !sync.leads) {
+            let note = "[sync] has no start: a cue follows the film only where its entry of a playlist has film, else it starts at once";
+            self.notes.push(format!("{}: {note}", plain::path(path)));
+        }
         if self.exits.len() == before {
             self.passes(path, &hall_in_words(hall));
         }

@@ -9,6 +9,7 @@ use super::job::{Job, JobResult};
 use super::preflighted::Preflighted;
 use super::testing::{Rig, row};
 use super::*;
+use crate::app::film::{FilmTable, SharedTable};
 use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
 use crate::health::HealthState;
@@ -414,4 +415,15 @@ fn after_a_preflight_that_failed_the_next_is_to_correct_what_it_found_and_not_to
     assert!(status.next.starts_with("correct each error that preflight found"), "{}", status.next);
     rig.supervisor.features.readiness.preflighted = None;
     assert_eq!(rig.supervisor.status().next, "run preflight, then arm");
+}
+
+#[test]
+fn a_cue_that_follows_no_film_in_a_hall_that_has_one_is_worth_a_warning() {
+    let mut rig = Rig::parked();
+    let warned = |rig: &Rig| rig.supervisor.status().warnings.iter().any(|one| one.id == "no-film");
+    assert!(!warned(&rig), "there is no [sync]");
+    rig.supervisor.hall.film = Some(SharedTable::of(FilmTable::default()));
+    assert!(warned(&rig));
+    rig.supervisor.hall.cued = None;
+    assert!(!warned(&rig));
 }

@@ -51,6 +51,7 @@ impl StatusParts<'_> {
         let of_the_film = hall.film.iter().flat_map(|table| table.read().warnings());
         warnings.extend(of_the_film.map(|sentence| in_two("film", &sentence)));
         warnings.extend(player::warnings(hall).iter().map(|trouble| in_two("player", trouble)));
+        warnings.extend(self.of_no_film());
         warnings.extend(features.onward.failed.iter().map(|trouble| in_two("playlist", trouble)));
         warnings.extend(links::troubles(&hall.links).map(|trouble| in_two("link", &trouble)));
         warnings.extend(features.lasting.warnings(hall));
@@ -119,6 +120,21 @@ impl StatusParts<'_> {
 
     fn of_the_machine(&self) -> impl Iterator<Item = Warning> {
         self.hall.granted.refusals.iter().map(|refusal| in_two("not-real-time", refusal))
+    }
+
+    /// A cue that follows nothing in a hall whose film others show: it starts as soon as it is let go.
+    fn of_no_film(&self) -> Option<Warning> {
+        let Self { hall, features, .. } = *self;
+        let entries = features.onward.list.iter().flat_map(|list| &list.playlist.entries);
+        let is_meant =
+            features.seats.test.is_some() || entries.into_iter().any(|entry| entry.film.begin.is_some());
+        let follows = |cued: &super::show::ProvedShow| cued.film.is_some();
+        if hall.film.is_none() || hall.player.is_some() || is_meant || hall.cued.as_ref().is_none_or(follows)
+        {
+            return None;
+        }
+        let text = "the cue that is loaded follows no film, and starts at once when it is let go: [sync] has no start";
+        Some(in_two("no-film", &format!("{text}; set start in [sync], or film in its entry of the playlist")))
     }
 
     fn of_preflight(&self) -> Option<Warning> {
