@@ -32,10 +32,21 @@ impl MpvPlayer {
         let now = Monotonic.now();
         let mut client = MpvClient::new(now);
         let ended = UnixStream::connect(&self.socket).and_then(|stream| self.converse(stream, &mut client));
-        self.told.note(|notes| notes.trouble = ended.err().map(|error| error.to_string()));
+        self.told.note(|notes| notes.trouble = ended.err().map(|error| self.trouble(&error)));
         let mut is_heard = true;
         client.hear_end(Monotonic.now(), &mut |what| is_heard &= self.tell(what));
         is_heard && self.told.waits()
+    }
+
+    /// What is wrong, for a person.
+    fn trouble(&self, error: &io::Error) -> String {
+        match error.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::ConnectionRefused => {
+                let socket = self.socket.display();
+                format!("no player is there; start mpv with --input-ipc-server={socket}")
+            }
+            _ => error.to_string(),
+        }
     }
 
     fn converse(&self, mut stream: UnixStream, client: &mut MpvClient) -> io::Result<()> {

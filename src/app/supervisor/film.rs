@@ -5,6 +5,7 @@ use super::hall::HallContext;
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::control::{Code, FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
 use crate::film::point::FilmState;
+use crate::time::ShowTime;
 
 /// The film by the source that leads, or by the first while none does.
 pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
@@ -31,6 +32,18 @@ pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
         switches: table.switches,
         joins: hall.live.film_joins(),
         sources: table.sources.iter().map(|row| source(row, begin_s)).collect(),
+    }
+}
+
+/// On which side of the cue that waits for it the film is, where it is outside; in words that do not change as it runs.
+pub(super) fn outside(hall: &HallContext) -> Option<&'static str> {
+    let (cued, table) = (hall.cued.as_ref()?, hall.film.as_ref()?.read());
+    let row = table.sources.get(table.leads.unwrap_or(0))?;
+    let at = ShowTime::from_secs_f64(row.media_s?).since(cued.film?.begin);
+    match at {
+        at if at < ShowTime::ZERO => Some("it is before the beginning of the cue"),
+        at if at > cued.timeline.duration() => Some("it is behind the end of the cue"),
+        _ => None,
     }
 }
 

@@ -14,7 +14,7 @@ use crate::control::{
     ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
 use crate::rt::Row;
-use crate::state::{Next, State};
+use crate::state::{Next, PlayMode, State};
 use crate::time::MonoTime;
 use crate::tracker;
 
@@ -105,9 +105,14 @@ impl StatusParts<'_> {
         }
     }
 
-    /// Why the hall is in its state; of one that is armed also which seats that are on will not move.
+    /// Why the hall is in its state; of one that is armed also which seats that are on will not move, of one that waits where the film is.
     fn cause(&self, table: &[Row]) -> String {
         let (hall, cause) = (self.hall, self.hall.cause());
+        if hall.mirror.state == State::Playing(PlayMode::Waiting) {
+            let outside = film::outside(hall);
+            return outside
+                .map_or(cause.clone(), |side| format!("{cause}: {side}; kinocue sync shows where"));
+        }
         let stays = |&lane: &usize| table.get(lane).is_some_and(|row| !row.standing.may_move());
         let word = |lane: usize| format!("{} {}", hall.config.controllers[lane].name, table[lane].standing);
         let stay: Vec<String> = hall.lanes_on().filter(stays).map(word).collect();

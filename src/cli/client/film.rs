@@ -95,7 +95,7 @@ fn film(server: &ServerArgs) -> Result<FilmStatus, Failure> {
 fn text(film: &FilmStatus) -> String {
     let FilmStatus { state, cause, next, source, position_s, error_ms, timecode, .. } = film;
     let by = source.as_ref().map_or_else(|| ", no source leads".to_owned(), |name| format!(" by {name}"));
-    let at = position_s.map_or_else(|| "unknown".to_owned(), |at| format!("{} in the cue", time(at)));
+    let at = position_s.map_or_else(|| "unknown".to_owned(), in_the_cue);
     let label = timecode.as_ref().map_or_else(String::new, |code| format!("{code}, "));
     let error = error_ms.map_or_else(
         || "none: the seats follow no film at the moment".to_owned(),
@@ -107,8 +107,12 @@ fn text(film: &FilmStatus) -> String {
         text.extend(line.map(|line| format!("{word:<6}  {line}\n")));
     }
     let rows = film.sources.iter().map(|row| cells(row, film));
-    let header = ["", "source", "state", "timecode", "rate ppm", "sigma ms", "dBFS", "dropouts", ""];
+    let header = ["", "source", "state", "film", "rate ppm", "sigma ms", "dBFS", "dropouts", ""];
     format!("{text}\n{}", table(header, rows))
+}
+
+fn in_the_cue(at_s: f64) -> String {
+    format!("{} in the cue", time(at_s))
 }
 
 fn chosen(film: &FilmStatus) -> Option<String> {
@@ -136,7 +140,7 @@ fn cells(row: &FilmSourceStatus, film: &FilmStatus) -> [String; 9] {
         if leads { ">" } else { "" }.to_owned(),
         row.source.clone(),
         row.state.clone(),
-        row.timecode.clone().unwrap_or_else(|| row.position_s.map_or_else(|| "-".to_owned(), time)),
+        row.timecode.clone().unwrap_or_else(|| row.position_s.map_or_else(|| "-".to_owned(), in_the_cue)),
         row.rate_ppm.map_or_else(|| "-".to_owned(), |ppm| format!("{ppm:+.0}")),
         figure(row.sigma_ms, 2),
         figure(row.level_dbfs, 0),
@@ -178,6 +182,10 @@ mod tests {
         let leading = text.lines().find(|line| line.trim_start().starts_with('>')).unwrap();
         let cells: Vec<&str> = leading.split_whitespace().collect();
         assert_eq!(cells[..8], [">", "ltc:alsa:hw:2,0", "locked", "01:00:05:12", "+12", "0.03", "-18", "0"]);
+        assert!(
+            text.contains("mpv:/run/mpv.sock  ") && text.contains("00:02.280 in the cue"),
+            "a place, not a label: {text}"
+        );
         assert!(!text.contains("does not follow the film"), "{text}");
     }
 

@@ -7,11 +7,13 @@ use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::app::supervisor::testing::{Rig, hall, told};
 use crate::config::{Config, FilmSync};
 use crate::control::LevelsChange;
-use crate::film::chase::ParkCause;
+use crate::film::chase::{ChaseRules, ParkCause};
 use crate::film::point::FilmState;
 use crate::film::source::{FilmArgs, FilmSource};
 use crate::playlist::{Playlist, Schedule};
+use crate::rt::FilmStart;
 use crate::state::{Event, PlayMode};
+use crate::time::ShowTime;
 
 const JOINING: State = State::Playing(PlayMode::Joining);
 const DAY: &str = "title = \"Day\"\n[[entry]]\ncue = \"one\"\nthen = \"go\"\n[[entry]]\ncue = \"two\"\nthen = \"go\"\n\
@@ -378,4 +380,20 @@ fn no_film_has_a_cue_loaded_that_is_armed_or_moves_or_where_a_person_has_loaded_
     goes_on.onward.fetch(1, Some(Start::GoOn));
     assert!(goes_on.onward.enter(2, &goes_on.hall).is_empty());
     assert_eq!((goes_on.at(70.0, FilmState::Locked), goes_on.onward.start), (None, Some(Start::GoOn)));
+}
+
+#[test]
+fn a_show_that_waits_says_on_which_side_of_its_cue_the_film_is() {
+    let mut hall = hall(State::Parked, "one");
+    let begin = ShowTime::from_millis(60_000);
+    let end = hall.cued.as_ref().unwrap().timeline.duration();
+    hall.cued.as_mut().unwrap().film = Some(FilmStart { begin, rules: ChaseRules::until(end) });
+    let mut side = |media_s| {
+        let row = SourceRow { media_s: Some(media_s), ..SourceRow::named("ltc", FilmState::Locked) };
+        hall.film = Some(SharedTable::of(FilmTable { sources: vec![row], ..FilmTable::default() }));
+        crate::app::supervisor::film::outside(&hall)
+    };
+    assert_eq!(side(52.5), Some("it is before the beginning of the cue"));
+    assert_eq!(side(61.0), None);
+    assert_eq!(side(66.0), Some("it is behind the end of the cue"));
 }
