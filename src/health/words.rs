@@ -34,7 +34,7 @@ impl HealthState {
             Self::Error => {
                 "clear the error at the controller; then, with the seats parked or stopped, clear the hall"
             }
-            Self::Excluded => "park, then home it with nobody on the seat",
+            Self::Excluded => "home it with nobody on the seat, while the hall is parked or recovering",
             Self::Unwatched => "watch the seat",
         }
     }

@@ -275,7 +275,9 @@ impl Why {
             Self::Latched => "clear it first",
             Self::SeatsAnywhere => "park or home first",
             Self::ArmedNow => "disarm first",
-            Self::StillPressed => "release its button, or disable a seat that cannot report it",
+            Self::StillPressed => {
+                "release its button; where none is pressed, reset the controller, or disable a seat that cannot report it"
+            }
             Self::StillWrong => "clear the error at the controller, or disable its seat",
             Self::NothingToClear => "go on",
         }
