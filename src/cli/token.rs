@@ -81,7 +81,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if args.json {
         print::json(&token)?;
     } else {
-        print::tell("For the configuration:\n");
+        print::tell(
+            "For the configuration, after which the service is restarted (a reload does not take [api]):\n",
+        );
         print::tell(&token.config);
         print::tell("\nThe token, shown only this once:");
         print::out(&format!("{}\n", token.token))?;

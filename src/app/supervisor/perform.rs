@@ -82,7 +82,11 @@ impl Supervisor {
             // Where it finds no room the controller is not looked at, and stays out.
             Act::Order(order) => drop(self.runtime.orders.push(order)),
             Act::Reload => {
-                self.reload = Some(reload(&self.hall, &self.ports.config)?);
+                let config = reload(&self.hall, &self.ports.config)?;
+                if config.api != self.hall.config.api {
+                    self.note("[api] has changed; restart the service, a reload does not take it".to_owned());
+                }
+                self.reload = Some(config);
                 self.hall.close();
             }
             Act::Note(note) => self.note(note),

@@ -126,7 +126,13 @@ pub(super) fn run(command: &ShowCommand) -> Result<Exit, Failure> {
         ShowCommand::Seek(SeekArgs { at, server }) => {
             return server.act("/api/v1/show/seek", &json!({ "position_s": at.as_secs_f64() }));
         }
-        ShowCommand::Reload(server) => return server.act("/api/v1/reload", &json!({})),
+        ShowCommand::Reload(server) => {
+            let exit = server.act("/api/v1/reload", &json!({}))?;
+            print::tell(
+                "kinocue: the hall now opens with the new configuration; kinocue watch shows when it is ready",
+            );
+            return Ok(exit);
+        }
     };
     server.act(&format!("/api/v1/show/{word}"), &json!({}))
 }
