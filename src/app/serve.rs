@@ -198,6 +198,8 @@ fn serve_halls(
     let began = Monotonic.now();
     let mut config = Arc::new(config);
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
+    // A person puts playlists there. Where it cannot be made, whoever loads one is told.
+    let _ = fs::create_dir_all(config.playlists());
     let mut numbers = Numbers::new();
     let mut film = HallFilm::default();
     let mut runtime = open(&config, crashed, &numbers, &signals.leave, &mut film)?;

@@ -24,6 +24,24 @@ fn a_start_goes_from_boot_to_parked_and_moves_nothing() {
 }
 
 #[test]
+fn the_folder_for_playlists_is_made_where_it_is_missing() {
+    let mut hall = Hall::closed(&[], |config| config);
+    fs::remove_dir(hall.path("playlists")).unwrap();
+    hall.serve();
+    assert!(hall.path("playlists").is_dir());
+}
+
+#[test]
+fn a_controller_that_works_with_other_axes_than_its_seat_has_is_in_error_from_the_start() {
+    let mut hall = Hall::closed(&["--pa", "02=2"], |config| config);
+    hall.serve();
+    let status = hall.wait(|status| status["controllers"][0]["health"] == "error");
+    let why = status["controllers"][0]["why"].as_str().unwrap();
+    assert!(why.starts_with("it works with 2 axes (PA02)"), "{why}");
+    assert_eq!(hall.end().motion(), 0);
+}
+
+#[test]
 fn after_a_crash_in_mid_show_nothing_moves_until_a_person_parks_the_seats() {
     let mut hall = Hall::open();
     hall.play("night");

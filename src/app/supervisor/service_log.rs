@@ -46,7 +46,8 @@ impl ServiceLog {
             };
             let Warning { id, controller, text, remedy, .. } = warning;
             let who = controller.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
-            let line = Line::new(priority, id.clone(), format!("{who}{text}; {remedy}"));
+            let next = if remedy.is_empty() { String::new() } else { format!("; {remedy}") };
+            let line = Line::new(priority, id.clone(), format!("{who}{text}{next}"));
             self.log.say(match controller {
                 Some(name) => line.with("controller", name.clone()),
                 None => line,
