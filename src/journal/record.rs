@@ -119,7 +119,7 @@ pub struct Outcome {
     pub end: String,
     /// How.
     pub result: Ending,
-    /// Faults and other events, in words, in order; at most 100 are kept.
+    /// Faults, seats that fell out and other events, in words, in order, each with its time of the day; at most 100 are kept.
     pub events: Vec<String>,
     /// Ticks that sent.
     pub ticks: u64,

@@ -39,7 +39,7 @@ fn show(show: &ReportShown) -> Vec<String> {
         record.sha256.clone(),
         plain(record.title.as_deref().unwrap_or_default()),
         plain(place.map_or("", |place| &place.id)),
-        place.map_or_else(String::new, |place| place.entry.to_string()),
+        place.map_or_else(String::new, |place| (place.entry + 1).to_string()),
         record.level.to_string(),
         record.vibration.to_string(),
         record.trim_ms.to_string(),
