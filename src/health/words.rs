@@ -62,6 +62,10 @@ impl Why {
                 "this IMAX answers as its manual says, which no other known one does: disable it, and send a capture \
                  (`kinocue decode --dialect imax`) to the maintainers of this program",
             ),
+            Self::Refuses(_) => Some(
+                "clear the error at the controller; or correct its dialect (smc, mbox): a controller refuses frames of the other; \
+                 then, with the seats parked or stopped, clear the hall",
+            ),
             Self::CutShort(_) => Some("wait until its position has been read"),
             Self::OtherAxes { .. } => Some(
                 "set PA02 to the axes of the seat, or give the seat a type with as many; with the seats parked or stopped, clear",
@@ -162,6 +166,13 @@ impl fmt::Display for Change {
 mod tests {
     use super::*;
     use crate::motion::Pulses;
+
+    #[test]
+    fn a_remedy_can_be_done_where_it_is_told() {
+        let next = HealthState::Excluded.next();
+        assert!(!next.contains("park,"), "a hall without its zero cannot park: {next}");
+        assert!(Why::Refuses(0).next().is_some_and(|next| next.contains("dialect")));
+    }
 
     #[test]
     fn a_seat_that_says_it_is_where_it_cannot_be_is_homed_and_nobody_is_sent_to_its_cables() {
