@@ -153,9 +153,8 @@ fn play(
     let cue = timeline.cue().path().to_path_buf();
     let length = timeline.duration();
     let for_ever = show.plays == 0;
-    for controller in config.without_effects().filter(|_| uses_effects(&timeline)) {
-        let name = &controller.name;
-        print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or [effects]"));
+    for (controller, what) in config.without_effects().filter(|_| uses_effects(&timeline)) {
+        print::tell(&format!("{}: effects stay off; {what}", controller.name));
     }
     config.absent.iter().for_each(|one| tell_absent(&one.controller));
     if manner.silent {

@@ -105,9 +105,14 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
 }
 
 impl Config {
-    /// The controllers to which every effect stays off.
-    pub(crate) fn without_effects(&self) -> impl Iterator<Item = &Controller> {
-        self.controllers.iter().filter(|controller| self.allowed_outputs(controller) == 0)
+    /// The controllers to which every effect stays off, and what a person can do about it.
+    pub(crate) fn without_effects(&self) -> impl Iterator<Item = (&Controller, &'static str)> {
+        let what = |controller: &Controller| match controller.drives() {
+            Some(_) => "drives have no outputs",
+            None => "name its outputs with --effect NAME=N or [effects]",
+        };
+        let dark = self.controllers.iter().filter(|controller| self.allowed_outputs(controller) == 0);
+        dark.map(move |controller| (controller, what(controller)))
     }
 }
 

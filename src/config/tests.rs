@@ -314,7 +314,11 @@ fn effects_of_unknown_wiring_stay_off_away_from_this_machine() {
     assert_eq!(config.effect_outputs(here, "light"), Some(1 << 5));
     assert_eq!(config.allowed_outputs(here), ALL_OUTPUTS);
     assert_eq!((config.effect_outputs(there, "air"), config.allowed_outputs(there)), (Some(0), 0));
-    assert_eq!(config.without_effects().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["c2"]);
+    let dark: Vec<_> = config.without_effects().map(|(one, what)| (one.name.as_str(), what)).collect();
+    assert_eq!(dark, [("c2", "name its outputs with --effect NAME=N or [effects]")]);
+    let drives = load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/silvermax.toml"))).unwrap();
+    let dark: Vec<_> = drives.without_effects().map(|(_, what)| what).collect();
+    assert!(!dark.is_empty() && dark.iter().all(|what| *what == "drives have no outputs"), "{dark:?}");
 }
 
 #[test]
