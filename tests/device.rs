@@ -160,7 +160,7 @@ fn names_and_rows_choose_controllers_of_a_configuration() {
     assert_eq!(chosen(&["--row", "A"]), "A1 A2");
     assert_eq!(chosen(&["--name", "B1"]), "B1");
     let unknown = said(&["register", "read", "PA02", "--config", config, "--row", "C"], vec![]);
-    assert_eq!((unknown.exit, unknown.err.as_str()), (64, "kinocue: no controller is in row C\n"));
+    assert_eq!((unknown.exit, unknown.err.as_str()), (66, "kinocue: there is no row C; there are: A, B\n"));
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn nobody_is_moved_without_a_word_that_the_seats_are_empty() {
     let said = run(&farm, &["home"]);
     assert_eq!(said.exit, 64);
     assert!(said.err.contains("--seats-empty"), "{}", said.err);
-    assert_eq!(run(&farm, &["home", "nobody", "--seats-empty"]).exit, 64);
+    assert_eq!(run(&farm, &["home", "nobody", "--seats-empty"]).exit, 66);
     let outcome = farm.stop().expect("no log to fail").remove(0);
     assert_eq!(outcome.counts.received, 0);
 }

@@ -158,6 +158,7 @@ fn fickle(socket: &UdpSocket, place: impl Fn(usize) -> i32, readings: &AtomicUsi
                 let nth = readings.fetch_add(1, Ordering::Relaxed);
                 words[..2].copy_from_slice(&position_words(Pulses(place(nth)), Dialect::Smc));
             }
+            (1, 0x00) => words[2] = 3,
             (1, 0x02) => words[0] = 3,
             _ => {}
         }

@@ -185,7 +185,10 @@ fn sixpack(subject: &DriveSubject<'_>, unit: u8, notes: &mut Notes) {
         notes.add(Check::NotHome, found, HOME);
     } else if !lost.is_empty() {
         let lost: Vec<String> = lost.iter().map(u8::to_string).collect();
-        let found = format!("motors {} of unit {unit} count no position of this seat", lost.join(", "));
+        let found = format!(
+            "motors {} of unit {unit} count no position of this seat as it is configured",
+            lost.join(", ")
+        );
         notes.add(Check::NotHome, found, HOME);
     }
     for motor in facts.motors.iter().filter(|motor| motor.searches()) {

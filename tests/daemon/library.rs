@@ -14,7 +14,7 @@ fn a_cue_that_fits_is_taken_in_and_one_that_does_not_is_refused_with_every_fault
     hall.done(&["upload", &file("good.csv")]);
     hall.done(&["load", "good"]);
     let run = hall.run(&["upload", &file("steep.csv")]);
-    assert_eq!(run.code, Some(1), "{run:?}");
+    assert_eq!(run.code, Some(65), "{run:?}");
     for fault in ["a1", "a3", "velocity", "acceleration", "jerk"] {
         assert!(run.stderr.contains(fault), "{fault}: {run:?}");
     }

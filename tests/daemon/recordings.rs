@@ -104,7 +104,7 @@ fn a_show_leaves_a_recording_whose_counts_are_those_of_its_report_and_in_which_n
     assert!(picture["sentence"].as_str().unwrap().starts_with("A2"), "{}", picture["sentence"]);
     assert!(picture["svg"].as_str().unwrap().starts_with("<svg "), "a picture");
     let other = hall.socket().get(&format!("{at}?seat=Z9"));
-    assert!(other.problem().0 == 404 && other.text().contains("the seats are A1, A2"), "{}", other.text());
+    assert!(other.problem().0 == 404 && other.text().contains("there are: A1, A2"), "{}", other.text());
     // From before the show to after it, with what people asked.
     let states: Vec<_> = recorded.of("/hall").map(|(_, _, value)| value["state"].clone()).collect();
     assert!(states.len() > 3, "{states:?}");

@@ -7,7 +7,7 @@ use crate::wire::sixpack2::{GREATEST_DIVIDER, MOST_STEPS, greatest_divider};
 
 /// The shares of its peak current that it can be set to, percent (CMD $11).
 pub(crate) const SHARES: [u8; 9] = [100, 75, 50, 38, 25, 19, 13, 9, 0];
-/// Microsteps that an axis and the search for its zero may make together: the counter of a seat that is home begins at 1,000,000, and none that was
+/// Microsteps that an axis and the search for its zero may make together: the counter of a seat that is home begins at 1,000,000 or more, and none that was
 /// restarted, or is not home yet, may look like that.
 const MOST_WAY: f64 = 900_000.0;
 /// The divider that its manual starts with.

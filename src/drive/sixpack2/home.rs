@@ -3,8 +3,9 @@
 //! Each motor in turn searches by itself, and knows no end of that: whoever leads it ends a search that takes too long. Then its counter is
 //! set, so that the lower end of the stroke is at 0, and all go slowly to park.
 //!
-//! What a unit is set to cannot be read, its counters can: so they lose their places before anything else is set, and that end becomes 1,000,000
-//! last of all. Whatever cuts a homing off, counters that have places of the seat are those of motors that are set up for shows.
+//! What a unit is set to cannot be read, its counters can: so they lose their places before anything else is set, and last of all that end
+//! becomes a number that is made of the settings. Whatever cuts a homing off, or is edited later, counters that have places of the seat are those
+//! of motors that are set up for its shows.
 
 use std::time::Duration;
 

@@ -36,7 +36,7 @@ pub(crate) struct UnitFacts {
 pub(crate) struct MotorFacts {
     /// Its number, from 0.
     pub(crate) motor: u8,
-    /// Microsteps; a seat that is home has the lower end of its stroke at 1,000,000.
+    /// Microsteps; a seat that is home has the lower end of its stroke where its settings say.
     pub(crate) position: i32,
     /// What it does, one of [`crate::wire::sixpack2::action`].
     pub(crate) action: u8,
@@ -97,6 +97,12 @@ impl SeatMotors<'_> {
             !told(axis.motor).is_some_and(|told| (low..=high).contains(&f64::from(told.position)))
         };
         axes.iter().filter(is_stranger).map(|axis| axis.motor).collect()
+    }
+
+    /// What the counters of its motors read at the lower end of the stroke once it is home.
+    #[cfg(test)]
+    pub(crate) fn at_low(&self) -> Vec<i32> {
+        self.axes().unwrap().iter().map(|axis| axis.scale.whole(axis.axis.low)).collect()
     }
 }
 

@@ -3,14 +3,19 @@
 use crate::motion::AxisGeometry;
 use crate::wire::sixpack2::{MOST_SPEED, steps_of_a_unit};
 
-/// What the counter reads at the lower end of the stroke: one that was reset, at 0, never looks like a place.
-const BASE: f64 = 1_000_000.0;
+/// The least that the counter reads at the lower end of the stroke, below 0 where it is reversed: one that was reset, at 0, never looks like
+/// a place.
+const LEAST_BASE: u64 = 1_000_000;
+/// From there on it reads what the settings come to: with a stroke of 900,000 at the most it stays below 2^23.
+const BASES: u64 = 6_000_000;
 
 /// How a motor counts one axis. Where it is reversed its counter goes down as the axis goes up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct MotorScale {
     /// Microsteps a millimetre, negative where it is reversed.
     per_mm: f64,
+    /// The counter at the lower end of the stroke.
+    base: f64,
     low_mm: f64,
     stroke_mm: f64,
     clock_divider: u8,
@@ -21,12 +26,21 @@ impl MotorScale {
     pub(crate) fn of(axis: &AxisGeometry, is_reversed: bool, clock_divider: u8) -> Self {
         let size = axis.pulses_per_rev / axis.lead;
         let per_mm = if is_reversed { -size } else { size };
-        Self { per_mm, low_mm: axis.low, stroke_mm: axis.stroke(), clock_divider }
+        let scale = Self { per_mm, base: 0.0, low_mm: axis.low, stroke_mm: axis.stroke(), clock_divider };
+        scale.counting_by(0)
+    }
+
+    /// The same, counting from what a sum of its settings says: nothing else can be read of a motor but its counter, so that is to be no
+    /// place of the stroke once the settings are others than those that the seat was homed with.
+    pub(crate) fn counting_by(self, sum: u64) -> Self {
+        #[expect(clippy::cast_precision_loss, reason = "millions")]
+        let base = (LEAST_BASE + sum % BASES) as f64;
+        Self { base: base.copysign(self.per_mm), ..self }
     }
 
     /// The counter at a place.
     pub(crate) fn steps(&self, mm: f64) -> f64 {
-        BASE + (mm - self.low_mm) * self.per_mm
+        self.base + (mm - self.low_mm) * self.per_mm
     }
 
     /// The same, whole.
@@ -43,7 +57,7 @@ impl MotorScale {
 
     /// The counter at a fraction of the stroke.
     pub(crate) fn at(&self, fraction: f64) -> f64 {
-        BASE + self.way_of(fraction)
+        self.base + self.way_of(fraction)
     }
 
     /// Microsteps of a part of the stroke.
@@ -53,7 +67,7 @@ impl MotorScale {
 
     /// The fraction of the stroke at the counter.
     pub(crate) fn fraction(&self, steps: f64) -> f64 {
-        (steps - BASE) / (self.stroke_mm * self.per_mm)
+        (steps - self.base) / (self.stroke_mm * self.per_mm)
     }
 
     /// The ends of the stroke, and so far beyond, by the counter, the lower number first.
@@ -65,7 +79,7 @@ impl MotorScale {
 
     /// The place of the counter.
     pub(crate) fn mm(&self, steps: f64) -> f64 {
-        self.low_mm + self.mm_of(steps - BASE)
+        self.low_mm + self.mm_of(steps - self.base)
     }
 
     /// The way of microsteps, in mm.
@@ -111,16 +125,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_lower_end_of_the_stroke_is_at_a_million_whichever_way_the_motor_counts() {
+    fn the_lower_end_of_the_stroke_is_at_a_million_or_more_to_the_side_to_which_the_motor_counts() {
         let axis = AxisGeometry { pulses_per_rev: 3_200.0, low: 10.0, high: 160.0, ..AxisGeometry::BENCH };
         let [plain, reversed] = [false, true].map(|reversed| MotorScale::of(&axis, reversed, 3));
         assert_eq!([plain.whole(10.0), plain.whole(160.0)], [1_000_000, 1_096_000]);
-        assert_eq!([reversed.whole(10.0), reversed.whole(160.0)], [1_000_000, 904_000]);
+        assert_eq!([reversed.whole(10.0), reversed.whole(160.0)], [-1_000_000, -1_096_000]);
         assert!((reversed.mm(reversed.steps(33.0)) - 33.0).abs() < 1e-9);
-        assert_eq!(reversed.reach(1.0), (903_360.0, 1_000_640.0));
+        assert_eq!(reversed.reach(1.0), (-1_096_640.0, -999_360.0));
         assert!(
-            (reversed.at(0.5) - 952_000.0).abs() < 1e-6 && (reversed.fraction(952_000.0) - 0.5).abs() < 1e-12
+            (reversed.at(0.5) + 1_048_000.0).abs() < 1e-6
+                && (reversed.fraction(-1_048_000.0) - 0.5).abs() < 1e-12
         );
+        let [low, high] = [5_999_999, 6_000_000].map(|sum| plain.counting_by(sum).whole(10.0));
+        assert_eq!((low, high), (6_999_999, 1_000_000));
         assert_eq!((plain.way(165.0), reversed.way(165.0)), (105_600, 105_600));
     }
 

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use sha2::{Digest as _, Sha256};
+
 use super::ask::{told_place, where_is};
 use super::find::FindError;
 use super::scale::MotorScale;
@@ -218,7 +220,11 @@ impl<'a> SeatMotors<'a> {
             let lag = self.lag(index, axis)?;
             Ok(MotorAxis { motor: *motor, axis, scale, lag, is_reversed, of: *self })
         };
-        self.seat.own().iter().zip(self.motors).enumerate().map(axis).collect()
+        let pairs = self.seat.own().iter().zip(self.motors).enumerate();
+        let axes = pairs.map(axis).collect::<Result<Vec<_>, HomeError>>()?;
+        let counting =
+            |axis: &MotorAxis<'a>| MotorAxis { scale: axis.scale.counting_by(axis.sum(&axes)), ..*axis };
+        Ok(axes.iter().map(counting).collect())
     }
 
     /// How an axis follows: a setting of the seat type, by its limits and not by what it plays, as a proof has it.
@@ -235,6 +241,17 @@ impl<'a> SeatMotors<'a> {
 }
 
 impl MotorAxis<'_> {
+    /// A number that is another once anything is that homing writes to a motor of the seat, or that its places are measured by.
+    fn sum(&self, all: &[Self]) -> u64 {
+        let each = |axis: &Self| {
+            let (scale, homing) = (axis.scale, axis.homing());
+            let written = [Purpose::Homing, Purpose::Show].map(|purpose| axis.settings(purpose));
+            format!("{scale:?} {} {:?} {written:?}", homing.zero_mm, homing.toward)
+        };
+        let text = format!("{} {:?}", self.motor, all.iter().map(each).collect::<Vec<_>>());
+        Sha256::digest(text).iter().take(7).fold(0, |sum, octet| sum << 8 | u64::from(*octet))
+    }
+
     /// Tells its motor what has to be taken, and gives where it is by then.
     pub(super) fn write<P: LinkPort>(
         &self,

@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use super::super::{Check, DriveSubject, LinkSurvey, judge_driven};
 use crate::config::drive_controller::Motors;
-use crate::config::{self, Acceptance, Config};
+use crate::config::{self, Acceptance, Config, Link};
 use crate::drive::link::TalkCounts;
+use crate::drive::motors_of;
 use crate::drive::rates::LinkLoad;
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts};
 use crate::drive::sixpack2::{self, MotorFacts};
@@ -69,9 +70,13 @@ impl Case {
         self
     }
 
-    fn found(&self) -> Vec<(Check, String)> {
+    fn link(&self) -> &Link {
         let name = &self.hall.controllers[0].drives().unwrap().link;
-        let link = self.hall.links.iter().find(|link| link.name == *name).unwrap();
+        self.hall.links.iter().find(|link| link.name == *name).unwrap()
+    }
+
+    fn found(&self) -> Vec<(Check, String)> {
+        let link = self.link();
         let load = LinkLoad::of(link, &self.hall);
         let subject =
             DriveSubject { controller: &self.hall.controllers[0], link, load, survey: &self.survey };
@@ -200,12 +205,13 @@ fn a_port_that_cannot_be_had_is_told_by_what_is_wrong_with_it() {
 fn sixpack() -> Case {
     let mut case = Case::new();
     case.hall.controllers.swap(0, 1);
-    let motors = [0, 1, 2].map(|motor| MotorFacts {
-        motor,
-        position: 1_000_000,
-        action: action::PI,
-        was_stopped: false,
-    });
+    let load = LinkLoad::of(case.link(), &case.hall).unwrap();
+    let period = load.period_for(case.link().rate_hz).unwrap();
+    let counters = motors_of(&case.hall.controllers[0], period).unwrap().at_low();
+    let motors: Vec<_> = (0..3)
+        .zip(counters)
+        .map(|(motor, position)| MotorFacts { motor, position, action: action::PI, was_stopped: false })
+        .collect();
     let facts = sixpack2::UnitFacts {
         unit: 1,
         firmware: 0x94,
@@ -213,7 +219,7 @@ fn sixpack() -> Case {
         celsius: 30,
         serial: 1_001,
         volts: 24.0,
-        motors: motors.into(),
+        motors,
     };
     case.survey.units.clear();
     case.survey.sixpacks.insert(1, Ok(Some(facts)));

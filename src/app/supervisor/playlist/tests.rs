@@ -88,7 +88,7 @@ fn an_entry_whose_cue_has_gone_is_named_until_something_is_loaded_and_the_one_be
     rig.settle();
     let status = rig.supervisor.status();
     let warning = status.warnings.iter().find(|one| one.id == "playlist").map(|one| one.text.clone());
-    assert_eq!(warning.as_deref(), Some("entry 2 of day did not start: there is no cue two in the library"));
+    assert_eq!(warning.as_deref(), Some("entry 2 of day did not start: there is no cue two"));
     assert_eq!((rig.state(), cue(&rig), status.playlist.unwrap().current), (State::Parked, None, 1));
     assert_eq!(
         rig.ask(Command::Arm { seats_empty: false }).unwrap_err().detail,

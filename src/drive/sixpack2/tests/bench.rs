@@ -63,6 +63,9 @@ pub(super) fn seat() -> SeatType {
     })
 }
 
+/// Where a counter may be at the lower end of the stroke: where is a matter of all settings of the seat.
+pub(super) const AT_LOW: std::ops::RangeInclusive<i32> = 1_000_000..=7_000_000;
+
 pub(super) const SWITCH: HomeWay = HomeWay::Switch { input: None, active_high: true };
 
 pub(super) fn drive(way: HomeWay) -> SeatDrive {

@@ -475,6 +475,7 @@ export default {
   "remedy.other-master": "den anderen Rechner anhalten; dann parken, und Referenzfahrt, wenn niemand auf dem Sitz ist",
   "remedy.outside": "seine Wortfolge oder PA02 richtigstellen, oder Referenzfahrt, wenn niemand auf dem Sitz ist (`kinocue home --config`, bei angehaltenem Dienst); er fährt von selbst wieder ein, sobald er im Hub ist",
   "remedy.preflight": "Systemprüfung starten",
+  "remedy.refuses": "den Fehler am Controller beheben, oder seinen Dialekt richtigstellen (smc, mbox): Frames des anderen weist er zurück; dann, wenn die Sitze geparkt oder gestoppt sind, den Saal quittieren",
   "remedy.rejoining": "parken, oder eine Show starten: er fährt langsam ein",
   "remedy.seat-out": "zuschalten, sobald er repariert ist",
   "remedy.stopped": "seinen Not-Halt-Taster entriegeln, dann quittieren",

@@ -475,6 +475,7 @@ export default {
   "remedy.other-master": "detenga la otra máquina; luego REPOSO, y búsqueda de origen sin nadie en la butaca",
   "remedy.outside": "corrija su orden de palabra o PA02, o busque su origen sin nadie en la butaca (`kinocue home --config`, con el servicio detenido); se reincorpora solo cuando esté dentro",
   "remedy.preflight": "ejecute la comprobación previa",
+  "remedy.refuses": "resuelva el error en el controlador, o corrija su dialecto (smc, mbox): rechaza las tramas del otro; después, con las butacas en reposo o detenidas, restablezca la sala",
   "remedy.rejoining": "REPOSO, o iniciar un show: se incorpora despacio",
   "remedy.seat-out": "actívela cuando esté reparada",
   "remedy.stopped": "desenclave su pulsador de parada de emergencia, luego restablezca",

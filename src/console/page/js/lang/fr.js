@@ -475,6 +475,7 @@ export default {
   "remedy.other-master": "arrêter l’autre machine ; puis REPOS, et prise d’origine sans personne sur le siège",
   "remedy.outside": "corriger son ordre des mots ou PA02, ou faire sa prise d’origine sans personne sur le siège (`kinocue home --config`, service arrêté) ; il rejoint de lui-même dès qu’il est dans sa course",
   "remedy.preflight": "lancer le contrôle préalable",
+  "remedy.refuses": "lever l’erreur au contrôleur, ou corriger son dialecte (smc, mbox) : il refuse les trames de l’autre ; puis, sièges au repos ou arrêtés, acquitter la salle",
   "remedy.rejoining": "REPOS, ou lancer un show : il rejoint lentement",
   "remedy.seat-out": "l’activer une fois réparé",
   "remedy.stopped": "déverrouiller son bouton d’arrêt d’urgence, puis acquitter",

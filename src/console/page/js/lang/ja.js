@@ -475,6 +475,7 @@ export default {
   "remedy.other-master": "他のマシンを止め、パークし、座席が無人の状態で原点復帰",
   "remedy.outside": "ワード順または PA02 を修正するか、座席が無人の状態で原点復帰する（`kinocue home --config`、サービス停止中）。範囲内に入れば自動で復帰します",
   "remedy.preflight": "事前点検を実行",
+  "remedy.refuses": "コントローラのエラーを解消するか、方言（smc、mbox）を正す。違う方言のフレームは拒否されます。その後、座席がパークまたは停止した状態でホールをリセット",
   "remedy.rejoining": "パークする、またはショーを開始する：ゆっくり合流します",
   "remedy.seat-out": "修理後に有効にする",
   "remedy.stopped": "非常停止ボタンを解除してからリセット",

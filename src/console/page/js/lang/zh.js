@@ -475,6 +475,7 @@ export default {
   "remedy.other-master": "停止另一台机器；然后归位，并在座椅无人时回零",
   "remedy.outside": "更正其字序或 PA02，或在座椅无人时回零（`kinocue home --config`，服务停止时）；回到行程内后自行并入",
   "remedy.preflight": "运行开演前检查",
+  "remedy.refuses": "排除控制器上的错误，或更正其方言（smc、mbox）：它会拒绝另一种方言的帧；然后在座椅归位或停止时复位该厅",
   "remedy.rejoining": "归位，或开始演出：会缓慢并入",
   "remedy.seat-out": "修好后再启用",
   "remedy.stopped": "释放其急停按钮，然后复位",
