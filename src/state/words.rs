@@ -205,7 +205,7 @@ impl Cause {
             Self::Asked(request) => asked(request),
             Self::StoppedHoming => (
                 "stopped-homing",
-                "stopped by the operator; the controllers finish their homing by themselves, which only the hard-wired \
+                "stopped by the operator; controllers on the network finish their homing by themselves, which only the hard-wired \
                  emergency stop can end",
             ),
             Self::Homed => ("homed", "the seats are home"),

@@ -95,7 +95,7 @@ export default {
   "cause.rebooted": "ein Controller ist neu gestartet; seine Position ist unbekannt",
   "cause.slept": "der Rechner schlief, oder das Programm war angehalten, für mehr als 2 s",
   "cause.started": "das Programm ist gestartet",
-  "cause.stopped-homing": "durch Bedienung gestoppt; die Controller beenden ihre Referenzfahrt selbst, nur der festverdrahtete Not-Halt kann sie abbrechen",
+  "cause.stopped-homing": "durch Bedienung gestoppt; Controller im Netz beenden ihre Referenzfahrt selbst, nur der festverdrahtete Not-Halt kann sie abbrechen",
   "clock.label": "Uhrzeit",
   "close": "Schließen",
   "controller": "Controller",

@@ -95,7 +95,7 @@ export default {
   "cause.rebooted": "un controlador se ha reiniciado; su posición es desconocida",
   "cause.slept": "la máquina durmió, o el programa estuvo suspendido, más de 2 s",
   "cause.started": "el programa ha arrancado",
-  "cause.stopped-homing": "detenido por el operador; los controladores terminan solos su búsqueda de origen, que solo la parada de emergencia cableada puede interrumpir",
+  "cause.stopped-homing": "detenido por el operador; los controladores de la red terminan solos su búsqueda de origen, que solo la parada de emergencia cableada puede interrumpir",
   "clock.label": "Hora",
   "close": "Cerrar",
   "controller": "Controlador",

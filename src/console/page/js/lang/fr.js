@@ -95,7 +95,7 @@ export default {
   "cause.rebooted": "un contrôleur a redémarré ; sa position est inconnue",
   "cause.slept": "la machine était en veille, ou le programme suspendu, pendant plus de 2 s",
   "cause.started": "le programme a démarré",
-  "cause.stopped-homing": "arrêté par l’opérateur ; les contrôleurs terminent seuls leur prise d’origine, que seul l’arrêt d’urgence câblé peut interrompre",
+  "cause.stopped-homing": "arrêté par l’opérateur ; les contrôleurs du réseau terminent seuls leur prise d’origine, que seul l’arrêt d’urgence câblé peut interrompre",
   "clock.label": "Heure",
   "close": "Fermer",
   "controller": "Contrôleur",
