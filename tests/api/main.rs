@@ -15,5 +15,7 @@ mod events;
 mod hall;
 mod late;
 mod limits;
+#[path = "../common/programs.rs"]
+mod programs;
 mod replies;
 mod routes;

@@ -1,9 +1,13 @@
 //! The description that is served, and what is served.
 
+use std::path::Path;
+use std::process::Command;
+
 use serde_json::Value;
 
 use crate::client::{Request, problem};
 use crate::hall::Hall;
+use crate::programs::is_there;
 
 const GETS: [&str; 18] = [
     "/api/v1/controllers",
@@ -96,6 +100,20 @@ fn every_operation_says_what_it_does_and_what_a_refusal_is() {
         assert_eq!(problem["$ref"], "#/components/schemas/Problem", "{method} {path}");
     }
     assert!(document["components"]["schemas"]["Status"]["properties"]["controllers"].is_object());
+}
+
+#[test]
+fn the_description_is_what_a_validator_takes() {
+    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers/bin/python");
+    if !is_there("python-mcap", python.is_file(), "tests/readers.sh installs it, and the validator") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("openapi.json");
+    std::fs::write(&file, Hall::open().socket().get("/api/v1/openapi.json").text()).unwrap();
+    let run = Command::new(python).args(["-m", "openapi_spec_validator"]).arg(&file).output().unwrap();
+    let said = String::from_utf8_lossy(&run.stdout) + String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{said}");
 }
 
 #[test]
