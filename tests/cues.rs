@@ -116,10 +116,16 @@ fn the_cues_are_of_the_sizes_that_the_readme_says() {
 }
 
 #[test]
-fn the_example_of_the_readme_is_a_cue() {
+fn the_example_of_the_readme_is_a_cue_that_passes() {
     let readme = fs::read_to_string(folder().join("README.md")).unwrap();
     let (_, from_example) = readme.split_once("```csv\n").expect("an example");
     let (example, _) = from_example.split_once("```").expect("its end");
     let cue = cue::read(Path::new("README.md"), example.as_bytes(), &Source::Native).unwrap();
     assert_eq!((cue.axes(), cue.rows(), cue.title()), (2, 6, Some("A nod")));
+    let file = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
+    fs::write(file.path(), example).unwrap();
+    let hall = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/hall.toml");
+    let mut check = std::process::Command::new(env!("CARGO_BIN_EXE_kinocue"));
+    let run = check.arg("check").arg(file.path()).arg("--config").arg(hall).output().unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
 }
