@@ -108,7 +108,7 @@ pub enum Problem {
     #[error("is empty; every row needs one")]
     EmptyCell,
     /// Text where a number belongs.
-    #[error("{0:?} is not a number")]
+    #[error("{0:?} is not a number{more}", more = with_point(.0))]
     NotANumber(String),
     /// NaN, infinity, or a number too large for one.
     #[error("{0} is not a finite number")]
@@ -137,7 +137,7 @@ pub enum Problem {
     #[error("a row's duration of {0} is not above 0")]
     NoDuration(String),
     /// A position outside the stroke.
-    #[error("{value} is outside the stroke, {low} to {high}{unit}")]
+    #[error("{value} is outside the stroke, {low} to {high}{unit}{}", in_what(*value, *high, unit))]
     OutsideStroke {
         /// The position as the file has it.
         value: f64,
@@ -273,4 +273,19 @@ pub enum Problem {
     /// A marker's name that is too long.
     #[error("a marker's name of {0} bytes; the limit is {MAX_MARKER_NAME}")]
     MarkerName(usize),
+}
+
+/// What to write instead of a number with a comma.
+fn with_point(text: &str) -> String {
+    let point = text.replace(',', ".");
+    if point != text && point.parse::<f64>().is_ok() { format!("; write {point}") } else { String::new() }
+}
+
+/// What a file has to say whose numbers can be no fractions.
+fn in_what(value: f64, high: f64, unit: &str) -> &'static str {
+    if unit.is_empty() && value > 5.0 * high {
+        "; if it is in percent or mm, write \"# units: percent\" or \"# units: mm\" above the header"
+    } else {
+        ""
+    }
 }

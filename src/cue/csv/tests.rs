@@ -79,7 +79,7 @@ fn bad_numbers_are_named_with_line_and_column() {
          3:8: a2: nan is not a finite number\n\
          4:4: a1: inf is not a finite number\n\
          4:8: a2: 1e999 is not a finite number\n\
-         5:4: a1: \"0,5\" is not a number"
+         5:4: a1: \"0,5\" is not a number; write 0.5"
     );
 }
 
@@ -94,6 +94,8 @@ fn columns_are_counted_in_characters() {
 #[test]
 fn positions_outside_the_stroke_are_refused_in_the_unit_of_the_file() {
     assert_eq!(faults("time_ms,a1\n0,1.42\n1,0"), "2:3: a1: 1.42 is outside the stroke, 0 to 1");
+    let percent = faults("time_ms,a1\n0,50\n1,0");
+    assert!(percent.ends_with("write \"# units: percent\" or \"# units: mm\" above the header"), "{percent}");
     assert_eq!(
         faults("# units: percent\ntime_ms,a1\n0,100.5\n1,0"),
         "3:3: a1: 100.5 is outside the stroke, 0 to 100 %"
