@@ -88,7 +88,7 @@ impl<P: LinkPort> LinkStream<P> {
                 let canary = canary().map_err(|error| format!("no random number: {error}"))?;
                 let homed =
                     silvermax::home(&mut stream.talk, seat, silvermax::Homing { canary, goes_on, told });
-                homed.map(|()| stream.rejoin(lane, canary)).map_err(|error| error.to_string())
+                homed.map(|canary| stream.rejoin(lane, canary)).map_err(|error| error.to_string())
             }
             Self::Sixpack2(stream) => {
                 let seat = motors_of(controller, terms.period).ok_or(NO_DRIVES)?;

@@ -9,7 +9,7 @@ use crate::config::{Controller, Drives, Link};
 use crate::drive::link::{LinkPort, LinkTalk as _, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
-use crate::drive::{motors_of, silvermax, sixpack2};
+use crate::drive::{motors_of, silvermax, sixpack2, units_of};
 use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Poll, StatusWord as _};
 
@@ -282,6 +282,11 @@ fn home(subject: &DriveSubject<'_>, notes: &mut Notes) {
             format!("units {} were switched off since the seat was homed (register 40)", lost.join(", "))
         };
         notes.add(Check::Restarted, found, HOME);
+    } else if units_of(subject.controller)
+        .is_some_and(|seat| canaries.iter().any(|(_, canary)| !seat.is_own(*canary)))
+    {
+        let found = "its units were homed with other settings than it has now (register 40)".to_owned();
+        notes.add(Check::NotHome, found, HOME);
     }
 }
 

@@ -11,6 +11,7 @@ const WITHOUT: &str = "KINOCUE_TESTS_WITHOUT";
 ///
 /// # Panics
 /// Where it is not installed and nobody asked for that.
+#[allow(dead_code, reason = "each test uses its own part")]
 pub(crate) fn is_installed(program: &str) -> bool {
     let paths = std::env::var_os("PATH").unwrap_or_default();
     let mut places = std::env::split_paths(&paths).map(|folder: PathBuf| folder.join(program));

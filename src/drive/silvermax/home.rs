@@ -29,8 +29,8 @@ const LOOKS: Duration = Duration::from_millis(10);
 
 /// Around a homing.
 pub(crate) struct Homing<'a> {
-    /// What is written into register 37 of each unit at the begin, and into 40 at the end: not 0, and no number that others would
-    /// write.
+    /// What is written into register 37 of each unit at the begin, and its upper half into 40 at the end: not 0, and no number that others
+    /// would write.
     pub(crate) canary: i32,
     /// False once somebody wants it to end: the axes are braked before anything else is asked.
     pub(crate) goes_on: &'a dyn Fn() -> bool,
@@ -38,7 +38,7 @@ pub(crate) struct Homing<'a> {
     pub(crate) told: &'a mut dyn FnMut(Step),
 }
 
-/// Homes a seat; all of its axes are at park afterwards.
+/// Homes a seat; all of its axes are at park afterwards. Gives what its units hold in register 40.
 ///
 /// # Errors
 /// A [`HomeError`]; by then all of its axes were told to brake, and it is not home.
@@ -46,12 +46,12 @@ pub(crate) fn home<P: LinkPort>(
     talk: &mut Talk<P>,
     seat: SeatUnits<'_>,
     mut around: Homing<'_>,
-) -> Result<(), HomeError> {
+) -> Result<i32, HomeError> {
     if around.canary == 0 {
         return Err(HomeError::Canary);
     }
-    let axes = seat.axes()?;
-    let done = run(talk, &axes, &mut around);
+    let (axes, canary) = (seat.axes()?, seat.canary(around.canary)?);
+    let done = run(talk, &axes, canary, &mut around);
     if done.is_err() {
         // What is wrong already is told; that the line is gone, too, is no news.
         let mut tell_all = |request: &dyn Fn(&UnitAxis<'_>) -> Request| {
@@ -62,12 +62,13 @@ pub(crate) fn home<P: LinkPort>(
         tell_all(&|axis| Request::Stop { deceleration: axis.brake() });
         tell_all(&|_| Request::WriteRegister { register: CANARY, value: 0 });
     }
-    done
+    done.map(|()| canary)
 }
 
 fn run<P: LinkPort>(
     talk: &mut Talk<P>,
     axes: &[UnitAxis<'_>],
+    canary: i32,
     around: &mut Homing<'_>,
 ) -> Result<(), HomeError> {
     for (index, axis) in axes.iter().enumerate() {
@@ -85,7 +86,7 @@ fn run<P: LinkPort>(
     }
     park(talk, &numbered, around)?;
     for (index, axis) in axes.iter().enumerate() {
-        axis.seal(talk, around.canary)?;
+        axis.seal(talk, around.canary, canary)?;
         (around.told)(Step::Set(index));
     }
     Ok(())

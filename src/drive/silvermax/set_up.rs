@@ -1,5 +1,7 @@
 //! The settings of the units of a seat: written where a person is, at rest, and read back (command reference, pages 47 to 75).
 
+use sha2::{Digest as _, Sha256};
+
 use super::scale::DriveScale;
 use super::talk::{Answer, Talk, TalkFault};
 use crate::config::drive::{SeatDrive, SilverMaxDrive};
@@ -11,6 +13,10 @@ use crate::wire::silvermax::register::{
     TORQUE_CLOSED, TORQUE_OPEN,
 };
 use crate::wire::silvermax::{Io, NakReason, Poll, Request, StatusWord, command};
+
+/// Bits of a canary that are a sum of settings, and how many.
+pub(super) const HALF: i32 = 0xffff;
+const HALF_BITS: u32 = 16;
 
 /// A seat, and the units that move it.
 #[derive(Debug, Clone, Copy)]
@@ -199,6 +205,28 @@ impl<'a> SeatUnits<'a> {
         Ok(self.axes()?.iter().map(settings).collect())
     }
 
+    /// The number that homing leaves in its units: by chance, but for its lower half, which is another once anything is that homing
+    /// writes, or that places are measured by.
+    pub(super) fn canary(&self, chance: i32) -> Result<i32, HomeError> {
+        let homing = &self.drive.homing;
+        let scales: Vec<_> = self.axes()?.iter().map(|axis| (axis.unit, axis.scale)).collect();
+        let text = format!("{scales:?} {:?} {} {:?}", self.settings()?, homing.zero_mm, homing.toward);
+        let sum = Sha256::digest(text).iter().take(2).fold(0, |sum, octet| sum << 8 | i32::from(*octet));
+        // Never 0, however it falls out.
+        Ok(chance & !HALF | 1 << HALF_BITS | sum)
+    }
+
+    /// One such number.
+    #[cfg(test)]
+    pub(crate) fn own_canary(&self) -> i32 {
+        self.canary(77 << 16).unwrap()
+    }
+
+    /// True if a canary is one that homing with these settings leaves.
+    pub(crate) fn is_own(&self, canary: i32) -> bool {
+        self.canary(canary).is_ok_and(|own| own == canary)
+    }
+
     /// Its axes.
     pub(super) fn axes(&self) -> Result<Vec<UnitAxis<'a>>, HomeError> {
         let pairs = self.seat.own().iter().zip(self.units).enumerate();
@@ -298,7 +326,12 @@ impl UnitAxis<'_> {
 
     /// Inside the stroke: what holds it there, read back; the canary last. One that was restarted meanwhile has lost its zero,
     /// wherever it says it is.
-    pub(super) fn seal<P: LinkPort>(&self, talk: &mut Talk<P>, canary: i32) -> Result<(), HomeError> {
+    pub(super) fn seal<P: LinkPort>(
+        &self,
+        talk: &mut Talk<P>,
+        mark: i32,
+        canary: i32,
+    ) -> Result<(), HomeError> {
         let [low, high] = self.soft_limits();
         let written = [
             (SOFT_LIMIT_LOW, low),
@@ -314,10 +347,10 @@ impl UnitAxis<'_> {
         let settings = [(TORQUE_CLOSED, torque), (TORQUE_OPEN, torque), (ERROR_LIMITS, self.error_words())];
         let held = settings.into_iter().chain(written.into_iter().take(3));
         held.into_iter().try_for_each(|(number, wanted)| self.read_back(talk, number, wanted))?;
-        self.is_up_since(talk, canary)?;
+        self.is_up_since(talk, mark)?;
         write(talk, self.unit, Request::WriteRegister { register: CANARY, value: canary })?;
         self.read_back(talk, CANARY, canary)?;
-        self.is_up_since(talk, canary)
+        self.is_up_since(talk, mark)
     }
 
     fn read_back<P: LinkPort>(&self, talk: &mut Talk<P>, number: u8, wanted: i32) -> Result<(), HomeError> {

@@ -39,7 +39,7 @@ impl Case {
             internal: Internal(Io::COOL),
             io: Io(Io::COOL),
             kill_cause: 0,
-            canary: 77,
+            canary: of.own_canary(),
             position: 0,
             target: 0,
             torque: [set.torque; 2],
@@ -120,7 +120,7 @@ fn a_seat_that_is_not_home_and_one_of_whose_units_one_was_off_are_told_apart_and
     let mut off = Case::new().all(|facts| (facts.canary, facts.soft_limits) = (0, [0, 0]));
     off.assert_found(Check::NotHome, "units 16, 17, 18 were not homed");
     Case::new().with(|facts| facts.canary = 0).assert_found(Check::Restarted, "units 17 were switched off");
-    Case::new().with(|facts| facts.canary = 78).assert_found(Check::Restarted, "at different times");
+    Case::new().with(|facts| facts.canary += 1 << 16).assert_found(Check::Restarted, "at different times");
     off.hall.show.accept_findings = vec![Acceptance { check: Check::NotHome, why: "so".to_owned() }];
     assert_eq!(off.found().len(), 1);
     assert!(!Check::NotHome.can_be_accepted() && Check::SoftLimits.can_be_accepted());

@@ -5,6 +5,7 @@ use super::axis::{Axis, Kind};
 use super::clock::{after, seconds};
 use crate::drive::Segment;
 use crate::drive::link::{LedLane, LedPose, LinkPose, STANDS_MM, Stage, StreamEvent};
+use crate::drive::silvermax::set_up::HALF;
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
@@ -23,6 +24,8 @@ pub(super) type SilverLane = LedLane<SilverMax>;
 pub(crate) struct LaneState {
     /// What register 40 of its units holds while they are home; none before it was seen.
     pub(super) canary: Option<i32>,
+    /// What a canary of homing with its settings has in its lower half.
+    sum: i32,
     /// One that is out comes back as soon as its units are seen to be home.
     pub(super) returns: bool,
     /// When its first slice begins.
@@ -40,9 +43,10 @@ pub(crate) struct LaneState {
 }
 
 impl LaneState {
-    pub(super) const fn new(now: MonoTime) -> Self {
+    pub(super) const fn new(sum: i32, now: MonoTime) -> Self {
         Self {
             canary: None,
+            sum,
             returns: false,
             origin: now,
             poses: 0,
@@ -73,7 +77,9 @@ impl SilverLane {
     pub(super) fn is_home(&self) -> Option<bool> {
         let mut told = self.axes.iter().map(|axis| axis.canary);
         let first = told.next()??;
-        let mut is_home = first != 0 && self.own.canary.is_none_or(|canary| canary == first);
+        let mut is_home = first != 0
+            && first & HALF == self.own.sum
+            && self.own.canary.is_none_or(|canary| canary == first);
         for canary in told {
             is_home &= canary? == first;
         }

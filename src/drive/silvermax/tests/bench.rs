@@ -79,7 +79,7 @@ pub(super) fn home_as(
     let of = SeatUnits { seat: &seat, drive, silvermax: &silvermax, units };
     let mut told = |step| steps.push(step);
     let around = Homing { canary: CANARY, goes_on: &|| true, told: &mut told };
-    (home(talk, of, around), steps)
+    (home(talk, of, around).map(drop), steps)
 }
 
 pub(super) fn unit(talk: &mut Talk<VirtualPort>, index: usize) -> &Unit {

@@ -1,11 +1,14 @@
 //! How seats find their zero.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use super::bench::*;
-use crate::config::drive::homing::HomeWay;
+use crate::config::drive::SeatDrive;
+use crate::config::drive::homing::{HomeWay, Side};
 use crate::drive::link::{LinkPort as _, LinkTalk as _, Step};
 use crate::drive::silvermax::*;
+use crate::motion::SeatType;
 use crate::sim::silvermax::{Action, UnitSetup};
 
 fn three() -> Vec<UnitSetup> {
@@ -32,9 +35,49 @@ fn a_seat_is_homed_by_the_edge_of_its_switch_to_a_count_and_stands_at_park() {
         let (executed, tally) = (unit(&mut talk, index).executed().clone(), unit(&mut talk, index).tally());
         assert_eq!((executed.jumps, tally.forbidden, tally.kills), (0, 0, 0));
         let facts = look(&mut talk, 16 + index as u8).unwrap();
-        assert_eq!((facts.canary, facts.position, facts.soft_limits), (CANARY, 0, [-800, 120_800]));
+        assert_eq!(
+            (facts.canary >> 17, facts.position),
+            (CANARY >> 17, 0),
+            "its upper half is the number given"
+        );
+        assert_eq!(facts.soft_limits, [-800, 120_800]);
         assert_eq!((facts.torque, facts.dry_brake), ([12_000 << 16 | 20_000; 2], 2_319_282));
     }
+}
+
+#[test]
+fn a_seat_whose_settings_were_edited_after_it_was_homed_is_not_home() {
+    let (homed, silvermax) = (drive(SWITCH), drive(SWITCH).silvermax.unwrap());
+    let of = |drive: &SeatDrive, seat: &SeatType| {
+        let silvermax = drive.silvermax.clone().unwrap_or(silvermax.clone());
+        SeatUnits { seat, drive, silvermax: &silvermax, units: &[16, 17, 18] }.own_canary()
+    };
+    let edits: [fn(&mut SeatDrive); 6] = [
+        |drive| drive.reverse[1] = true,
+        |drive| drive.homing.zero_mm = -12.0,
+        |drive| drive.homing.toward = Side::Up,
+        |drive| drive.margin_mm = 2.0,
+        |drive| drive.silvermax.as_mut().unwrap().max_error_mm = 4.0,
+        |drive| drive.silvermax.as_mut().unwrap().torque.hold = 0.5,
+    ];
+    let all: BTreeSet<i32> = edits
+        .into_iter()
+        .map(|edit| {
+            let mut edited = homed.clone();
+            edit(&mut edited);
+            of(&edited, &seat())
+        })
+        .chain([of(&homed, &seat()), of(&homed, &seat().with_each(|axis| axis.lead = 4.0))])
+        .collect();
+    assert_eq!(all.len(), 8, "each has a number of its own");
+    // Who plays with one of them says so.
+    let mut play = Play::with_ppm([0; 3]);
+    let mut edited = drive(SWITCH);
+    edited.homing.zero_mm = -12.0;
+    let (seat, silvermax) = (seat(), edited.silvermax.clone().unwrap());
+    let seat = SeatUnits { seat: &seat, drive: &edited, silvermax: &silvermax, units: &[16, 17, 18] };
+    let facts = look(&mut play.stream.talk, 16).unwrap();
+    assert!(facts.canary != 0 && !seat.is_own(facts.canary));
 }
 
 #[test]
@@ -64,7 +107,7 @@ fn a_reversed_axis_finds_the_same_edge() {
     let mut drive = drive(SWITCH);
     drive.reverse[0] = true;
     // The virtual axis has its switch where its counts are low: up, for a reversed one.
-    drive.homing.toward = crate::config::drive::homing::Side::Up;
+    drive.homing.toward = Side::Up;
     drive.homing.zero_mm = 152.0;
     let mut talk = talk_to(&[UnitSetup::new(16)]);
     assert_eq!(home_as(&mut talk, &drive, &[16]).0, Ok(()));
@@ -126,7 +169,7 @@ fn the_index_is_looked_for_behind_the_edge() {
 fn a_homing_is_stopped_between_two_looks() {
     use std::sync::atomic::{AtomicBool, Ordering};
     let mut talk = talk_to(&[UnitSetup::new(16)]);
-    let (seat, drive) = (crate::motion::SeatType { axes: 1, ..seat() }, drive(SWITCH));
+    let (seat, drive) = (SeatType { axes: 1, ..seat() }, drive(SWITCH));
     let silvermax = drive.silvermax.clone().unwrap();
     let of = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16] };
     let abort = AtomicBool::new(false);

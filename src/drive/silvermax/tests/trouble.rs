@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::bench::*;
 use crate::drive::link::*;
+use crate::drive::silvermax::look;
 use crate::sim::serial::LineFaults;
 use crate::sim::silvermax::Action;
 
@@ -169,7 +170,8 @@ fn a_unit_that_was_restarted_is_told_and_its_seat_stays_out_until_it_is_homed() 
     assert!(!play.stream.is_ready(0));
     let homed = home_as(&mut play.stream.talk, &drive(SWITCH), &[16, 17, 18]).0;
     assert_eq!(homed, Ok(()));
-    play.stream.rejoin(0, CANARY);
+    let canary = look(&mut play.stream.talk, 16).unwrap().canary;
+    play.stream.rejoin(0, canary);
     play.wait(1.0);
     assert!(play.stream.is_ready(0));
 }
