@@ -25,7 +25,7 @@ fn the_page_speaks_as_the_browser_asks_and_as_a_person_chooses_and_says_what_has
     enter(&browser, &hall, &["eo", "fr-CA", "de"]);
     browser.reads("state", "au repos");
     browser.wait("document.documentElement.lang === 'fr'");
-    browser.reads("cause", "tous les sièges ont été trouvés au repos");
+    browser.reads("cause", "tous les sièges qui participent ont été trouvés au repos");
     browser.reads("stop-note", "Ce n’est pas l’arrêt d’urgence");
     browser.wait(r"/100\s%/.test(document.getElementById('levels').textContent)"); // with a narrow gap
 

@@ -20,7 +20,7 @@ fn a_cue_that_fits_is_taken_in_and_one_that_does_not_is_refused_with_every_fault
     }
     assert_eq!(hall.run(&["load", "steep"]).code, Some(66));
     let run = hall.run(&["upload", &file("steep.csv"), "--id", "good"]);
-    assert_eq!(run.code, Some(1), "{run:?}");
+    assert_eq!(run.code, Some(65), "{run:?}");
     hall.done(&["load", "good"]); // the one before is still there
     let mut names: Vec<_> =
         fs::read_dir(hall.path("cues")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
