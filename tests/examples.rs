@@ -12,7 +12,8 @@ use std::process::Command;
 use programs::is_installed;
 
 /// What only the reader has: devices, films, captures, a packaged service; programs of others.
-const YOURS: [&str; 20] = [
+const YOURS: [&str; 21] = [
+    "offset=6", // controllers of six axes
     "alsa:",
     "/dev/snd",
     "film.mkv",

@@ -278,11 +278,11 @@ fn the_program_ends_with_0_on_ctrl_c_too() {
 }
 
 #[test]
-fn the_program_refuses_a_taken_port_with_71_and_the_lan_with_64() {
+fn the_program_refuses_a_taken_port_with_75_and_the_lan_with_64() {
     let taken = host();
     let address = taken.local_addr().expect("it is bound").to_string();
     for (args, code) in
-        [(["--listen", &address], 71), (["--listen", "0.0.0.0:0"], 64), (["--pa", "zz=1"], 64)]
+        [(["--listen", &address], 75), (["--listen", "0.0.0.0:0"], 64), (["--pa", "zz=1"], 64)]
     {
         let mut sim = Program::start(&args);
         assert_eq!(sim.0.wait().expect("it ends").code(), Some(code), "{args:?}");

@@ -82,7 +82,9 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
 
 /// Adds what holds of every route.
 fn completed(mut document: OpenApi) -> OpenApi {
-    document.paths.paths.values_mut().for_each(describe);
+    for (path, item) in &mut document.paths.paths {
+        describe(path, item);
+    }
     let token = SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer));
     document.components.get_or_insert_default().add_security_scheme("token", token);
     document.security = Some(vec![SecurityRequirement::new("token", [""; 0])]);
@@ -94,8 +96,8 @@ pub(super) fn guarded(router: axum::Router<Arc<Shared>>, shared: Arc<Shared>) ->
     router.layer(from_fn_with_state(Arc::clone(&shared), gate::gate)).with_state(shared)
 }
 
-fn describe(path: &mut PathItem) {
-    let changes = [&mut path.post, &mut path.put].into_iter().flatten();
+fn describe(path: &str, item: &mut PathItem) {
+    let changes = [&mut item.post, &mut item.put].into_iter().flatten();
     changes.for_each(|operation| {
         let headers = [
             header(
@@ -109,9 +111,18 @@ fn describe(path: &mut PathItem) {
         ];
         operation.parameters.get_or_insert_default().extend(headers.map(RefOr::T));
     });
-    let all = [&mut path.get, &mut path.post, &mut path.put, &mut path.delete].into_iter();
-    let came = ["What was asked for", "It was done", "It was done", "It was done"];
-    for (operation, came) in all.zip(came).filter_map(|(operation, came)| Some((operation.as_mut()?, came))) {
+    let all = [
+        ("get", "What was asked for", &mut item.get),
+        ("post", "It was done", &mut item.post),
+        ("put", "It was done", &mut item.put),
+        ("delete", "It was done", &mut item.delete),
+    ];
+    for (method, came, operation) in all {
+        let Some(operation) = operation else { continue };
+        // The names of our functions are not those of programs that are made of this.
+        let words = path.trim_start_matches("/api/v1").split(|sign: char| !sign.is_ascii_alphanumeric());
+        let name = std::iter::once(method).chain(words.filter(|word| !word.is_empty()));
+        operation.operation_id = Some(name.collect::<Vec<_>>().join("_"));
         may_fail(operation);
         for reply in operation.responses.responses.values_mut() {
             if let RefOr::T(reply) = reply

@@ -37,7 +37,7 @@ use progress::Progress;
 
 const EXAMPLES: [&str; 5] = [
     "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408",
-    "kinocue play cues/coaster.csv --to 127.0.0.1:7408,name=A1 --to 127.0.0.1:7409,name=A2 --rate 250",
+    "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408,name=A1 --to 127.0.0.1:7409,name=A2 --rate 250",
     "kinocue play cues/voyage.csv --to 127.0.0.1:7408,axes=6 --to 127.0.0.1:7409,axes=6,offset=6",
     "kinocue play cues/bench-ride.csv --config examples/hall.toml --start 0:12 --json > report.json",
     "kinocue play cues/seat-demo.csv --to 127.0.0.1:7408 --record ride.mcap --record-mode full",
