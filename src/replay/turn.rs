@@ -140,22 +140,27 @@ impl<'a> Turn<'a> {
 
     /// What was recorded of the next reply. That before it which is not known is passed over, with what it told.
     fn next_fate(&mut self) -> Option<(usize, FrameNo, Fate, u32)> {
-        while let Some((record, rest)) = self.records.split_first() {
-            match *record {
-                AckRecord::Fate(controller, frame, fate, latency) => {
-                    self.records = rest;
-                    if self.bench.knows(controller, frame) {
-                        return Some((controller, frame, fate, latency));
-                    }
-                }
-                AckRecord::Health(input @ HealthInput::Refused(_)) => {
-                    self.bench.judge(input);
-                    self.records = rest;
-                }
-                _ => return None,
+        loop {
+            self.take_refusals();
+            let (AckRecord::Fate(controller, frame, fate, latency), rest) = self.records.split_first()?
+            else {
+                return None;
+            };
+            self.records = rest;
+            if self.bench.knows(*controller, *frame) {
+                return Some((*controller, *frame, *fate, *latency));
             }
         }
-        None
+    }
+
+    /// Gives health what a reply told it.
+    fn take_refusals(&mut self) {
+        while let Some((AckRecord::Health(input @ HealthInput::Refused(_)), rest)) =
+            self.records.split_first()
+        {
+            self.bench.judge(*input);
+            self.records = rest;
+        }
     }
 }
 
@@ -207,11 +212,6 @@ impl Ledger for Turn<'_> {
         if let Fate::Answered(ReplyCode::Running) = fate {
             self.bench.health.on_ack(controller, frame, at);
         }
-        while let Some((AckRecord::Health(input @ HealthInput::Refused(_)), rest)) =
-            self.records.split_first()
-        {
-            self.bench.judge(*input);
-            self.records = rest;
-        }
+        self.take_refusals();
     }
 }
