@@ -3,6 +3,8 @@
 use std::fs::File;
 use std::io::{self, Read as _};
 
+use sha2::{Digest as _, Sha256};
+
 /// What a homing does, for whoever watches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
@@ -18,6 +20,11 @@ pub(crate) enum Step {
     Parking,
     /// Its settings are written and read back.
     Set(usize),
+}
+
+/// A number that is another once what a seat is set to, in words, is: nothing else can be read back of much of it.
+pub(crate) fn sum_of(settings: &str) -> u64 {
+    Sha256::digest(settings).iter().take(8).fold(0, |sum, octet| sum << 8 | u64::from(*octet))
 }
 
 /// A number that stands in no register by itself.

@@ -54,13 +54,12 @@ pub(crate) fn home<P: LinkPort>(
     let done = run(talk, &axes, canary, &mut around);
     if done.is_err() {
         // What is wrong already is told; that the line is gone, too, is no news.
-        let mut tell_all = |request: &dyn Fn(&UnitAxis<'_>) -> Request| {
-            for axis in &axes {
-                let _ = talk.insist(axis.unit, request(axis));
-            }
-        };
-        tell_all(&|axis| Request::Stop { deceleration: axis.brake() });
-        tell_all(&|_| Request::WriteRegister { register: CANARY, value: 0 });
+        let brakes = axes.iter().map(|axis| (axis.unit, Request::Stop { deceleration: axis.brake() }));
+        let forgets =
+            axes.iter().map(|axis| (axis.unit, Request::WriteRegister { register: CANARY, value: 0 }));
+        for (unit, request) in brakes.chain(forgets) {
+            let _ = talk.insist(unit, request);
+        }
     }
     done.map(|()| canary)
 }

@@ -1,12 +1,10 @@
 //! The settings of the units of a seat: written where a person is, at rest, and read back (command reference, pages 47 to 75).
 
-use sha2::{Digest as _, Sha256};
-
 use super::scale::DriveScale;
 use super::talk::{Answer, Talk, TalkFault};
 use crate::config::drive::{SeatDrive, SilverMaxDrive};
 use crate::drive::TICK_NS;
-use crate::drive::link::LinkPort;
+use crate::drive::link::{LinkPort, sum_of};
 use crate::motion::{AxisGeometry, SeatType};
 use crate::wire::silvermax::register::{
     self, CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, MARK, QUEUE_SOURCE, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW,
@@ -14,9 +12,8 @@ use crate::wire::silvermax::register::{
 };
 use crate::wire::silvermax::{Io, NakReason, Poll, Request, StatusWord, command};
 
-/// Bits of a canary that are a sum of settings, and how many.
+/// Bits of a canary that are a sum of settings.
 pub(super) const HALF: i32 = 0xffff;
-const HALF_BITS: u32 = 16;
 
 /// A seat, and the units that move it.
 #[derive(Debug, Clone, Copy)]
@@ -195,25 +192,22 @@ impl<'a> SeatUnits<'a> {
     /// # Errors
     /// [`HomeError::Counts`], [`HomeError::ErrorLimit`] where no unit can be set so.
     pub(crate) fn settings(&self) -> Result<Vec<UnitSettings>, HomeError> {
-        let settings = |axis: &UnitAxis<'_>| UnitSettings {
-            unit: axis.unit,
-            torque: axis.torque_words(None),
-            error_limits: axis.error_words(),
-            dry_brake: axis.brake().cast_signed(),
-            soft_limits: axis.soft_limits(),
-        };
-        Ok(self.axes()?.iter().map(settings).collect())
+        Ok(self.axes()?.iter().map(UnitAxis::settings).collect())
     }
 
-    /// The number that homing leaves in its units: by chance, but for its lower half, which is another once anything is that homing
-    /// writes, or that places are measured by.
-    pub(super) fn canary(&self, chance: i32) -> Result<i32, HomeError> {
+    /// What a canary has in its lower half: another number once anything is that homing writes, or that places are measured by.
+    pub(super) fn sum(&self) -> Result<i32, HomeError> {
         let homing = &self.drive.homing;
-        let scales: Vec<_> = self.axes()?.iter().map(|axis| (axis.unit, axis.scale)).collect();
-        let text = format!("{scales:?} {:?} {} {:?}", self.settings()?, homing.zero_mm, homing.toward);
-        let sum = Sha256::digest(text).iter().take(2).fold(0, |sum, octet| sum << 8 | i32::from(*octet));
+        let set: Vec<_> = self.axes()?.iter().map(|axis| (axis.scale, axis.settings())).collect();
+        let [low, high, ..] =
+            sum_of(&format!("{set:?} {} {:?}", homing.zero_mm, homing.toward)).to_le_bytes();
+        Ok(u16::from_le_bytes([low, high]).into())
+    }
+
+    /// The number that homing leaves in its units: by chance, but for its lower half.
+    pub(super) fn canary(&self, chance: i32) -> Result<i32, HomeError> {
         // Never 0, however it falls out.
-        Ok(chance & !HALF | 1 << HALF_BITS | sum)
+        Ok(chance & !HALF | (HALF + 1) | self.sum()?)
     }
 
     /// One such number.
@@ -277,6 +271,17 @@ fn mnemonic(request: Request) -> &'static str {
 }
 
 impl UnitAxis<'_> {
+    /// What homing leaves in its unit.
+    fn settings(&self) -> UnitSettings {
+        UnitSettings {
+            unit: self.unit,
+            torque: self.torque_words(None),
+            error_limits: self.error_words(),
+            dry_brake: self.brake().cast_signed(),
+            soft_limits: self.soft_limits(),
+        }
+    }
+
     /// Before anything moves: what is wrong, then disarmed and held by its driver where it stands, with a mark that a restart
     /// takes away.
     pub(super) fn disarm<P: LinkPort>(&self, talk: &mut Talk<P>, mark: i32) -> Result<(), HomeError> {

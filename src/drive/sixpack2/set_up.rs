@@ -2,8 +2,6 @@
 
 use std::time::Duration;
 
-use sha2::{Digest as _, Sha256};
-
 use super::ask::{told_place, where_is};
 use super::find::FindError;
 use super::scale::MotorScale;
@@ -12,7 +10,7 @@ use crate::config::drive::homing::{HomeWay, Side};
 use crate::config::drive::sixpack2::{MotorCurrent, PropDiv, SHARES, Sixpack2Drive};
 use crate::config::drive::{SeatDrive, homing::DriveHoming};
 use crate::drive::Lag;
-use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, sum_of};
 use crate::motion::{AxisGeometry, SeatType};
 use crate::wire::sixpack2::{
     CurrentSettings, MotorSettings, PeakCurrent, PiSettings, PositionTold, RampSettings, ReferenceSettings,
@@ -248,8 +246,7 @@ impl MotorAxis<'_> {
             let written = [Purpose::Homing, Purpose::Show].map(|purpose| axis.settings(purpose));
             format!("{scale:?} {} {:?} {written:?}", homing.zero_mm, homing.toward)
         };
-        let text = format!("{} {:?}", self.motor, all.iter().map(each).collect::<Vec<_>>());
-        Sha256::digest(text).iter().take(7).fold(0, |sum, octet| sum << 8 | u64::from(*octet))
+        sum_of(&format!("{} {:?}", self.motor, all.iter().map(each).collect::<Vec<_>>()))
     }
 
     /// Tells its motor what has to be taken, and gives where it is by then.

@@ -20,7 +20,7 @@ use std::time::Duration;
 use self::axis::{Axis, AxisTerms, Doubt};
 use self::lane::{LaneState, SilverLane};
 use self::polls::Question;
-use super::set_up::{HALF, HomeError, SeatUnits};
+use super::set_up::{HomeError, SeatUnits};
 use super::talk::{Talk, TalkFault};
 use crate::drive::link::{
     BrakeReason, Family, IDLE, Lead, LedPose, LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent,
@@ -71,7 +71,7 @@ impl Family for SilverMax {
             let terms = AxisTerms { unit: axis.unit, scale: axis.scale, brake: axis.brake(), period, tick };
             Axis::new(terms, now)
         });
-        Ok(SilverLane::new(axes.collect(), terms, LaneState::new(seat.canary(0)? & HALF, now), now))
+        Ok(SilverLane::new(axes.collect(), terms, LaneState::new(seat.sum()?, now), now))
     }
 
     fn begin<P: LinkPort>(stream: &mut Stream<Self, P>, lane: usize, at: MonoTime) {

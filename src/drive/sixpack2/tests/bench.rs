@@ -63,8 +63,20 @@ pub(super) fn seat() -> SeatType {
     })
 }
 
-/// Where a counter may be at the lower end of the stroke: where is a matter of all settings of the seat.
-pub(super) const AT_LOW: std::ops::RangeInclusive<i32> = 1_000_000..=7_000_000;
+/// A seat on motors of unit 1.
+pub(super) fn on_motors<'a>(
+    seat: &'a SeatType,
+    drive: &'a SeatDrive,
+    motors: &'a [u8],
+    period: Duration,
+) -> SeatMotors<'a> {
+    SeatMotors { seat, drive, sixpack2: drive.sixpack2.as_ref().unwrap(), unit: 1, motors, period }
+}
+
+/// What the counters of its motors read at the lower end of the stroke.
+pub(super) fn at_low(drive: &SeatDrive, motors: &[u8], period: Duration) -> Vec<i32> {
+    on_motors(&SeatType { axes: motors.len(), ..seat() }, drive, motors, period).at_low()
+}
 
 pub(super) const SWITCH: HomeWay = HomeWay::Switch { input: None, active_high: true };
 
@@ -112,8 +124,7 @@ pub(super) fn home_on(
 ) -> (Result<(), HomeError>, Vec<Step>) {
     let mut steps = Vec::new();
     let seat = SeatType { axes: motors.len(), ..seat() };
-    let sixpack2 = drive.sixpack2.clone().unwrap();
-    let of = SeatMotors { seat: &seat, drive, sixpack2: &sixpack2, unit, motors, period: PERIOD };
+    let of = SeatMotors { unit, ..on_motors(&seat, drive, motors, PERIOD) };
     let mut told = |step| steps.push(step);
     let homed = home(talk, of, Homing { goes_on: &|| true, told: &mut told });
     (homed, steps)

@@ -35,15 +35,7 @@ fn homed() -> Play {
     let mut talk = talk_at(&[on_bus(1)], BIT_RATE);
     assert_eq!(find(&mut talk, &[1]).map(|told| told.len()), Ok(1));
     let (seat, drive) = (seat(), drive(SWITCH));
-    let sixpack2 = drive.sixpack2.clone().unwrap();
-    let of = SeatMotors {
-        seat: &seat,
-        drive: &drive,
-        sixpack2: &sixpack2,
-        unit: 1,
-        motors: &[0, 1, 2],
-        period: SLICE,
-    };
+    let of = on_motors(&seat, &drive, &[0, 1, 2], SLICE);
     home(&mut talk, of, Homing { goes_on: &|| true, told: &mut |_| {} }).unwrap();
     talk.port().line.bus_mut().forget();
     let mut play = Play::over(talk, SLICE, &[of], Play::judge).unwrap();
@@ -163,15 +155,7 @@ fn home_over(line: LinkLine) -> Talk<LinkLine> {
     let mut talk = Talk::new(line, TalkTerms::of(&link()));
     assert_eq!(find(&mut talk, &[1]).map(|told| told[0].reset), Ok(1));
     let (seat, drive) = (seat(), drive(HomeWay::Here));
-    let sixpack2 = drive.sixpack2.clone().unwrap();
-    let of = SeatMotors {
-        seat: &seat,
-        drive: &drive,
-        sixpack2: &sixpack2,
-        unit: 1,
-        motors: &[0, 1, 2],
-        period: SLICE,
-    };
+    let of = on_motors(&seat, &drive, &[0, 1, 2], SLICE);
     home(&mut talk, of, Homing { goes_on: &|| true, told: &mut |_| {} }).unwrap();
     let facts = look_for(&mut talk, 1, &[0, 1, 2]).unwrap().expect("there is one rate");
     assert!(!facts.was_reset && of.strangers(&facts).is_empty(), "{facts:?}");
@@ -181,9 +165,10 @@ fn home_over(line: LinkLine) -> Talk<LinkLine> {
 fn assert_homed(units: &SixpackBus) {
     let unit = &units.units()[0];
     assert_eq!((unit.books.unknown, unit.books.no_motor, unit.strays()), (0, 0, 0));
-    for motor in &unit.motors[..3] {
+    let counters = at_low(&drive(HomeWay::Here), &[0, 1, 2], SLICE);
+    for (motor, at_low) in unit.motors.iter().zip(counters) {
         // From where a person said that it is 2 mm below the stroke it went to park.
-        assert!(AT_LOW.contains(&motor.position()), "{}", motor.position());
+        assert_eq!(motor.position(), at_low);
         assert!((motor.shaft.place() - shaft().start - 2.0 * MM).abs() < 1.0, "{}", motor.shaft.place());
     }
 }

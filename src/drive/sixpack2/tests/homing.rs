@@ -27,9 +27,9 @@ fn a_seat_is_homed_by_the_edges_of_its_switches_and_stands_at_park_with_its_sett
     let order = [Step::Searching(0), Step::Found(0), Step::Searching(1), Step::Parking, Step::Set(2)];
     let at: Vec<_> = order.iter().map(|step| steps.iter().position(|told| told == step)).collect();
     assert!(at.is_sorted() && at[0].is_some(), "{steps:?}");
-    for index in 0..3 {
+    for (index, at_low) in at_low(&drive(SWITCH), &[0, 1, 2], PERIOD).into_iter().enumerate() {
         assert!(place(&mut talk, index).abs() < 0.06, "{}", place(&mut talk, index));
-        assert!(AT_LOW.contains(&counts(&mut talk, index)), "{}", counts(&mut talk, index));
+        assert_eq!(counts(&mut talk, index), at_low);
         let motor = motor(&mut talk, index);
         let (written, executed) = (motor.written, motor.shaft.executed());
         assert!(is_set_up_for_shows(motor), "{written:?}");
@@ -52,8 +52,7 @@ fn a_seat_whose_settings_were_edited_after_it_was_homed_is_not_home() {
     assert_eq!(home_as(&mut talk, &homed, &[0, 1, 2]).0, Ok(()));
     let facts = look_for(&mut talk, 1, &[0, 1, 2]).unwrap().unwrap();
     let strangers = |drive: &SeatDrive, seat: &SeatType, period: Duration| {
-        let (sixpack2, motors) = (drive.sixpack2.clone().unwrap(), [0, 1, 2]);
-        SeatMotors { seat, drive, sixpack2: &sixpack2, unit: 1, motors: &motors, period }.strangers(&facts)
+        on_motors(seat, drive, &[0, 1, 2], period).strangers(&facts)
     };
     assert_eq!(strangers(&homed, &seat(), PERIOD), [0; 0]);
     let edits: [fn(&mut SeatDrive); 9] = [
@@ -101,7 +100,7 @@ fn a_reversed_axis_and_one_whose_zero_is_up_find_theirs() {
     let mut talk = talk_to(&[unit_with(1, ShaftSetup { is_reversed: true, ..shaft() })]);
     assert_eq!(home_as(&mut talk, &reversed, &[0]).0, Ok(()));
     assert!(place(&mut talk, 0).abs() < 0.06, "{}", place(&mut talk, 0));
-    assert!(AT_LOW.contains(&-counts(&mut talk, 0)), "{}", counts(&mut talk, 0));
+    assert_eq!(counts(&mut talk, 0), at_low(&reversed, &[0], PERIOD)[0]);
     assert_eq!(motor(&mut talk, 0).written.kind.p5, 0x80);
     // The virtual switch is below: up, for an axis that goes the other way than its motor is said to.
     let mut up = drive(SWITCH);
@@ -238,15 +237,7 @@ fn nothing_plays_to_motors_that_a_homing_left_as_it_searches_whether_they_or_the
     assert_eq!(home_as(&mut whole, &drive(SWITCH), &[0, 1, 2]).0, Ok(()));
     let lasts = whole.now().since(begun);
     let (seat, drive) = (seat(), drive(SWITCH));
-    let sixpack2 = drive.sixpack2.clone().unwrap();
-    let of = SeatMotors {
-        seat: &seat,
-        drive: &drive,
-        sixpack2: &sixpack2,
-        unit: 1,
-        motors: &[0, 1, 2],
-        period: PERIOD,
-    };
+    let of = on_motors(&seat, &drive, &[0, 1, 2], PERIOD);
     let (mut ready, mut searching) = (0, 0);
     let near_its_ends = (0..16).map(|step| Duration::from_millis(25 * step));
     let afters = near_its_ends.clone().chain(near_its_ends.map(|ago| lasts.saturating_sub(ago)));
