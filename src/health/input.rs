@@ -22,6 +22,8 @@ pub(crate) enum HealthInput {
     OtherSent(usize, u32),
     /// [`HealthTable::on_beat_sent`].
     BeatSent(usize, MonoTime),
+    /// [`HealthTable::on_beat_kept`].
+    BeatKept(usize, MonoTime),
     /// [`HealthTable::on_zero`].
     Zero(usize, bool),
     /// [`HealthTable::on_drive`]: the axis, from 1, and by what.
@@ -64,6 +66,7 @@ impl HealthInput {
             | Self::ReadSent(of, _)
             | Self::OtherSent(of, _)
             | Self::BeatSent(of, _)
+            | Self::BeatKept(of, _)
             | Self::Zero(of, _)
             | Self::Drive(of, ..)
             | Self::LostZero(of)
@@ -91,6 +94,7 @@ impl HealthTable {
             HealthInput::ReadSent(controller, datagrams) => self.on_read_sent(controller, datagrams),
             HealthInput::OtherSent(controller, datagrams) => self.on_other_sent(controller, datagrams.into()),
             HealthInput::BeatSent(controller, at) => self.on_beat_sent(controller, at),
+            HealthInput::BeatKept(controller, at) => self.on_beat_kept(controller, at),
             HealthInput::Zero(controller, homed) => self.on_zero(controller, homed),
             HealthInput::Drive(controller, axis, error) => self.on_drive(controller, axis, error),
             HealthInput::LostZero(controller) => self.on_lost_zero(controller),

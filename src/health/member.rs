@@ -139,6 +139,11 @@ impl Member {
     /// A beat was sent at `at`: with no frames going there, an answer to it is the sign of life that is waited for.
     pub(super) fn on_beat_sent(&mut self, at: MonoTime) {
         self.traffic.sent += 1;
+        self.on_beat(at);
+    }
+
+    /// The same of a beat that the kernel did not take: whoever cannot be asked is as silent as who does not answer.
+    pub(super) fn on_beat(&mut self, at: MonoTime) {
         if self.flows(at) {
             return;
         }

@@ -169,6 +169,11 @@ impl HealthTable {
         self.members[controller].on_beat_sent(at);
     }
 
+    /// A beat did not go out, as the kernel did not take it: an answer is missing as if it had.
+    pub(crate) fn on_beat_kept(&mut self, controller: usize, at: MonoTime) {
+        self.members[controller].on_beat(at);
+    }
+
     /// What DPF0 says, read by itself, of whether a controller knows its zero.
     pub(crate) fn on_zero(&mut self, controller: usize, homed: bool) {
         self.members[controller].on_zero(homed);

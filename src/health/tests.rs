@@ -382,6 +382,25 @@ fn with_no_frames_on_their_way_a_controller_is_lost_that_answers_no_beat() {
 }
 
 #[test]
+fn with_no_frames_on_their_way_a_controller_is_lost_to_which_no_beat_goes_out() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.silence(&[2]);
+    for _ in 0..4 {
+        for controller in 0..4 {
+            if controller == 2 {
+                hall.health.on_beat_kept(controller, hall.now);
+            } else {
+                hall.health.on_beat_sent(controller, hall.now);
+                hall.health.on_status(controller, hall.now + Duration::from_millis(1));
+            }
+        }
+        hall.now = hall.now + Duration::from_millis(250);
+        hall.look();
+    }
+    assert_eq!(hall.standings(), [HealthState::Ok, HealthState::Lost, HealthState::Ok]);
+}
+
+#[test]
 fn one_controller_lost_is_its_whole_seat_lost_and_nobody_elses() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.run(100);

@@ -3,8 +3,8 @@
 use super::ack_words::{FALLS, of, place};
 use super::cursor::Cursor;
 use crate::health::HealthInput::{
-    self, Alive, Ambiguous, Answered, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew, LostZero,
-    Moved, OtherAxes, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+    self, Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew,
+    LostZero, Moved, OtherAxes, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
 };
 use crate::health::{Continuity, Identity, Sighting};
 use crate::motion::Pulses;
@@ -51,6 +51,7 @@ pub(super) fn write_input(out: &mut Vec<u8>, input: HealthInput) {
         Homed(controller) => put(50, controller, &[]),
         Joined(group) => put(51, group, &[]),
         LookAnew(group) => put(52, group, &[]),
+        BeatKept(controller, at) => put(53, controller, &at.as_nanos().to_le_bytes()),
     }
 }
 
@@ -80,6 +81,7 @@ pub(super) fn read_input(kind: u8, of: usize, from: &mut Cursor<'_>) -> Option<H
         50 => Homed(of),
         51 => Joined(of),
         52 => LookAnew(of),
+        53 => BeatKept(of, from.time()?),
         _ => return None,
     })
 }

@@ -196,8 +196,8 @@ mod tests {
     #[test]
     fn what_health_was_told_reads_as_it_was() {
         use HealthInput::{
-            Alive, Ambiguous, Answered, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew, LostZero,
-            Moved, OtherAxes, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+            Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew,
+            LostZero, Moved, OtherAxes, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
         };
         let (mut tap, mut ring) = ack_tap(3, Rate::from_hz(100.0));
         let identity = Identity { version: 7, minor_version: 8, work_mode: 2, axes: 3 };
@@ -210,6 +210,7 @@ mod tests {
             ReadSent(1, 3),
             OtherSent(1, 70_000),
             BeatSent(2, AT),
+            BeatKept(2, AT),
             Zero(1, false),
             Drive(1, 3, 513),
             LostZero(2),

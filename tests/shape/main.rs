@@ -40,8 +40,9 @@ const ROWS: &[Row] = &[
     // Six more for two families of drives that are simulated and decoded side by side, most of them rows of tables.
     // Six more with replay and columns of acks, each of which reads what the recorder writes.
     // Two more for columns of bits, which are written and read by the same steps, and for a lag that is sought as differences are.
+    // One more for beats that the kernel did not take, a row beside those that went out.
     // 31 more with cues that are edited on the command line, codes and words of the status in rows, and units on a bus; not taken apart yet.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 99.0, 43.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 100.0, 43.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 8.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
@@ -61,9 +62,10 @@ const ROWS: &[Row] = &[
     // room for a change of pace where seats vibrate.
     // 750 more for recordings in columns of bits, their lag, scene and room, what is wrong with them apart, frames that drives were told to drop, motors of
     // seats that take no part, effects and markers for the page, and a film that was off its speed.
+    // 30 more for what real links found: beats that are not taken, a descriptor for a stop, what to do where too many files are open.
     // 2,200 more for cues that are edited, rehearsals and one exit code for one thing, SIXpack 2 units on a CAN bus, codes and margins for a page in six
     // languages, doors for what is fuzzed, and what a newcomer and two attacks found.
-    ("lines of code", counts::lines_of_code, Less, 88_250.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 88_280.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.

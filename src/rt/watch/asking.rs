@@ -45,9 +45,19 @@ impl Watch {
 
     /// Asks a controller for something; says in how many datagrams. What the kernel does not take is asked for again.
     pub(super) fn ask(&mut self, controller: usize, need: Need, now: MonoTime) -> u32 {
+        self.try_ask(controller, need, now).0
+    }
+
+    /// The same; also says whether the kernel did not take one.
+    fn try_ask(&mut self, controller: usize, need: Need, now: MonoTime) -> (u32, bool) {
         let Self { peers, sender, .. } = self;
-        let mut send = |datagram: &[u8]| !matches!(sender.send(controller, datagram), Delivery::Failed(_));
-        peers[controller].poll(need, now, &mut send)
+        let mut is_kept = false;
+        let mut send = |datagram: &[u8]| {
+            let failed = matches!(sender.send(controller, datagram), Delivery::Failed(_));
+            is_kept |= failed;
+            !failed
+        };
+        (peers[controller].poll(need, now, &mut send), is_kept)
     }
 
     /// While nothing moves, no ack tells that a controller lives, nor where its seat is; and while frames flow none tells that a seat
@@ -69,8 +79,13 @@ impl Watch {
     }
 
     fn ask_beat(&mut self, controller: usize, is_led: bool, now: MonoTime) {
-        if self.stands(controller).may_move() && self.ask(controller, Need::KeepAlive { is_led }, now) > 0 {
-            self.judge(HealthInput::BeatSent(controller, now));
+        if !self.stands(controller).may_move() {
+            return;
+        }
+        match self.try_ask(controller, Need::KeepAlive { is_led }, now) {
+            (0, false) => {}
+            (0, true) => self.judge(HealthInput::BeatKept(controller, now)),
+            _ => self.judge(HealthInput::BeatSent(controller, now)),
         }
     }
 
