@@ -3,6 +3,8 @@
 use std::io;
 use std::net::SocketAddrV4;
 
+use crate::sys::file::want_of_files;
+
 /// What keeps the sockets from being opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -33,7 +35,7 @@ pub enum NetError {
 impl NetError {
     /// The refusal of `attempt` at `address`, with the remedy that fits its cause.
     pub(super) fn refused(attempt: &'static str, address: SocketAddrV4, cause: io::Error) -> Self {
-        let remedy = match cause.raw_os_error() {
+        let of_errno = || match cause.raw_os_error() {
             Some(libc::EADDRINUSE) => {
                 "another program holds the port, perhaps a second kinocue: end it, or bind another port"
             }
@@ -48,11 +50,9 @@ impl NetError {
                 "the local address that is bound does not lead there: give --bind (or bind under [show]) this \
                  machine's address in the controllers' network, or 0.0.0.0"
             }
-            Some(libc::EMFILE | libc::ENFILE) => {
-                "too many files are open: raise the limit with LimitNOFILE= or `ulimit -n`"
-            }
             _ => "check the network settings of this machine",
         };
+        let remedy = want_of_files(&cause).unwrap_or_else(of_errno);
         Self::Refused { attempt, address, remedy, cause }
     }
 }

@@ -9,6 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use super::Settings;
+use crate::sys::file::want_of_files;
 use crate::sys::folder::Folder;
 use crate::sys::realtime;
 
@@ -177,10 +178,9 @@ impl Tray {
     /// Notes trouble, once until it is over.
     fn fail(&mut self, why: &io::Error, folder: &Path) {
         if self.trouble.is_none() {
-            let folder = folder.display();
-            self.trouble = Some(format!(
-                "what people set cannot be kept over a restart: {why}; make room in {folder}, or name another folder with --state"
-            ));
+            let room = || format!("make room in {}, or name another folder with --state", folder.display());
+            let remedy = want_of_files(why).map_or_else(room, str::to_owned);
+            self.trouble = Some(format!("what people set cannot be kept over a restart: {why}; {remedy}"));
         }
     }
 

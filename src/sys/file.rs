@@ -28,9 +28,22 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
     }
 }
 
+/// What to do where files cannot be opened because too many are; `None` where that is not the reason.
+pub(crate) fn want_of_files(error: &io::Error) -> Option<&'static str> {
+    matches!(error.raw_os_error(), Some(libc::EMFILE | libc::ENFILE))
+        .then_some("too many files are open: raise the limit with LimitNOFILE= or `ulimit -n`")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn room_on_a_disk_is_not_what_too_many_open_files_want() {
+        let remedy = |errno| want_of_files(&io::Error::from_raw_os_error(errno));
+        assert!(remedy(libc::EMFILE).is_some_and(|remedy| remedy.contains("LimitNOFILE")));
+        assert_eq!([libc::ENOSPC, libc::EROFS, libc::EIO].map(remedy), [None; 3]);
+    }
 
     #[test]
     fn a_pipe_that_nobody_writes_to_and_a_device_that_never_ends_are_refused_at_once() {

@@ -20,6 +20,7 @@ use crate::record::{
     Counts, Entry, EntryMaker, EventNote, Flight, IncidentCause, IncidentStep, Incidents, Intake, Message,
     Note, Opening,
 };
+use crate::sys::file::want_of_files;
 use crate::sys::realtime;
 use crate::time::{Clock, MonoTime};
 
@@ -293,7 +294,8 @@ impl Worker {
             (show.file, show.again_at) = (None, Some(now + AGAIN));
         }
         self.link.tell(|status| status.recording = None);
-        let remedy = "free space on that disk, or set [record] dir to a folder that the service may write to";
+        let room = "free space on that disk, or set [record] dir to a folder that the service may write to";
+        let remedy = want_of_files(error).unwrap_or(room);
         let trouble = format!(
             "the show is not recorded: {dir}: {error}; {remedy}; the show goes on, and a new file is tried every 30 s"
         );
@@ -304,8 +306,8 @@ impl Worker {
         self.incident = None;
         self.incidents.give_up();
         let dir = self.disk.dir().display();
-        let trouble =
-            format!("an incident is not kept: {dir}: {error}; free space on that disk, or set [record] dir");
+        let remedy = want_of_files(error).unwrap_or("free space on that disk, or set [record] dir");
+        let trouble = format!("an incident is not kept: {dir}: {error}; {remedy}");
         self.link.trouble(RecordPart::Incident, Some(trouble));
     }
 

@@ -1,6 +1,7 @@
 //! Signals of the system: to end, and to reload the configuration, for which another hall is opened.
 
 use std::collections::VecDeque;
+use std::error::Error as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -87,7 +88,8 @@ pub(super) fn reload(hall: &HallContext, path: &Path) -> Result<Arc<Config>, Pro
     hall.is_free()?;
     let config = config::load(path).map_err(|faults| {
         let detail = format!("{} is bad; the old configuration is kept", path.display());
-        let faults = faults.to_string().lines().map(str::to_owned).collect();
+        let cause = faults.source().map_or_else(String::new, |cause| format!(": {cause}"));
+        let faults = format!("{faults}{cause}").lines().map(str::to_owned).collect();
         Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
     })?;
     Ok(Arc::new(match &hall.config.store.kept_in {
