@@ -16,6 +16,7 @@ use super::socket::{self, SocketFile};
 use super::{ApiError, peer};
 use crate::control::Handle;
 use crate::sys::clock::Monotonic;
+use crate::sys::file::want_of_files;
 use crate::time::{Clock as _, MonoTime};
 
 /// Connections at a time; of more the oldest goes, so that idle ones keep nobody out.
@@ -43,7 +44,9 @@ pub struct StopSocket {
 pub fn stop_socket(path: &Path, handle: Handle) -> Result<StopSocket, ApiError> {
     let (listener, file) = socket::unix(path)?;
     let (wake, sleeper) = UnixStream::pair().map_err(ApiError::System)?;
-    let desk = StopDesk { listener, _file: file, sleeper, handle, peers: VecDeque::new(), pause_until: None };
+    let spare = sleeper.try_clone().ok();
+    let desk =
+        StopDesk { listener, _file: file, sleeper, spare, handle, peers: VecDeque::new(), pause_until: None };
     let thread = Builder::new().name("stop".to_owned()).spawn(move || desk.run());
     Ok(StopSocket { wake: Some(wake), thread: Some(thread.map_err(ApiError::System)?) })
 }
@@ -62,6 +65,8 @@ struct StopDesk {
     listener: UnixListener,
     _file: SocketFile,
     sleeper: UnixStream,
+    /// A descriptor that is kept for a caller who finds none left.
+    spare: Option<UnixStream>,
     handle: Handle,
     peers: VecDeque<Caller>,
     pause_until: Option<MonoTime>,
@@ -85,6 +90,9 @@ impl StopDesk {
             self.pause_until = self.pause_until.filter(|&until| until > now);
             self.hear(now);
             self.accept(now);
+            if self.spare.is_none() {
+                self.spare = self.sleeper.try_clone().ok();
+            }
         }
     }
 
@@ -124,10 +132,16 @@ impl StopDesk {
                 }
                 Ok(_) => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return,
+                Err(error) if want_of_files(&error).is_some() && self.makes_room() => {}
                 // Out of descriptors or memory: a moment later there may be some.
                 Err(_) => self.pause_until = Some(now + PAUSE),
             }
         }
+    }
+
+    /// Gives up a descriptor for whoever calls: the spare one, or that of the oldest caller.
+    fn makes_room(&mut self) -> bool {
+        self.spare.take().is_some() || self.peers.pop_front().is_some()
     }
 }
 
