@@ -68,6 +68,9 @@ impl Why {
                 "clear the error at the controller; or correct its dialect (smc, mbox): a controller refuses frames of the other; \
                  then, with the seats parked or stopped, clear the hall",
             ),
+            Self::Unsteady(_) => Some(
+                "mend what keeps frames, acks or the seat; then, with the seats parked or stopped, clear the hall",
+            ),
             Self::CutShort(_) => Some("wait until its position has been read"),
             Self::OtherAxes { .. } => Some(
                 "set PA02 to the axes of the seat, or give the seat a type with as many; with the seats parked or stopped, clear",
@@ -204,6 +207,8 @@ mod tests {
         let next = HealthState::Excluded.next();
         assert!(!next.contains("park,"), "a hall without its zero cannot park: {next}");
         assert!(Why::Refuses(0).next().is_some_and(|next| next.contains("dialect")));
+        // Its controller has no error.
+        assert!(Why::Unsteady(0).next().is_some_and(|next| !next.contains("at the controller")));
     }
 
     #[test]

@@ -479,6 +479,7 @@ export default {
   "remedy.rejoining": "parken, oder eine Show starten: er fährt langsam ein",
   "remedy.seat-out": "zuschalten, sobald er repariert ist",
   "remedy.stopped": "seinen Not-Halt-Taster entriegeln, dann quittieren",
+  "remedy.unsteady": "beheben, was Frames, ACKs oder den Sitz stört; dann, wenn die Sitze geparkt oder gestoppt sind, den Saal quittieren",
   "remedy.unwatched": "den Sitz beobachten",
   "remedy.wide": "dieser IMAX antwortet, wie sein Handbuch sagt, was kein anderer bekannter tut: ihn abschalten, und eine Aufzeichnung (`kinocue decode --dialect imax`) an die Entwickler dieses Programms senden",
   "result": "Ergebnis",

@@ -479,6 +479,7 @@ export default {
   "remedy.rejoining": "REPOSO, o iniciar un show: se incorpora despacio",
   "remedy.seat-out": "actívela cuando esté reparada",
   "remedy.stopped": "desenclave su pulsador de parada de emergencia, luego restablezca",
+  "remedy.unsteady": "corrija lo que perturba las tramas, los ACK o la butaca; luego, con las butacas en reposo o detenidas, restablezca la sala",
   "remedy.unwatched": "vigile la butaca",
   "remedy.wide": "este IMAX responde como dice su manual, lo que ningún otro conocido hace: desactívelo y envíe una captura (`kinocue decode --dialect imax`) a los desarrolladores de este programa",
   "result": "Resultado",

@@ -479,6 +479,7 @@ export default {
   "remedy.rejoining": "REPOS, ou lancer un show : il rejoint lentement",
   "remedy.seat-out": "l’activer une fois réparé",
   "remedy.stopped": "déverrouiller son bouton d’arrêt d’urgence, puis acquitter",
+  "remedy.unsteady": "corriger ce qui perturbe les trames, les ACK ou le siège ; puis, sièges au repos ou arrêtés, acquitter la salle",
   "remedy.unwatched": "surveiller le siège",
   "remedy.wide": "cet IMAX répond comme le dit son manuel, ce qu’aucun autre connu ne fait : le désactiver, et envoyer une capture (`kinocue decode --dialect imax`) aux développeurs de ce programme",
   "result": "Résultat",

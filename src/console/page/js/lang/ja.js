@@ -479,6 +479,7 @@ export default {
   "remedy.rejoining": "パークする、またはショーを開始する：ゆっくり合流します",
   "remedy.seat-out": "修理後に有効にする",
   "remedy.stopped": "非常停止ボタンを解除してからリセット",
+  "remedy.unsteady": "フレーム、ACK、座席を妨げている原因を取り除き、座席がパークまたは停止した状態でホールをリセット",
   "remedy.unwatched": "座席を目視で監視",
   "remedy.wide": "この IMAX はマニュアルどおりに応答しますが、他に例がありません：無効にし、キャプチャ（`kinocue decode --dialect imax`）を本プログラムの開発者へ送ってください",
   "result": "結果",

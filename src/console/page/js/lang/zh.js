@@ -479,6 +479,7 @@ export default {
   "remedy.rejoining": "归位，或开始演出：会缓慢并入",
   "remedy.seat-out": "修好后再启用",
   "remedy.stopped": "释放其急停按钮，然后复位",
+  "remedy.unsteady": "排除干扰帧、ACK 或座椅的原因；然后在座椅归位或停止时复位影厅",
   "remedy.unwatched": "请人工观察该座椅",
   "remedy.wide": "此 IMAX 按手册方式应答，其他已知设备均非如此：请停用，并将抓包（`kinocue decode --dialect imax`）发给本程序的维护者",
   "result": "结果",
