@@ -41,8 +41,7 @@ impl StatusParts<'_> {
     ) -> Vec<Warning> {
         let Self { hall, features, .. } = *self;
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
-        let takes_part = |(lane, row): (usize, &Row)| hall.settings.is_on(lane) && row.standing.may_move();
-        warnings.extend(nobody(table, hall.mirror.state, takes_part));
+        warnings.extend(self.of_nobody(table));
         warnings.extend(self.of_strangers());
         warnings.extend(belts::warnings(hall, table));
         warnings.extend(self.of_the_machine());
@@ -81,10 +80,35 @@ impl StatusParts<'_> {
         warnings
     }
 
+    /// Whether the hall came to its state a moment ago: who is looked for may not have answered yet.
+    fn has_begun(&self) -> bool {
+        self.hall.now.since(self.hall.mirror.since) < FIRST_LOOK
+    }
+
+    /// A hall may play and park with all its seats out; what its state says is true of none of them then.
+    fn of_nobody(&self, table: &[Row]) -> Option<Warning> {
+        let (settings, state) = (&self.hall.settings, self.hall.mirror.state);
+        let is_early = self.has_begun() || state == State::Boot;
+        let is_looked_for = |row: &Row| is_early && row.why == Why::NotSeenYet;
+        let takes_part = |(lane, row): (usize, &Row)| settings.is_on(lane) && row.standing.may_move();
+        if table.iter().all(is_looked_for) || table.iter().enumerate().any(takes_part) {
+            return None;
+        }
+        Some(Warning {
+            id: WarningCode::NoSeat.to_string(),
+            severity: Severity::Error,
+            coded: Some(Coded::new(WarningCode::NoSeat.word(), [])),
+            remedy_code: Some(RemedyCode::NoSeat.to_string()),
+            controller: None,
+            text: format!("no seat takes part: the hall is {state}, its seats are not"),
+            remedy: "enable seats (`kinocue enable`), or see at each why it is out".to_owned(),
+        })
+    }
+
     fn of_controllers(&self, table: &[Row]) -> impl Iterator<Item = Warning> {
         let hall = self.hall;
         let controllers = hall.config.controllers.iter().zip(table).enumerate();
-        let has_begun = hall.now.since(hall.mirror.since) < FIRST_LOOK;
+        let has_begun = self.has_begun();
         let of = |(lane, (controller, row)): (usize, (&crate::config::Controller, &Row))| {
             let severity = match row.standing {
                 HealthState::Rejoining if matches!(row.why, Why::Moved(_)) => Severity::Error,
@@ -193,21 +217,4 @@ fn in_two(id: &str, trouble: &str) -> Warning {
         remedy: remedy.to_owned(),
         ..Warning::default()
     }
-}
-
-/// A hall may play and park with all its seats out; what its state says is true of none of them then.
-fn nobody(table: &[Row], state: State, takes_part: impl FnMut((usize, &Row)) -> bool) -> Option<Warning> {
-    let is_looked_for = |row: &Row| row.why == Why::NotSeenYet;
-    if table.iter().all(is_looked_for) || table.iter().enumerate().any(takes_part) {
-        return None;
-    }
-    Some(Warning {
-        id: WarningCode::NoSeat.to_string(),
-        severity: Severity::Error,
-        coded: Some(Coded::new(WarningCode::NoSeat.word(), [])),
-        remedy_code: Some(RemedyCode::NoSeat.to_string()),
-        controller: None,
-        text: format!("no seat takes part: the hall is {state}, its seats are not"),
-        remedy: "enable seats (`kinocue enable`), or see at each why it is out".to_owned(),
-    })
 }
