@@ -25,6 +25,10 @@ pub(super) struct Strangers {
 impl Strangers {
     /// Notes what is counted now.
     pub(super) fn note(&mut self, table: &[Row], now: MonoTime) {
+        // Nothing to count from has been told yet.
+        if table.is_empty() {
+            return;
+        }
         self.newest = table.iter().map(|row| row.counts.stray + row.counts.duplicate).collect();
         if self.counted.back().is_none_or(|(at, _)| now.since(*at) >= EVERY) {
             self.counted.push_back((now, self.newest.clone()));
@@ -79,6 +83,15 @@ mod tests {
             strangers.note(&[row(30, 12), row(500, 0)], at);
         }
         assert_eq!(strangers.of(0), None);
+    }
+
+    #[test]
+    fn they_are_told_in_the_first_minute_as_well() {
+        let mut strangers = Strangers::default();
+        strangers.note(&[], MonoTime::default());
+        strangers.note(&[row(0, 0)], MonoTime::default() + SECOND);
+        strangers.note(&[row(40, 0)], MonoTime::default() + 2 * SECOND);
+        assert_eq!(strangers.of(0), Some(40));
     }
 
     #[test]
