@@ -69,6 +69,18 @@ impl Guarded {
         Self::spawn(Command::new(env!("CARGO_BIN_EXE_kinocue")).args(args), stdin, stderr)
     }
 
+    /// The same started by another program, whose arguments those of ours follow.
+    pub(crate) fn start_by(by: &[String], args: &[&str]) -> Self {
+        let mut command = Command::new(&by[0]);
+        command.args(&by[1..]).arg(env!("CARGO_BIN_EXE_kinocue")).args(args);
+        Self::spawn(&mut command, Stdio::null(), Stdio::piped())
+    }
+
+    /// Its number.
+    pub(crate) fn pid(&self) -> u32 {
+        self.child.as_ref().expect("it was not taken").id()
+    }
+
     fn spawn(command: &mut Command, stdin: Stdio, stderr: Stdio) -> Self {
         command.current_dir(env!("CARGO_MANIFEST_DIR"));
         command.stdin(stdin).stdout(Stdio::piped()).stderr(stderr);
@@ -263,7 +275,7 @@ pub(crate) struct Row {
 
 impl Row {
     /// A row; none where it is the one that says where the motors came to rest.
-    fn parse(line: &str) -> Option<Self> {
+    pub(crate) fn parse(line: &str) -> Option<Self> {
         let cells: Vec<&str> = line.split(',').collect();
         let pulses = |cells: &[&str]| cells.iter().filter_map(|cell| cell.parse().ok()).collect();
         Some(Self {

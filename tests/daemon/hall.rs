@@ -14,9 +14,7 @@ use tempfile::TempDir;
 use crate::http::To;
 use crate::process::{Guarded, PATIENCE, Relay, Run, Seen, Sim};
 use crate::serving::{self, Serving};
-
-/// Statuses that are waited through; where all is well a few dozen do.
-const MOST_STATUSES: usize = 600;
+use crate::statuses;
 
 /// A row of two seats, each controller behind a relay that shows its frames and has a plug.
 pub(crate) struct Hall {
@@ -197,17 +195,10 @@ impl Hall {
     }
 
     /// Waits for a status like that.
-    pub(crate) fn wait(&self, mut wanted: impl FnMut(&Value) -> bool) -> Value {
-        let mut last = None;
-        // A connection that finds no room, or whose daemon is between two configurations, is made anew.
-        let connections = std::iter::repeat_with(|| self.statuses()).take(MOST_STATUSES);
-        for status in connections.flatten().take(MOST_STATUSES) {
-            if wanted(&status) {
-                return status;
-            }
-            last = Some(status);
-        }
-        panic!("it did not come to that: {last:#?}\n{:?}", self.serving().lines());
+    pub(crate) fn wait(&self, wanted: impl FnMut(&Value) -> bool) -> Value {
+        let told = || format!("{:?}", self.serving().lines());
+        statuses::wait(&self.path("control.sock"), told, wanted)
+            .unwrap_or_else(|last| panic!("it did not come to that: {last:#?}\n{}", told()))
     }
 
     /// Waits for a state.
@@ -221,18 +212,6 @@ impl Hall {
         let now = |status: &Value| status["ticks"].as_u64();
         let until = now(&self.wait(|status| now(status).is_some())).expect("a count") + ticks;
         self.wait(|status| now(status).is_some_and(|now| now >= until))
-    }
-
-    /// The status now, and each that comes.
-    fn statuses(&self) -> impl Iterator<Item = Value> {
-        let stream = UnixStream::connect(self.path("control.sock"));
-        let mut stream =
-            stream.unwrap_or_else(|error| panic!("it has ended: {error}: {:?}", self.serving().lines()));
-        stream.set_read_timeout(Some(PATIENCE)).expect("it is longer than nothing");
-        // HTTP/1.0 knows no chunks, so that lines are whole.
-        let _ = stream.write_all(b"GET /api/v1/events HTTP/1.0\r\nHost: localhost\r\n\r\n"); // it may be closed again
-        let lines = BufReader::new(stream).lines().map_while(Result::ok);
-        lines.filter_map(|line| Some(serde_json::from_str(line.strip_prefix("data: ")?).expect("JSON")))
     }
 
     /// The lines of the journal that are of that kind; whole once the daemon has ended.
