@@ -115,7 +115,8 @@ fn a_controller_that_overflows_in_mid_show_is_out_in_words_and_the_other_plays_o
         let (text, remedy) = warning(&out, "controller-error", Some(1)).expect("it is told");
         assert!(text.contains(&format!("Err{error}: ")) && text.contains(words), "{text}");
         assert!(remedy.contains("at the controller"), "{remedy}");
-        let out = hall.lives_on(20);
+        // What was sent is told a while later where the machine is busy.
+        let out = hall.lives_on(100);
         let later = hall.lives_on(50);
         assert!(later["state"] == "playing" && count(&later, 1, "sent") == count(&out, 1, "sent"), "{later}");
         hall.happens(1, "err=0");
