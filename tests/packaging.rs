@@ -248,6 +248,19 @@ fn each_test_that_the_page_of_faults_names_is_there() {
     }
 }
 
+#[test]
+fn the_tool_that_tries_faults_knows_all_of_the_page_by_number_and_refuses_others() {
+    let tool = |words: &[&str]| {
+        Command::new(root().join("tools/faults")).args(words).output().expect("python3 is there")
+    };
+    let list = tool(&[]);
+    let lines = String::from_utf8_lossy(&list.stdout).lines().count();
+    assert!(list.status.success() && lines == 62, "{lines}: {}", said(&list));
+    let unknown = tool(&["63"]);
+    assert_eq!(unknown.status.code(), Some(1), "{}", said(&unknown));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("numbers from 1 to 62"), "{}", said(&unknown));
+}
+
 /// All sources below a folder, one behind the other.
 fn rust_under(folder: &str) -> String {
     let entries = fs::read_dir(root().join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
