@@ -170,6 +170,7 @@ fn play(
         None => Play::new(config, timeline, show, manner),
     };
     let mut play = play.map_err(|error| refused(error, &cue))?;
+    play.crowding().into_iter().for_each(|words| print::tell(&format!("kinocue: {words}")));
     if let Some(file) = &args.record {
         play = play
             .recorded(file, args.record_mode)

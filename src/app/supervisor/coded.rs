@@ -47,6 +47,8 @@ words! {
         BeltUntold = "belt-untold",
         /// What the system refused.
         NotRealTime = "not-real-time",
+        /// What frames take of the time between ticks.
+        Sending = "sending",
         /// Of the film.
         Film = "film",
         /// The cue follows none.

@@ -35,6 +35,8 @@ pub(super) struct HallContext {
     pub(super) leave: Arc<AtomicBool>,
     /// What the system granted the tick thread.
     pub(super) granted: RealTime,
+    /// What to do where frames take too much of the time between ticks.
+    pub(super) crowding: Option<String>,
     pub(super) mirror: StateMirror,
     pub(super) settings: HallSettings,
     /// What is loaded.
@@ -114,6 +116,7 @@ impl HallContext {
             live: Arc::clone(&runtime.live),
             leave: Arc::clone(&runtime.leave),
             granted: runtime.granted.clone(),
+            crowding: runtime.crowding.clone(),
             mirror: StateMirror::new(now),
             settings,
             cued: None,

@@ -203,6 +203,7 @@ fn runtime(config: &Arc<Config>) -> (RuntimeHandle, Consumer<TickCommand>, NewsO
         orders: RingBuffer::new(16).0,
         links: Vec::new(),
         granted: RealTime::NOTHING,
+        crowding: None,
     };
     (runtime, commands_end, news)
 }

@@ -131,7 +131,9 @@ impl StatusParts<'_> {
     }
 
     fn of_the_machine(&self) -> impl Iterator<Item = Warning> {
-        self.hall.granted.refusals.iter().map(|refusal| in_two(WarningCode::NotRealTime.word(), refusal))
+        let crowding = self.hall.crowding.iter().map(|words| in_two(WarningCode::Sending.word(), words));
+        let refusals = &self.hall.granted.refusals;
+        refusals.iter().map(|refusal| in_two(WarningCode::NotRealTime.word(), refusal)).chain(crowding)
     }
 
     /// A cue that follows nothing in a hall whose film others show: it starts as soon as it is let go.
