@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 
 use super::rehearsal::Rehearsal;
+use super::token::link;
 use super::{Exit, Failure, OrExit as _, exit, load, places, print};
 use crate::api::ApiError;
 use crate::app::serve::{Parts, Places, ServeError, serve, signals};
@@ -78,6 +79,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         for address in addresses {
             let text = format!("the API and the console: http://{address}/");
             log.say(Line::new(Priority::Info, "listening", text));
+        }
+        if let (Some(rehearsal), Some(address)) = (&rehearsal, addresses.first()) {
+            print::tell(&format!("to rehearse, with all rights: {}", link(*address, &rehearsal.token)));
         }
     })?;
     Ok(Exit::Done)

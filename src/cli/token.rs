@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, Read as _};
+use std::net::SocketAddr;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
@@ -96,6 +97,11 @@ pub(super) fn chance<const N: usize>() -> io::Result<[u8; N]> {
     let mut bytes = [0; N];
     File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     Ok(bytes)
+}
+
+/// The console with the token in the fragment, which no browser sends anywhere.
+pub(super) fn link(address: SocketAddr, token: &str) -> String {
+    format!("http://{address}/#token={token}")
 }
 
 impl<'n> Token<'n> {

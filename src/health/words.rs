@@ -58,7 +58,7 @@ impl Why {
                 Some("home it with nobody on the seat (`kinocue home --config`, with the service stopped)")
             }
             Self::OtherMaster(_) => {
-                Some("stop the other machine; then park, and home it with nobody on the seat")
+                Some("stop the other machine; then clear, and home it with nobody on the seat")
             }
             Self::Wide(_) => Some(
                 "this IMAX answers as its manual says, which no other known one does: disable it, and send a capture \
