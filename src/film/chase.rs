@@ -236,6 +236,18 @@ impl Chase {
         self.state
     }
 
+    /// Whether the seats hold for what is over in a moment: it jumped, and where it is now is being found, which no source is given more
+    /// than five seconds for. What may last, as a film that was stopped, rests as a pause does.
+    #[must_use]
+    pub(crate) const fn is_held_briefly(&self) -> bool {
+        let is_brief = match self.why {
+            HoldCause::Apart => true,
+            HoldCause::Film(state) => state.is_brief(),
+            HoldCause::Unstable | HoldCause::Asks => false,
+        };
+        matches!(self.state, ChaseState::Holding) && is_brief
+    }
+
     /// A person lets seats that hold join, once, and soon.
     pub(crate) fn let_join(&mut self, now: MonoTime) {
         self.let_join = Some(now + LET_FOR);
