@@ -238,6 +238,13 @@ impl FilmTable {
         row.filter(|row| row.state == FilmState::Locked && row.may_lead)?.media_s.map(ShowTime::from_secs_f64)
     }
 
+    /// Sources that have all ended without a position of a film.
+    pub(crate) fn unheard(&self) -> Option<String> {
+        let is_unheard = self.over && self.sources.iter().all(|row| row.used == 0);
+        let names = || self.sources.iter().map(|row| row.source.as_str()).collect::<Vec<_>>().join(", ");
+        is_unheard.then(names)
+    }
+
     /// How long so many frames of the film last, as the source that leads has it, else the first; of 24 a second where none knows.
     pub(crate) fn frames_ms(&self, frames: i32) -> i32 {
         let rate =
