@@ -52,6 +52,13 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
         run.stderr
     );
     assert!(seen.rest_in_park());
+    // While they wait and join, too, it is said where the film is, and who says so.
+    for state in ["waiting: ", "joining: the seats join the film", "playing: "] {
+        let lines = || run.stderr.lines().filter(|line| line.starts_with(&format!("kinocue: {state}")));
+        let says = |line: &str| line.contains("; film ") && line.contains(" by ltc:/");
+        assert!(lines().count() > 0 && lines().all(says), "{state}: {}", run.stderr);
+    }
+    assert!(run.stderr.contains(" the cue by ltc:/"), "{}", run.stderr);
     let said = |what: &str| run.stderr.find(what).unwrap_or_else(|| panic!("{what}: {}", run.stderr));
     assert!(
         said("joining: the seats join the film") < said("playing: the seats that take part are on the cue")

@@ -173,6 +173,14 @@ fn up_to_a_frame_is_slewed_and_more_is_joined() {
 }
 
 #[test]
+fn seats_that_fell_behind_the_film_by_missed_ticks_blame_no_film() {
+    let mut stand = Stand::following(rules());
+    stand.missed = 5;
+    assert_eq!(stand.tick(), ChaseVerdict::Hold(HoldCause::Behind));
+    assert!(matches!(stand.tick(), ChaseVerdict::Follow { join: 2, .. }));
+}
+
+#[test]
 fn seats_hold_briefly_for_a_film_that_is_being_found_and_rest_for_one_that_may_stay_away() {
     for state in FilmState::ALL.into_iter().filter(|state| !state.may_lead() && *state != FilmState::Ended) {
         let mut stand = Stand::following(rules());
