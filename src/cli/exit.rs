@@ -113,7 +113,7 @@ pub(super) fn of_film(error: FilmError) -> Failure {
     let exit = match &error {
         FilmError::NoInput { .. } => Exit::NoInput,
         FilmError::Sound { .. } | FilmError::Index { .. } => Exit::BadCue,
-        FilmError::Many(_) | FilmError::NoLine(_) | FilmError::NoSuchTime => {
+        FilmError::Many(_) | FilmError::Twice(_) | FilmError::NoLine(_) | FilmError::NoSuchTime => {
             Exit::Usage
         }
         FilmError::Open { .. }

@@ -259,6 +259,7 @@ fn a_source_that_is_none_is_refused_and_so_is_what_a_film_cannot_be_led_with() {
     let cue = rise(&folder, 2);
     let refused = [
         (&["--chase", "tape:1"][..], 64, "is not a source; use mpv:SOCKET"),
+        (&["--chase", "mpv:/s", "--chase", "ltc:-", "--chase", "mpv:/s"], 64, "mpv:/s is named twice"),
         (&["--chase", "ltc:nothing.wav"], 66, "nothing.wav cannot be opened: No such file"),
         (&["--chase", "ltc:-", "--start", "1"], 64, "cannot be used with"),
         (&["--chase", "ltc:-", "--film-fps", "26"], 64, "is not a frame rate; take"),

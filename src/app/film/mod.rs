@@ -3,6 +3,8 @@
 
 mod clock;
 mod datagrams;
+#[cfg(feature = "harness")]
+pub(crate) mod doors;
 mod hall;
 mod heard;
 mod indexed;
@@ -123,6 +125,9 @@ pub(crate) enum FilmError {
     /// There are too many of them.
     #[error("{0} sources are too many; {MOST_SOURCES} can be ranked")]
     Many(usize),
+    /// Two of them are one.
+    #[error("{0} is named twice; name each source once, the best first")]
+    Twice(String),
     /// There is no line that could be relayed.
     #[error(
         "{0} is not a line that a relay reads; take ltc:alsa:DEVICE, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:- or mtc:DEVICE"
@@ -241,6 +246,10 @@ impl FilmReader {
     ) -> Result<Self, FilmError> {
         if sources.len() > MOST_SOURCES {
             return Err(FilmError::Many(sources.len()));
+        }
+        let is_named = |place: usize| sources[..place].iter().any(|one| one.source == sources[place].source);
+        if let Some(twice) = (1..sources.len()).find(|place| is_named(*place)) {
+            return Err(FilmError::Twice(sources[twice].source.to_string()));
         }
         let (to, heard) = sync_channel(WAITING);
         let notes: Vec<Notes> = sources.iter().map(SourceNotes::shared).collect();
