@@ -129,7 +129,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.stream.no_acks };
     let film = film(args)?;
-    play(config, timeline, show, manner, film.as_ref(), args)
+    let exit = play(config, timeline, show, manner, film.as_ref(), args)?;
+    film.and_then(|film| film.table().read().unheard()).map_or(Ok(exit), unheard)
 }
 
 /// Begins to listen to the film that leads, if one does.
@@ -142,7 +143,7 @@ fn film(args: &Args) -> Result<Option<FilmReader>, Failure> {
         return Ok(None);
     }
     let rules = SourceRules { allows_coarse: args.allow_coarse, ..SourceRules::default() };
-    FilmReader::start(&sources, rules).map(Some).or_system()
+    FilmReader::start(&sources, rules).map(Some).map_err(exit::of_film)
 }
 
 /// Plays what is proved to fit, and prints the report.
@@ -187,6 +188,13 @@ fn play(
     let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, args.json)
+}
+
+/// Sources that say nothing of a film are no input to a play that chases one.
+fn unheard(sources: String) -> Result<Exit, Failure> {
+    let why = "ended, and nothing of a film was heard in it; see with `kinocue sync watch` what it carries, and check a recording with \
+               `kinocue sync check`";
+    Err(anyhow!("{sources}: {why}")).or_exit(Exit::BadCue)
 }
 
 fn uses_effects(timeline: &Timeline) -> bool {

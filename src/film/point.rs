@@ -67,6 +67,11 @@ impl FilmState {
     pub(crate) const fn may_lead(self) -> bool {
         matches!(self, Self::FreeRunning | Self::Locked | Self::Freewheeling)
     }
+
+    /// True if seats may follow, or will know in a moment whether they may.
+    pub(super) const fn is_brief(self) -> bool {
+        self.may_lead() || matches!(self, Self::Acquiring | Self::Jumped)
+    }
 }
 
 /// Where the film is at an instant, and how fast it runs.

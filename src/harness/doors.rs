@@ -5,11 +5,15 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
 
+use sha2::{Digest as _, Sha256};
+
+use crate::app::film::doors as film;
 use crate::film::artnet::ArtNetReader;
 use crate::film::ltc::LtcReader;
 use crate::film::mpv::MpvClient;
 use crate::film::mtc::MtcReader;
 use crate::film::observation::Observation;
+use crate::film::sound::SoundIndex;
 use crate::film::timecode::{FrameRate, Label};
 use crate::time::MonoTime;
 use crate::wire::silvermax::{Collected, LineCollector};
@@ -43,6 +47,10 @@ pub const DOORS: &[Door] = &[
     ("mtc", mtc),
     ("artnet", artnet),
     ("mpv", mpv),
+    ("film-wav", film::wav),
+    ("film-relay", film::relayed),
+    ("film-position", film::position),
+    ("film-index", film_index),
     ("recording", |octets| seen(record::summarize(octets))),
     ("replay", |octets| seen(replay::replay(octets))),
     ("capture", captured),
@@ -132,6 +140,13 @@ fn mpv(octets: &[u8]) {
         seen(client.poll(now));
         client.hear(piece, now, &mut |heard| out(heard));
     });
+}
+
+/// With the sum that its content has as well: else all that is wrong would end there.
+fn film_index(octets: &[u8]) {
+    let content = octets.split_last_chunk::<32>().map_or(octets, |(content, _)| content);
+    seen(SoundIndex::of_octets(octets));
+    seen(SoundIndex::of_octets(&[content, &Sha256::digest(content)[..]].concat()));
 }
 
 fn captured(octets: &[u8]) {

@@ -114,6 +114,7 @@ mod tests {
     use crate::control::{Code, MarginOf, Role};
     use crate::film::chase::{HoldCause, ParkCause};
     use crate::film::point::FilmState;
+    use crate::film::words::FilmLed;
     use crate::health::{HealthState, Why as Standing};
     use crate::motion::Pulses;
     use crate::state::{Cause, Next, Readiness, State, Transition, Trouble, Why};
@@ -136,7 +137,7 @@ mod tests {
         let troubles =
             each!(Trouble { Limiter, Planner, Deaf, Homing(0), HomingTime, ParkingTime, OtherMaster(0) });
         let over = each!(ParkCause { FilmEnded, FilmCutShort, CueLeft, HeldTooLong });
-        let awaited = each!(HoldCause { Film(FilmState::Lost), Apart, Unstable, Asks });
+        let awaited = each!(HoldCause { Film(FilmState::Lost), Apart, Behind, Unstable, Asks });
         let mut all = each!(Cause {
             Started, Crashed, AwayFromPark, FoundParked, Asked(Transition::Go), StoppedHoming, Homed, ArrivedAtPark, ArmLapsed,
             NotReady(Readiness::NoCue), Rebooted(0), GapOver, Joined, Late, CueEnded, PausedTooLong, GroupOut(0), EmergencyStop(0),
@@ -234,7 +235,9 @@ mod tests {
             add("warning", code.word(), values);
         }
         for state in FilmState::ALL {
-            [true, false].iter().for_each(|followed| add("film-next", state.next(*followed).0, 0));
+            for led in each!(FilmLed { Nobody, Joining, Following }) {
+                add("film-next", state.next(led).0, 0);
+            }
         }
         MarginOf::ALL.iter().for_each(|of| add("margin", of.word(), 0));
         [Role::View, Role::Operate, Role::Engineer].iter().for_each(|role| add("role", &role.to_string(), 0));
