@@ -115,7 +115,7 @@ impl LaneEvidence {
 
     /// Notes a reading. One thread alone may.
     pub fn on_reading(&self, reading: &Reading) {
-        let how = u64::from(reading.rests) * RESTS | u64::from(reading.moves) * MOVES;
+        let how = (u64::from(reading.rests) * RESTS) | (u64::from(reading.moves) * MOVES);
         let word = u64::from(reading.slots) | how | (reading.by as u64) << BY;
         let words = [reading.at.as_nanos(), reading.sways.to_bits(), word];
         self.reading.put(std::array::from_fn(|place| {
