@@ -25,6 +25,7 @@ mod incidents;
 mod intake;
 mod judging;
 mod margins;
+mod marks;
 mod notes;
 mod read;
 #[cfg(test)]
@@ -57,6 +58,7 @@ pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
 pub(crate) use intake::{Counts, Intake, Taps};
 pub(crate) use judging::{JudgedController, Judging};
 pub(crate) use margins::{Margin, Margins, Quantity};
+pub(crate) use marks::{MarkBudget, MarkRefusal};
 pub(crate) use notes::{ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote};
 pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;
