@@ -37,6 +37,12 @@ impl TickHead {
         let state = State::Playing(crate::state::PlayMode::Following);
         Self { index, deadline, late_ns: 0, missed: 0, film: ShowTime::ZERO, state }
     }
+
+    /// The same with the film there.
+    #[must_use]
+    pub const fn showing(self, film: ShowTime) -> Self {
+        Self { film, ..self }
+    }
 }
 
 /// What was asked of a lane before the limiter saw it.

@@ -69,8 +69,8 @@ pub(crate) use sampled::{Message, Sampled, SeatSample, TickSample};
 pub(crate) use schemas::state_number;
 pub(crate) use seat::RecordedAxis;
 pub use seat::{FrameKind, RecordedSeat};
-pub(crate) use summary::{SeatTotals, Summary, each_chunk, state_word, summarize};
+pub(crate) use summary::{FilmPass, SeatTotals, Summary, each_chunk, state_word, summarize};
 pub use tap::{Tap, tap};
 pub(crate) use tap::{file_octets_a_second, octets_a_second};
 #[cfg(test)]
-pub(crate) use tests::{recorded_as, recorded_falling, recorded_measured};
+pub(crate) use tests::{recorded_as, recorded_falling, recorded_filmed, recorded_measured};
