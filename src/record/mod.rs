@@ -64,7 +64,7 @@ pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;
 pub(crate) use recording::{ACKS, About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ};
 pub(crate) use recover::{RecoverError, Recovered, recover};
-pub(crate) use report::report_of;
+pub(crate) use report::{Closing, closing_of};
 pub(crate) use sampled::{Message, Sampled, SeatSample, TickSample};
 pub(crate) use schemas::state_number;
 pub(crate) use seat::RecordedAxis;

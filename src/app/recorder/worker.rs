@@ -163,6 +163,7 @@ impl Worker {
                     let is_mark = matches!(note, Note::Mark(_));
                     self.keep(at, note);
                     if is_mark {
+                        self.intake.marked();
                         self.link.tell(|status| status.marks += 1);
                         self.on_incident(IncidentCause::Mark, at, now);
                     }
