@@ -7,9 +7,6 @@ use crate::plot::TimeAxis;
 use crate::record::FilmPass;
 use crate::time::{MonoTime, ShowTime};
 
-/// So many passes are looked through for the show time of an instant, from its own back.
-const BACK: usize = 64;
-
 /// An axis, and what stands on it.
 #[derive(Debug, Clone)]
 pub(crate) struct FilmAxis {
@@ -79,12 +76,16 @@ impl FilmAxis {
 
     /// Where an instant of that show time, s, is; `None` where it is not on the axis.
     pub(super) fn moment(&self, at: MonoTime, film_s: f64) -> Option<Moment> {
-        let begun = self.passes.partition_point(|pass| pass.begin < at).max(1);
         let has = |index: &usize| {
             let FilmPass { from_s, until_s, before_s, after_s, .. } = self.passes[*index];
             from_s - before_s <= film_s && film_s <= until_s + after_s
         };
-        let index = (0..begun).rev().take(BACK).find(has)?;
+        let own = self.passes.partition_point(|pass| pass.begin < at).saturating_sub(1);
+        // A tick of the sample in which the film went back may be of the pass before.
+        let FilmPass { begin, before_s, .. } = self.passes[own];
+        let may_be_before = at.since(begin).as_secs_f64() <= before_s;
+        let before = own.checked_sub(1).filter(|_| may_be_before);
+        let index = [Some(own), before].into_iter().flatten().find(has)?;
         let FilmPass { from_s, until_s, .. } = self.passes[index];
         let (begin_s, pass) =
             self.time.passes().get(index).map_or((from_s, 0), |pass| (pass.at_s, index + 1));
