@@ -51,6 +51,9 @@ fn passes(time: &TimeAxis) -> String {
     if passes.is_empty() { passes } else { format!(" data-passes=\"[{passes}]\"") }
 }
 
+/// Passes whose begin is a line across each panel.
+const MOST_PASSES: usize = 40;
+
 const TOOLS: &str = "<div class=\"tools\" hidden><button data-does=\"in\" aria-label=\"Larger\">+</button>\
 <button data-does=\"out\" aria-label=\"Smaller\">−</button><button data-does=\"back\" aria-label=\"Earlier\">←</button>\
 <button data-does=\"on\" aria-label=\"Later\">→</button><button data-does=\"whole\">Whole</button>\
@@ -97,6 +100,9 @@ fn section(panel: &Panel, time: &TimeAxis) -> String {
         );
     }
     out += "<div class=\"clip ticks\"></div>";
+    for pass in time.passes().iter().skip(1).take(MOST_PASSES) {
+        out += &format!("<i class=\"pass\" {}\"></i>", at(time, pass.at_s));
+    }
     let range = if panel.scale == Scale::Range { " range" } else { "" };
     let paths = panel.bands.iter().map(|band| {
         format!("<path class=\"curve{range} {}\" d=\"{}\"/>", classes(band.style), path::band(panel, band))
