@@ -30,6 +30,7 @@ mod controllers;
 mod cues;
 mod gate;
 mod guarded;
+mod history;
 mod input;
 mod once;
 mod peer;

@@ -176,6 +176,8 @@ pub struct RecordStatus {
     pub(crate) incidents: BTreeMap<String, u64>,
     /// Moments that were marked.
     pub(crate) marks: u64,
+    /// Marks that were not kept: within a second of another, or more than 60 and one a minute.
+    pub(crate) more_marks: u64,
     /// How often something could not be written.
     pub(crate) errors: u64,
     /// What is wrong, and what to do, by what it is of: `show`, `incident`, `flight`, `earlier`; empty if all is well.

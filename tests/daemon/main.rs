@@ -22,6 +22,7 @@ mod serving;
 mod wav;
 
 mod begin;
+mod disks;
 mod drives;
 mod film;
 mod hall;

@@ -41,7 +41,8 @@ const ROWS: &[Row] = &[
     // Six more with replay and columns of acks, each of which reads what the recorder writes.
     // Two more for columns of bits, which are written and read by the same steps, and for a lag that is sought as differences are.
     // 31 more with cues that are edited on the command line, codes and words of the status in rows, and units on a bus; not taken apart yet.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 99.0, 43.0),
+    // Two more for clamps and marks in a list of counts.
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 101.0, 43.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 8.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
@@ -64,13 +65,15 @@ const ROWS: &[Row] = &[
     // 2,200 more for cues that are edited, rehearsals and one exit code for one thing, SIXpack 2 units on a CAN bus, codes and margins for a page in six
     // languages, doors for what is fuzzed, and what a newcomer and two attacks found.
     // 180 more for sources of a film that are refused with a remedy, where a film is while its seats join, and doors for what reads films.
-    ("lines of code", counts::lines_of_code, Less, 88_430.0, 39_800.0),
+    // 540 more for a history of shows, passes of a film in pictures, a budget of marks, and datagrams that name nobody.
+    ("lines of code", counts::lines_of_code, Less, 88_791.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
     // Three more that tests make or ask: frames that were withdrawn, acks of links, what the hall lets a film do.
     // Four more: the doors that a fuzzer and tests go through.
-    ("public items and fields", counts::public_items, Less, 1_234.0, 400.0),
+    // One more: where the film is in a tick that a bench makes.
+    ("public items and fields", counts::public_items, Less, 1_235.0, 400.0),
     // A table: a row for each reason why a seat stands as it does.
     ("lines of the longest function", counts::longest_function, Less, 60.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 466.0, 390.0),

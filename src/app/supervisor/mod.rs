@@ -66,7 +66,7 @@ use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, Stat
 use crate::journal::Journal;
 use crate::library::Library;
 use crate::osc::Counts;
-use crate::record::{ActionNote, LogNote, Note};
+use crate::record::{LogNote, Note};
 use crate::rt::{News, Ticket};
 use crate::settings::{Settings, SettingsFile};
 use crate::state::State;
@@ -79,6 +79,7 @@ use job::{Jobs, Tools};
 use list::List;
 use procedures::Procedures;
 use record::ShowRecords;
+use recorded::AsksTold;
 use shared_link::SharedLink;
 use status::StatusParts;
 
@@ -149,6 +150,7 @@ pub(crate) struct Supervisor {
     told: MonoTime,
     /// What went wrong lately and no state says, newest last.
     notes: VecDeque<String>,
+    asks_told: AsksTold,
     reload: Option<Arc<Config>>,
 }
 
@@ -189,6 +191,7 @@ impl Supervisor {
             jobs: Jobs::new(tools),
             told: now,
             notes: carryover.notes,
+            asks_told: AsksTold::default(),
             reload: None,
         };
         carryover.untold.into_iter().for_each(|note| supervisor.note(note));
@@ -323,6 +326,7 @@ impl Supervisor {
         let log = &self.ports.service_log;
         self.features.records.settle_folds(now).iter().for_each(|action| log.say_ask(action));
         log.say_journal(self.features.records.news());
+        self.asks_told.settle(&self.hall);
         log.say_settings(self.ports.settings_file.news());
         self.keep_settings();
         self.publish();
@@ -350,12 +354,7 @@ impl Supervisor {
     /// Writes down what somebody asked, and what came of it.
     fn write_down(&mut self, desired: &Desired, result: &Result<(), Problem>) {
         let state = self.hall.mirror.state;
-        self.hall.recorder.keep(Note::Action(ActionNote {
-            who: recorded::name_of(&desired.who, &self.hall),
-            what: desired.ask.to_string(),
-            result: result.as_ref().map_or_else(ToString::to_string, |()| "done".to_owned()),
-            state: state.to_string(),
-        }));
+        self.asks_told.take(desired, result, &self.hall);
         let due = self.features.records.write_down(desired, result, state, self.hall.now);
         due.iter().for_each(|action| self.ports.service_log.say_ask(action));
     }
