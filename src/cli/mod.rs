@@ -31,6 +31,7 @@ mod info;
 mod latency;
 mod load;
 mod man;
+mod metres;
 mod names;
 mod places;
 mod play;
