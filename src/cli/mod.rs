@@ -108,6 +108,8 @@ enum ProgramCommand {
     #[command(flatten)]
     Client(client::ClientCommand),
     Completions(completions::Args),
+    #[command(hide = true)]
+    Known(client::KnownArgs),
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
     Prove(prove::Args),
@@ -195,6 +197,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Token(args) => token::run(&args),
         ProgramCommand::Client(command) => client::run(&command),
         ProgramCommand::Completions(args) => completions::run(&args),
+        ProgramCommand::Known(args) => client::known(&args),
         ProgramCommand::Prove(args) => prove::run(&args),
         ProgramCommand::DrawRecording(args) => draw_recording::run(&args),
         ProgramCommand::FilmPlayer(args) => film_player::run(&args),
