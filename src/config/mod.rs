@@ -32,6 +32,7 @@ mod seat;
 mod section;
 mod site;
 mod sync;
+mod syntax;
 mod target;
 #[cfg(test)]
 mod tests;

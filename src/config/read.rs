@@ -66,7 +66,7 @@ pub(super) fn document(path: &Path, text: &str) -> Result<Config, ConfigFaults> 
     let mut faults = Faults::of(text);
     let (tree, errors) = DeTable::parse_recoverable(text);
     for error in errors {
-        faults.note_syntax(error.span().map_or(0, |span| span.start), error.message());
+        faults.note_syntax(&error);
     }
     let config = root(tree.get_ref(), &mut faults);
     match config {
