@@ -242,6 +242,7 @@ fn serve_halls(
         numbers.extend(left.closed.numbers.clone());
         (runtime, config) =
             reopen(next, config, &numbers, &mut ports.carryover, &ports.signals.leave, &mut film)?;
+        surfaces.take_tokens(&config);
     };
     surfaces.close();
     log.close();
@@ -275,7 +276,7 @@ fn reopen(
     match open(&next) {
         Ok(runtime) => Ok((runtime, next)),
         Err(error) => {
-            carryover.note(format!(
+            carryover.refuse(format!(
                 "the hall does not open with the new configuration, and has the old one: {error}"
             ));
             Ok((open(&before)?, before))

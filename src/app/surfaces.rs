@@ -95,6 +95,11 @@ impl Surfaces {
         self.api.addresses()
     }
 
+    /// Takes the tokens of a configuration that is in effect now.
+    pub(crate) fn take_tokens(&self, config: &Config) {
+        self.api.set_tokens(&config.api.tokens);
+    }
+
     /// What has come to the port for OSC, if there is one.
     pub(crate) fn osc_counts(&self) -> Option<Arc<Counts>> {
         self.osc.clone()

@@ -84,6 +84,8 @@ use status::StatusParts;
 
 /// From one status to the next.
 const TELL: Duration = Duration::from_millis(100);
+/// How long whoever has the configuration read anew waits for controllers that do not answer.
+const OPENS: Duration = Duration::from_secs(10);
 /// Notes that are kept.
 const NOTES: usize = 5;
 
@@ -150,6 +152,8 @@ pub(crate) struct Supervisor {
     /// What went wrong lately and no state says, newest last.
     notes: VecDeque<String>,
     reload: Option<Arc<Config>>,
+    /// Who asked for another configuration, this one or the next, and what came of it.
+    reloading: Option<(Asked, Result<(), Problem>)>,
 }
 
 impl Supervisor {
@@ -190,6 +194,7 @@ impl Supervisor {
             told: now,
             notes: carryover.notes,
             reload: None,
+            reloading: carryover.reloading,
         };
         carryover.untold.into_iter().for_each(|note| supervisor.note(note));
         supervisor.hall.set_desk();
@@ -326,6 +331,17 @@ impl Supervisor {
         log.say_settings(self.ports.settings_file.news());
         self.keep_settings();
         self.publish();
+        self.answer_reload();
+    }
+
+    /// Answers whoever asked for this configuration, once the hall knows its seats, or has looked for them for long enough.
+    fn answer_reload(&mut self) {
+        let has_opened = self.hall.mirror.state != State::Boot || self.hall.now.since(self.opened) > OPENS;
+        if self.reload.is_none()
+            && let Some((asked, result)) = self.reloading.take_if(|_| has_opened)
+        {
+            self.answer(asked, result);
+        }
     }
 
     /// The next time at which there is something to do.
@@ -414,6 +430,7 @@ impl Supervisor {
             latched,
             notes: std::mem::take(&mut self.notes),
             untold: Vec::new(),
+            reloading: self.reloading.take(),
         }
     }
 
