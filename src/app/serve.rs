@@ -17,6 +17,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use super::film::HallFilm;
+use super::notify::AlarmTeller;
 use super::recorder::{HallRecorder, RecordLink, RecordPlaces};
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
@@ -215,12 +216,16 @@ fn serve_halls(
         config: places.config,
         began,
         signals,
-        service_log: ServiceLog::new(log.clone()),
+        service_log: ServiceLog::new(
+            log.clone(),
+            AlarmTeller::start(&config, &log).map_err(ServeError::System)?,
+        ),
         carryover: Carryover::of(kept),
         settings_file,
         film: None,
         player: None,
         osc: surfaces.osc_counts(),
+        buttons: surfaces.pads(),
         recorder: RecordLink::default(),
     };
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());

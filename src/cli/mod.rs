@@ -11,6 +11,7 @@ use crate::{api, plain};
 
 mod ask;
 mod bounds;
+mod buttons;
 mod check;
 mod client;
 mod completions;
@@ -98,6 +99,7 @@ enum ProgramCommand {
     Register(register::Args),
     Sync(sync::Args),
     Home(home::Args),
+    Buttons(buttons::Args),
     Doctor(doctor::Args),
     Serve(serve::Args),
     Latency(latency::Args),
@@ -188,6 +190,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Register(args) => register::run(&args),
         ProgramCommand::Sync(args) => sync::run(&args),
         ProgramCommand::Home(args) => home::run(&args),
+        ProgramCommand::Buttons(args) => buttons::run(&args),
         ProgramCommand::Doctor(args) => doctor::run(&args),
         ProgramCommand::Serve(args) => serve::run(&args),
         ProgramCommand::Latency(args) => latency::run(&args),

@@ -22,12 +22,14 @@ mod serving;
 mod wav;
 
 mod begin;
+mod buttons;
 mod drives;
 mod film;
 mod hall;
 mod lasting;
 mod library;
 mod mbox;
+mod notify;
 mod player;
 mod playlist;
 mod recordings;

@@ -56,6 +56,7 @@ use std::time::Duration;
 
 use jiff::Zoned;
 
+use super::buttons::PadTable;
 use super::film::SharedTable;
 use super::player::PlayerLink;
 use super::recorder::RecordLink;
@@ -114,6 +115,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) player: Option<PlayerLink>,
     /// What has come to the port for OSC, where there is one.
     pub(crate) osc: Option<Arc<Counts>>,
+    /// How the pads are, where there are any.
+    pub(crate) buttons: Option<PadTable>,
     /// The way to the recorder.
     pub(crate) recorder: RecordLink,
 }
@@ -173,7 +176,8 @@ impl Supervisor {
         examine(library.clone());
         let mut hall = HallContext::new(&runtime, settings, now);
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
-        hall.recorder = ports.recorder.clone();
+        (hall.buttons, hall.recorder) = (ports.buttons.clone(), ports.recorder.clone());
+        hall.notify = ports.service_log.notify_table();
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,

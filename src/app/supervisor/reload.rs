@@ -82,6 +82,8 @@ pub(super) fn not_taken(now: &Config, next: &Config) -> Vec<&'static str> {
         ("[api], beside its tokens,", api != now.api),
         ("[osc]", next.osc != now.osc),
         ("[text]", next.text != now.text),
+        ("[buttons]", next.buttons != now.buttons),
+        ("[notify]", next.notify != now.notify),
     ];
     changed.into_iter().filter(|(_, changed)| *changed).map(|(table, _)| table).collect()
 }
