@@ -138,6 +138,8 @@ checks! {
     Address "address" Identity Fail
         "The controller has another address or port in its settings (PA10 to PA14) than it was reached at: its station \
          code and its reports then belong to another seat.";
+    Dialect "dialect" Identity Fail
+        "It reports or refuses as controllers of the other dialect do: what it tells, and where its seat stands, would be misread.";
     DuplicateAddress "duplicate-address" Identity Fail
         "Two controllers of the configuration share an address, or a hardware address (PA16 to PA1b): frames for one seat \
          move another.";

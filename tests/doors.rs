@@ -70,6 +70,7 @@ fn beginnings(door: &str) -> Vec<Vec<u8>> {
             b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\0\x10/kinocue/stop\0\0\0".to_vec(),
         ],
         "text" => text(&["go", "level 60%", "seek 01:02:03", "stop"]),
+        "buttons" => vec![[[0; 16], [1, 0, 2, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0]].concat(), vec![0; 48]],
         "ltc" => vec![[[0_u8, 0x20].repeat(20), [0, 0xe0].repeat(20)].concat().repeat(40)],
         "mtc" => vec![(0..8).flat_map(|piece| [0xf1, piece << 4]).collect(), octets("f07f7f0101610203 04f7")],
         "artnet" => vec![[&b"Art-Net\0\0\x97\0\x0e\0\0"[..], &[4, 3, 2, 1, 1]].concat()],

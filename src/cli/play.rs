@@ -10,7 +10,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::stream::StreamArgs;
 use super::targets::tell_absent;
-use super::{Exit, Failure, OrExit as _, exit, print};
+use super::{Exit, Failure, OrExit as _, exit, metres, print};
 use crate::app::film::{FilmReader, SourceRules};
 use crate::app::runtime::RuntimeError;
 use crate::app::{Play, PlayError, Played, RollCall};
@@ -116,6 +116,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let timeline = Timeline::new(load::cue(&args.cue, &args.source.source())?);
     let config = configuration(args, timeline.cue().axes())?;
+    let seats = load::seats(Some(&config), None, timeline.axes());
+    let small = metres::of_hall(&config).into_iter().chain(metres::of_cue(&timeline, &seats));
+    small.for_each(|text| print::tell(&format!("kinocue: {text}")));
     let show = Show {
         rate: Rate::from_hz(config.show.rate_hz),
         timing: config.show.timing,

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 
 use super::rehearsal::Rehearsal;
 use super::token::link;
-use super::{Exit, Failure, OrExit as _, exit, load, places, print};
+use super::{Exit, Failure, OrExit as _, exit, load, metres, places, print};
 use crate::api::ApiError;
 use crate::app::serve::{Parts, Places, ServeError, serve, signals};
 use crate::app::surfaces::{Sockets, SurfaceError};
@@ -74,6 +74,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sockets = Sockets { stop: args.stop_socket.clone().unwrap_or_else(beside), control };
     let places = Places { config: path, state, sockets };
     let log = Log::start(print::tell).or_system()?;
+    for text in metres::of_hall(&config) {
+        log.say(Line::new(Priority::Warning, "metres", text));
+    }
     let parts = Parts { config, places, pages: console::page, signals: signals()?, log: log.clone() };
     serve(parts, |_, addresses| {
         for address in addresses {

@@ -19,7 +19,7 @@ use crate::time::MonoTime;
 use crate::wire::silvermax::{Collected, LineCollector};
 use crate::wire::sixpack2::FrameCollector;
 use crate::wire::{FromController, Message, VibrationPort};
-use crate::{capture, config, cue, device, latency, osc, playlist, record, replay, settings, text_port};
+use crate::{app, capture, config, cue, device, latency, osc, playlist, record, replay, settings, text_port};
 
 /// A door: its name, and what takes octets there.
 pub type Door = (&'static str, fn(&[u8]));
@@ -43,6 +43,7 @@ pub const DOORS: &[Door] = &[
     ("label", |octets| with_text(octets, |text| seen(text.parse::<Label>()))),
     ("osc", osc::try_datagram),
     ("text", text_port::try_line),
+    ("buttons", app::buttons::try_records),
     ("ltc", ltc),
     ("mtc", mtc),
     ("artnet", artnet),

@@ -22,6 +22,7 @@ mod serving;
 mod wav;
 
 mod begin;
+mod buttons;
 mod disks;
 mod drives;
 mod film;
@@ -29,6 +30,7 @@ mod hall;
 mod lasting;
 mod library;
 mod mbox;
+mod notify;
 mod player;
 mod playlist;
 mod recordings;

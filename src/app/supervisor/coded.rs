@@ -59,6 +59,10 @@ words! {
         Player = "player",
         /// Of a serial link.
         Link = "link",
+        /// Of a pad.
+        Buttons = "buttons",
+        /// Of alarms that nobody was told.
+        Notify = "notify",
         /// Of the recording of a show.
         RecordShow = "record-show",
         /// Of an incident.

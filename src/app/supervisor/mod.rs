@@ -56,6 +56,7 @@ use std::time::Duration;
 
 use jiff::Zoned;
 
+use super::buttons::PadTable;
 use super::film::SharedTable;
 use super::player::PlayerLink;
 use super::recorder::RecordLink;
@@ -85,6 +86,8 @@ use status::StatusParts;
 
 /// From one status to the next.
 const TELL: Duration = Duration::from_millis(100);
+/// How long whoever has the configuration read anew waits for controllers that do not answer.
+const OPENS: Duration = Duration::from_secs(10);
 /// Notes that are kept.
 const NOTES: usize = 5;
 
@@ -113,6 +116,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) player: Option<PlayerLink>,
     /// What has come to the port for OSC, where there is one.
     pub(crate) osc: Option<Arc<Counts>>,
+    /// How the pads are, where there are any.
+    pub(crate) buttons: Option<PadTable>,
     /// The way to the recorder.
     pub(crate) recorder: RecordLink,
 }
@@ -152,6 +157,8 @@ pub(crate) struct Supervisor {
     notes: VecDeque<String>,
     asks_told: AsksTold,
     reload: Option<Arc<Config>>,
+    /// Who asked for another configuration, this one or the next, and what came of it.
+    reloading: Option<(Asked, Result<(), Problem>)>,
 }
 
 impl Supervisor {
@@ -171,7 +178,8 @@ impl Supervisor {
         examine(library.clone());
         let mut hall = HallContext::new(&runtime, settings, now);
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
-        hall.recorder = ports.recorder.clone();
+        (hall.buttons, hall.recorder) = (ports.buttons.clone(), ports.recorder.clone());
+        hall.notify = ports.service_log.notify_table();
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,
@@ -193,6 +201,7 @@ impl Supervisor {
             notes: carryover.notes,
             asks_told: AsksTold::default(),
             reload: None,
+            reloading: carryover.reloading,
         };
         carryover.untold.into_iter().for_each(|note| supervisor.note(note));
         supervisor.hall.set_desk();
@@ -330,6 +339,17 @@ impl Supervisor {
         log.say_settings(self.ports.settings_file.news());
         self.keep_settings();
         self.publish();
+        self.answer_reload();
+    }
+
+    /// Answers whoever asked for this configuration, once the hall knows its seats, or has looked for them for long enough.
+    fn answer_reload(&mut self) {
+        let has_opened = self.hall.mirror.state != State::Boot || self.hall.now.since(self.opened) > OPENS;
+        if self.reload.is_none()
+            && let Some((asked, result)) = self.reloading.take_if(|_| has_opened)
+        {
+            self.answer(asked, result);
+        }
     }
 
     /// The next time at which there is something to do.
@@ -413,6 +433,7 @@ impl Supervisor {
             latched,
             notes: std::mem::take(&mut self.notes),
             untold: Vec::new(),
+            reloading: self.reloading.take(),
         }
     }
 

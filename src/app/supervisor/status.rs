@@ -8,7 +8,9 @@ use super::hall::HallContext;
 use super::readiness::CORRECT;
 use super::seat_places::SeatPlaces;
 use super::{belts, film};
+use crate::app::buttons::PadTable;
 use crate::app::links;
+use crate::app::notify::NotifyTable;
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
@@ -80,6 +82,8 @@ impl StatusParts<'_> {
             playlist: features.onward.list.as_ref().map(|list| list.status(&Zoned::now())),
             film: hall.film.as_ref().map(|table| film::status(&table.read(), hall)),
             osc: hall.osc.as_ref().map(|counts| counts.by_word()),
+            buttons: hall.buttons.as_ref().map(PadTable::status).unwrap_or_default(),
+            notify: hall.notify.as_ref().map(NotifyTable::status).unwrap_or_default(),
             trim_ms: hall.settings.trim_ms,
             levels: hall.settings.levels.clone(),
             presets: hall.config.presets.iter().map(|preset| preset.name.clone()).collect(),

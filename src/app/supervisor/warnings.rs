@@ -8,6 +8,7 @@ use super::readiness::CORRECT;
 use super::status::StatusParts;
 use super::{belts, player, recorded};
 use crate::app::links;
+use crate::app::notify::NotifyTable;
 use crate::control::{Coded, Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -56,6 +57,14 @@ impl StatusParts<'_> {
         warnings.extend(failed.map(|trouble| in_two(WarningCode::Playlist.word(), trouble)));
         warnings
             .extend(links::troubles(&hall.links).map(|trouble| in_two(WarningCode::Link.word(), &trouble)));
+        warnings.extend(hall.buttons.iter().flat_map(|pads| pads.warnings(WarningCode::Buttons.word())));
+        let untold = hall.notify.iter().flat_map(NotifyTable::status).filter_map(|way| {
+            Some(in_two(
+                WarningCode::Notify.word(),
+                &format!("alarms by {} are not sent: {}", way.way, way.trouble?),
+            ))
+        });
+        warnings.extend(untold);
         warnings.extend(features.lasting.warnings(hall));
         let troubles = hall.recorder.status().troubles;
         warnings.extend(troubles.iter().map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));

@@ -21,11 +21,12 @@ impl Worker {
     }
 
     pub(super) fn fail_incident(&mut self, error: &io::Error) {
-        self.incident = None;
+        // Its file, or the folder where there is none yet.
+        let file = self.incident.take().map_or_else(|| self.disk.dir().to_owned(), |open| open.disk.path);
         self.incidents.give_up();
-        let dir = self.disk.dir().display();
+        let file = file.display();
         let trouble =
-            format!("an incident is not kept: {dir}: {error}; free space on that disk, or set [record] dir");
+            format!("an incident is not kept: {file}: {error}; free space on that disk, or set [record] dir");
         self.link.trouble(RecordPart::Incident, Some(trouble));
     }
 
