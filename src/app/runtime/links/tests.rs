@@ -24,7 +24,7 @@ use crate::health::HealthState;
 use crate::net::{Delivery, DrainGrid, Network, Origin};
 use crate::rt::{Command, Ticked};
 use crate::sim::serial::{Bus, LineFaults, SerialLine};
-use crate::sim::silvermax::{SilverBus, Unit, UnitSetup};
+use crate::sim::silvermax::{Action, SilverBus, Unit, UnitSetup};
 use crate::state::{Event, Finding, Readiness, State, Transition};
 use crate::time::{Clock, MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -247,6 +247,14 @@ impl Hall<'_, '_> {
     fn places_mm(&self) -> Vec<f64> {
         self.units(|unit| (unit.place() - ZERO) / MM)
     }
+
+    /// Something pushes an axis so many mm off where its drive holds it, and is done with that after a second.
+    fn push(&mut self, unit: Option<u8>, mm: f64) {
+        let at = self.line.lock().now;
+        self.line.lock().line.bus_mut().act(unit, Action::Pushed((mm * MM) as i32), at);
+        self.run(1.0, |hall| hall.runtime.live.want(NOW.get()));
+        self.line.lock().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
+    }
 }
 
 /// Reads a configuration.
@@ -267,17 +275,32 @@ fn hall_over(
     over: impl FnOnce(SharedLine) -> Port,
     lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline),
 ) {
+    hall_of(HALL, over, lead);
+}
+
+/// The same of another hall.
+fn hall_of(
+    text: &str,
+    over: impl FnOnce(SharedLine) -> Port,
+    lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline),
+) {
+    let config = Arc::new(read(text));
+    let line = homed_line(&config, 7 << 16);
+    let port = over(line.clone());
+    homed((config, 1.0), line, port, lead);
+}
+
+/// A line with three units whose seat was homed.
+fn homed_line(config: &Config, canary: i32) -> SharedLine {
     NOW.set(MonoTime::from_nanos(3_000_000_000));
-    let config = Arc::new(read(HALL));
     let setups = [16, 17, 18].map(|unit| UnitSetup { place: 12_000, ..UnitSetup::new(unit) });
     let line = SharedLine::new(SilverBus::new(&setups, BAUD, NOW.get()), 11);
     let seat = units_of(&config.controllers[0]).expect("it has units");
-    let homing = Homing { canary: 7_311, goes_on: &|| true, told: &mut |_| {} };
+    let homing = Homing { canary, goes_on: &|| true, told: &mut |_| {} };
     home(&mut Talk::new(line.clone(), TalkTerms::of(&config.links[0])), seat, homing)
         .expect("it finds its zero");
     line.lock().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
-    let port = over(line.clone());
-    homed((config, 1.0), line, port, lead);
+    line
 }
 
 /// Opens a hall whose seat was homed over a line, which its play has by a port, with a cue on it at a level.

@@ -115,7 +115,8 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let position = axis.scale.fraction(told.position.into());
         axis.figures.position = position;
         let at = self.talk.moment().sent;
-        self.tell(StreamEvent::Read { lane: number(index), axis: a, position, at });
+        // It counts the steps that it asked for: that its motor is pushed off, it cannot know.
+        self.tell(StreamEvent::Read { lane: number(index), axis: a, position, held: None, at });
         Ok(Some(told))
     }
 
