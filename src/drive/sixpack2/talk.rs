@@ -58,6 +58,8 @@ pub(crate) struct Talk<P> {
     own_baud: u32,
     /// Until when somebody drives the line.
     busy: MonoTime,
+    /// When the last frame that was sent has wholly arrived.
+    arrived: MonoTime,
 }
 
 impl<P: LinkPort> LinkTalk for Talk<P> {
@@ -76,7 +78,7 @@ impl<P: LinkPort> Talk<P> {
     /// Over a port that is open.
     pub(crate) fn new(port: P, terms: TalkTerms) -> Self {
         let busy = port.now();
-        Self { state: TalkState::over(port, terms), own_baud: terms.baud, busy }
+        Self { state: TalkState::over(port, terms), own_baud: terms.baud, busy, arrived: busy }
     }
 
     /// The rate of the link.
@@ -94,6 +96,11 @@ impl<P: LinkPort> Talk<P> {
     pub(crate) fn arrival(&self) -> (MonoTime, Duration) {
         let frame = self.octets(NINE);
         (self.now().max(self.busy) + self.octets(BREAK) + frame, frame)
+    }
+
+    /// When the last frame that was sent has wholly arrived.
+    pub(crate) const fn arrived(&self) -> MonoTime {
+        self.arrived
     }
 
     /// How long a question holds up what is said next.
@@ -236,6 +243,7 @@ impl<P: LinkPort> Talk<P> {
         let takes = self.octets(u32::try_from(octets.len()).unwrap_or(u32::MAX));
         self.state.port.send(&octets)?;
         self.busy = self.now() + takes;
+        self.arrived = self.busy;
         if self.state.terms.has_echo {
             let deadline = self.busy + SLACK;
             self.take_echo(&octets, deadline)?;
