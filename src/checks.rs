@@ -200,6 +200,9 @@ checks! {
         "The adapter delays answers, by 16 ms unless set otherwise, and a link that waits for each answer plays slowly.";
     EchoDiffers "echo-differs" Network Fail
         "Some two-wire adapters echo what is sent. If echoes and answers are confused, no exchange can be trusted.";
+    LineNoise "line-noise" Network Warn
+        "More came over the link than its units sent: by noise a request becomes another one, which a drive obeys, since neither family \
+         has a checksum on a serial line.";
     FramePortFree "frame-port-free" Network Info
         "With port 0 in bind the frame port changes at every start, so PA24 cannot be compared with it.";
 

@@ -16,6 +16,8 @@ use crate::wire::silvermax::{Poll, StatusWord as _};
 /// Answers that begin so late are held back by an adapter, no unit waits so long.
 const HELD_BACK: Duration = Duration::from_millis(12);
 const HOME: &str = "home it, with nobody on the seat";
+/// In so many requests one that something else comes of is noise, and no chance.
+const NOISY: u64 = 20;
 /// What answers may be later than was reckoned with, as a part of it.
 const LATER: f64 = 1.25;
 
@@ -213,20 +215,30 @@ fn answers(subject: &DriveSubject<'_>, notes: &mut Notes) {
 
 /// What came that should not have.
 fn line(subject: &DriveSubject<'_>, notes: &mut Notes) {
-    let (link, TalkCounts { asked, answered, malformed, doubled, echo_differs, .. }) =
+    let (link, TalkCounts { asked, answered, malformed, doubled, echo_differs, echoed, .. }) =
         (&subject.link.name, subject.survey.counts);
     if subject.link.has_echo && 2 * echo_differs > asked {
         let found = format!("{echo_differs} of {asked} requests were not echoed on link {link}");
         notes.add(Check::EchoDiffers, found, "this adapter does not echo what is sent: set echo = false");
-    } else if !subject.link.has_echo && 2 * malformed > asked && 2 * answered > asked {
-        let found = format!("{malformed} lines besides {answered} answers came back on link {link}");
+    } else if !subject.link.has_echo && 2 * echoed > asked {
+        let found =
+            format!("{echoed} of {asked} requests came back besides {answered} answers on link {link}");
         notes.add(Check::EchoDiffers, found, "this adapter echoes what is sent: set echo = true");
     } else if doubled > 0 {
         let found = format!("{doubled} more answers than requests on link {link}");
         notes.add(
             Check::DuplicateUnit,
             found,
-            "connect each unit alone to the line, and set IDT of those that share a number",
+            "connect each unit alone to the line, and give those that share a number another",
+        );
+    } else if NOISY * malformed > asked {
+        let found = format!(
+            "what nobody sent came {malformed} times while {asked} requests were sent on link {link}"
+        );
+        notes.add(
+            Check::LineNoise,
+            found,
+            "check shield, ground, and the resistors at the ends of two wires, and that baud and stop_bits are those of the units",
         );
     }
 }

@@ -19,7 +19,7 @@ mod virtual_play;
 mod virtual_port;
 
 pub(crate) use delays::Delays;
-pub(crate) use exchange::{LinkTalk, Moment, TalkCounts, TalkState, TalkTerms};
+pub(crate) use exchange::{LinkTalk, MOST_STRAY, Moment, TalkCounts, TalkState, TalkTerms};
 pub(crate) use homing::{Step, canary, sum_of};
 pub(crate) use led_lane::{LedLane, LinkAxis, STANDS_MM};
 pub(crate) use line::LinkLine;

@@ -105,6 +105,14 @@ pub(crate) enum HomeError {
         /// The same in counts.
         counts: f64,
     },
+    /// Two with one number.
+    #[error(
+        "two units answer as unit {unit}; connect each alone to the line, and give one of them another number (IDT)"
+    )]
+    Twins {
+        /// Their number.
+        unit: u8,
+    },
     /// Too hot.
     #[error("unit {unit} is too hot; let it cool, find out what loads it, then home")]
     Hot {

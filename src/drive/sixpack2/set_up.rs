@@ -59,6 +59,14 @@ pub(crate) enum HomeError {
     /// It is not to be had.
     #[error(transparent)]
     Find(#[from] FindError),
+    /// Two with one number.
+    #[error(
+        "two units answer as unit {unit}; connect each alone to the line, and give one of them another number"
+    )]
+    Twins {
+        /// Their number.
+        unit: u8,
+    },
     /// The clock is too slow for the seat.
     #[error("{0}")]
     TooSlow(String),

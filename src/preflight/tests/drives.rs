@@ -15,8 +15,16 @@ use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
 use crate::wire::sixpack2::action;
 
-const COUNTS: TalkCounts =
-    TalkCounts { asked: 51, answered: 51, late: 0, doubled: 0, malformed: 0, foreign: 0, echo_differs: 0 };
+const COUNTS: TalkCounts = TalkCounts {
+    asked: 51,
+    answered: 51,
+    late: 0,
+    doubled: 0,
+    malformed: 0,
+    foreign: 0,
+    echo_differs: 0,
+    echoed: 0,
+};
 
 /// A seat that was homed, on units 16 to 18.
 struct Case {
@@ -156,8 +164,8 @@ fn who_does_not_answer_and_who_answers_for_another_is_told() {
 #[test]
 fn an_adapter_that_repeats_what_is_sent_has_to_be_known_for_it() {
     let mut case = Case::new();
-    case.survey.counts.malformed = 51;
-    case.assert_found(Check::EchoDiffers, "51 lines besides 51 answers came back");
+    (case.survey.counts.malformed, case.survey.counts.echoed) = (51, 51);
+    case.assert_found(Check::EchoDiffers, "51 of 51 requests came back besides 51 answers");
     let mut case = Case::new();
     case.hall.links.iter_mut().for_each(|link| link.has_echo = true);
     assert_eq!(case.found(), []);

@@ -191,6 +191,27 @@ impl<B: Bus> Hall<'_, '_, B> {
         self.loops.ticks.engine.lane(0).gets_a_frame()
     }
 
+    /// In a ride the port vanishes, and comes back under its name as the line of another seat: that it is not led.
+    fn moves_nobody_on_another_line(
+        &mut self,
+        show: StagedShow,
+        other: &SharedLine<B>,
+        places: impl Fn(&B) -> Vec<f64>,
+    ) {
+        self.go(show);
+        self.run(6.0, |_| {});
+        assert!(self.is_led());
+        self.line.lock().is_gone = true;
+        self.run(0.3, |_| {});
+        std::mem::swap(&mut self.line.lock().line, &mut other.lock().line);
+        self.line.lock().is_gone = false;
+        let before = places(self.line.lock().line.bus());
+        self.run(10.0, |hall| hall.runtime.live.want(NOW.get()));
+        let row = self.runtime.live.table().swap_remove(0);
+        assert!(!self.is_led() && row.standing == HealthState::Excluded, "{row:?}");
+        assert_eq!(places(self.line.lock().line.bus()), before, "{}", row.why);
+    }
+
     /// That a seat which is held up for a second is read before it is led again, and not led while it is said to be lost.
     fn comes_back_after_a_second(&mut self, show: StagedShow, later: Duration) {
         self.go(show);

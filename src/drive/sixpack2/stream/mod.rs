@@ -209,7 +209,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let now = self.talk.now();
         if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
             lane.stage = Stage::Out;
-            lane.own.is_failing = false;
+            (lane.own.is_failing, lane.own.serial) = (false, [None; 2]);
             lane.make_ready(now);
         }
     }

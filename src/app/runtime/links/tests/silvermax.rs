@@ -156,3 +156,12 @@ fn a_line_that_is_cut_brings_the_seat_to_rest_within_the_lead_and_puts_its_lane_
         assert_gentle(hall);
     });
 }
+
+#[test]
+fn a_port_that_comes_back_as_the_line_of_another_seat_moves_nobody_there() {
+    let other = homed_line(&read(HALL), 9 << 16);
+    hall(|hall, show, _| {
+        let places = |bus: &SilverBus| bus.units().iter().map(Unit::place).collect();
+        hall.moves_nobody_on_another_line(show, &other, places);
+    });
+}
