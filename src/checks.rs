@@ -340,6 +340,9 @@ checks! {
         "Until it is homed, a drive counts from where it was switched on, so its position is unknown.";
     Restarted "restarted" Status Fail
         "The drives of a seat were not homed together: one of them has been off since, and counts from elsewhere.";
+    OffPark "off-park" Status Warn
+        "The seat stands elsewhere than at its park pose: a show was cut off, it was moved, or something pushes it. It is led slowly \
+         from where it was read.";
     Killed "killed" Status Fail
         "A drive released its motor, because of an error or heat, and waits for a person.";
     DriveError "drive-error" Status Fail
@@ -396,6 +399,7 @@ impl Check {
                 | Self::Position
                 | Self::NotHome
                 | Self::Restarted
+                | Self::OffPark
                 | Self::Killed
                 | Self::DriveError
                 | Self::DriveHot

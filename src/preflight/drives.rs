@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{Check, Notes};
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Drives, Link};
-use crate::drive::link::{LinkPort, LinkTalk as _, TalkCounts};
+use crate::drive::link::{AT_PARK, LinkPort, LinkTalk as _, STANDS_MM, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
 use crate::drive::{motors_of, silvermax, sixpack2, units_of};
@@ -140,6 +140,7 @@ pub(super) fn one(subject: &DriveSubject<'_>) -> Notes {
         if subject.answered() {
             rate(subject, &mut notes);
             home(subject, &mut notes);
+            places(subject, &mut notes);
             subject.facts().for_each(|unit| trouble(unit, &mut notes));
             settings(subject, &mut notes);
         }
@@ -192,6 +193,14 @@ fn sixpack(subject: &DriveSubject<'_>, unit: u8, notes: &mut Notes) {
             lost.join(", ")
         );
         notes.add(Check::NotHome, found, HOME);
+    }
+    if let Some(seat) = seat.filter(|_| is_home(notes)) {
+        for (axis, motor) in seat.motors.iter().enumerate() {
+            let told = facts.motors.iter().find(|told| told.motor == *motor);
+            if let Some(place) = told.and_then(|told| seat.place(told)) {
+                off_park(subject, axis, [place; 2], notes);
+            }
+        }
     }
     for motor in facts.motors.iter().filter(|motor| motor.searches()) {
         let found = format!("motor {} of unit {unit} searches for its zero without a command", motor.motor);
@@ -299,6 +308,38 @@ fn home(subject: &DriveSubject<'_>, notes: &mut Notes) {
     {
         let found = "its units were homed with other settings than it has now (register 40)".to_owned();
         notes.add(Check::NotHome, found, HOME);
+    }
+}
+
+/// True if nothing is found by which the seat is not home.
+fn is_home(notes: &Notes) -> bool {
+    !notes.0.iter().any(|one| matches!(one.check, Check::NotHome | Check::Restarted))
+}
+
+/// Where the axes of a seat stand that is home.
+fn places(subject: &DriveSubject<'_>, notes: &mut Notes) {
+    let Some(seat) = units_of(subject.controller).filter(|_| is_home(notes)) else { return };
+    for facts in subject.facts() {
+        let axis = seat.units.iter().position(|unit| *unit == facts.unit);
+        if let (Some(axis), Some(places)) = (axis, seat.places(facts)) {
+            off_park(subject, axis, places, notes);
+        }
+    }
+}
+
+/// Whether an axis, from 0, that was read there, and is held there, stands at park.
+fn off_park(subject: &DriveSubject<'_>, axis: usize, [at, held]: [f64; 2], notes: &mut Notes) {
+    let Some(geometry) = subject.controller.seat.own().get(axis) else { return };
+    if (at - geometry.park).abs() <= AT_PARK {
+        return;
+    }
+    let [read, park, held] = [at, geometry.park, held].map(|part| geometry.place(part));
+    let found = format!("axis {} stands at {read:.1} mm, its park place is {park:.1} mm", axis + 1);
+    if (read - held).abs() < STANDS_MM {
+        notes.add(Check::OffPark, found, "park it, or start a show: it joins slowly from there");
+    } else {
+        let found = format!("{found}, and its drive holds it at {held:.1} mm");
+        notes.add(Check::OffPark, found, "free it, or find out why its motor does not hold it");
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) use exchange::{LinkTalk, MOST_STRAY, Moment, TalkCounts, TalkState, T
 pub(crate) use homing::{Step, canary, sum_of};
 pub(crate) use led_lane::{LedLane, LinkAxis, STANDS_MM};
 pub(crate) use line::LinkLine;
-pub(crate) use peer::{LaneWants, LinkPeer};
+pub(crate) use peer::{AT_PARK, LaneWants, LinkPeer};
 pub(crate) use port::{LinkFault, LinkPort};
 pub(crate) use stream::{Family, IDLE, LinkPlay, Stream};
 pub(crate) use streaming::{
