@@ -31,9 +31,9 @@ pub(crate) use streaming::{
     lane_number,
 };
 #[cfg(test)]
-pub(crate) use virtual_play::{TICK, VirtualPlay, back, ride_about, there};
+pub(crate) use virtual_play::{TICK, VirtualPlay, back, ride_about, ride_for_a_minute, soaks, there};
 #[cfg(test)]
-pub(crate) use virtual_port::{Damage, VirtualPort};
+pub(crate) use virtual_port::{Damage, Stalls, VirtualPort};
 
 use crate::channel::ChannelId;
 use crate::cue::Vibration;
