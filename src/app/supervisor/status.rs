@@ -16,6 +16,8 @@ use crate::control::model::us;
 use crate::control::{
     Coded, ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
+use crate::drive::link::AT_PARK;
+use crate::motion::AxisGeometry;
 use crate::rt::Row;
 use crate::state::{Next, PlayMode, State};
 use crate::time::{MonoTime, ShowTime};
@@ -113,13 +115,20 @@ impl StatusParts<'_> {
         }
     }
 
-    /// Why the hall is in its state; of one that is armed also which seats that are on will not move, of one that waits where the film is.
+    /// Why the hall is in its state; of one that is parked also which seats that are on were read elsewhere, of one that is armed which of
+    /// them will not move, of one that waits where the film is.
     fn cause(&self, table: &[Row]) -> String {
         let (hall, cause) = (self.hall, self.hall.cause());
         if hall.mirror.state == State::Playing(PlayMode::Waiting) {
             let outside = film::outside(hall);
             return outside
                 .map_or(cause.clone(), |side| format!("{cause}: {side}; kinocue sync shows where"));
+        }
+        if hall.mirror.state == State::Parked {
+            let away: Vec<String> = hall.lanes_on().filter_map(|lane| off_park(hall, table, lane)).collect();
+            let more = if away.len() > FEW { " ..." } else { "" };
+            let named = away.iter().take(FEW).map(String::as_str).collect::<Vec<_>>().join(", ");
+            return if away.is_empty() { cause } else { format!("{cause}; not at park: {named}{more}") };
         }
         let stays = |&lane: &usize| table.get(lane).is_some_and(|row| !row.standing.may_move());
         let word = |lane: usize| format!("{} {}", hall.config.controllers[lane].name, table[lane].standing);
@@ -202,6 +211,17 @@ impl StatusParts<'_> {
             ..nameplate(controller)
         }
     }
+}
+
+/// Where the seat of a lane was read whose drives or controller tell that it is not at park.
+fn off_park(hall: &HallContext, table: &[Row], lane: usize) -> Option<String> {
+    let (controller, row) = (&hall.config.controllers[lane], table.get(lane)?);
+    let SeatPlaces { positions_mm, measured, .. } = SeatPlaces::of(controller, &row.state);
+    let read = positions_mm.filter(|_| measured.is_some() && row.homed == Some(true))?;
+    let mut axes = controller.seat.own().iter().zip(read).enumerate();
+    let is_off = |axis: &AxisGeometry, at: f64| (at - axis.place(axis.park)).abs() > AT_PARK * axis.stroke();
+    let (index, (axis, at)) = axes.find(|(_, (axis, at))| is_off(axis, *at))?;
+    Some(format!("{} (axis {} at {at:.1} {})", controller.name, index + 1, axis.unit.name()))
 }
 
 /// What a controller is, and nothing of how it is.
