@@ -1,7 +1,7 @@
 //! What recording costs: the taps on the tick and ack threads, the thread behind them, the lateness of ticks with and without, and
 //! how soon an incident is on the disk. 64 controllers of six axes, 1,000 ticks a second.
 //!
-//! `cargo bench --bench record -- [--rounds N] [--quick] [--costs]`
+//! `cargo bench --bench record -- [--rounds N] [--quick] [--costs]`; with `--plot` alone, what a picture of two hours costs.
 
 #![expect(
     clippy::cast_precision_loss,
@@ -32,11 +32,11 @@ use common::spread::{Spread, verdict};
 use kinocue::harness::motion::{MAX_AXES, SeatType, Slot, Window};
 use kinocue::harness::net::{Delivery, Sender};
 use kinocue::harness::record::{AckTap, Asked, FrameKind, RecordedSeat, Tap, TickHead};
-use kinocue::harness::recording::{RecorderRig, drained, replies};
+use kinocue::harness::recording::{RecorderRig, drained, recorded_show, replies};
 use kinocue::harness::rt::FrameSink;
 use kinocue::harness::sys::clock::{Monotonic, thread_cpu_time};
 use kinocue::harness::sys::realtime::normal_priority;
-use kinocue::harness::time::{Clock as _, MonoTime, Rate};
+use kinocue::harness::time::{Clock as _, MonoTime, Rate, ShowTime};
 use kinocue::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, VibrationPort};
 use senders::again::sender;
 use senders::children::Peer;
@@ -55,8 +55,10 @@ fn main() {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words[..] {
         ["peer", count] => peer::run(count.parse().expect("a number")),
-        ["plain", seconds, ref to @ ..] => finish(&play(seconds, to, false)),
-        ["tapped", seconds, ref to @ ..] => finish(&play(seconds, to, true)),
+        ["plain", seconds, ref to @ ..] => finish(&play(seconds, to, Behind::Nobody)),
+        ["tapped", seconds, ref to @ ..] => finish(&play(seconds, to, Behind::Recorder)),
+        ["stalled", seconds, ref to @ ..] => finish(&play(seconds, to, Behind::StalledDisk)),
+        ["--plot"] => plots(),
         _ => measure(&words),
     }
 }
@@ -252,12 +254,16 @@ fn frames(tick: u64) -> Vec<Led> {
 }
 
 fn tapped(tap: &mut Tap, tick: u64, at: MonoTime, frames: &[Led]) {
+    tap_all(tap, at, frames);
+    tap.tick(&TickHead::of(tick, at));
+}
+
+fn tap_all(tap: &mut Tap, at: MonoTime, frames: &[Led]) {
     for (lane, frame) in frames.iter().enumerate() {
         tap.asked(Asked::of(frame.pose, AXES));
         // One after the other, a microsecond or so each.
         tap.frame(lane, frame.datagram(), at + Duration::from_nanos(1_200 * lane as u64), Delivery::Sent);
     }
-    tap.tick(&TickHead::of(tick, at));
 }
 
 /// A socket to each of as many, on loopback.
@@ -289,15 +295,57 @@ impl Sockets {
     }
 }
 
-/// With taps and without, by turns, each in a process of its own.
+/// A show of two hours at 100 Hz, sampled as shows are by themselves, and pictures of it by the program.
+fn plots() {
+    const HOURS: u64 = 2;
+    let folder = tempfile::tempdir().expect("a folder");
+    let show = folder.path().join("show.mcap");
+    let mut dice = Dice(7);
+    let began = Monotonic.now();
+    recorded_show(seats(), Rate::from_hz(100.0), &show, HOURS * 360_000, |tap, acks, tick| {
+        let at = MonoTime::from_nanos(tick * 10_000_000);
+        tap_all(tap, at, &frames(10 * tick));
+        tap.tick(&TickHead::of(tick, at).showing(ShowTime::from_millis(10 * tick.cast_signed())));
+        replied(acks, tick, at, &mut dice);
+    });
+    let took = Monotonic.now().since(began).as_secs_f64();
+    let size = std::fs::metadata(&show).expect("it is there").len() as f64 / 1e6;
+    println!("show of {HOURS} h          {size:.1} MB, made in {took:.1} s");
+    for name in ["picture.html", "picture.svg"] {
+        let out = folder.path().join(name);
+        let (seconds, resident) = plot(&show, &out);
+        let size = std::fs::metadata(&out).expect("it was drawn").len() as f64 / 1e3;
+        println!(
+            "{name}        {seconds:.2} s  <= 2 (5 by RECORD.md)  {size:.0} kB  <= 500  {resident:.0} MB  <= 300"
+        );
+    }
+}
+
+/// Draws a recording; gives how long that took, s, and how much memory, MB.
+fn plot(show: &Path, out: &Path) -> (f64, f64) {
+    let began = Monotonic.now();
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_kinocue"))
+        .args([Path::new("plot"), show, Path::new("-o"), out, Path::new("--force")])
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .expect("it runs");
+    let (status, mut resident) = (format!("/proc/{}/status", child.id()), 0.0_f64);
+    while child.try_wait().expect("it is ours").is_none() {
+        let told = std::fs::read_to_string(&status).unwrap_or_default();
+        let most = told.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB"));
+        resident = resident.max(most.and_then(|kb| kb.parse().ok()).unwrap_or(0.0) / 1e3);
+        Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(5));
+    }
+    (Monotonic.now().since(began).as_secs_f64(), resident)
+}
+
+/// With taps and without, and with a disk that stands still, by turns, each in a process of its own.
 fn lateness(rounds: usize, seconds: u64) {
     let peer = Peer::start(LANES);
-    let ratios: Vec<[f64; 2]> = (0..rounds)
+    let ratios: Vec<[f64; 3]> = (0..rounds)
         .map(|round| {
-            let mut kinds = ["plain", "tapped"];
-            if !round.is_multiple_of(2) {
-                kinds.reverse();
-            }
+            let mut kinds = ["plain", "stalled", "tapped"];
+            kinds.rotate_left(round % 3);
             let mut p99 = kinds.map(|kind| {
                 let outcome: Outcome = sender(&[kind, &seconds.to_string()], &peer.addresses);
                 (kind, outcome.lateness.p99)
@@ -307,10 +355,12 @@ fn lateness(rounds: usize, seconds: u64) {
         })
         .collect();
     let column = |at: usize| Spread::of(ratios.iter().map(|pair| pair[at]));
-    let ratio = Spread::of(ratios.iter().map(|[plain, tapped]| tapped / plain));
+    let ratio = |at: usize| Spread::of(ratios.iter().map(|one| one[at] / one[0]));
     println!("lateness p99 without  {:.1} us", column(0));
-    println!("lateness p99 with     {:.1} us", column(1));
-    println!("with / without        {ratio:.3}  <= 1.05: {}", verdict(ratio, 1.05));
+    println!("lateness p99 with     {:.1} us", column(2));
+    println!("the disk stands still {:.1} us", column(1));
+    println!("with / without        {:.3}  <= 1.05: {}", ratio(2), verdict(ratio(2), 1.05));
+    println!("still / without       {:.3}  <= 1.05: {}", ratio(1), verdict(ratio(1), 1.05));
 }
 
 /// The sockets, and a tap.
@@ -341,8 +391,19 @@ impl FrameSink for Tapped {
     }
 }
 
-/// Plays to controllers that answer, recorded or not: behind the taps is the thread that a hall has.
-fn play(seconds: &str, to: &[&str], is_tapped: bool) -> Outcome {
+/// What is behind the taps.
+#[derive(Clone, Copy, PartialEq)]
+enum Behind {
+    /// There are none.
+    Nobody,
+    /// The thread that a hall has.
+    Recorder,
+    /// The same, at a disk that stands still for the whole play.
+    StalledDisk,
+}
+
+/// Plays to controllers that answer, recorded or not.
+fn play(seconds: &str, to: &[&str], behind: Behind) -> Outcome {
     let to: Vec<SocketAddrV4> = to.iter().map(|word| word.parse().expect("an address")).collect();
     let folder = PathBuf::from("/dev/shm").join(format!("kinocue-bench-{}", std::process::id()));
     let over = AtomicBool::new(false);
@@ -352,11 +413,13 @@ fn play(seconds: &str, to: &[&str], is_tapped: bool) -> Outcome {
         scope.spawn(move || {
             let _ = normal_priority();
             while !over.load(Ordering::Acquire) {
-                rig.take();
+                if behind == Behind::Recorder {
+                    rig.take();
+                }
                 Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(20));
             }
         });
-        let taps: Option<(Tap, AckTap)> = is_tapped.then_some((tap, acks));
+        let taps: Option<(Tap, AckTap)> = (behind != Behind::Nobody).then_some((tap, acks));
         let outcome =
             ours::run_into(&Monotonic, seconds.parse().expect("a number"), &to, false, |sender, loops| {
                 let tap = taps.map(|(tap, acks)| {

@@ -138,6 +138,8 @@ checks! {
     Address "address" Identity Fail
         "The controller has another address or port in its settings (PA10 to PA14) than it was reached at: its station \
          code and its reports then belong to another seat.";
+    Dialect "dialect" Identity Fail
+        "It reports or refuses as controllers of the other dialect do: what it tells, and where its seat stands, would be misread.";
     DuplicateAddress "duplicate-address" Identity Fail
         "Two controllers of the configuration share an address, or a hardware address (PA16 to PA1b): frames for one seat \
          move another.";
@@ -200,6 +202,9 @@ checks! {
         "The adapter delays answers, by 16 ms unless set otherwise, and a link that waits for each answer plays slowly.";
     EchoDiffers "echo-differs" Network Fail
         "Some two-wire adapters echo what is sent. If echoes and answers are confused, no exchange can be trusted.";
+    LineNoise "line-noise" Network Warn
+        "More came over the link than its units sent: by noise a request becomes another one, which a drive obeys, since neither family \
+         has a checksum on a serial line.";
     FramePortFree "frame-port-free" Network Info
         "With port 0 in bind the frame port changes at every start, so PA24 cannot be compared with it.";
 
@@ -337,6 +342,9 @@ checks! {
         "Until it is homed, a drive counts from where it was switched on, so its position is unknown.";
     Restarted "restarted" Status Fail
         "The drives of a seat were not homed together: one of them has been off since, and counts from elsewhere.";
+    OffPark "off-park" Status Warn
+        "The seat stands elsewhere than at its park pose: a show was cut off, it was moved, or something pushes it. It is led slowly \
+         from where it was read.";
     Killed "killed" Status Fail
         "A drive released its motor, because of an error or heat, and waits for a person.";
     DriveError "drive-error" Status Fail
@@ -393,6 +401,7 @@ impl Check {
                 | Self::Position
                 | Self::NotHome
                 | Self::Restarted
+                | Self::OffPark
                 | Self::Killed
                 | Self::DriveError
                 | Self::DriveHot

@@ -36,6 +36,7 @@
 
 mod motion;
 mod plain;
+mod published;
 mod time;
 pub mod wire;
 

@@ -7,6 +7,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use kinocue::harness::doors::DOORS;
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::Clock as _;
+use sha2::{Digest as _, Sha256};
 
 /// Wrong copies of each beginning.
 const WRONG: usize = 60;
@@ -67,12 +70,32 @@ fn beginnings(door: &str) -> Vec<Vec<u8>> {
             b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\0\x10/kinocue/stop\0\0\0".to_vec(),
         ],
         "text" => text(&["go", "level 60%", "seek 01:02:03", "stop"]),
+        "buttons" => vec![[[0; 16], [1, 0, 2, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0]].concat(), vec![0; 48]],
         "ltc" => vec![[[0_u8, 0x20].repeat(20), [0, 0xe0].repeat(20)].concat().repeat(40)],
         "mtc" => vec![(0..8).flat_map(|piece| [0xf1, piece << 4]).collect(), octets("f07f7f0101610203 04f7")],
         "artnet" => vec![[&b"Art-Net\0\0\x97\0\x0e\0\0"[..], &[4, 3, 2, 1, 1]].concat()],
         "mpv" => text(&[
             "{\"event\":\"property-change\",\"id\":1,\"name\":\"pause\",\"data\":false}\n{\"request_id\":1,\"error\":\"success\",\"data\":12.5}\n",
         ]),
+        "film-wav" => {
+            let header = b"RIFF\x34\0\0\0WAVEfmt \x10\0\0\0\x01\0\x02\0\x80\xbb\0\0\0\xee\x02\0\x04\0\x10\0data\x10\0\0\0";
+            vec![[&header[..], &[7; 16]].concat(), vec![1, 2, 3, 4, 5]]
+        }
+        "film-relay" => {
+            let at = Monotonic.now().as_nanos().to_le_bytes();
+            vec![[&b"kinocue relay 1 ltc\n"[..], &at, b"\x04\0abcd", &at, b"\x02\0ef"].concat()]
+        }
+        "film-position" => [
+            text(&["{\"media_ms\": 61500.0, \"rate\": 1.001, \"playing\": true, \"age_ms\": 20}"]),
+            vec![b"/kinocue/sync\0\0\0,hTd\0\0\0\0\0\0\0\0\0\0\xf0\x3c\x3f\xf0\0\0\0\0\0\0".to_vec()],
+        ]
+        .concat(),
+        "film-index" => {
+            let (blocks, marks) = (2_u32.to_le_bytes(), 2_u32.to_le_bytes());
+            let content =
+                [&b"KINOKIDX\x01\0\x03\0one"[..], &blocks, &marks, &[9; 130], &[1; 6], &[2; 6]].concat();
+            vec![[&content[..], &Sha256::digest(&content)].concat()]
+        }
         "recording" | "replay" => ["refused", "came-back", "lost-frames"]
             .map(|name| file(&format!("tests/data/recordings/{name}.mcap")))
             .into(),

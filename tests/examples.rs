@@ -12,7 +12,7 @@ use std::process::Command;
 use programs::is_installed;
 
 /// What only the reader has: devices, films, captures, a packaged service; programs of others.
-const YOURS: [&str; 21] = [
+const YOURS: [&str; 23] = [
     "offset=6", // controllers of six axes
     "alsa:",
     "/dev/snd",
@@ -32,12 +32,29 @@ const YOURS: [&str; 21] = [
     "/var/lib",
     "/run/kinocue",
     "man ",
+    "/dev/input",
+    "buttons watch",
     "--config examples/silvermax.toml --name",
     "--config examples/sixpack2.toml --name",
 ];
 /// What each page needs beside it, in the order in which they run.
 const STAGES: [(&str, &[&str]); 3] = [
-    ("", &["check", "info", "fit", "edit", "decode", "doctor", "token", "completions", "demo", "sim"]),
+    (
+        "",
+        &[
+            "check",
+            "info",
+            "fit",
+            "edit",
+            "decode",
+            "doctor",
+            "token",
+            "buttons",
+            "completions",
+            "demo",
+            "sim",
+        ],
+    ),
     (
         "sim --safe --count 2",
         &["play", "plot", "convert", "preflight", "home", "register", "sync", "record", "replay", "latency"],

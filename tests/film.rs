@@ -145,6 +145,50 @@ fn the_seat_rests_while_the_film_stands_and_joins_it_where_it_goes_on() {
     assert_eq!(played.ended.ending, Ending::Completed);
 }
 
+/// When frames were sent, seconds, and where each led, pulses.
+fn sent(played: &Played, from_s: f64, to_s: f64) -> Vec<(f64, i32)> {
+    let sent = played.frames.iter().map(|frame| {
+        let at_s = frame.at.since(ORIGIN).as_secs_f64();
+        (at_s, frame.request.positions[0].0)
+    });
+    sent.filter(|(at_s, _)| (from_s..to_s).contains(at_s)).collect()
+}
+
+#[test]
+fn frames_hold_the_seat_through_a_seek_of_the_film_until_it_is_found_and_then_it_joins() {
+    let played = play(vec![
+        film(0.5, 0.5, 1.0, FilmState::Locked),
+        film(8.0, 8.0, 1.0, FilmState::Jumped),
+        film(11.0, 16.0, 1.0, FilmState::Locked),
+    ]);
+    let all = sent(&played, 7.0, 13.0);
+    let longest = all.windows(2).map(|two| two[1].0 - two[0].0).fold(0.0, f64::max);
+    assert!(longest < 0.0105, "{longest} s without a frame");
+    let held = sent(&played, 8.5, 11.0);
+    assert!(held.len() >= 249 && held.iter().all(|(_, at)| *at == held[0].1), "{} frames", held.len());
+    assert!(errors_mm(&played, 15.0, 24.0, |at| at + 5.0) < 0.05);
+}
+
+#[test]
+fn a_seat_that_is_held_for_a_seek_is_let_rest_once_the_film_is_stopped_or_lost_and_is_not_held_anew() {
+    for state in [FilmState::Stopped, FilmState::Lost, FilmState::Unusable] {
+        let played = play(vec![
+            film(0.5, 0.5, 1.0, FilmState::Locked),
+            film(8.0, 8.0, 1.0, FilmState::Jumped),
+            film(9.0, 8.0, 0.0, state),
+            film(12.0, 8.0, 0.0, FilmState::Jumped),
+            film(14.0, 8.0, 1.0, FilmState::Locked),
+        ]);
+        assert!(sent(&played, 8.5, 9.0).len() >= 49, "{state:?}");
+        assert_eq!(
+            sent(&played, 9.2, 13.9).len(),
+            0,
+            "a frame would take back what was moved by hand: {state:?}"
+        );
+        assert!(errors_mm(&played, 18.0, 30.0, |at| at - 6.0) < 0.05, "{state:?}");
+    }
+}
+
 #[test]
 fn a_film_that_ends_parks_the_seats_and_a_show_that_it_never_led_moves_none() {
     for (ends_s, ending) in [(8.0, Ending::Stopped), (29.0, Ending::Completed)] {

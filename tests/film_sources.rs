@@ -132,6 +132,23 @@ fn a_second_without_a_word_changes_nothing_and_a_seek_is_joined() {
     assert_unclamped(&played, "a seek");
 }
 
+#[test]
+fn frames_hold_the_seat_through_a_seek_that_the_player_takes_a_while_for() {
+    let truth = TrueFilm::new(-1.0, 1.0);
+    let film = ShownFilm::told_by(1, truth, 3).sought(10.0, 4.0, 1.5);
+    let truth = film.truth.clone();
+    let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
+    let at: Vec<f64> = played.lane(0).map(|frame| seconds(frame.at)).collect();
+    let longest = at.windows(2).map(|two| two[1] - two[0]).fold(0.0, f64::max);
+    assert!(longest < 0.0105, "{longest} s without a frame");
+    let moves = moves(&played).into_iter().find(|(at, mm)| *at > 11.0 && mm.abs() > 0.001);
+    let begun = moves.expect("it joins").0 - 11.5;
+    println!("the join begins {:.0} ms after the film was found", begun * 1e3);
+    assert!((0.0..=0.3).contains(&begun), "{begun} s");
+    assert!(p99(&errors_ms(&played, &truth), 15.0..20.0) <= 0.6);
+    assert_unclamped(&played, "a seek");
+}
+
 /// The states that the hall was in, and from when on.
 fn states(played: &Played) -> Vec<(f64, State)> {
     let entered = |news: &News| match news {
@@ -208,7 +225,7 @@ fn faulty(seed: u32) -> ShownFilm {
             6 => film.changed(|truth| truth.rate_from(t, 1.0 + far / 100.0).rate_from(t + short, 1.0)),
             7 => film.paused(t, t + short),
             8 => film.unheard(t, t + short),
-            9 => film.sought(t, far),
+            9 => film.sought(t, far, 0.01),
             10 => film.sped(t, 1.0 + far / 20_000.0),
             11 => film.sped(t, far / 10.0).sped(t + short, 1.0),
             // Garbage: places that agree on nothing.

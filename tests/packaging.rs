@@ -113,7 +113,11 @@ fn the_simulated_hall_reaches_nothing_but_this_machine() {
 #[test]
 fn the_units_are_as_closed_as_they_were_measured_to_be() {
     // Exposure in tenths; ends with a failure above it.
-    for (unit, most) in [("systemd/kinocue.service", "12"), ("systemd/kinocue-sync.service", "6")] {
+    for (unit, most) in [
+        ("systemd/kinocue.service", "12"),
+        ("systemd/kinocue-sync.service", "6"),
+        ("systemd/kinocue-buttons.service", "6"),
+    ] {
         let most = format!("--threshold={most}");
         if let Some(output) = tool("systemd-analyze", &["security", "--offline=true", &most, unit]) {
             assert!(output.status.success(), "{}", said(&output));
@@ -246,6 +250,19 @@ fn each_test_that_the_page_of_faults_names_is_there() {
     for name in names {
         assert!(sources.contains(&format!("fn {name}(")), "docs/faults.md: there is no test {name}");
     }
+}
+
+#[test]
+fn the_tool_that_tries_faults_knows_all_of_the_page_by_number_and_refuses_others() {
+    let tool = |words: &[&str]| {
+        Command::new(root().join("tools/faults")).args(words).output().expect("python3 is there")
+    };
+    let list = tool(&[]);
+    let lines = String::from_utf8_lossy(&list.stdout).lines().count();
+    assert!(list.status.success() && lines == 62, "{lines}: {}", said(&list));
+    let unknown = tool(&["63"]);
+    assert_eq!(unknown.status.code(), Some(1), "{}", said(&unknown));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("numbers from 1 to 62"), "{}", said(&unknown));
 }
 
 /// All sources below a folder, one behind the other.

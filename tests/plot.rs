@@ -10,6 +10,12 @@ mod programs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use kinocue::harness::motion::{MAX_AXES, Pulses, SeatType, Slot, Window};
+use kinocue::harness::net::Delivery;
+use kinocue::harness::record::{Asked, FrameKind, RecordedSeat, TickHead};
+use kinocue::harness::recording::recorded_show;
+use kinocue::harness::time::{MonoTime, Rate, ShowTime};
+use kinocue::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, VibrationPort};
 use serde_json::json;
 
 use browser::Browser;
@@ -59,6 +65,84 @@ fn a_page_fits_its_window_loads_nothing_and_shows_parts_larger() {
     browser.press("[data-does=whole]");
     assert_eq!(browser.eval(&format!("return Number({shown})")).as_f64(), Some(whole));
     assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+/// A recording of a seat with that name; the film ran over the same two seconds three times, with the seat higher each time.
+fn recorded(path: &Path, name: &str) {
+    let seat = SeatType::bench3(3);
+    let window = Window::new((0..3).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect());
+    let seats = vec![RecordedSeat::new(name, &window, FrameKind::Datagram(VibrationPort::Two))];
+    recorded_show(seats, Rate::from_hz(100.0), path, 600, |tap, _, tick| {
+        let (at, film) = (MonoTime::from_nanos(tick * 10_000_000), tick % 200);
+        // A stroke of 150 mm is 300,000 pulses.
+        let pulses = i32::try_from(30_000 + 75_000 * (tick / 200) + 150 * film).expect("in the stroke");
+        let (positions, place) = ([Pulses(pulses); 3], f64::from(pulses) / 300_000.0);
+        let motion = Motion {
+            timing: Timing::Relative,
+            channel: 0,
+            accept: Code::ALL,
+            reply: Code::NONE,
+            frame: FrameNo(u32::try_from(tick).expect("few")),
+            time_ms: 10,
+            positions: &positions,
+            outputs: 0,
+            analogue: Analogue::default(),
+            vibration: None,
+        };
+        let mut pose = [0.0; MAX_AXES];
+        pose[..3].fill(place);
+        tap.asked(Asked::of(pose, 3));
+        tap.frame(0, motion.emit(&mut [0; MAX_LEN]), at, Delivery::Sent);
+        tap.tick(&TickHead::of(tick, at).showing(ShowTime::from_millis(10 * film.cast_signed())));
+    });
+}
+
+#[test]
+fn a_page_of_a_recording_shows_each_pass_of_the_film_beside_the_last_and_fits_its_window() {
+    let Some(browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let (file, page) = (folder.path().join("thrice.mcap"), folder.path().join("thrice.html"));
+    recorded(&file, TITLE);
+    for theme in ["light", "dark", "print"] {
+        let run = kinocue(&[text(&file), "-o", text(&page), "--theme", theme, "--force"]);
+        assert!(run.status.success(), "{run:?}");
+        browser.open(&format!("file://{}", page.display()));
+        assert!(
+            browser
+                .eval("return document.querySelector('h1').textContent")
+                .to_string()
+                .contains("window.harmed")
+        );
+        assert_eq!(browser.eval("return window.harmed ?? null"), json!(null));
+        assert_eq!(browser.eval("return performance.getEntriesByType('resource').length"), json!(0));
+        for width in [400, 1600] {
+            browser.resize(width, 900);
+            browser.wait("document.querySelectorAll('.times .tick').length >= 3");
+            let fits = browser.eval("return document.documentElement.scrollWidth <= innerWidth");
+            assert_eq!(fits, json!(true), "{theme} {width}");
+            let flags = browser
+                .eval("return [...document.querySelectorAll('.flags span')].map((one) => one.textContent)");
+            assert_eq!(flags, json!(["pass 2", "pass 3"]));
+            browser.shot(&format!("plot-recording-{theme}-{width}"));
+        }
+    }
+    // The clock begins anew with each pass, also in a part that is shown larger.
+    let clocks = "return [...document.querySelectorAll('.times .tick span')].map((one) => one.textContent)";
+    let begins = |clocks: &serde_json::Value| {
+        let all: Vec<String> = serde_json::from_value(clocks.clone()).expect("texts");
+        all.windows(2).filter(|pair| pair[1] < pair[0]).count()
+    };
+    let whole = browser.eval(clocks);
+    assert_eq!(begins(&whole), 2, "{whole}");
+    browser.press("[data-does=in]");
+    let part = browser.eval(clocks);
+    assert_ne!(part, whole);
+    assert!(begins(&part) <= 2, "{part}");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+    let svg = folder.path().join("thrice.svg");
+    assert!(kinocue(&[text(&file), "-o", text(&svg)]).status.success());
+    browser.open(&format!("file://{}", svg.display()));
+    browser.shot("plot-recording-svg");
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! `kinocue serve` as an ordinary user on a laptop: one command, simulated seats, and nothing in /var.
 
 use std::fs;
-use std::io::{BufRead as _, BufReader};
-use std::net::UdpSocket;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{TcpStream, UdpSocket};
 use std::os::unix::fs::chown;
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
@@ -77,16 +77,20 @@ impl Laptop {
 }
 
 /// A service, killed with its test.
-struct Serving(Child);
+struct Serving {
+    child: Child,
+    /// What it said until its seats were parked.
+    said: Vec<String>,
+}
 
 impl Serving {
     /// Starts it, and waits until its seats are parked.
     fn start(laptop: &Laptop, args: &[&str]) -> Self {
         let mut child = laptop.command(args).stderr(Stdio::piped()).spawn().expect("kinocue runs");
         let stderr = BufReader::new(child.stderr.take().expect("it is a pipe"));
-        let serving = Self(child);
+        let mut serving = Self { child, said: Vec::new() };
         let mut lines = stderr.lines().map_while(Result::ok);
-        let mut said = Vec::new();
+        let said = &mut serving.said;
         assert!(
             lines.by_ref().inspect(|line| said.push(line.clone())).any(|line| line.contains("parked: ")),
             "{said:?}"
@@ -96,15 +100,15 @@ impl Serving {
     }
 
     fn end(mut self) -> Option<i32> {
-        kill_process(Pid::from_child(&self.0), Signal::TERM).expect("it runs");
-        self.0.wait().expect("it ends").code()
+        kill_process(Pid::from_child(&self.child), Signal::TERM).expect("it runs");
+        self.child.wait().expect("it ends").code()
     }
 }
 
 impl Drop for Serving {
     fn drop(&mut self) {
-        let _ = self.0.kill(); // it may have ended
-        let _ = self.0.wait();
+        let _ = self.child.kill(); // it may have ended
+        let _ = self.child.wait();
     }
 }
 
@@ -135,6 +139,29 @@ fn an_ordinary_user_rehearses_with_one_command_and_nothing_lies_in_var() {
     for name in ["cues/bench-ride.csv", "log", "recordings", "rehearsal.toml", "run"] {
         assert!(state.join(name).exists(), "{name}");
     }
+}
+
+#[test]
+fn whoever_rehearses_is_given_a_link_that_may_do_everything() {
+    let laptop = Laptop::new();
+    let hall = laptop.hall();
+    let text = fs::read_to_string(laptop.path(&hall)).expect("it was written");
+    let (before, _) = text.split_once("[api]").unwrap_or((&text, ""));
+    let page = format!("{before}\n[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"view\"\n");
+    fs::write(laptop.path("page.toml"), page).expect("there is room");
+    let serving = Serving::start(&laptop, &["serve", "--rehearse", "--config", "page.toml"]);
+    let link = serving
+        .said
+        .iter()
+        .find_map(|line| line.split_once("http://").filter(|(_, to)| to.contains("#token=")));
+    let (address, token) = link.and_then(|(_, to)| to.split_once("/#token=")).expect("it says so");
+    let mut asked = TcpStream::connect(address).expect("it listens");
+    let request = "GET /api/v1/who HTTP/1.0";
+    write!(asked, "{request}\r\nHost: {address}\r\nAuthorization: Bearer {token}\r\n\r\n").expect("it reads");
+    let mut reply = String::new();
+    asked.read_to_string(&mut reply).expect("it replies");
+    assert!(reply.contains("200 OK") && reply.contains("\"engineer\""), "{reply}");
+    assert_eq!(serving.end(), Some(0));
 }
 
 #[test]

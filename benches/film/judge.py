@@ -2,6 +2,7 @@
 that is asked on a connection of the judge's own."""
 
 import array
+import bisect
 import contextlib
 import json
 import math
@@ -129,6 +130,14 @@ class Seat:
         self.sim.wait()
 
 
+def straight(those):
+    """The straight line through instants and places, and its rate."""
+    middle = statistics.fmean(at for at, _ in those)
+    place = statistics.fmean(media for _, media in those)
+    rate = sum((at - middle) * (media - place) for at, media in those) / sum((at - middle) ** 2 for at, _ in those)
+    return (lambda t: place + rate * (t - middle)), rate
+
+
 class Player:
     """mpv with a film, and the judge's own connection to it, which asks where its sound is."""
 
@@ -182,14 +191,27 @@ class Player:
 
     def clock(self, since, until):
         """The film as a straight line between two instants: place and rate at the middle, and how far the answers are from it, s."""
+        those = self.prompt(since, until)
+        place, rate = straight(those)
+        left = [abs(media - place(at)) for at, media in those]
+        return place, rate, sorted(left)[len(left) * 99 // 100]
+
+    def bent(self, since, until):
+        """The film as its player had it about each instant: a line through the answers of half a second, which bends as the player's clock does."""
+        those = self.prompt(since - 1.0, until + 1.0)
+        times = [at for at, _ in those]
+
+        def place(t):
+            near = those[bisect.bisect(times, t - 0.25) : bisect.bisect(times, t + 0.25)]
+            return straight(near)[0](t) if len(near) > 4 else None
+
+        return place
+
+    def prompt(self, since, until):
+        """Answers between two instants that took no longer than most."""
         those = [answer for answer in self.answers if since <= answer[0] <= until]
         quick = statistics.median(answer[1] for answer in those)
-        those = [(at, media) for at, trip, media in those if trip <= 2 * quick]
-        middle = statistics.fmean(at for at, _ in those)
-        place = statistics.fmean(media for _, media in those)
-        rate = sum((at - middle) * (media - place) for at, media in those) / sum((at - middle) ** 2 for at, _ in those)
-        left = [abs(media - place - rate * (at - middle)) for at, media in those]
-        return (lambda t: place + rate * (t - middle)), rate, sorted(left)[len(left) * 99 // 100]
+        return [(at, media) for at, trip, media in those if trip <= 2 * quick]
 
     def close(self):
         self.over = True

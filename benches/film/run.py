@@ -63,6 +63,12 @@ class Show:
         ends = ((at, at + lasts, self.ramp.media(pulses)) for at, lasts, pulses in frames if since <= at <= until)
         return [(at, (place(end) + ahead_s - media) * 1e3) for at, end, media in ends if media is not None]
 
+    def errors_of_bent(self, frames, since, until):
+        """The same by a film that bends as its player's clock does."""
+        place = self.player.bent(since, until)
+        ends = ((place(at + lasts), self.ramp.media(pulses)) for at, lasts, pulses in frames if since <= at <= until)
+        return [(film - media) * 1e3 for film, media in ends if film is not None and media is not None]
+
     def __exit__(self, *_):
         self.play.close()
         if self.between:
@@ -76,10 +82,12 @@ def follow(args, folder, player=(), lost=0.0):
         time.sleep(SETTLED_S + args.seconds)
         frames = show.seat.frames()
         holds = show.holds()
-    errors = [error for _, error in show.errors(frames, show.began + SETTLED_S, show.began + SETTLED_S + args.seconds)]
+    span = show.began + SETTLED_S, show.began + SETTLED_S + args.seconds
+    errors, bent = [error for _, error in show.errors(frames, *span)], show.errors_of_bent(frames, *span)
     bias, gap = statistics.median(errors), max(b[0] - a[0] for a, b in zip(frames, frames[1:]))
     told = "; ".join(" ".join(line.split()) for line in show.play.lines if line.startswith(("ticks", "lateness")))
     film = f"film {1e6 * (show.film_rate - 1):+.0f} ppm, its answers within {1e3 * show.film_left:.2f} ms of a line"
+    film += f"; |error| by the player's own answers around each frame {spread(map(abs, bent))}"
     return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, longest gap between frames {1e3 * gap:.0f} ms; {told}; {film}"
 
 

@@ -1,6 +1,7 @@
 //! Access over TCP: the accepted host names, the accepted origins of pages, and the tokens.
 
 use std::net::{IpAddr, SocketAddr};
+use std::sync::{Arc, PoisonError, RwLock};
 
 use axum::http::header::{AUTHORIZATION, HOST, ORIGIN};
 use axum::http::{HeaderMap, HeaderName, Uri};
@@ -21,7 +22,34 @@ pub(super) struct Access {
     hosts: Vec<String>,
     origins: Vec<String>,
     open_role: Option<Role>,
-    tokens: Vec<config::ApiToken>,
+    tokens: AccessTokens,
+}
+
+/// Who has a token; others from one request to the next where the configuration is read anew.
+#[derive(Debug, Clone, Default)]
+pub(super) struct AccessTokens(Arc<RwLock<Vec<config::ApiToken>>>);
+
+impl AccessTokens {
+    /// Has these from now on; says if they were others.
+    pub(super) fn set(&self, tokens: &[config::ApiToken]) -> bool {
+        let mut known = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        let are_others = *known != tokens;
+        *known = tokens.to_vec();
+        are_others
+    }
+
+    /// Whose token it is. Takes as long for a wrong one as for any of the right ones.
+    fn holder(&self, token: &str) -> Option<config::ApiToken> {
+        let hash = Sha256::digest(token.get(..token.len().min(MAX_TOKEN_LEN))?);
+        let (known, mut found) = (self.0.read().unwrap_or_else(PoisonError::into_inner), None);
+        for one in known.iter() {
+            let same: Choice = one.sha256.as_slice().ct_eq(hash.as_slice());
+            if bool::from(same) {
+                found = Some(one);
+            }
+        }
+        found.filter(|_| token.len() <= MAX_TOKEN_LEN).cloned()
+    }
 }
 
 impl Access {
@@ -31,7 +59,14 @@ impl Access {
         let by = |scheme: &str| hosts.iter().map(|host| format!("{scheme}://{host}")).collect::<Vec<_>>();
         let derived = || [by("http"), by("https")].concat();
         let origins = if config.origins.is_empty() { derived() } else { config.origins.clone() };
-        Self { hosts, origins, open_role: config.open_role, tokens: config.tokens.clone() }
+        let tokens = AccessTokens::default();
+        tokens.set(&config.tokens);
+        Self { hosts, origins, open_role: config.open_role, tokens }
+    }
+
+    /// Who has a token.
+    pub(super) fn tokens(&self) -> AccessTokens {
+        self.tokens.clone()
     }
 
     /// True if a request was meant for this server: a page of another one that resolves its own name to our address is not
@@ -74,7 +109,7 @@ impl Access {
         };
         // First of all: whoever has the right one is kept waiting by nobody, least of all behind the same address.
         let token = authorization.split_once(' ').filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
-        let known = token.and_then(|(_, token)| self.token(token.trim()));
+        let known = token.and_then(|(_, token)| self.tokens.holder(token.trim()));
         let Some(config::ApiToken { name, role, .. }) = known else {
             if let Some(wait) = tries.wait(address, now) {
                 let detail = format!("too many wrong tokens from {address}");
@@ -85,20 +120,7 @@ impl Access {
             let remedy = "check it; `kinocue token` makes a new one for the configuration";
             return Err(Problem::new(Code::Token, "unknown token", remedy));
         };
-        Ok(Who { role: *role, surface: Surface::Http, name: name.clone() })
-    }
-
-    /// Whose token it is. Takes as long for a wrong one as for any of the right ones.
-    fn token(&self, token: &str) -> Option<&config::ApiToken> {
-        let hash = Sha256::digest(token.get(..token.len().min(MAX_TOKEN_LEN))?);
-        let mut found = None;
-        for known in &self.tokens {
-            let same: Choice = known.sha256.as_slice().ct_eq(hash.as_slice());
-            if bool::from(same) {
-                found = Some(known);
-            }
-        }
-        found.filter(|_| token.len() <= MAX_TOKEN_LEN)
+        Ok(Who { role, surface: Surface::Http, name })
     }
 }
 

@@ -6,6 +6,7 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::task::Poll;
 
+use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::header::{
     AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
@@ -13,10 +14,12 @@ use axum::http::header::{
 };
 use axum::http::{HeaderName, HeaderValue, Method};
 use axum::middleware::Next;
-use axum::response::{IntoResponse as _, Response};
+use axum::response::{IntoResponse, Response};
+use sha2::{Digest as _, Sha256};
 
 use super::access::one;
-use super::once::KeptReply;
+use super::input::whole;
+use super::once::{Asked, KeptReply, Ring};
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
 use super::rest::BodyRest;
@@ -71,7 +74,12 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
     let response = match key {
         // A stop is done each time that it comes.
         _ if request.uri().path() == STOP => caught(next.run(request)).await,
-        Ok(Some(key)) if request.method() == Method::POST => once(shared, &asker, &key, request, next).await,
+        Ok(Some(key)) if request.method() == Method::POST => {
+            let ring = if known { Ring::Of(asker.clone()) } else { Ring::Guests };
+            once(shared, (&ring, &asker, &key), request, next)
+                .await
+                .unwrap_or_else(IntoResponse::into_response)
+        }
         Ok(_) => caught(next.run(request)).await,
         Err(problem) => problem.into_response(),
     };
@@ -126,12 +134,18 @@ fn takes_query(path: &str) -> bool {
 }
 
 /// Does it, or gives the reply to the first request with that key.
-async fn once(shared: &Shared, asker: &str, key: &str, request: Request, next: Next) -> Response {
-    let what = format!("{} {}", request.method(), request.uri().path());
-    let first = match shared.once.first(asker, key, &what, Monotonic.now()) {
-        Ok(first) => first,
-        Err(problem) => return problem.into_response(),
-    };
+async fn once(
+    shared: &Shared,
+    (ring, asker, key): (&Ring, &str, &str),
+    request: Request,
+    next: Next,
+) -> Result<Response, Problem> {
+    let (parts, body) = request.into_parts();
+    let body = whole(&parts.headers, body).await?;
+    let line = format!("{} {}", parts.method, parts.uri.path());
+    let asked = Asked { line, body: Sha256::digest(&body).into() };
+    let first = shared.once.first(ring, asker, key, &asked, Monotonic.now())?;
+    let request = Request::from_parts(parts, Body::from(body));
     let reply = first.get_or_init(|| async {
         KeptReply::of(render(caught(next.run(request)).await, Some(&shared.handle.status()))).await
     });
@@ -139,7 +153,7 @@ async fn once(shared: &Shared, asker: &str, key: &str, request: Request, next: N
     if reply.is_busy() {
         shared.once.release(&first);
     }
-    reply.response()
+    Ok(reply.response())
 }
 
 /// The response, or a problem where the handler panicked.

@@ -115,7 +115,7 @@ pub(super) fn id(text: &str) -> Result<library::Id, Problem> {
 }
 
 /// The body, of at most [`MAX_BODY`] bytes.
-async fn whole(headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
+pub(super) async fn whole(headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
     check_length(headers, MAX_BODY as u64)?;
     match tokio::time::timeout(BODY_TIME, Limited::new(body, MAX_BODY).collect()).await {
         Ok(Ok(body)) => Ok(body.to_bytes()),

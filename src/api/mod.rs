@@ -30,6 +30,7 @@ mod controllers;
 mod cues;
 mod gate;
 mod guarded;
+mod history;
 mod input;
 mod once;
 mod peer;
@@ -55,9 +56,10 @@ mod tries;
 pub(crate) use serving::ServingThread;
 pub use stop::{StopSocket, stop_socket};
 
-use access::Access;
+use access::{Access, AccessTokens};
 use shared::{Pulse, Shared};
 use socket::SocketFile;
+use streams::Streams;
 
 /// What its threads are called. A panic on one of them ends the request that it was for, and nothing else.
 pub(crate) const THREAD: &str = "api";
@@ -142,6 +144,8 @@ pub enum ApiError {
 #[derive(Debug)]
 pub struct Running {
     addresses: Vec<SocketAddr>,
+    tokens: AccessTokens,
+    streams: Streams,
     _thread: ServingThread,
 }
 
@@ -150,6 +154,13 @@ impl Running {
     #[must_use]
     pub fn addresses(&self) -> &[SocketAddr] {
         &self.addresses
+    }
+
+    /// Has these tokens from now on. Where they are others, whoever is pushed to over TCP has to come again, and show one.
+    pub(crate) fn set_tokens(&self, tokens: &[config::ApiToken]) {
+        if self.tokens.set(tokens) {
+            self.streams.part_with_tcp();
+        }
     }
 }
 
@@ -163,12 +174,14 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
     let (tcp, addresses) = ports(&config.listen)?;
     let (closing, closed) = watch::channel(false);
     let (router, document) = routes::routes();
+    let (access, streams) = (Access::new(&config, &addresses), Streams::default());
+    let tokens = access.tokens();
     let shared = Shared {
         handle,
-        access: Access::new(&config, &addresses),
+        access,
         tries: Default::default(),
         once: Default::default(),
-        streams: Default::default(),
+        streams: streams.clone(),
         errands: shared::errands(),
         reports: shared::one_at_a_time(),
         curves: shared::one_at_a_time(),
@@ -194,7 +207,8 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         .map_err(ApiError::System)?;
     let sockets = ApiSockets { local, _file: file, tcp, log };
     let thread = Builder::new().name(THREAD.to_owned()).spawn(move || run(runtime, sockets, shared, router));
-    Ok(Running { addresses, _thread: ServingThread::new(closing, thread.map_err(ApiError::System)?) })
+    let thread = ServingThread::new(closing, thread.map_err(ApiError::System)?);
+    Ok(Running { addresses, tokens, streams, _thread: thread })
 }
 
 /// What is listened on.

@@ -1,6 +1,6 @@
 //! Requests that come twice: a POST with an `Idempotency-Key` is done once, and its repeats get the first reply.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -17,16 +17,35 @@ use crate::time::MonoTime;
 
 /// The longest key.
 const MAX_KEY: usize = 64;
-/// Keys that are remembered.
+/// Keys of one asker that are remembered.
 const KEYS: usize = 1024;
-/// Bytes of replies that are remembered; of more the oldest are forgotten with their keys.
-const BYTES: usize = 16 << 20;
+/// Bytes of replies to one asker that are remembered; of more the oldest are forgotten with their keys.
+const BYTES: usize = 4 << 20;
 /// How long a key is remembered.
 const AGE: Duration = Duration::from_secs(600);
 
-/// The keys of late, and the replies to them.
+/// The keys of late, and the replies to them: those of each asker by themselves, so that nobody has the keys of others forgotten. A request of
+/// theirs that came again would be done again.
 #[derive(Debug, Default)]
-pub(super) struct Once(Mutex<VecDeque<Kept>>);
+pub(super) struct Once(Mutex<HashMap<Ring, VecDeque<Kept>>>);
+
+/// Whose keys are kept together.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) enum Ring {
+    /// Of one who has a token, or may open the control socket.
+    Of(String),
+    /// Of all who come without one, from however many addresses.
+    Guests,
+}
+
+/// A request as it is compared with another of the same key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Asked {
+    /// Method and path.
+    pub(super) line: String,
+    /// SHA-256 of the body.
+    pub(super) body: [u8; 32],
+}
 
 /// The reply to the first request with a key; empty until it is there.
 pub(super) type First = Arc<OnceCell<KeptReply>>;
@@ -37,7 +56,7 @@ struct Kept {
     asker: String,
     key: String,
     /// What was asked with it.
-    request: String,
+    asked: Asked,
     since: MonoTime,
     first: First,
 }
@@ -54,36 +73,41 @@ impl Once {
     /// The place for the reply to that key of `asker`; whoever finds it empty fills it.
     pub(super) fn first(
         &self,
+        ring: &Ring,
         asker: &str,
         key: &str,
-        request: &str,
+        asked: &Asked,
         now: MonoTime,
     ) -> Result<First, Problem> {
         if key.is_empty() || key.len() > MAX_KEY || !key.bytes().all(|byte| byte.is_ascii_graphic()) {
             let remedy = format!("use 1 to {MAX_KEY} characters of ASCII, a new key for each request");
             return Err(bad_value(format!("{key:?} is not an Idempotency-Key"), remedy));
         }
-        let mut kept = self.kept();
-        forget(&mut kept, now);
+        let mut rings = self.rings();
+        rings.values_mut().for_each(|kept| forget(kept, now));
+        rings.retain(|_, kept| !kept.is_empty());
+        let kept = rings.entry(ring.clone()).or_default();
         if let Some(before) = kept.iter().find(|kept| kept.asker == asker && kept.key == key) {
-            if before.request == request {
+            if before.asked == *asked {
                 return Ok(Arc::clone(&before.first));
             }
-            let detail = format!("the Idempotency-Key {key:?} was already used for {}", before.request);
+            let with = if before.asked.line == asked.line { " with another body" } else { "" };
+            let detail =
+                format!("the Idempotency-Key {key:?} was already used for {}{with}", before.asked.line);
             return Err(bad_value(detail, "use a new key for a new request"));
         }
         let first = First::default();
-        let [asker, key, request] = [asker, key, request].map(str::to_owned);
-        kept.push_back(Kept { asker, key, request, since: now, first: Arc::clone(&first) });
+        let [asker, key] = [asker, key].map(str::to_owned);
+        kept.push_back(Kept { asker, key, asked: asked.clone(), since: now, first: Arc::clone(&first) });
         Ok(first)
     }
 
     /// Forgets a key whose request was not even begun.
     pub(super) fn release(&self, first: &First) {
-        self.kept().retain(|kept| !Arc::ptr_eq(&kept.first, first));
+        self.rings().values_mut().for_each(|kept| kept.retain(|kept| !Arc::ptr_eq(&kept.first, first)));
     }
 
-    fn kept(&self) -> MutexGuard<'_, VecDeque<Kept>> {
+    fn rings(&self) -> MutexGuard<'_, HashMap<Ring, VecDeque<Kept>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -140,42 +164,61 @@ mod tests {
         KeptReply { status: StatusCode::OK, content_type: None, body: vec![b'x'; bytes].into() }
     }
 
+    fn post(path: &str) -> Asked {
+        Asked { line: format!("POST {path}"), body: [0; 32] }
+    }
+
+    fn ask(once: &Once, asker: &str, key: &str, asked: &Asked, now: MonoTime) -> Result<First, Problem> {
+        once.first(&Ring::Of(asker.to_owned()), asker, key, asked, now)
+    }
+
     #[test]
     fn a_key_stands_for_one_request_of_one_person() {
         let once = Once::default();
-        let first = once.first("anna", "k", "POST /go", at(0)).unwrap();
-        let again = once.first("anna", "k", "POST /go", at(1)).unwrap();
+        let first = ask(&once, "anna", "k", &post("/go"), at(0)).unwrap();
+        let again = ask(&once, "anna", "k", &post("/go"), at(1)).unwrap();
         assert!(Arc::ptr_eq(&first, &again));
-        assert!(!Arc::ptr_eq(&first, &once.first("ben", "k", "POST /go", at(1)).unwrap()));
-        assert_eq!(once.first("anna", "k", "POST /stop", at(1)).unwrap_err().code, Code::Value);
+        assert!(!Arc::ptr_eq(&first, &ask(&once, "ben", "k", &post("/go"), at(1)).unwrap()));
+        assert_eq!(ask(&once, "anna", "k", &post("/stop"), at(1)).unwrap_err().code, Code::Value);
+        let other = Asked { body: [1; 32], ..post("/go") };
+        assert_eq!(ask(&once, "anna", "k", &other, at(1)).unwrap_err().code, Code::Value);
         for bad in ["", "a b", "ä", &"k".repeat(65)] {
-            assert_eq!(once.first("anna", bad, "POST /go", at(1)).unwrap_err().code, Code::Value, "{bad}");
+            assert_eq!(ask(&once, "anna", bad, &post("/go"), at(1)).unwrap_err().code, Code::Value, "{bad}");
         }
     }
 
     #[test]
     fn a_key_is_forgotten_after_ten_minutes_or_when_nothing_was_done() {
         let once = Once::default();
-        let first = once.first("anna", "k", "POST /go", at(0)).unwrap();
-        assert!(Arc::ptr_eq(&first, &once.first("anna", "k", "POST /go", at(599)).unwrap()));
-        let later = once.first("anna", "k", "POST /go", at(600)).unwrap();
+        let first = ask(&once, "anna", "k", &post("/go"), at(0)).unwrap();
+        assert!(Arc::ptr_eq(&first, &ask(&once, "anna", "k", &post("/go"), at(599)).unwrap()));
+        let later = ask(&once, "anna", "k", &post("/go"), at(600)).unwrap();
         assert!(!Arc::ptr_eq(&first, &later));
         once.release(&later);
-        assert!(!Arc::ptr_eq(&later, &once.first("anna", "k", "POST /go", at(601)).unwrap()));
+        assert!(!Arc::ptr_eq(&later, &ask(&once, "anna", "k", &post("/go"), at(601)).unwrap()));
     }
 
     #[test]
-    fn neither_many_keys_nor_long_replies_fill_the_memory() {
+    fn neither_many_keys_nor_long_replies_fill_the_memory_nor_have_the_keys_of_others_forgotten() {
         let once = Once::default();
+        let of = |asker: &str| once.rings()[&Ring::Of(asker.to_owned())].len();
+        let resume = ask(&once, "carl", "k", &post("/resume"), at(0)).unwrap();
         for n in 0..3000 {
-            once.first("anna", &n.to_string(), "POST /go", at(0)).unwrap();
+            let guest = format!("10.0.{}.{}", n / 256, n % 256);
+            once.first(&Ring::Guests, &guest, "k", &post("/go"), at(0)).unwrap();
         }
-        assert_eq!(once.kept().len(), KEYS);
+        assert_eq!(once.rings()[&Ring::Guests].len(), KEYS);
+        for n in 0..3000 {
+            ask(&once, "anna", &n.to_string(), &post("/go"), at(0)).unwrap();
+        }
+        assert_eq!(of("anna"), KEYS);
         for n in 0..100 {
-            let first = once.first("ben", &n.to_string(), "POST /go", at(0)).unwrap();
+            let first = ask(&once, "ben", &n.to_string(), &post("/go"), at(0)).unwrap();
             first.set(reply(1 << 20)).unwrap();
         }
-        once.first("ben", "last", "POST /go", at(0)).unwrap();
-        assert_eq!(once.kept().len(), 17, "16 MiB, and the one that is under way");
+        ask(&once, "ben", "last", &post("/go"), at(0)).unwrap();
+        assert_eq!(of("ben"), 5, "4 MiB, and the one that is under way");
+        let again = ask(&once, "carl", "k", &post("/resume"), at(1)).unwrap();
+        assert!(Arc::ptr_eq(&resume, &again), "it is not done again");
     }
 }

@@ -28,12 +28,12 @@ use crate::control::model::Ending;
 use crate::control::{Code, Command, Problem, is_recording};
 use crate::journal::{Outcome, ShowRecord};
 use crate::library::RecordingPicture;
-use crate::record::report_of;
+use crate::record::closing_of;
 
 /// The newest that are listed, and no more.
 const MOST: usize = 500;
 /// What came of shows is looked up for so many of them: more than any page shows, and few enough for whoever waits for the disk.
-const OUTCOMES: usize = 50;
+pub(super) const OUTCOMES: usize = 50;
 /// Bytes of a piece, and how many wait for whoever reads them.
 const PIECE: usize = 64 << 10;
 const WAITING: usize = 2;
@@ -222,9 +222,17 @@ fn list(dir: &Path) -> Vec<RecordingInfo> {
     all
 }
 
+/// The names of all recordings that are whole, newest first.
+pub(super) fn names(dir: &Path) -> Vec<String> {
+    let name = |entry: fs::DirEntry| entry.file_name().into_string().ok().filter(|name| is_recording(name));
+    let mut all: Vec<_> = fs::read_dir(dir).into_iter().flatten().flatten().filter_map(name).collect();
+    all.sort_unstable_by(|one, other| other.cmp(one));
+    all
+}
+
 /// What came of the show that a file is of.
 fn outcome(path: &Path) -> Option<RecordedOutcome> {
-    let report = report_of(File::open(path).ok()?).ok()??;
+    let report = closing_of(File::open(path).ok()?).ok()?.report?;
     let Outcome { result, missed_ticks, frames, .. } =
         serde_json::from_slice::<ShowRecord>(&report).ok()?.outcome?;
     Some(RecordedOutcome { result, lost: frames.lost, missed_ticks })

@@ -14,7 +14,9 @@ use utoipa_axum::routes;
 
 use super::problem::{PROBLEM_JSON, ProblemBody};
 use super::shared::Shared;
-use super::{controllers, cues, gate, playlist, recordings, reports, service, settings, show, status};
+use super::{
+    controllers, cues, gate, history, playlist, recordings, reports, service, settings, show, status,
+};
 use crate::control::Code;
 
 /// What can be said of the whole.
@@ -71,6 +73,7 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(cues::one, cues::upload))
         .routes(routes!(cues::curve))
         .routes(routes!(reports::one))
+        .routes(routes!(history::all))
         .routes(routes!(recordings::all))
         .routes(routes!(recordings::one, recordings::remove))
         .routes(routes!(recordings::picture))

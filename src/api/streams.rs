@@ -13,7 +13,7 @@ const MOST: (usize, usize) = (32, 16);
 const MOST_OF_ONE: usize = 16;
 
 /// Room for those who are pushed to.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Streams(Arc<Mutex<Vec<Watching>>>);
 
 /// A place among them, free again when it is dropped.
@@ -52,6 +52,13 @@ impl Streams {
         let leave = Arc::<Notify>::default();
         watching.push(Watching { who: who.clone(), leave: Arc::clone(&leave) });
         Ok(StreamPlace { watching: Arc::clone(&self.0), leave })
+    }
+
+    /// Has all leave who came over TCP: whoever still may comes again.
+    pub(super) fn part_with_tcp(&self) {
+        let all = lock(&self.0);
+        let theirs = all.iter().filter(|one| one.who.surface == Surface::Http);
+        theirs.for_each(|one| one.leave.notify_one());
     }
 }
 

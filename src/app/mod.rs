@@ -1,9 +1,11 @@
 //! Wiring: opens everything, starts and stops the threads, and sums up. Knows every room; no room knows it.
 
+pub(crate) mod buttons;
 mod company;
 pub(crate) mod film;
 mod helpers;
 mod links;
+pub(crate) mod notify;
 mod play;
 pub(crate) mod player;
 pub(crate) mod recorder;

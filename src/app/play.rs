@@ -107,6 +107,11 @@ impl Play {
         Ok(Self { runtime, staged, holds: false, recording: None, roll: Arc::default(), links: Vec::new() })
     }
 
+    /// What to do where frames take too much of the time between ticks.
+    pub(crate) fn crowding(&self) -> Option<&str> {
+        self.runtime.crowding()
+    }
+
     /// The same play, recorded to a file that is not there yet.
     ///
     /// # Errors

@@ -17,7 +17,6 @@ use super::runtime::RuntimeHandle;
 use super::staged::StagedShow;
 use crate::belief::{FRESH, KnownPose, LaneEvidence, Reading};
 use crate::drive::Lane;
-use crate::engine::Mix;
 use crate::health::Why;
 use crate::motion::Slot;
 use crate::plan::slow_park_time;
@@ -267,7 +266,7 @@ impl PlayScript {
             return Err(PlayError::Silent(silent));
         }
         for lane in lanes_with(&self.handle.config.controllers, is_silent) {
-            self.handle.desk.set(lane, Mix { on: false, ..self.handle.desk.mix(lane) });
+            self.handle.desk.leave_out(lane);
         }
         self.roll.note(silent);
         while self.roll.is_open() && !self.is_called_off() {

@@ -17,6 +17,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use super::film::HallFilm;
+use super::notify::AlarmTeller;
 use super::recorder::{HallRecorder, RecordLink, RecordPlaces};
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
@@ -215,12 +216,16 @@ fn serve_halls(
         config: places.config,
         began,
         signals,
-        service_log: ServiceLog::new(log.clone()),
+        service_log: ServiceLog::new(
+            log.clone(),
+            AlarmTeller::start(&config, &log).map_err(ServeError::System)?,
+        ),
         carryover: Carryover::of(kept),
         settings_file,
         film: None,
         player: None,
         osc: surfaces.osc_counts(),
+        buttons: surfaces.pads(),
         recorder: RecordLink::default(),
     };
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
@@ -242,6 +247,7 @@ fn serve_halls(
         numbers.extend(left.closed.numbers.clone());
         (runtime, config) =
             reopen(next, config, &numbers, &mut ports.carryover, &ports.signals.leave, &mut film)?;
+        surfaces.take_tokens(&config);
     };
     surfaces.close();
     log.close();
@@ -275,7 +281,7 @@ fn reopen(
     match open(&next) {
         Ok(runtime) => Ok((runtime, next)),
         Err(error) => {
-            carryover.note(format!(
+            carryover.refuse(format!(
                 "the hall does not open with the new configuration, and has the old one: {error}"
             ));
             Ok((open(&before)?, before))

@@ -1,4 +1,4 @@
-//! The surfaces of the daemon: the HTTP API with the console, the stop socket, OSC and the text port. They outlive the hall
+//! The surfaces of the daemon: the HTTP API with the console, the stop socket, buttons, OSC and the text port. They outlive the hall
 //! that is kept behind them.
 
 use std::io;
@@ -9,6 +9,7 @@ use std::thread::Builder;
 use tokio::runtime;
 use tokio::sync::watch;
 
+use super::buttons::{Buttons, PadTable};
 use crate::api::{self, ApiError, Pages, ServingThread, StopSocket, stop_socket};
 use crate::config::Config;
 use crate::control::Handle;
@@ -40,6 +41,9 @@ pub(crate) enum SurfaceError {
     /// The port for text.
     #[error(transparent)]
     Text(#[from] TextError),
+    /// There is no thread for a pad.
+    #[error("the system refused a thread for [buttons]")]
+    Buttons(#[source] io::Error),
     /// There is no thread, or no timer.
     #[error("the system refused the ports for OSC and text")]
     System(#[source] io::Error),
@@ -51,6 +55,7 @@ pub(crate) struct Surfaces {
     // The stop goes last.
     ports: Option<ServingThread>,
     osc: Option<Arc<Counts>>,
+    buttons: Buttons,
     api: api::Running,
     stop: StopSocket,
 }
@@ -86,7 +91,8 @@ impl Surfaces {
         let counts = osc.as_ref().map(Osc::counts);
         let ports =
             if osc.is_some() || text.is_some() { Some(show_control(osc, text, log.clone())?) } else { None };
-        Ok(Self { ports, osc: counts, api, stop })
+        let buttons = Buttons::read(config, handle, log).map_err(SurfaceError::Buttons)?;
+        Ok(Self { ports, osc: counts, buttons, api, stop })
     }
 
     /// Where the API listens over TCP.
@@ -95,16 +101,27 @@ impl Surfaces {
         self.api.addresses()
     }
 
+    /// Takes the tokens of a configuration that is in effect now.
+    pub(crate) fn take_tokens(&self, config: &Config) {
+        self.api.set_tokens(&config.api.tokens);
+    }
+
     /// What has come to the port for OSC, if there is one.
     pub(crate) fn osc_counts(&self) -> Option<Arc<Counts>> {
         self.osc.clone()
     }
 
-    /// Closes them in turn, the stop last.
+    /// How the pads are, if there are any.
+    pub(crate) fn pads(&self) -> Option<PadTable> {
+        self.buttons.table()
+    }
+
+    /// Closes them in turn, those that stop last.
     pub(crate) fn close(self) {
-        let Self { ports, api, stop, .. } = self;
+        let Self { ports, api, buttons, stop, .. } = self;
         drop(ports);
         drop(api);
+        drop(buttons);
         drop(stop);
     }
 }

@@ -1,13 +1,12 @@
 //! What the ack thread has seen of one lane, as levels that the tick thread reads: nothing of it can be lost in a full mailbox,
 //! and nobody waits. One thread writes.
 
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
-
 use crate::motion::{MAX_AXES, Pose};
+use crate::published::{SharedWord, SharedWords};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
-/// Where a reading comes from.
+/// Where a reading comes from; the place of each is its number in [`LaneEvidence`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Source {
     /// The position registers DP06 to DP0b and DP21 to DP26 (SMC manual 2.3.3).
@@ -60,25 +59,21 @@ impl Reading {
 #[derive(Debug, Default)]
 pub struct LaneEvidence {
     /// The number of the newest frame that was acked, and [`SOME`]; 0 where there is none.
-    acked: AtomicU64,
-    /// Odd while a reading is being written.
-    version: AtomicU32,
-    pose: [AtomicU64; MAX_AXES],
-    at: AtomicU64,
-    sways: AtomicU64,
-    slots: AtomicU32,
+    acked: SharedWord,
+    /// Of a reading the pose, when it was made, how far it sways, and the rest in one word.
+    reading: SharedWords<{ MAX_AXES + 3 }>,
 }
 
 const SOME: u64 = 1 << 32;
-const RESTS: u32 = 1 << 16;
-const MOVES: u32 = 1 << 17;
+const RESTS: u64 = 1 << 16;
+const MOVES: u64 = 1 << 17;
 const BY: u32 = 18;
 
 impl LaneEvidence {
     /// The newest frame that was acked.
     #[must_use]
     pub(crate) fn acked(&self) -> Option<FrameNo> {
-        let acked = self.acked.load(Ordering::Acquire);
+        let acked = self.acked.get();
         #[expect(clippy::cast_possible_truncation, reason = "the number is the lower half")]
         (acked & SOME != 0).then_some(FrameNo(acked as u32))
     }
@@ -86,28 +81,20 @@ impl LaneEvidence {
     /// Notes an ack; an older one than the newest says nothing new.
     pub fn on_ack(&self, frame: FrameNo) {
         if self.acked().is_none_or(|newest| frame.since(newest) > 0) {
-            self.acked.store(SOME | u64::from(frame.0), Ordering::Release);
+            self.acked.put(SOME | u64::from(frame.0));
         }
     }
 
     /// Which reading is the newest; 0 before the first.
     #[must_use]
     pub(crate) fn version(&self) -> u32 {
-        self.version.load(Ordering::Acquire)
+        self.reading.version()
     }
 
     /// The newest reading and its version; none before the first, and while one is being written.
     #[must_use]
     pub(crate) fn reading(&self) -> Option<(u32, Reading)> {
-        let version = self.version();
-        if version == 0 || version % 2 == 1 {
-            return None;
-        }
-        let pose = std::array::from_fn(|slot| f64::from_bits(self.pose[slot].load(Ordering::Relaxed)));
-        let (at, word) = (self.at.load(Ordering::Relaxed), self.slots.load(Ordering::Relaxed));
-        let sways = f64::from_bits(self.sways.load(Ordering::Relaxed));
-        // What was loaded before this is of one version if the version is still the same after it.
-        fence(Ordering::Acquire);
+        let (version, [pose @ .., at, sways, word]) = self.reading.get()?;
         let by = match word >> BY {
             0 => Source::Registers,
             1 => Source::Report,
@@ -115,39 +102,25 @@ impl LaneEvidence {
             _ => Source::Passing,
         };
         let reading = Reading {
-            pose,
+            pose: pose.map(f64::from_bits),
             slots: (word & 0xffff) as u16,
             at: MonoTime::from_nanos(at),
             rests: word & RESTS != 0,
             moves: word & MOVES != 0,
-            sways,
+            sways: f64::from_bits(sways),
             by,
         };
-        (self.version.load(Ordering::Relaxed) == version).then_some((version, reading))
+        Some((version, reading))
     }
 
     /// Notes a reading. One thread alone may.
     pub fn on_reading(&self, reading: &Reading) {
-        let version = self.version.load(Ordering::Relaxed);
-        self.version.store(version.wrapping_add(1), Ordering::Relaxed);
-        // Nothing of the reading is seen before the version is odd.
-        fence(Ordering::Release);
-        for (cell, place) in self.pose.iter().zip(reading.pose) {
-            cell.store(place.to_bits(), Ordering::Relaxed);
-        }
-        self.at.store(reading.at.as_nanos(), Ordering::Relaxed);
-        self.sways.store(reading.sways.to_bits(), Ordering::Relaxed);
-        let by = match reading.by {
-            Source::Registers => 0,
-            Source::Report => 1,
-            Source::Homing => 2,
-            Source::Passing => 3,
-        };
-        let rests = if reading.rests { RESTS } else { 0 };
-        let moves = if reading.moves { MOVES } else { 0 };
-        self.slots.store(u32::from(reading.slots) | rests | moves | by << BY, Ordering::Relaxed);
-        // Zero stays for "none": after 2^31 readings the count begins anew.
-        let next = version.wrapping_add(2);
-        self.version.store(if next == 0 { 2 } else { next }, Ordering::Release);
+        let how = (u64::from(reading.rests) * RESTS) | (u64::from(reading.moves) * MOVES);
+        let word = u64::from(reading.slots) | how | (reading.by as u64) << BY;
+        let words = [reading.at.as_nanos(), reading.sways.to_bits(), word];
+        self.reading.put(std::array::from_fn(|place| {
+            let of_pose = reading.pose.get(place).map(|fraction| fraction.to_bits());
+            of_pose.unwrap_or_else(|| words[place - MAX_AXES])
+        }));
     }
 }

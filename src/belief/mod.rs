@@ -49,7 +49,7 @@ const FOLLOWS: Duration = Duration::from_millis(100);
 /// A reading from before this says nothing of a seat that frames lead: where they led it then is not kept.
 const STALE: Duration = Duration::from_millis(400);
 /// How far from wherever frames have led it a seat may be found that follows them, strokes: 1.5 mm of 150.
-const ASTRAY: f64 = 0.01;
+pub(crate) const ASTRAY: f64 = 0.01;
 /// Rounding to pulses, and the step from one whole millisecond to the next, may take a frame past the greatest speed by this.
 const ROUNDING: f64 = 1.01;
 /// How far from where it was left a seat at rest has to be found to have been moved, in strokes: 0.075 mm of 150.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::drives::{self, DriveArgs, DriveReport, DriveVerdict};
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
-use super::{Exit, Failure, print};
+use super::{Exit, Failure, metres, print};
 use crate::config::{self, Config, ConfigFault, ConfigFaults, parse_level};
 use crate::cue::{self, CueFaults, Fault, Place};
 use crate::drive::terms;
@@ -208,22 +208,25 @@ impl CheckReport {
         self.links(path, hall);
         if hall.film.is_none() && hall.sync.as_ref().is_some_and(|sync| !sync.leads) {
             let note = "[sync] has no start: a cue follows the film only where its entry of a playlist has film, else it starts at once";
-            self.notes.push(format!("{}: {note}", plain::path(path)));
+            self.note(path, note);
         }
         if self.exits.len() == before {
             self.passes(path, &hall_in_words(hall));
         }
     }
 
+    /// Notes what was not looked at, or looks wrong, once.
+    fn note(&mut self, path: &Path, text: &str) {
+        let note = format!("{}: {text}", plain::path(path));
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
     /// Notes how often the links of a hall play, and those that are to play more often than they can.
     fn links(&mut self, path: &Path, hall: &Config) {
         let (told, faults) = terms::in_words(hall);
-        for text in told {
-            let note = format!("{}: {text}", plain::path(path));
-            if !self.notes.contains(&note) {
-                self.notes.push(note);
-            }
-        }
+        told.iter().chain(&metres::of_hall(hall)).for_each(|text| self.note(path, text));
         for fault in faults {
             self.fault(Exit::CheckFailed, FaultReport::new(path, &Place::File, fault));
         }
@@ -246,6 +249,8 @@ impl CheckReport {
                 .for_each(|faults| self.cue_faults(faults));
             return;
         };
+        let small = metres::of_cue(&timeline, &judge.seats(timeline.axes()));
+        small.iter().for_each(|text| self.note(path, text));
         judge.stroke(&timeline).faults.iter().for_each(|faults| self.cue_faults(faults));
         for misfit in judge.hall.iter().flat_map(|hall| hall.misfits(&timeline)) {
             let place = timeline.cue().column_place(&misfit.column(), misfit.at());

@@ -19,11 +19,12 @@ use crate::doctor::lateness::{LatenessRun, MachineLoad, RATE_HZ};
 use crate::doctor::measure::measure;
 use crate::doctor::{FindingLine, Hall, Verdict, facts, judge, ready};
 use crate::sys::realtime::normal_priority;
+use crate::time::Rate;
 
 /// Checks if this machine is fit for real-time use.
 ///
 /// The checks come first, each with its finding, a verdict and the exact fix. Then it measures a bare loop with the clock and
-/// scheduling of `play`, at 1,000 ticks per second. It changes nothing and sends nothing.
+/// scheduling of `play`, at 1,000 ticks per second. It changes nothing, and sends nothing but to itself.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Verdicts:
@@ -71,7 +72,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let hall = match &args.config {
         Some(path) => hall(&load::config(path)?),
-        None => Hall { controllers: args.controllers, neighbours: args.controllers },
+        None => {
+            Hall { controllers: args.controllers, neighbours: args.controllers, rate: Rate::from_hz(RATE_HZ) }
+        }
     };
     let mut lines = judge(&facts(), hall);
     let loads: &[MachineLoad] = match (args.seconds, args.load) {
@@ -100,7 +103,11 @@ fn hall(config: &Config) -> Hall {
     let addresses = config.stations().into_iter().map(|one| *one.connection.address.ip());
     let elsewhere: HashSet<_> = addresses.filter(|ip| !ip.is_loopback()).collect();
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    Hall { controllers: count(config.controllers.len()), neighbours: count(elsewhere.len()) }
+    Hall {
+        controllers: count(config.stations().len()),
+        neighbours: count(elsewhere.len()),
+        rate: Rate::from_hz(config.show.rate_hz),
+    }
 }
 
 /// Measures on this thread, while another draws how far it is.

@@ -7,6 +7,7 @@ use std::{fmt, io, iter};
 
 use anyhow::anyhow;
 
+use crate::app::film::FilmError;
 use crate::net::NetError;
 
 /// How the program ends; the numbers are those of `sysexits.h`.
@@ -19,7 +20,7 @@ pub(crate) enum Exit {
     CheckFailed = 1,
     /// Wrong use of the command line.
     Usage = 64,
-    /// A cue that cannot be played.
+    /// A cue that cannot be played, or a film's sound or index that cannot be read.
     BadCue = 65,
     /// A file that is missing, a folder where a file belongs, or a name that is unknown.
     NoInput = 66,
@@ -105,6 +106,22 @@ pub(super) fn of_net(error: &NetError) -> Exit {
         NetError::Refused { .. } => of_system(error),
         _ => Exit::Usage,
     }
+}
+
+/// What the program ends with where a source of the film cannot be had.
+pub(super) fn of_film(error: FilmError) -> Failure {
+    let exit = match &error {
+        FilmError::NoInput { .. } => Exit::NoInput,
+        FilmError::Sound { .. } | FilmError::Index { .. } => Exit::BadCue,
+        FilmError::Many(_) | FilmError::Twice(_) | FilmError::NoLine(_) | FilmError::NoSuchTime => {
+            Exit::Usage
+        }
+        FilmError::Open { .. }
+        | FilmError::Command { .. }
+        | FilmError::Clock { .. }
+        | FilmError::Thread(_) => of_system(&error),
+    };
+    Failure { exit, error: error.into() }
 }
 
 /// An output that exists is replaced only where that was asked for.

@@ -9,7 +9,7 @@ const GROUPS: [(&str, &[&str]); 8] = [
     ("Try it, without seats", &["demo", "sim"]),
     ("Make and check cues", &["check", "info", "plot", "fit", "edit", "convert"]),
     ("Play one cue, or follow a film", &["play", "sync"]),
-    ("Set up a hall", &["preflight", "home", "register", "doctor", "latency", "token"]),
+    ("Set up a hall", &["preflight", "home", "register", "doctor", "latency", "token", "buttons"]),
     (
         "Run a hall: the service, and what it plays",
         &["serve", "reload", "cues", "upload", "load", "playlist", "select"],

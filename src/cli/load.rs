@@ -117,20 +117,25 @@ fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
     })
 }
 
+/// What each axis of a cue is on: the seat given, else that of the first controller of the hall that takes the axis, else the bench seat.
+pub(super) fn seats(hall: Option<&Config>, seat: Option<&Arc<SeatType>>, axes: usize) -> Vec<SeatAxis> {
+    let bench = Arc::new(SeatType::bench3(axes));
+    let seat_of = |axis| {
+        let mut controllers = hall.into_iter().flat_map(|hall| &hall.controllers);
+        match (seat, controllers.find(|one| one.takes(axis))) {
+            (Some(seat), _) => SeatAxis::new(seat, axis),
+            (None, Some(taker)) => SeatAxis::new(&taker.seat, axis - taker.axis_offset),
+            (None, None) => SeatAxis::new(&bench, axis),
+        }
+    };
+    (0..axes).map(seat_of).collect()
+}
+
 impl Judge {
     /// What each axis of a cue is on: the seat asked for, else that of the first controller that takes the axis,
     /// else the bench seat.
     pub(super) fn seats(&self, axes: usize) -> Vec<SeatAxis> {
-        let bench = Arc::new(SeatType::bench3(axes));
-        let seat_of = |axis| {
-            let mut controllers = self.hall.iter().flat_map(|hall| &hall.controllers);
-            match (&self.seat, controllers.find(|one| one.takes(axis))) {
-                (Some(seat), _) => SeatAxis::new(seat, axis),
-                (None, Some(taker)) => SeatAxis::new(&taker.seat, axis - taker.axis_offset),
-                (None, None) => SeatAxis::new(&bench, axis),
-            }
-        };
-        (0..axes).map(seat_of).collect()
+        seats(self.hall.as_ref(), self.seat.as_ref(), axes)
     }
 
     /// What a cue has to be proved for: on the seat asked for, else on all seats of the configuration, else on the bench

@@ -11,6 +11,7 @@ use crate::{api, plain};
 
 mod ask;
 mod bounds;
+mod buttons;
 mod check;
 mod client;
 mod completions;
@@ -31,6 +32,7 @@ mod info;
 mod latency;
 mod load;
 mod man;
+mod metres;
 mod names;
 mod places;
 mod play;
@@ -97,6 +99,7 @@ enum ProgramCommand {
     Register(register::Args),
     Sync(sync::Args),
     Home(home::Args),
+    Buttons(buttons::Args),
     Doctor(doctor::Args),
     Serve(serve::Args),
     Latency(latency::Args),
@@ -107,6 +110,8 @@ enum ProgramCommand {
     #[command(flatten)]
     Client(client::ClientCommand),
     Completions(completions::Args),
+    #[command(hide = true)]
+    Known(client::KnownArgs),
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
     Prove(prove::Args),
@@ -185,6 +190,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Register(args) => register::run(&args),
         ProgramCommand::Sync(args) => sync::run(&args),
         ProgramCommand::Home(args) => home::run(&args),
+        ProgramCommand::Buttons(args) => buttons::run(&args),
         ProgramCommand::Doctor(args) => doctor::run(&args),
         ProgramCommand::Serve(args) => serve::run(&args),
         ProgramCommand::Latency(args) => latency::run(&args),
@@ -194,6 +200,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Token(args) => token::run(&args),
         ProgramCommand::Client(command) => client::run(&command),
         ProgramCommand::Completions(args) => completions::run(&args),
+        ProgramCommand::Known(args) => client::known(&args),
         ProgramCommand::Prove(args) => prove::run(&args),
         ProgramCommand::DrawRecording(args) => draw_recording::run(&args),
         ProgramCommand::FilmPlayer(args) => film_player::run(&args),

@@ -10,7 +10,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::stream::StreamArgs;
 use super::targets::tell_absent;
-use super::{Exit, Failure, OrExit as _, exit, print};
+use super::{Exit, Failure, OrExit as _, exit, metres, print};
 use crate::app::film::{FilmReader, SourceRules};
 use crate::app::runtime::RuntimeError;
 use crate::app::{Play, PlayError, Played, RollCall};
@@ -116,6 +116,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let timeline = Timeline::new(load::cue(&args.cue, &args.source.source())?);
     let config = configuration(args, timeline.cue().axes())?;
+    let seats = load::seats(Some(&config), None, timeline.axes());
+    let small = metres::of_hall(&config).into_iter().chain(metres::of_cue(&timeline, &seats));
+    small.for_each(|text| print::tell(&format!("kinocue: {text}")));
     let show = Show {
         rate: Rate::from_hz(config.show.rate_hz),
         timing: config.show.timing,
@@ -129,7 +132,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.stream.no_acks };
     let film = film(args)?;
-    play(config, timeline, show, manner, film.as_ref(), args)
+    let exit = play(config, timeline, show, manner, film.as_ref(), args)?;
+    film.and_then(|film| film.table().read().unheard()).map_or(Ok(exit), unheard)
 }
 
 /// Begins to listen to the film that leads, if one does.
@@ -142,7 +146,7 @@ fn film(args: &Args) -> Result<Option<FilmReader>, Failure> {
         return Ok(None);
     }
     let rules = SourceRules { allows_coarse: args.allow_coarse, ..SourceRules::default() };
-    FilmReader::start(&sources, rules).map(Some).or_system()
+    FilmReader::start(&sources, rules).map(Some).map_err(exit::of_film)
 }
 
 /// Plays what is proved to fit, and prints the report.
@@ -170,6 +174,7 @@ fn play(
         None => Play::new(config, timeline, show, manner),
     };
     let mut play = play.map_err(|error| refused(error, &cue))?;
+    play.crowding().into_iter().for_each(|words| print::tell(&format!("kinocue: {words}")));
     if let Some(file) = &args.record {
         play = play
             .recorded(file, args.record_mode)
@@ -186,6 +191,13 @@ fn play(
     let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, args.json)
+}
+
+/// Sources that say nothing of a film are no input to a play that chases one.
+fn unheard(sources: String) -> Result<Exit, Failure> {
+    let why = "ended, and nothing of a film was heard in it; see with `kinocue sync watch` what it carries, and check a recording with \
+               `kinocue sync check`";
+    Err(anyhow!("{sources}: {why}")).or_exit(Exit::BadCue)
 }
 
 fn uses_effects(timeline: &Timeline) -> bool {

@@ -7,7 +7,7 @@ use anyhow::anyhow;
 
 use super::record::{open, seat_in, unread};
 use super::{Exit, Failure, OrExit as _};
-use crate::plot::{self, Gathered, Look, Picture, TimeAxis};
+use crate::plot::{self, FilmAxis, Gathered, Look, Picture};
 use crate::record::{Contents, Summary, Wanted, beginning, read, summarize};
 use crate::time::ShowTime;
 
@@ -56,15 +56,17 @@ pub(super) fn picture(asked: &Asked<'_>) -> Result<(Picture, String, Vec<String>
     let (contents, summary) = summarize(open(asked.file)?).map_err(|error| unread(error, asked.file))?;
     let lane = lane(asked, &contents, &summary)?;
     let seats: Vec<String> = contents.seats.iter().map(|seat| seat.name.clone()).collect();
-    let time = axis(asked, &summary)?;
-    let look = Look { lane, time, is_detailed: asked.is_detailed };
+    let axis = axis(asked, &summary)?;
+    let other_axis = axis.plain();
+    let look = Look { lane, axis, is_detailed: asked.is_detailed };
     let gathered = gathered(asked.file, look, &contents)?;
     let other = match asked.other {
         Some(path) => {
             let (contents, _) = summarize(open(path)?).map_err(|error| unread(error, path))?;
             let name = &summary.seats[lane].name;
             let lane = seat_in(&contents, name)?;
-            Some(self::gathered(path, Look { lane, ..look }, &contents)?)
+            let look = Look { lane, axis: other_axis, is_detailed: asked.is_detailed };
+            Some(self::gathered(path, look, &contents)?)
         }
         None => None,
     };
@@ -96,14 +98,16 @@ fn lane(asked: &Asked<'_>, contents: &Contents, summary: &Summary) -> Result<usi
         .or_exit(Exit::BadCue)
 }
 
-fn axis(asked: &Asked<'_>, summary: &Summary) -> Result<TimeAxis, Failure> {
-    let (first, last) = summary.film.unwrap_or((0.0, 1.0));
-    let from_s = asked.from.map_or(first, |from| from.as_secs_f64().max(first));
-    let until_s = asked.until.map_or(last, |until| until.as_secs_f64().min(last));
-    if from_s >= until_s {
-        let [first, last] = [first, last].map(ShowTime::from_secs_f64);
-        let error = anyhow!("nothing to show there; the film ran from {first} to {last}");
-        return Err(error).or_exit(Exit::Usage);
-    }
-    Ok(TimeAxis { from_s, until_s, columns: asked.columns })
+fn axis(asked: &Asked<'_>, summary: &Summary) -> Result<FilmAxis, Failure> {
+    let Some((first, last)) = summary.film else {
+        return Ok(FilmAxis::of_film(0.0, 1.0, asked.columns));
+    };
+    let from_s = asked.from.map_or(f64::NEG_INFINITY, ShowTime::as_secs_f64);
+    let until_s = asked.until.map_or(f64::INFINITY, ShowTime::as_secs_f64);
+    FilmAxis::over(&summary.passes, (from_s, until_s), asked.columns)
+        .ok_or_else(|| {
+            let [first, last] = [first, last].map(ShowTime::from_secs_f64);
+            anyhow!("nothing to show there; the film ran from {first} to {last}")
+        })
+        .or_exit(Exit::Usage)
 }

@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow};
 
+use super::token::Token;
 use super::{Exit, Failure, OrExit as _, load};
 use crate::config::{Config, Controller, Station};
+use crate::control::Role;
 use crate::sim::{Farm, Options, Setup, pa};
 
 /// The hall of a rehearsal that names none.
@@ -23,6 +25,8 @@ const FILES: [(&str, &str); 3] = [
 pub(super) struct Rehearsal {
     /// A copy of the configuration: what is done to the file itself leads no reload to real seats.
     pub(super) config: PathBuf,
+    /// What whoever started it may do everything with, until it ends.
+    pub(super) token: String,
     _farms: Vec<Farm>,
 }
 
@@ -38,8 +42,9 @@ impl Rehearsal {
             }
             None => HALL.to_owned(),
         };
-        let copy = state.join("rehearsal.toml");
-        write(&copy, &text)?;
+        let (copy, token) =
+            (state.join("rehearsal.toml"), Token::new("rehearsal", Role::Engineer).or_system()?);
+        write(&copy, &format!("{text}\n{}\n", token.config))?;
         let hall = load::config(config.unwrap_or(&copy))?;
         let host = refuse_others(&hall)?;
         let farms = hall.stations().iter().map(|one| simulate(one, host)).collect::<Result<_, _>>()?;
@@ -49,7 +54,7 @@ impl Rehearsal {
                 FILES.iter().map(|(name, text)| (state.join(name), text)).filter(|(path, _)| !path.exists());
             missing.into_iter().try_for_each(|(path, text)| write(&path, text))?;
         }
-        Ok(Self { config: copy, _farms: farms })
+        Ok(Self { config: copy, token: token.token, _farms: farms })
     }
 }
 

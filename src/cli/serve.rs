@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 
 use super::rehearsal::Rehearsal;
-use super::{Exit, Failure, OrExit as _, exit, load, places, print};
+use super::token::link;
+use super::{Exit, Failure, OrExit as _, exit, load, metres, places, print};
 use crate::api::ApiError;
 use crate::app::serve::{Parts, Places, ServeError, serve, signals};
 use crate::app::surfaces::{Sockets, SurfaceError};
@@ -73,11 +74,17 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sockets = Sockets { stop: args.stop_socket.clone().unwrap_or_else(beside), control };
     let places = Places { config: path, state, sockets };
     let log = Log::start(print::tell).or_system()?;
+    for text in metres::of_hall(&config) {
+        log.say(Line::new(Priority::Warning, "metres", text));
+    }
     let parts = Parts { config, places, pages: console::page, signals: signals()?, log: log.clone() };
     serve(parts, |_, addresses| {
         for address in addresses {
             let text = format!("the API and the console: http://{address}/");
             log.say(Line::new(Priority::Info, "listening", text));
+        }
+        if let (Some(rehearsal), Some(address)) = (&rehearsal, addresses.first()) {
+            print::tell(&format!("to rehearse, with all rights: {}", link(*address, &rehearsal.token)));
         }
     })?;
     Ok(Exit::Done)

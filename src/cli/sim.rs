@@ -63,6 +63,7 @@ Commands for serial drives, also for --faults, there without a time:
   lost=0.1, doubled=0.1, flipped=0.1   bytes lost, doubled or flipped at random
   late=0.1/30ms    bytes arrive this much later, at random
   answer_lost=0.1, lose=2   answers are lost after the request was carried out: at random, or the next N
+  noise=20         bytes per second that nobody sent, at random, in both directions
   held=16ms        the adapter holds received bytes back this long; held=0ms ends it
   echo=1           the adapter echoes what is sent; echo=0 ends it
   unplug=1         the adapter is unplugged, and the link is gone; unplug=0: back under the same name
@@ -70,6 +71,7 @@ Commands for serial drives, also for --faults, there without a time:
 For a SilverMax, all units, or unit 17 alone with 17@ before it:
   reset            a power cycle
   hot=1, blocked=1, dead=1   overheated; mechanically blocked; no communication at all; 0 ends it
+  pushed=0.6       something pushes its axis this many mm off where the motor holds it; pushed=0 lets go
   X2=0, X2=1       an input is low, or high; X1 (the home switch) to X7
   as=16, as=0      answers as another unit, or as itself
   ppm=200          its clock runs fast by this many parts per million

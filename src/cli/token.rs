@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, Read as _};
+use std::net::SocketAddr;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
@@ -21,7 +22,7 @@ const MAX_NAME: usize = 64;
 /// Prints the token on stdout, and the lines to add to the configuration on stderr.
 ///
 /// The token is shown only once and stored nowhere: the configuration holds only its SHA-256. Treat
-/// it like a key. To revoke it, remove its lines from the configuration and restart the service.
+/// it like a key. To revoke it, remove its lines from the configuration and reload it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -82,7 +83,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::json(&token)?;
     } else {
         print::tell(
-            "For the configuration, after which the service is restarted (a reload does not take [api]):\n",
+            "For the configuration, after which `kinocue reload` takes it, while nothing is armed:\n",
         );
         print::tell(&token.config);
         print::tell("\nThe token, shown only this once:");
@@ -96,6 +97,11 @@ pub(super) fn chance<const N: usize>() -> io::Result<[u8; N]> {
     let mut bytes = [0; N];
     File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     Ok(bytes)
+}
+
+/// The console with the token in the fragment, which no browser sends anywhere.
+pub(super) fn link(address: SocketAddr, token: &str) -> String {
+    format!("http://{address}/#token={token}")
 }
 
 impl<'n> Token<'n> {

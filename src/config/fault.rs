@@ -4,6 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use super::syntax::in_words;
 use crate::plain;
 
 /// How much of a fault is told, bytes.
@@ -76,10 +77,13 @@ impl<'t> Faults<'t> {
         }
     }
 
-    /// Notes that the text is no TOML at byte `at`; further faults of that line are not noted.
-    pub(crate) fn note_syntax(&mut self, at: usize, message: impl Into<String>) {
-        self.note(at, message);
-        self.broken.push(self.line(at));
+    /// Notes that the text is no TOML; further faults of that line are not noted.
+    pub(crate) fn note_syntax(&mut self, error: &toml::de::Error) {
+        let span = error.span().unwrap_or(0..0);
+        let from = self.text[..span.start].rfind('\n').map_or(0, |end| end + 1);
+        let line = self.text[from..].lines().next().unwrap_or_default();
+        self.note(span.start, in_words(error.message(), &self.text[span.clone()], line));
+        self.broken.push(self.line(span.start));
     }
 
     /// The line of byte `at`, counted from 1.

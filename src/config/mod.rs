@@ -12,6 +12,7 @@ use crate::motion::{MAX_AXES, SeatType};
 mod accept;
 mod api;
 mod axis;
+mod buttons;
 mod controller;
 pub(crate) mod drive;
 pub(crate) mod drive_controller;
@@ -20,10 +21,12 @@ mod fault;
 mod film;
 mod fit;
 mod gear;
+mod keys;
 mod level;
 mod library;
 pub(crate) mod link;
 mod log;
+mod notify;
 mod osc;
 mod preset;
 mod read;
@@ -32,6 +35,7 @@ mod seat;
 mod section;
 mod site;
 mod sync;
+mod syntax;
 mod target;
 #[cfg(test)]
 mod tests;
@@ -39,6 +43,7 @@ mod text;
 
 pub(crate) use crate::wire::{Dialect, Timing, VibrationPort};
 pub use api::{Api, ApiToken, Role};
+pub(crate) use buttons::{ButtonPad, PadDevice, PadLamp, PadWord};
 pub(crate) use controller::{Accept, Connection, FanOut, FansOut, cue_axes};
 pub use controller::{Controller, Station};
 pub(crate) use drive_controller::Drives;
@@ -47,10 +52,12 @@ pub(crate) use fault::{ConfigFault, ConfigFaults, Faults};
 pub(crate) use film::{FilmPlayer, OnStop, stays_below};
 pub(crate) use fit::{HallStroke, Misfit};
 pub(crate) use gear::GearWord;
+pub(crate) use keys::{key_name, lamp_name};
 pub(crate) use level::{level, no_level, parse_level, switches, trim};
 pub(crate) use library::Store;
 pub(crate) use link::Link;
 pub(crate) use log::{Log, journal_in};
+pub(crate) use notify::{Mail, Notify, WebHook};
 pub(crate) use osc::OscPort;
 pub(crate) use preset::Preset;
 pub(crate) use record::{Record, RecordMode};
@@ -95,6 +102,10 @@ pub struct Config {
     pub(crate) osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.
     pub(crate) text: Option<TextPort>,
+    /// Pads whose keys ask something, in the order of their names.
+    pub(crate) buttons: Vec<ButtonPad>,
+    /// Who is told of alarms, if anybody.
+    pub(crate) notify: Option<Notify>,
     /// HTTP over TCP.
     pub(crate) api: Api,
     /// The film that leads the shows, where one does.

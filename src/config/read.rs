@@ -12,6 +12,7 @@ use crate::motion::MAX_AXES;
 
 use super::accept::acceptances;
 use super::api::api;
+use super::buttons::buttons;
 use super::drive::{DriveEntry, seat_drives};
 use super::drive_controller::{Placed, drive_controller, is_on_link, refuse_parted_groups, settle};
 use super::effect_limits::effect_limits;
@@ -20,6 +21,7 @@ use super::film::film;
 use super::library::store;
 use super::link::{LinkEntry, links};
 use super::log::log;
+use super::notify::notify;
 use super::osc::osc;
 use super::preset::presets;
 use super::record::record;
@@ -66,7 +68,7 @@ pub(super) fn document(path: &Path, text: &str) -> Result<Config, ConfigFaults> 
     let mut faults = Faults::of(text);
     let (tree, errors) = DeTable::parse_recoverable(text);
     for error in errors {
-        faults.note_syntax(error.span().map_or(0, |span| span.start), error.message());
+        faults.note_syntax(&error);
     }
     let config = root(tree.get_ref(), &mut faults);
     match config {
@@ -79,7 +81,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let mut section = Section::new("the file", 0, table, faults);
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
-    let [api_at, link_at, record_at] = ["api", "link", "record"].map(|key| section.get(key));
+    let [api_at, link_at, record_at, buttons_at, notify_at] =
+        ["api", "link", "record", "buttons", "notify"].map(|key| section.get(key));
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; add at least one");
     }
@@ -100,6 +103,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
+    let buttons = buttons_at.map_or_else(Vec::new, |entry| buttons(entry, faults));
+    let notify = notify_at.and_then(|entry| notify(entry, faults));
     let film = film_at.and_then(|entry| film(entry, faults));
     // The player tells where its film is, whoever else does.
     let of_player = film.is_some().then(FilmSync::default);
@@ -118,6 +123,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         links,
         osc,
         text,
+        buttons,
+        notify,
         api: api?,
         sync,
         film,

@@ -87,6 +87,7 @@ pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync
     }
     let [fps, start] = ["film_fps", "start"].map(|key| section.text(key));
     let sources = names.iter().filter_map(|name| source(*name, &mut section)).collect::<Vec<_>>();
+    refuse_twice(&sources, section.faults);
     let [ltc, sound] =
         ["ltc", "sound"].map(|kind| section.get(kind).and_then(|entry| latency(entry, section.faults)));
     let channel = section.get("ltc").and_then(|entry| channel(entry, section.faults)).unwrap_or(1);
@@ -123,6 +124,15 @@ fn source<'t>(name: Entry<'t>, section: &mut Section<'t, '_, '_>) -> Option<(Ent
     let whole = if text.contains(':') { text.to_owned() } else { of_table(name, text, section)? };
     let source = FilmSource::from_str(&whole);
     source.map_err(|error| name.fault(section.faults, &error.to_string())).ok().map(|source| (name, source))
+}
+
+/// Of two that are one a person could choose neither, and a rank would mean nothing.
+fn refuse_twice(sources: &[(Entry<'_>, FilmSource)], faults: &mut Faults<'_>) {
+    for (place, (name, source)) in sources.iter().enumerate() {
+        if sources[..place].iter().any(|(_, before)| before == source) {
+            name.fault(faults, &format!("{source} is named twice; name each source once, the best first"));
+        }
+    }
 }
 
 /// What a table says, as `play --chase` takes it.
@@ -319,6 +329,11 @@ mod tests {
             ("sources = [\"artnet\"]", "there is no [sync.artnet]; it has to have from"),
             ("sources = [\"artnet\"]\n[sync.artnet]\nbind = \"0.0.0.0:6454\"", "[sync.artnet] has no from"),
             ("sources = [\"artnet:anybody\"]", "has no sender"),
+            ("sources = [\"mpv:/s\", \"osc:10.0.0.2\", \"mpv:/s\"]", "sources: mpv:/s is named twice"),
+            (
+                "sources = [\"mpv:/s\", \"mpv\"]\n[sync.mpv]\nsocket = \"/s\"",
+                "sources: mpv:/s is named twice",
+            ),
             ("sources = [\"mpv:/s\"]\nfilm_fps = \"26\"", "is not a frame rate; take 23.976"),
             ("sources = [\"mpv:/s\"]\nstart = \"1:2\"", "is not a timecode"),
             ("sources = [\"mpv:/s\"]\nrate_band = \"9%\"", "is not a share within 0% to 1.5%"),

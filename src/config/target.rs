@@ -98,6 +98,8 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         links: Vec::new(),
         osc: None,
         text: None,
+        buttons: Vec::new(),
+        notify: None,
         api: Api::default(),
         sync: None,
         film: None,

@@ -44,6 +44,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/follow.js" JS,
     "js/headline.js" JS,
     "js/histogram.js" JS,
+    "js/history.js" JS,
     "js/lang/de.js" JS,
     "js/lang/en.js" JS,
     "js/lang/es.js" JS,

@@ -23,9 +23,10 @@ pub(crate) use model::{Coded, Histogram, Percentiles, Severity, Then, Times};
 pub(crate) use places::{Place, Places, network};
 pub use problem::{Code, Problem};
 pub(crate) use recordings::is_recording;
-pub use status::{ControllerStatus, JournalLine, Status};
 pub(crate) use status::{
-    EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, MarginOf, MarginStatus,
-    PlaylistStatus, PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus, TestRow, TestStatus, Warning,
+    ButtonsStatus, EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, MarginOf,
+    MarginStatus, NotifyStatus, PlaylistStatus, PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus,
+    TestRow, TestStatus, Warning,
 };
+pub use status::{ControllerStatus, JournalLine, Status};
 pub use who::{Surface, Who};

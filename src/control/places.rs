@@ -1,11 +1,17 @@
 //! Room for so many connections of a surface. There is always room for one more: whoever has not shown who it is goes first,
-//! so that neither idle connections nor half of a request keep a stop out.
+//! so that neither idle connections nor half of a request keep a stop out; and before all one who has so many that others could
+//! not come.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::Notify;
+
+/// One who has a larger part of all places than this, and more than some, leaves before strangers: a stop comes by a new connection,
+/// which is a stranger's until it was read.
+const LARGEST_PART: usize = 8;
+const SOME: usize = 8;
 
 /// Room for connections.
 #[derive(Debug, Clone)]
@@ -46,12 +52,13 @@ impl Places {
 
     /// A place for a connection from that address, and whether another one has to leave for it.
     ///
-    /// Strangers leave before those who are known; of these, one of whoever has the most, the one that was silent longest.
+    /// Strangers leave before those who are known, unless one of these has very many; of all that may, one of whoever has the most,
+    /// the one that was silent longest.
     #[must_use]
     pub(crate) fn take(&self, address: Option<IpAddr>) -> (Place, bool) {
         let mut taken = lock(&self.taken);
         let crowded = taken.len() >= self.most;
-        if let Some(index) = if crowded { first_to_go(&taken) } else { None } {
+        if let Some(index) = if crowded { first_to_go(&taken, self.most) } else { None } {
             taken.remove(index).leave.notify_one();
         }
         let leave = Arc::<Notify>::default();
@@ -83,14 +90,16 @@ impl Drop for Place {
     }
 }
 
-fn first_to_go(taken: &[Taken]) -> Option<usize> {
-    let stranger = |one: &Taken| matches!(one.by, Guest::Stranger(_));
-    let strangers = taken.iter().any(stranger);
-    let may_go = || taken.iter().enumerate().filter(|(_, one)| stranger(one) || !strangers);
+fn first_to_go(taken: &[Taken], all: usize) -> Option<usize> {
     let mut places = HashMap::<&Guest, usize>::new();
-    may_go().for_each(|(_, one)| *places.entry(&one.by).or_default() += 1);
-    let most = places.values().max().copied()?;
-    may_go().find(|(_, one)| places[&one.by] == most).map(|(index, _)| index)
+    taken.iter().for_each(|one| *places.entry(&one.by).or_default() += 1);
+    let crowds = |guest: &Guest| places[guest] > SOME.max(all / LARGEST_PART);
+    let rank = |guest: &Guest| match guest {
+        Guest::Known(_) => 2 * u8::from(crowds(guest)),
+        Guest::Stranger(_) => 1,
+    };
+    let most = places.keys().map(|guest| (rank(guest), places[guest])).max()?;
+    taken.iter().position(|one| (rank(&one.by), places[&one.by]) == most)
 }
 
 /// What one machine can take another address of at will: the whole /64 of IPv6.
@@ -157,6 +166,24 @@ mod tests {
         let address = |last| Some(Ipv6Addr::new(0xfd00, 0, 0, 1, 0, 0, 0, last).into());
         let _many: Vec<Place> = (0..5).map(|last| places.take(address(last)).0).collect();
         assert!(!has_to_leave(&lone));
+    }
+
+    #[test]
+    fn one_who_is_known_and_fills_all_places_makes_room_for_a_stop_that_is_a_strangers_until_it_is_read() {
+        let places = Places::new(64);
+        let operator = places.take(v4(1)).0;
+        operator.show("tablet");
+        let viewers: Vec<Place> = (0..63)
+            .map(|_| {
+                let place = places.take(v4(2)).0;
+                place.show("viewer");
+                place
+            })
+            .collect();
+        let stop = places.take(v4(1)).0;
+        let _next = places.take(v4(2)).0;
+        assert!(!has_to_leave(&stop) && !has_to_leave(&operator), "one viewer is enough");
+        assert_eq!(viewers.iter().map(has_to_leave).filter(|leaves| *leaves).count(), 2);
     }
 
     #[test]

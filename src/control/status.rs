@@ -66,6 +66,12 @@ pub struct Status {
     /// Left out where there is no such port.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub osc: Option<BTreeMap<String, u64>>,
+    /// The pads of `[buttons]`; left out where there is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub buttons: Vec<ButtonsStatus>,
+    /// The ways of `[notify]`; left out where there is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notify: Vec<NotifyStatus>,
     /// How much later than the film the motion is, ms.
     pub trim_ms: i32,
     /// Levels and effects as they are set.
@@ -124,6 +130,38 @@ impl Status {
     }
 }
 
+/// A pad whose buttons ask something of the hall.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub struct ButtonsStatus {
+    /// Its name in the configuration.
+    pub name: String,
+    /// Its device, or the relay that has it.
+    pub device: String,
+    /// True while its buttons are heard.
+    pub works: bool,
+    /// Why they are not, and what to do.
+    pub trouble: Option<String>,
+    /// Presses that asked something since the program started.
+    pub presses: u64,
+    /// What the last one asked.
+    pub last: Option<String>,
+}
+
+/// A way by which alarms are told to people who are elsewhere.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub struct NotifyStatus {
+    /// `webhook` or `mail`.
+    pub way: String,
+    /// Messages that were sent since the program started.
+    pub sent: u64,
+    /// Messages that were given up.
+    pub lost: u64,
+    /// Why the last one was not sent, and what to do.
+    pub trouble: Option<String>,
+}
+
 /// How the hall is, in short.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
@@ -176,6 +214,8 @@ pub struct RecordStatus {
     pub(crate) incidents: BTreeMap<String, u64>,
     /// Moments that were marked.
     pub(crate) marks: u64,
+    /// Marks that were not kept: within a second of another, or more than 60 and one a minute.
+    pub(crate) more_marks: u64,
     /// How often something could not be written.
     pub(crate) errors: u64,
     /// What is wrong, and what to do, by what it is of: `show`, `incident`, `flight`, `earlier`; empty if all is well.

@@ -20,6 +20,8 @@ pub enum Surface {
     Osc,
     /// Lines of text over TCP.
     Text,
+    /// A button of this machine: nobody sees who presses it.
+    Buttons,
     /// The schedule of the playlist, armed by a person.
     Schedule,
     /// A signal to the process.
@@ -54,6 +56,7 @@ plain::displayed!(Surface {
     Self::Http => "http",
     Self::Osc => "osc",
     Self::Text => "text",
+    Self::Buttons => "buttons",
     Self::Schedule => "schedule",
     Self::Signal => "signal",
     Self::Program => "program",

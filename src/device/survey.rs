@@ -14,7 +14,7 @@ use crate::config::{Controller, Station};
 use crate::net::Origin;
 use crate::observe::{ControllerState, Observer, Watched};
 use crate::time::{Clock, MonoTime};
-use crate::wire::{DeviceError, Dialect, ReplyCode};
+use crate::wire::{DeviceError, Dialect, FromController, ReplyCode};
 
 /// Reads whose round trip is measured.
 pub(crate) const ROUNDS: usize = 20;
@@ -60,6 +60,8 @@ pub(crate) struct Survey {
     pub(crate) foreign_packets: Option<u16>,
     /// What it reported unasked.
     pub(crate) reported: ControllerState,
+    /// The dialect in which it reported; `None` if it did not.
+    pub(crate) speaks: Option<Dialect>,
 }
 
 impl Survey {
@@ -103,6 +105,7 @@ struct Asking<'t, L, C> {
     begun: MonoTime,
     found: Vec<Survey>,
     packets: Vec<Packets>,
+    speaks: Vec<Option<Dialect>>,
 }
 
 /// What a controller should have counted.
@@ -136,6 +139,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
             observer: Observer::new(controllers.iter().map(Watched::of).collect()),
             found: vec![Survey::default(); controllers.len()],
             packets: vec![Packets::default(); controllers.len()],
+            speaks: vec![None; controllers.len()],
             controllers,
         }
     }
@@ -223,12 +227,13 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
     }
 
     fn listen(&mut self) {
-        self.talk.wait(self.begun + LISTEN, &mut hearing(&mut self.observer));
+        self.talk.wait(self.begun + LISTEN, &mut hearing(&mut self.observer, &mut self.speaks));
     }
 
     fn finish(self) -> Vec<Survey> {
-        let Self { talk, observer, mut found, .. } = self;
+        let Self { talk, observer, mut found, speaks, .. } = self;
         for (lane, survey) in found.iter_mut().enumerate() {
+            survey.speaks = speaks[lane];
             survey.odds = talk.odds(lane);
             survey.reported = observer.states()[lane];
         }
@@ -237,8 +242,8 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
 
     /// Asks, notes states, and counts what is sent; hears what comes meanwhile.
     fn ask(&mut self, requests: Vec<(usize, Request)>, patience: Patience) -> Vec<RequestOutcome> {
-        let Self { talk, observer, .. } = self;
-        let outcomes = talk.ask_watching(requests, patience, &mut hearing(observer));
+        let Self { talk, observer, speaks, .. } = self;
+        let outcomes = talk.ask_watching(requests, patience, &mut hearing(observer, speaks));
         for RequestOutcome { lane, request, result } in &outcomes {
             self.packets[*lane].count(request, result);
             let state = result.as_ref().ok().map(|answer| (answer.code, answer.error));
@@ -259,11 +264,19 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
     }
 }
 
-/// Takes what is no answer for a report.
-fn hearing(observer: &mut Observer) -> impl FnMut(Origin, &[u8], MonoTime) {
+/// Takes what is no answer for a report, of which each dialect has its own.
+fn hearing(observer: &mut Observer, speaks: &mut [Option<Dialect>]) -> impl FnMut(Origin, &[u8], MonoTime) {
     |origin, bytes, at| {
         let _ = match origin {
-            Origin::Controller(lane) => observer.hear(lane, &observer.read(lane, bytes), at),
+            Origin::Controller(lane) => {
+                let read = observer.read(lane, bytes);
+                match read {
+                    FromController::Status(_) => speaks[lane] = Some(Dialect::Smc),
+                    FromController::Report(_) => speaks[lane] = Some(Dialect::Mbox),
+                    _ => {}
+                }
+                observer.hear(lane, &read, at)
+            }
             Origin::Stranger(from) => observer.hear_elsewhere(from, bytes, at),
         };
     }

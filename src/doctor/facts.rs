@@ -12,6 +12,8 @@ use super::network::{NeighbourTable, NetworkFacts};
 use super::processor::{Around, DmaLatency, IdleState, Processor, machine};
 use super::scheduling::{FifoTrial, Group, RealTimeRefusal, Scheduling, Throttle};
 use super::{Facts, Seen, text};
+use crate::net::SendCost;
+use crate::sys::clock::Monotonic;
 use crate::sys::machine as sys;
 use crate::sys::realtime::PRIORITY;
 
@@ -278,5 +280,6 @@ fn network(files: sys::ProcessLimit) -> NetworkFacts {
         receive_default: number("/proc/sys/net/core/rmem_default"),
         udp_pages: read(udp).and_then(|text| last(text).ok_or_else(|| strange(udp))),
         files,
+        sending: SendCost::measured(&Monotonic).map_err(|error| format!("loopback: {error}")),
     }
 }

@@ -19,6 +19,8 @@ pub(crate) mod text;
 
 use serde::Serialize;
 
+use crate::time::Rate;
+
 pub(crate) use facts::facts;
 
 /// A fact, or why it could not be seen, in words.
@@ -94,6 +96,8 @@ pub(crate) struct Hall {
     /// Addresses among them that are not this machine's own; each takes an entry of the neighbour table, unless it lies
     /// behind a router.
     pub(crate) neighbours: u32,
+    /// How often frames go to each.
+    pub(crate) rate: Rate,
 }
 
 /// All that is known of the machine.

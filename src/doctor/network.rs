@@ -1,6 +1,7 @@
 //! Tables and buffers that a hall of many controllers can outgrow.
 
 use super::{FindingLine, Hall, Seen, count};
+use crate::net::SendCost;
 use crate::sys::machine::ProcessLimit;
 
 /// What is known of the network's limits.
@@ -16,6 +17,8 @@ pub(crate) struct NetworkFacts {
     pub(crate) udp_pages: Seen<u64>,
     /// Files that the process may have open.
     pub(crate) files: ProcessLimit,
+    /// What a frame costs.
+    pub(crate) sending: Seen<SendCost>,
 }
 
 /// The kernel's table of link addresses, `net.ipv4.neigh.default.gc_thresh1` to `3`.
@@ -47,7 +50,7 @@ impl NetworkFacts {
     /// One line for each.
     #[must_use]
     pub(crate) fn judge(&self, hall: Hall) -> Vec<FindingLine> {
-        vec![self.neighbour_table(hall), self.receive_buffer(hall), self.open_files(hall)]
+        vec![self.neighbour_table(hall), self.receive_buffer(hall), self.open_files(hall), self.sending(hall)]
     }
 
     fn neighbour_table(&self, hall: Hall) -> FindingLine {
@@ -124,6 +127,21 @@ impl NetworkFacts {
                 format!("{found}, those of all {all}; UDP's own memory: {why}"),
                 LOOK,
             ),
+        }
+    }
+
+    fn sending(&self, hall: Hall) -> FindingLine {
+        const ID: &str = "sending";
+        let cost = match &self.sending {
+            Ok(cost) => cost,
+            Err(why) => return FindingLine::unknown(ID, why, "ip link set lo up"),
+        };
+        let (controllers, rate) = (hall.controllers as usize, hall.rate);
+        let found = cost.words(controllers, rate);
+        match cost.remedy(controllers, rate) {
+            None => FindingLine::ok(ID, found),
+            Some(remedy) if cost.share(controllers, rate) < 1.0 => FindingLine::warn(ID, found, remedy),
+            Some(remedy) => FindingLine::bad(ID, found + ": ticks are missed, and seats lost", remedy),
         }
     }
 

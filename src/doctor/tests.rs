@@ -1,5 +1,7 @@
 //! Machines made up, and what is said of them.
 
+use std::time::Duration;
+
 use super::clocks::{ClockSource, Clocks};
 use super::kernel::{Kernel, Preemption, RealTimeThreads, Slack};
 use super::lateness::{LatenessRun, MachineLoad};
@@ -8,11 +10,18 @@ use super::network::{NeighbourTable, NetworkFacts};
 use super::processor::{Around, DmaLatency, IdleState, Processor};
 use super::scheduling::{FifoTrial, Group, RealTimeRefusal, Scheduling, Throttle};
 use super::*;
+use crate::net::SendCost;
 use crate::sys::machine::{ClockSync, ProcessLimit};
 use crate::sys::realtime::Policy;
 use crate::tracker::histogram;
 
-const ONE: Hall = Hall { controllers: 1, neighbours: 1 };
+fn one() -> Hall {
+    of(1, 1)
+}
+
+fn of(controllers: u32, neighbours: u32) -> Hall {
+    Hall { controllers, neighbours, rate: Rate::from_hz(100.0) }
+}
 const NO_LIMIT: ProcessLimit = ProcessLimit { soft: None, hard: None };
 
 fn at_most(limit: u64) -> ProcessLimit {
@@ -54,6 +63,7 @@ fn good() -> Facts {
             receive_default: Ok(212_992),
             udp_pages: Ok(190_000),
             files: at_most(4_096),
+            sending: Ok(SendCost(Duration::from_nanos(3_500))),
         },
     }
 }
@@ -74,7 +84,7 @@ fn not_seen<T>() -> Seen<T> {
 
 /// The line of that name for one controller.
 fn line(facts: &Facts, id: &str) -> FindingLine {
-    line_for(facts, ONE, id)
+    line_for(facts, one(), id)
 }
 
 fn line_for(facts: &Facts, hall: Hall, id: &str) -> FindingLine {
@@ -87,7 +97,7 @@ fn verdict(facts: &Facts, id: &str) -> Verdict {
 
 #[test]
 fn a_machine_that_is_set_up_is_ready_and_every_line_says_so() {
-    let lines = judge(&good(), ONE);
+    let lines = judge(&good(), one());
     assert!(ready(&lines));
     for line in &lines {
         assert_eq!((line.verdict, &line.fix), (Verdict::Ok, &None), "{line:?}");
@@ -109,7 +119,7 @@ fn whatever_is_not_ok_says_what_to_do() {
     facts.clocks = Clocks { source: not_seen(), resolution_ns: 4_000_000, sync: not_seen() };
     facts.network.neighbours = not_seen();
     facts.network.receive_max = not_seen();
-    for line in judge(&facts, ONE) {
+    for line in judge(&facts, one()) {
         let told = line.fix.as_ref().is_some_and(|fix| !fix.is_empty());
         assert_eq!(told, line.verdict != Verdict::Ok, "{line:?}");
     }
@@ -120,7 +130,7 @@ fn a_refused_policy_is_never_ready_and_names_the_limit_to_raise() {
     let mut facts = good();
     refuse(&mut facts, true);
     facts.scheduling.limit = at_most(0);
-    assert!(!ready(&judge(&facts, ONE)));
+    assert!(!ready(&judge(&facts, one())));
     assert_eq!(verdict(&facts, "realtime_policy"), Verdict::Bad);
     let limit = line(&facts, "priority_limit");
     assert_eq!(limit.verdict, Verdict::Bad);
@@ -145,7 +155,7 @@ fn a_policy_that_systemd_gave_needs_no_limit() {
     facts.scheduling.trial =
         Ok(FifoTrial { given: true, policy: Policy::RoundRobin, priority: 20, refusal: None });
     facts.scheduling.limit = at_most(0);
-    assert!(ready(&judge(&facts, ONE)));
+    assert!(ready(&judge(&facts, one())));
     assert!(line(&facts, "realtime_policy").found.contains("rr at priority 20, inherited"));
 }
 
@@ -274,12 +284,12 @@ fn a_wall_clock_that_nobody_disciplines_or_that_is_far_off_is_worth_a_warning() 
         facts.clocks.sync = Ok(sync);
         assert_eq!(verdict(&facts, "clock_synchronisation"), Verdict::Warn);
     }
-    assert!(ready(&judge(&facts, ONE)));
+    assert!(ready(&judge(&facts, one())));
 }
 
 #[test]
 fn a_huge_hall_outgrows_the_table_of_neighbours_unless_it_is_elsewhere() {
-    let hall = |neighbours| Hall { controllers: 1_024, neighbours };
+    let hall = |neighbours| of(1_024, neighbours);
     let facts = good();
     let table = line_for(&facts, hall(1_024), "neighbour_table");
     assert_eq!(table.verdict, Verdict::Bad);
@@ -294,7 +304,7 @@ fn a_huge_hall_outgrows_the_table_of_neighbours_unless_it_is_elsewhere() {
 
 #[test]
 fn buffers_and_files_are_held_against_the_hall() {
-    let hall = Hall { controllers: 5_000, neighbours: 0 };
+    let hall = of(5_000, 0);
     let mut facts = good();
     let files = line_for(&facts, hall, "open_files");
     assert!(files.verdict == Verdict::Bad && files.fix.unwrap().contains("LimitNOFILE=8192"));

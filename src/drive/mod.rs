@@ -31,7 +31,7 @@ use std::sync::Arc;
 
 use crate::belief::{Fall, Reading};
 use crate::config::Controller;
-use crate::health::Sighting;
+use crate::health::{Pushed, Sighting};
 use crate::motion::Pulses;
 use crate::observe::Look;
 use crate::time::MonoTime;
@@ -130,6 +130,8 @@ pub(crate) struct Whereabouts {
     pub(crate) told: Option<PerAxis<Pulses>>,
     /// An axis, from 0, that is not inside its stroke, and where it says that it is.
     pub(crate) outside: Option<(usize, Pulses)>,
+    /// An axis that something has pushed off where its drive holds it, too far to be led from there.
+    pub(crate) pushed: Option<Pushed>,
     /// Its positions make two places of each, and nothing tells which is true.
     pub(crate) is_ambiguous: bool,
     /// It is read elsewhere than at park, by more than noise.

@@ -114,8 +114,8 @@ impl Engine {
         match why {
             Rest::Stopped if self.is_parked_untold() => self.enter(Phase::Done),
             _ if self.is_to_park() => self.ask(Goal::Park, None, now),
-            // A film that is chased is joined once it has reached the cue.
-            Rest::Film if soonest < ShowTime::ZERO => {}
+            // A film that is chased is joined once it can be followed, and has reached the cue.
+            Rest::Film if self.directive == Directive::HoldBriefly || soonest < ShowTime::ZERO => {}
             Rest::Late | Rest::Film => self.ask(Goal::Cue, Some(soonest), soonest),
             Rest::Ended if self.plays_left == Some(0) => self.ask(Goal::Home, None, now),
             Rest::Ended => self.ask(Goal::Again, None, self.playhead.cue_time(ShowTime::ZERO)),

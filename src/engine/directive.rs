@@ -17,6 +17,8 @@ pub(crate) enum Directive {
     Play,
     /// They are to come to rest, and the film waits.
     Hold,
+    /// The same for a moment: the film that is chased has jumped, and frames hold the lanes until it is known where it is.
+    HoldBriefly,
     /// They are to come to rest, and nothing goes on from there.
     Stop,
     /// They are to park, and then the show is over.
@@ -47,7 +49,7 @@ impl Directive {
         use Rest::{Ended, Film, Late, Paused, Stopped};
         match (self, phase) {
             // One that waits goes on waiting through a stop.
-            (Self::Stop | Self::Hold | Self::Off | Self::Wait, Waiting(_) | Done) => PhaseTurn::Stay,
+            (Self::Stop | Self::Hold | Self::HoldBriefly | Self::Off | Self::Wait, Waiting(_) | Done) => PhaseTurn::Stay,
             (Self::Off | Self::Wait,
                 Settling(_) | Following(_) | Braking(_) | Held(_) | Parking(_) | Closing(..)) => PhaseTurn::Stay,
 
@@ -60,6 +62,13 @@ impl Directive {
             (Self::Hold, Held(Holding { why: Paused, .. })) => PhaseTurn::StayDown,
             (Self::Hold, Braking(Late | Film | Paused | Stopped)) => PhaseTurn::Stay,
             (Self::Hold, Held(Holding { why: Stopped, .. }) | Parking(_) | Closing(..)) => PhaseTurn::Stay,
+
+            (Self::HoldBriefly, Settling(_) | Following(_) | Braking(Ended)) => PhaseTurn::ComeDown(Film),
+            (Self::HoldBriefly, Held(Holding { why: Late | Ended, .. })) => PhaseTurn::ComeDown(Film),
+            // Lanes to which nothing goes any more are not held anew: a frame would take a seat back that was moved by hand meanwhile.
+            (Self::HoldBriefly, Held(Holding { why: Film | Paused, .. })) => PhaseTurn::StayDown,
+            (Self::HoldBriefly, Braking(Late | Film | Paused | Stopped)) => PhaseTurn::Stay,
+            (Self::HoldBriefly, Held(Holding { why: Stopped, .. }) | Parking(_) | Closing(..)) => PhaseTurn::Stay,
 
             (Self::Stop, Braking(Stopped) | Held(Holding { why: Stopped, .. })) => PhaseTurn::StayDown,
             (Self::Stop, Braking(Late | Film | Ended | Paused)) => PhaseTurn::ComeDown(Stopped),

@@ -240,8 +240,12 @@ impl Engine {
             Phase::Closing(..) => return self.close(),
             Phase::Waiting(_) | Phase::Done => return,
             // The film runs on: these lanes join it where it is by then.
-            Phase::Holding(Holding { why: Rest::Late | Rest::Film, .. }) => self.playhead.run(time),
-            // The film waits from the very request on.
+            Phase::Holding(Holding { why: Rest::Late | Rest::Film, .. })
+                if self.directive != Directive::HoldBriefly =>
+            {
+                self.playhead.run(time);
+            }
+            // The film waits from the very request on, and one that has jumped is nowhere yet.
             Phase::Braking(_) | Phase::Holding(_) => {}
             Phase::Following(_) | Phase::Parking(_) => {
                 self.fade(time);

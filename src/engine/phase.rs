@@ -26,7 +26,7 @@ pub(super) fn hold_frames(rate: Rate) -> u8 {
 pub(crate) enum Rest {
     /// Frames stopped for too long; the film runs on.
     Late,
-    /// The film that is chased can be followed, and the way onto the cue is not known yet.
+    /// The film that is chased has jumped, or can be followed and the way onto the cue is not known yet.
     Film,
     /// The cue is over, and the way on from there not known yet.
     Ended,

@@ -53,6 +53,8 @@ pub enum HoldCause {
     Film(FilmState),
     /// The film is further from the playhead than may be slewed.
     Apart,
+    /// It is so because ticks were missed.
+    Behind,
     /// It was so too often: a person has to let them join.
     Unstable,
     /// They were asked to wait for a person before each join.
@@ -236,6 +238,18 @@ impl Chase {
         self.state
     }
 
+    /// Whether the seats hold for what is over in a moment: it jumped, and where it is now is being found, which no source is given more
+    /// than five seconds for. What may last, as a film that was stopped, rests as a pause does.
+    #[must_use]
+    pub(crate) const fn is_held_briefly(&self) -> bool {
+        let is_brief = match self.why {
+            HoldCause::Apart | HoldCause::Behind => true,
+            HoldCause::Film(state) => state.is_brief(),
+            HoldCause::Unstable | HoldCause::Asks => false,
+        };
+        matches!(self.state, ChaseState::Holding) && is_brief
+    }
+
     /// A person lets seats that hold join, once, and soon.
     pub(crate) fn let_join(&mut self, now: MonoTime) {
         self.let_join = Some(now + LET_FOR);
@@ -319,7 +333,9 @@ impl Chase {
         let is_apart = self.state == ChaseState::Following
             && self.follower.error_s(&point, end, input.frame).abs() > self.rules.join_above.as_secs_f64();
         if is_apart {
-            return ChaseSign::Unready(HoldCause::Apart);
+            // Who is to look for the cause: the film's people, or this machine's.
+            let cause = if input.tick.missed > 0 { HoldCause::Behind } else { HoldCause::Apart };
+            return ChaseSign::Unready(cause);
         }
         if let Some(cause) = self.waits_for_a_person(now) {
             return self.held(cause, now);

@@ -42,4 +42,4 @@ mod tests;
 pub(crate) mod timecode;
 pub(crate) mod tracker;
 pub(crate) mod wall;
-mod words;
+pub(crate) mod words;

@@ -4,9 +4,9 @@
 mod tests;
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 use std::time::Duration;
 
+use crate::published::SharedWords;
 use crate::time::{MonoTime, ShowTime, Tick};
 
 /// A point older than this speaks for nobody. Whoever publishes does so ten times a second, whatever the source does; if that
@@ -67,6 +67,11 @@ impl FilmState {
     pub(crate) const fn may_lead(self) -> bool {
         matches!(self, Self::FreeRunning | Self::Locked | Self::Freewheeling)
     }
+
+    /// True if seats may follow, or will know in a moment whether they may.
+    pub(super) const fn is_brief(self) -> bool {
+        self.may_lead() || matches!(self, Self::Acquiring | Self::Jumped)
+    }
 }
 
 /// Where the film is at an instant, and how fast it runs.
@@ -98,56 +103,40 @@ impl FilmPoint {
     }
 }
 
-/// The newest point, for one writer and any reader.
+/// The newest point, for one writer and any reader: its instant, its place in the film, its rate, and its epoch with the number of
+/// the state below it.
 #[derive(Debug, Default)]
-pub struct PublishedPoint {
-    /// Odd while a point is being written; 0 before the first.
-    version: AtomicU32,
-    at: AtomicU64,
-    media: AtomicU64,
-    rate: AtomicU64,
-    /// The epoch, and below it the number of the state.
-    epoch: AtomicU64,
-}
+pub struct PublishedPoint(SharedWords<4>);
 
 const STATE_BITS: u32 = 8;
 
 impl PublishedPoint {
     /// Publishes a point. Only one thread may.
     pub fn publish(&self, point: &FilmPoint) {
-        let version = self.version.load(Ordering::Relaxed);
-        self.version.store(version.wrapping_add(1), Ordering::Relaxed);
-        // Nothing of the point is seen before the version is odd.
-        fence(Ordering::Release);
-        self.at.store(point.at.as_nanos(), Ordering::Relaxed);
-        self.media.store(point.media.as_nanos().cast_unsigned(), Ordering::Relaxed);
-        self.rate.store(point.rate.to_bits(), Ordering::Relaxed);
         let state = FilmState::ALL.iter().position(|state| *state == point.state).unwrap_or_default();
-        self.epoch.store(u64::from(point.epoch) << STATE_BITS | state as u64, Ordering::Relaxed);
-        // Zero stays for "none": after 2^31 points the count begins anew.
-        let next = version.wrapping_add(2);
-        self.version.store(if next == 0 { 2 } else { next }, Ordering::Release);
+        // Each word more is one more that a tick has to read: these two have room in one.
+        let epoch = u64::from(point.epoch) << STATE_BITS | state as u64;
+        self.0.put([
+            point.at.as_nanos(),
+            point.media.as_nanos().cast_unsigned(),
+            point.rate.to_bits(),
+            epoch,
+        ]);
     }
 
     /// The newest point; `None` before the first and while one is being written.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "what was put together is taken apart")]
     pub(crate) fn read(&self) -> Option<FilmPoint> {
-        let version = self.version.load(Ordering::Acquire);
-        if version == 0 || version % 2 == 1 {
-            return None;
-        }
-        let word = self.epoch.load(Ordering::Relaxed);
-        let point = FilmPoint {
-            at: MonoTime::from_nanos(self.at.load(Ordering::Relaxed)),
-            media: ShowTime::from_nanos(self.media.load(Ordering::Relaxed).cast_signed()),
-            rate: f64::from_bits(self.rate.load(Ordering::Relaxed)),
-            epoch: (word >> STATE_BITS) as u32,
-            state: *FilmState::ALL.get((word & 0xff) as usize)?,
-        };
-        // What was loaded before this is of one version if the version is still the same after it.
-        fence(Ordering::Acquire);
-        (self.version.load(Ordering::Relaxed) == version).then_some(point)
+        // Which version it is says nothing: a point has its own instant, by which it grows old.
+        let (_, [at, media, rate, epoch]) = self.0.get()?;
+        Some(FilmPoint {
+            at: MonoTime::from_nanos(at),
+            media: ShowTime::from_nanos(media.cast_signed()),
+            rate: f64::from_bits(rate),
+            epoch: (epoch >> STATE_BITS) as u32,
+            state: *FilmState::ALL.get((epoch & 0xff) as usize)?,
+        })
     }
 }
 

@@ -28,6 +28,17 @@ impl FilmState {
     }
 }
 
+/// Whom a film leads that can be followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FilmLed {
+    /// A show that follows it has not been started, or is paused.
+    Nobody,
+    /// Seats wait to be on the cue, or are on their way.
+    Joining,
+    /// Seats that are on the cue.
+    Following,
+}
+
 impl FilmState {
     /// What a source says of the film, for somebody who looks at that source alone.
     pub(crate) const fn of_a_source(self) -> &'static str {
@@ -57,13 +68,16 @@ impl FilmState {
         }
     }
 
-    /// What a person does next about the film, by a stable code and in words; that depends on whether seats follow it.
-    pub(crate) const fn next(self, is_followed: bool) -> (&'static str, &'static str) {
+    /// What a person does next about the film, by a stable code and in words; that depends on what its seats do.
+    pub(crate) const fn next(self, led: FilmLed) -> (&'static str, &'static str) {
         match self {
-            Self::FreeRunning | Self::Locked if is_followed => ("followed", "nothing; the seats follow it"),
-            Self::FreeRunning | Self::Locked => {
-                ("start-show", "nothing; seats follow it once a person starts the show")
-            }
+            Self::FreeRunning | Self::Locked => match led {
+                FilmLed::Following => ("followed", "nothing; the seats follow it"),
+                FilmLed::Joining => ("joined", "nothing; the seats join it as soon as it is in the cue"),
+                FilmLed::Nobody => {
+                    ("start-show", "nothing; seats follow it once a person starts or resumes the show")
+                }
+            },
             Self::Freewheeling | Self::Acquiring | Self::Jumped => ("wait", "wait a moment"),
             Self::Absent | Self::Lost => ("start-film", "start the film; check that its source is connected"),
             Self::Stopped => ("run-on", "let the film run on"),
@@ -83,9 +97,12 @@ impl HoldCause {
         match self {
             Self::Film(state) => state.row(),
             Self::Apart => ("film-apart", "the film was too far from the seats for them to slew to it"),
+            Self::Behind => {
+                ("film-behind", "this machine was late, and the seats fell too far behind the film")
+            }
             Self::Unstable => (
                 "film-unstable",
-                "the seats had to join five times in a minute: check its source, and resume",
+                "the seats had to join five times in a minute: check the film's source, and resume",
             ),
             Self::Asks => ("film-asks", "each join waits for a person: resume"),
         }

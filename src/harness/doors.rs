@@ -5,17 +5,21 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
 
+use sha2::{Digest as _, Sha256};
+
+use crate::app::film::doors as film;
 use crate::film::artnet::ArtNetReader;
 use crate::film::ltc::LtcReader;
 use crate::film::mpv::MpvClient;
 use crate::film::mtc::MtcReader;
 use crate::film::observation::Observation;
+use crate::film::sound::SoundIndex;
 use crate::film::timecode::{FrameRate, Label};
 use crate::time::MonoTime;
 use crate::wire::silvermax::{Collected, LineCollector};
 use crate::wire::sixpack2::FrameCollector;
 use crate::wire::{FromController, Message, VibrationPort};
-use crate::{capture, config, cue, device, latency, osc, playlist, record, replay, settings, text_port};
+use crate::{app, capture, config, cue, device, latency, osc, playlist, record, replay, settings, text_port};
 
 /// A door: its name, and what takes octets there.
 pub type Door = (&'static str, fn(&[u8]));
@@ -39,10 +43,15 @@ pub const DOORS: &[Door] = &[
     ("label", |octets| with_text(octets, |text| seen(text.parse::<Label>()))),
     ("osc", osc::try_datagram),
     ("text", text_port::try_line),
+    ("buttons", app::buttons::try_records),
     ("ltc", ltc),
     ("mtc", mtc),
     ("artnet", artnet),
     ("mpv", mpv),
+    ("film-wav", film::wav),
+    ("film-relay", film::relayed),
+    ("film-position", film::position),
+    ("film-index", film_index),
     ("recording", |octets| seen(record::summarize(octets))),
     ("replay", |octets| seen(replay::replay(octets))),
     ("capture", captured),
@@ -132,6 +141,13 @@ fn mpv(octets: &[u8]) {
         seen(client.poll(now));
         client.hear(piece, now, &mut |heard| out(heard));
     });
+}
+
+/// With the sum that its content has as well: else all that is wrong would end there.
+fn film_index(octets: &[u8]) {
+    let content = octets.split_last_chunk::<32>().map_or(octets, |(content, _)| content);
+    seen(SoundIndex::of_octets(octets));
+    seen(SoundIndex::of_octets(&[content, &Sha256::digest(content)[..]].concat()));
 }
 
 fn captured(octets: &[u8]) {

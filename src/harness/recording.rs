@@ -73,6 +73,32 @@ impl RecorderRig {
     }
 }
 
+/// Records a show of so many ticks, which `tick` taps, in virtual time.
+pub fn recorded_show(
+    seats: Vec<RecordedSeat>,
+    rate: Rate,
+    path: &Path,
+    ticks: u64,
+    mut tick: impl FnMut(&mut Tap, &mut AckTap, u64),
+) {
+    /// The thread behind the taps looks so often, and gives the disk what it has.
+    const LOOKS: u64 = 50;
+    let clocks = (MonoTime::default(), 0);
+    let opening = Opening::new(&About::of_hall("bench", rate, clocks), &seats).sampled();
+    let maker = EntryMaker::new(seats.len(), clocks);
+    let out = BufWriter::new(File::create(path).expect("there is room"));
+    let file = Recording::open(out, &opening, maker).expect("there is room");
+    let (Taps { ticks: mut tap, mut acks }, intake) = Intake::new(seats, rate, record::SAMPLE_HZ);
+    let mut recorder = Recorder::new(intake, file);
+    for number in 0..ticks {
+        tick(&mut tap, &mut acks, number);
+        if number % LOOKS == LOOKS - 1 {
+            recorder.take().and_then(|()| recorder.flush()).expect("there is room");
+        }
+    }
+    recorder.finish(None).expect("there is room");
+}
+
 /// A hall in virtual time that is recorded in full.
 pub struct HallRecording(Recorder<Cursor<Vec<u8>>>);
 

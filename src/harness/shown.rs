@@ -185,10 +185,10 @@ impl ShownFilm {
         self.unheard(from, to)
     }
 
-    /// Somebody winds it, and says so, to so many seconds further on.
-    pub fn sought(mut self, at: f64, seconds: f64) -> Self {
+    /// Somebody winds it, and says so, to so many seconds further on, by a player that takes so long for it.
+    pub fn sought(mut self, at: f64, seconds: f64, takes_s: f64) -> Self {
         self.truth = self.truth.step_at(at, seconds);
-        self.words.extend([(at - 0.01, FilmWord::Seek), (at + 0.01, FilmWord::Landed)]);
+        self.words.extend([(at - 0.01, FilmWord::Seek), (at + takes_s, FilmWord::Landed)]);
         self
     }
 

@@ -39,6 +39,30 @@ impl HealthState {
     }
 }
 
+/// An axis that stands beside where its drive holds it; places in thousandths of a millimetre, or of a degree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Pushed {
+    /// Which, from 0.
+    pub(crate) axis: usize,
+    /// Where it was read.
+    pub(crate) at: i32,
+    /// Where its drive holds it.
+    pub(crate) held: i32,
+}
+
+impl Pushed {
+    /// A place in them.
+    #[expect(clippy::cast_possible_truncation, reason = "some metres; saturating")]
+    pub(crate) const fn thousandths(place: f64) -> i32 {
+        (place * 1e3).round() as i32
+    }
+
+    /// Where it was read, and where its drive holds it, to a tenth.
+    pub(super) fn places(self) -> [String; 2] {
+        [self.at, self.held].map(|place| format!("{:.1}", f64::from(place) / 1e3))
+    }
+}
+
 /// Why a group stands as it does. Controllers are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Why {
@@ -76,6 +100,13 @@ pub enum Why {
         axis: usize,
         /// Where.
         pulses: Pulses,
+    },
+    /// An axis of this controller stands beside where its drive holds it.
+    Pushed {
+        /// Which controller.
+        controller: usize,
+        /// Which axis, and where.
+        pushed: Pushed,
     },
     /// An emergency stop at this controller.
     EmergencyStop(usize),
@@ -147,6 +178,7 @@ impl Why {
             | Self::Ambiguous(controller)
             | Self::OtherAxes { controller, .. }
             | Self::Outside { controller, .. }
+            | Self::Pushed { controller, .. }
             | Self::EmergencyStop(controller)
             | Self::HeldUntilReset(controller)
             | Self::Error { controller, .. }

@@ -1,6 +1,6 @@
 //! What the table is told beside frames, replies and the observer's events, as one value each, so that it can be kept and told again.
 
-use super::{HealthTable, Sighting};
+use super::{HealthTable, Pushed, Sighting};
 use crate::belief::Fall;
 use crate::motion::Pulses;
 use crate::time::MonoTime;
@@ -44,6 +44,8 @@ pub(crate) enum HealthInput {
     FellOut(usize, Fall),
     /// [`HealthTable::on_outside`].
     Outside(usize, Option<(usize, Pulses)>),
+    /// [`HealthTable::on_pushed`].
+    Pushed(usize, Option<Pushed>),
     /// [`HealthTable::on_ambiguous`].
     Ambiguous(usize, bool),
     /// [`HealthTable::on_homed`].
@@ -77,6 +79,7 @@ impl HealthInput {
             | Self::Moved(of)
             | Self::FellOut(of, _)
             | Self::Outside(of, _)
+            | Self::Pushed(of, _)
             | Self::Ambiguous(of, _)
             | Self::Homed(of) => of < controllers,
         }
@@ -105,6 +108,7 @@ impl HealthTable {
             HealthInput::Moved(controller) => self.on_moved(controller),
             HealthInput::FellOut(controller, why) => self.on_fell_out(controller, why),
             HealthInput::Outside(controller, outside) => self.on_outside(controller, outside),
+            HealthInput::Pushed(controller, pushed) => self.on_pushed(controller, pushed),
             HealthInput::Ambiguous(controller, ambiguous) => self.on_ambiguous(controller, ambiguous),
             HealthInput::Homed(controller) => self.on_homed(controller),
             HealthInput::Joined(group) => self.on_joined(group),
@@ -131,6 +135,7 @@ impl HealthTable {
         match input {
             HealthInput::Part(controller, takes_part) => self.members[controller].out != takes_part,
             HealthInput::Outside(controller, outside) => self.members[controller].outside == outside,
+            HealthInput::Pushed(controller, pushed) => self.members[controller].pushed == pushed,
             HealthInput::Ambiguous(controller, ambiguous) => self.members[controller].ambiguous == ambiguous,
             HealthInput::OtherSent(_, datagrams) => datagrams == 0,
             _ => false,

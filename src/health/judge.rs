@@ -66,6 +66,8 @@ impl HealthTable {
             let outside = |(axis, pulses)| Why::Outside { controller, axis, pulses };
             found.outside = found.outside.or(member.outside.map(outside));
             found.outside = found.outside.or(when(member.ambiguous, Why::Ambiguous(controller)));
+            let pushed = |pushed| Why::Pushed { controller, pushed };
+            found.outside = found.outside.or(member.pushed.map(pushed));
             found.unseen |= !member.is_seen(now);
         }
         found
@@ -182,7 +184,9 @@ impl GroupStanding {
             (_, Findings { must_rehome: Some(why), .. }) => (HealthState::Excluded, why),
             (HealthState::Excluded, _) => (HealthState::Lost, Why::NotSeenYet),
             (_, Findings { outside: Some(why), .. }) => (HealthState::Lost, why),
-            (HealthState::Lost, _) if matches!(self.why, Why::Outside { .. } | Why::Ambiguous(_)) => {
+            (HealthState::Lost, _)
+                if matches!(self.why, Why::Outside { .. } | Why::Ambiguous(_) | Why::Pushed { .. }) =>
+            {
                 (HealthState::Lost, Why::NotSeenYet)
             }
             (HealthState::Lost, Findings { unseen: false, .. }) => {

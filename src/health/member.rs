@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use super::Why;
 use super::counter::{CountVerdict, PacketCounter};
 use super::faults::FaultLatch;
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
 use super::reads::Reads;
 use super::replies::Replies;
+use super::{Pushed, Why};
 use crate::belief::Fall;
 use crate::motion::Pulses;
 use crate::state::Trouble;
@@ -55,6 +55,8 @@ pub(super) struct Member {
     falls: [Option<MonoTime>; 2],
     /// The axis, from 0, that told a position outside of its stroke, and which.
     pub(super) outside: Option<(usize, Pulses)>,
+    /// An axis that is pushed off where its drive holds it.
+    pub(super) pushed: Option<Pushed>,
     /// Its positions make two places each.
     pub(super) ambiguous: bool,
     /// When a frame was last sent, and what the controller counts meanwhile.
@@ -80,6 +82,7 @@ impl Member {
             unsure: None,
             falls: [None; 2],
             outside: None,
+            pushed: None,
             ambiguous: false,
             framed: None,
             counter: PacketCounter::default(),

@@ -26,7 +26,7 @@ use std::time::Duration;
 
 pub use groups::Groups;
 pub use health_state::Notice;
-pub(crate) use health_state::{Change, HealthState, Why};
+pub(crate) use health_state::{Change, HealthState, Pushed, Why};
 pub(crate) use input::HealthInput;
 pub(crate) use proof::{Continuity, Identity, Sighting};
 pub(crate) use words::ACKS_OFF;
@@ -235,6 +235,11 @@ impl HealthTable {
     /// An axis, from 0, says that it is outside of its stroke, and where; none once all are inside. That is no position.
     pub(crate) fn on_outside(&mut self, controller: usize, outside: Option<(usize, Pulses)>) {
         self.members[controller].outside = outside;
+    }
+
+    /// An axis is pushed off where its drive holds it, too far to be led; none once none is.
+    pub(crate) fn on_pushed(&mut self, controller: usize, pushed: Option<Pushed>) {
+        self.members[controller].pushed = pushed;
     }
 
     /// True if the positions of a controller make two places of each, and nothing says in which order their words come.

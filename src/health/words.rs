@@ -54,11 +54,14 @@ impl Why {
                 "correct its word order or PA02, or home it with nobody on the seat (`kinocue home --config`, with the service \
                  stopped); it rejoins by itself once it is inside",
             ),
+            Self::Pushed { .. } => Some(
+                "free it, or find out why its motor does not hold it; it rejoins by itself once it stands where it is held",
+            ),
             Self::Ambiguous(_) => {
                 Some("home it with nobody on the seat (`kinocue home --config`, with the service stopped)")
             }
             Self::OtherMaster(_) => {
-                Some("stop the other machine; then park, and home it with nobody on the seat")
+                Some("stop the other machine; then clear, and home it with nobody on the seat")
             }
             Self::Wide(_) => Some(
                 "this IMAX answers as its manual says, which no other known one does: disable it, and send a capture \
@@ -91,6 +94,14 @@ impl fmt::Display for Why {
                 axis + 1,
                 pulses.0
             ),
+            Self::Pushed { pushed, .. } => {
+                let ([at, held], axis) = (pushed.places(), pushed.axis + 1);
+                write!(
+                    f,
+                    "its axis {axis} stands at {at} mm, and its drive holds it at {held} mm: something pushes it, or its load is \
+                     too much for the motor"
+                )
+            }
             Self::Error { error, .. } => write!(f, "{}", crate::wire::DeviceError(*error)),
             Self::Drive { axis, error, .. } => write!(f, "drive of axis {axis}: error {error}"),
             Self::Alarm { register: DPFE, value, .. } => {
@@ -164,6 +175,7 @@ impl Why {
             ),
             Self::Unproved(_) => ("unproved", "it is unknown whether it has rebooted"),
             Self::Outside { .. } => ("outside", ITSELF),
+            Self::Pushed { .. } => ("pushed", ITSELF),
             Self::Error { .. } => ("error", ITSELF),
             Self::Drive { .. } => ("drive", ITSELF),
             Self::Alarm { register: DPFE, .. } => ("drive-alarm", ITSELF),
@@ -181,6 +193,10 @@ impl Why {
     pub(crate) fn figures(self) -> Vec<String> {
         match self {
             Self::Outside { axis, pulses, .. } => vec![(axis + 1).to_string(), pulses.0.to_string()],
+            Self::Pushed { pushed, .. } => {
+                let [at, held] = pushed.places();
+                vec![(pushed.axis + 1).to_string(), at, held]
+            }
             Self::Error { error, .. } => vec![crate::wire::DeviceError(error).to_string()],
             Self::Drive { axis, error, .. } => vec![axis.to_string(), error.to_string()],
             Self::Alarm { register: DPFE, value, .. } => vec![value.to_string()],

@@ -26,7 +26,7 @@ mod writer;
 pub(crate) use fold::Folds;
 pub use record::{Action, FilmProof, Outcome, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
-pub(crate) use report::{JournalError, JournalReport, ReportBounds, ReportShown, Totals, report};
+pub(crate) use report::{JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report};
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};

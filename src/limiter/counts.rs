@@ -103,3 +103,17 @@ impl Counter {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clamp_that_lasts_a_second_is_a_fault_and_one_that_ends_a_frame_before_is_none() {
+        let mut counter = Counter::default();
+        (0..100).for_each(|_| counter.tick(10, true, true));
+        assert_eq!((counter.counts.clamps, counter.counts.fault), (1, false));
+        counter.tick(10, true, true);
+        assert_eq!((counter.counts.clamps, counter.counts.fault), (1, true));
+    }
+}

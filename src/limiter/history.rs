@@ -33,7 +33,7 @@ pub(super) struct Reciprocals {
 /// What four poses show.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shown {
-    slope: f64,
+    pub(super) slope: f64,
     /// Twice the second divided difference of the newest three.
     pub(super) acceleration: f64,
     /// Six times the third divided difference.

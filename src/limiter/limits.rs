@@ -52,3 +52,38 @@ pub(super) struct NextPose {
     /// Over the two distances.
     pub(super) shown: [Shown; 2],
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::AxisGeometry;
+
+    #[test]
+    fn each_limit_is_kept_by_itself_over_either_distance_and_what_is_no_number_keeps_none() {
+        let limits = AxisLimits::new(Limits::of(&AxisGeometry::BENCH), 0.01);
+        let at_most = Shown { slope: 0.0, acceleration: limits.acceleration, jerk: -limits.jerk };
+        let sound = NextPose {
+            position: 1.0,
+            velocity: -limits.velocity,
+            step: limits.step,
+            shown: [at_most, at_most],
+        };
+        assert!(limits.hold(&sound));
+        for more in [1.01, -1.01, f64::NAN, f64::INFINITY] {
+            let breaks: [fn(&mut NextPose) -> &mut f64; 7] = [
+                |next| &mut next.position,
+                |next| &mut next.velocity,
+                |next| &mut next.step,
+                |next| &mut next.shown[0].acceleration,
+                |next| &mut next.shown[1].acceleration,
+                |next| &mut next.shown[0].jerk,
+                |next| &mut next.shown[1].jerk,
+            ];
+            for (place, broken) in breaks.into_iter().enumerate() {
+                let mut next = sound;
+                *broken(&mut next) *= more;
+                assert!(!limits.hold(&next), "{more} times the limit of {place}: {next:?}");
+            }
+        }
+    }
+}

@@ -227,6 +227,11 @@ impl Limiter {
     /// What one axis is sent, and whether what was asked broke a limit.
     fn judge_axis(&mut self, axis: usize, asked: f64, frame: &Frame, by: Provenance) -> (f64, bool) {
         let state = &mut self.axes[axis];
+        // Near an end of the stroke one axis of many is not calm, in all lanes of a hall at once.
+        if state.mode == AxisMode::Following && self.fast_path.is_calm(axis, asked) {
+            state.take_up(AxisMode::Following);
+            return (asked, false);
+        }
         // As long as it follows, what is asked is what is sent, and that is measured below.
         // Apart from it it is looked at by itself, to know when it may be followed again.
         let broken = state.mode != AxisMode::Following && state.look(asked, frame.time_ms);
@@ -274,7 +279,7 @@ impl Limiter {
             let acceleration = acceleration.clamp(-limits.acceleration, limits.acceleration);
             let state = AxisState { position: next.position, velocity, acceleration };
             // No way peaks lower than braking with everything (docs/limiter.md, section 4).
-            Halt::least_past(state, limits, 1.0) <= ROOM_SLACK
+            Halt::plainly_turns(state, limits) || Halt::least_past(state, limits, 1.0) <= ROOM_SLACK
         })
     }
 

@@ -41,6 +41,7 @@ pub(super) fn families(record: &RecordStatus) -> Vec<MetricFamily> {
             help: "Incidents, by cause",
             values: MetricValues::Counters(incidents.collect()),
         },
+        MetricFamily::counter("record_marks_left_out", "Marks that were one too many", record.more_marks),
         MetricFamily::counter("record_errors", "Failed writes", record.errors),
     ]
 }

@@ -96,6 +96,8 @@ fn playing() -> Status {
         ..Warning::default()
     };
     Status {
+        buttons: vec![],
+        notify: vec![],
         test: None,
         record: RecordStatus {
             mode: "sampled".to_owned(),

@@ -185,6 +185,23 @@ impl Halt {
         past(1.0).max(past(-1.0))
     }
 
+    /// True if it is plain that an axis can turn inside its stroke, without the roots of [`Self::least_past`]: the acceleration that
+    /// it has is enough, or the way to rest that lets go of it first.
+    pub(crate) fn plainly_turns(from: AxisState, limits: Limits) -> bool {
+        let Limits { acceleration, jerk, .. } = limits;
+        let turns = |room: f64, speed: f64, pull: f64| {
+            // With a pull that goes on as it is it turns after v² / 2a; both ways keep the limits, so that the least peaks no farther.
+            if pull <= 0.0 && (speed <= 0.0 || speed * speed <= -2.0 * pull * room) {
+                return true;
+            }
+            let pull = pull.max(0.0);
+            let speed = speed.max(0.0) + 0.5 * pull * pull / jerk;
+            speed * (pull / jerk + 0.5 * (speed / acceleration + acceleration / jerk)) <= room
+        };
+        turns(1.0 - from.position, from.velocity, from.acceleration)
+            && turns(from.position, -from.velocity, -from.acceleration)
+    }
+
     /// Its stretches of constant jerk that last: how it moves at the beginning of each, the jerk, and the seconds.
     pub(crate) fn stretches(&self) -> impl Iterator<Item = (AxisState, f64, f64)> {
         let lasting = self.stretches.iter().filter(|stretch| stretch.seconds > 0.0);
@@ -316,6 +333,20 @@ mod tests {
                 }
                 prop_assert!(at.velocity.abs() < 1e-9 && at.acceleration.abs() < 1e-6, "{halt:?}");
                 prop_assert!((at.position - halt.rest()).abs() < 1e-12, "{halt:?}");
+            }
+        }
+
+        #[test]
+        fn where_it_is_plain_that_there_is_room_braking_with_all_means_stays_inside(
+            to_end in 0.0..0.03_f64, velocity in -1.6..1.6_f64, acceleration in -20.0..20.0_f64, lower: bool,
+        ) {
+            let position = if lower { to_end } else { 1.0 - to_end };
+            let limits = Limits { velocity: 1.6, acceleration: 20.0, jerk: 400.0 };
+            // Slow ones as well: near an end nearly all that are quick have no room.
+            for slower in [1.0, 0.1, 0.01] {
+                let from = moving(position, slower * velocity, slower * acceleration);
+                let past = Halt::least_past(from, limits, 1.0);
+                prop_assert!(!Halt::plainly_turns(from, limits) || past < 1e-12, "{from:?}: {past}");
             }
         }
 

@@ -60,72 +60,92 @@ pub struct Readings {
 /// Measures one axis pose by pose. Never allocates.
 #[derive(Debug, Clone)]
 pub struct Measure {
-    spacing: Spacing,
-    seen: usize,
-    /// Where the newest pose stands.
-    newest: usize,
-    last_velocity: f64,
-    times: [i64; HISTORY],
-    positions: [f64; HISTORY],
+    times: MeasureTimes,
+    places: MeasurePlaces,
 }
 
 impl Measure {
     /// A measure that has seen no pose yet.
     #[must_use]
     pub const fn new(spacing: Spacing) -> Self {
-        Self {
-            spacing,
-            seen: 0,
-            newest: HISTORY - 1,
-            last_velocity: 0.0,
-            times: [0; HISTORY],
-            positions: [0.0; HISTORY],
-        }
+        Self { times: MeasureTimes::new(spacing), places: MeasurePlaces::NONE }
     }
 
     /// Takes the next pose, at a show time after the one before, and says what it showed.
     pub fn push(&mut self, at: ShowTime, position: f64) -> Readings {
+        let spans = self.times.push(at);
+        self.places.push(&spans, position)
+    }
+}
+
+/// When the poses of a measure were, which is the same for all axes of a seat. Never allocates.
+#[derive(Debug, Clone)]
+pub(crate) struct MeasureTimes {
+    spacing: Spacing,
+    seen: usize,
+    /// Where the newest pose stands.
+    newest: usize,
+    times: [i64; HISTORY],
+}
+
+/// Where the poses stand that the newest makes differences with, and how long is between them.
+#[derive(Debug, Clone)]
+pub(crate) struct MeasureSpans {
+    newest: usize,
+    /// The pose before, s before the newest, and the middle of both; none of the first pose.
+    before: Option<(usize, f64, ShowTime)>,
+    /// When the pose before was, where there was one before that.
+    step_at: Option<ShowTime>,
+    /// Of each distance; none before there are enough poses.
+    apart: [Option<ApartSpans>; 2],
+}
+
+/// The poses of a third difference, the newest first.
+#[derive(Debug, Clone, Copy)]
+struct ApartSpans {
+    slots: [usize; 4],
+    /// Seconds between each and the next, and between those two apart.
+    one: [f64; 3],
+    two: [f64; 2],
+    second_at: ShowTime,
+    /// Seconds between all, and the middle; none where there are no four.
+    third: Option<(f64, ShowTime)>,
+}
+
+impl MeasureTimes {
+    pub(crate) const fn new(spacing: Spacing) -> Self {
+        Self { spacing, seen: 0, newest: HISTORY - 1, times: [0; HISTORY] }
+    }
+
+    /// Takes the time of the next pose, after that of the one before.
+    pub(crate) fn push(&mut self, at: ShowTime) -> MeasureSpans {
         self.newest = if self.newest + 1 < HISTORY { self.newest + 1 } else { 0 };
         self.times[self.newest] = at.as_nanos();
-        self.positions[self.newest] = position;
         self.seen += 1;
-        let mut readings = Readings::default();
-        if self.seen >= 2 {
-            let (velocity, at) = self.slope(0, 1);
-            readings.velocity = Reading { value: velocity, at: ShowTime::from_nanos(at) };
-            if self.seen >= 3 {
-                readings.step = Reading { value: velocity - self.last_velocity, at: self.time(1) };
-            }
-            self.last_velocity = velocity;
+        let before = (self.seen >= 2).then(|| {
+            let middle = self.times[self.slot(1)].midpoint(self.times[self.newest]);
+            (self.slot(1), self.seconds(0, 1), ShowTime::from_nanos(middle))
+        });
+        MeasureSpans {
+            newest: self.newest,
+            before,
+            step_at: (self.seen >= 3).then(|| self.time(1)),
+            apart: [self.spacing.n, self.spacing.m].map(|apart| self.apart(apart)),
         }
-        for apart in [self.spacing.n, self.spacing.m] {
-            self.differences(apart, &mut readings);
-        }
-        readings
     }
 
-    fn differences(&self, apart: usize, readings: &mut Readings) {
-        if self.seen <= 2 * apart {
-            return;
-        }
-        // Neighbours share the slope between them.
-        let slope = self.slope(apart, apart).0;
-        let newest = (self.slope(0, apart).0 - slope) / self.seconds(0, 2 * apart);
-        keep_larger(&mut readings.acceleration, 2.0 * newest, self.time(apart));
-        if self.seen <= 3 * apart {
-            return;
-        }
-        let span = self.seconds(0, 3 * apart);
-        let older = (slope - self.slope(2 * apart, apart).0) / self.seconds(apart, 2 * apart);
-        let third = (newest - older) / span;
-        let middle = self.time(apart).as_nanos().midpoint(self.time(2 * apart).as_nanos());
-        keep_larger(&mut readings.jerk, 6.0 * third, ShowTime::from_nanos(middle));
-    }
-
-    fn slope(&self, back: usize, apart: usize) -> (f64, i64) {
-        let (a, b) = (self.slot(back + apart), self.slot(back));
-        let slope = (self.positions[b] - self.positions[a]) / self.seconds(back, apart);
-        (slope, self.times[a].midpoint(self.times[b]))
+    fn apart(&self, apart: usize) -> Option<ApartSpans> {
+        (self.seen > 2 * apart).then_some(())?;
+        let has_third = self.seen > 3 * apart;
+        let last = if has_third { 3 * apart } else { 2 * apart };
+        let middle = || self.time(apart).as_nanos().midpoint(self.time(2 * apart).as_nanos());
+        Some(ApartSpans {
+            slots: [0, apart, 2 * apart, last].map(|back| self.slot(back)),
+            one: [0, apart, 2 * apart].map(|back| self.seconds(back, apart)),
+            two: [0, apart].map(|back| self.seconds(back, 2 * apart)),
+            second_at: self.time(apart),
+            third: has_third.then(|| (self.seconds(0, 3 * apart), ShowTime::from_nanos(middle()))),
+        })
     }
 
     #[expect(clippy::cast_precision_loss, reason = "spans of some milliseconds")]
@@ -139,6 +159,45 @@ impl Measure {
 
     fn slot(&self, back: usize) -> usize {
         if back <= self.newest { self.newest - back } else { self.newest + HISTORY - back }
+    }
+}
+
+/// Where the poses of one axis were.
+#[derive(Debug, Clone)]
+pub(crate) struct MeasurePlaces {
+    last_velocity: f64,
+    positions: [f64; HISTORY],
+}
+
+impl MeasurePlaces {
+    /// None yet.
+    pub(crate) const NONE: Self = Self { last_velocity: 0.0, positions: [0.0; HISTORY] };
+
+    /// Takes the position of the next pose, and says what it showed.
+    pub(crate) fn push(&mut self, spans: &MeasureSpans, position: f64) -> Readings {
+        self.positions[spans.newest] = position;
+        let mut readings = Readings::default();
+        if let Some((before, seconds, at)) = spans.before {
+            let velocity = (position - self.positions[before]) / seconds;
+            readings.velocity = Reading { value: velocity, at };
+            if let Some(at) = spans.step_at {
+                readings.step = Reading { value: velocity - self.last_velocity, at };
+            }
+            self.last_velocity = velocity;
+        }
+        spans.apart.iter().flatten().for_each(|apart| self.differences(apart, &mut readings));
+        readings
+    }
+
+    fn differences(&self, spans: &ApartSpans, readings: &mut Readings) {
+        let places = spans.slots.map(|slot| self.positions[slot]);
+        // Neighbours share the slope between them.
+        let slope = |index: usize| (places[index] - places[index + 1]) / spans.one[index];
+        let newest = (slope(0) - slope(1)) / spans.two[0];
+        keep_larger(&mut readings.acceleration, 2.0 * newest, spans.second_at);
+        let Some((seconds, middle)) = spans.third else { return };
+        let older = (slope(1) - slope(2)) / spans.two[1];
+        keep_larger(&mut readings.jerk, 6.0 * ((newest - older) / seconds), middle);
     }
 }
 

@@ -5,6 +5,7 @@
 //! the send buffer, and then the live ones starve. Connected sockets also leave it to the kernel that a reply is taken
 //! from its own controller only.
 
+mod cost;
 mod error;
 mod network;
 mod open;
@@ -23,6 +24,7 @@ use socket2::Socket;
 
 use crate::time::MonoTime;
 
+pub(crate) use cost::SendCost;
 pub(crate) use error::NetError;
 pub use network::{Network, over};
 pub use recv::Origin;

@@ -30,7 +30,7 @@ impl Playlist {
         let mut faults = Faults::of(text);
         let (tree, errors) = DeTable::parse_recoverable(text);
         for error in errors {
-            faults.note_syntax(error.span().map_or(0, |span| span.start), error.message());
+            faults.note_syntax(&error);
         }
         let playlist = root(path, tree.get_ref(), &mut faults);
         match playlist {

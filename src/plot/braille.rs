@@ -1,6 +1,5 @@
 //! A picture as lines of braille, for a terminal: two columns and four rows of dots a character.
 
-use super::scale;
 use super::text::{clock, number};
 use super::{Lane, Panel, Picture, Scale};
 use crate::plain;
@@ -37,7 +36,12 @@ pub(crate) fn braille(picture: &Picture) -> String {
     lines.extend(picture.lanes.iter().flat_map(|one| lane(one, cells)));
     lines.push(times(picture, cells));
     for flag in &picture.flags {
-        lines.push(format!("{:BEFORE$}{} {}", "", clock(flag.at_s, 0.0), plain::escaped(&flag.name, 200)));
+        lines.push(format!(
+            "{:BEFORE$}{} {}",
+            "",
+            clock(picture.time.film_s(flag.at_s), 0.0),
+            plain::escaped(&flag.name, 200)
+        ));
     }
     for one in &picture.histograms {
         let bar = |(end, count): &(String, u64)| (*count > 0).then(|| format!("to {end}: {count}"));
@@ -100,13 +104,13 @@ fn lane(lane: &Lane, cells: usize) -> Vec<String> {
 fn times(picture: &Picture, cells: usize) -> String {
     let time = &picture.time;
     let most = f64::from(u16::try_from(cells / 12).unwrap_or(u16::MAX).max(2));
-    let ticks = scale::of_time(time.from_s, time.until_s, most);
+    let (step, ticks) = time.ticks(most);
     let mut line = " ".repeat(BEFORE);
-    for at in ticks.at {
-        let cell = dot(time.part(at).unwrap_or_default(), cells) + BEFORE;
+    for tick in ticks {
+        let cell = dot(tick.part, cells) + BEFORE;
         if line.chars().count() <= cell {
             line.extend(std::iter::repeat_n(' ', cell - line.chars().count()));
-            line += &clock(at, ticks.step);
+            line += &clock(tick.film_s, step);
             line.push(' ');
         }
     }

@@ -14,13 +14,15 @@ mod svg;
 mod tests;
 mod text;
 mod theme;
+mod time_axis;
 
 pub(crate) use braille::{braille, cells};
 pub(crate) use of_cue::{Columns, Subject, of_cue};
-pub(crate) use of_recording::{Gathered, Look, of_recording};
+pub(crate) use of_recording::{FilmAxis, Gathered, Look, of_recording};
 pub(crate) use page::page;
 pub(crate) use svg::svg;
 pub(crate) use theme::Theme;
+pub(crate) use time_axis::TimeAxis;
 
 use serde::Serialize;
 
@@ -75,26 +77,6 @@ impl Histogram {
         let most = self.bins.iter().map(|(_, count)| *count).max().unwrap_or(0);
         let log = |count: u64| (1.0 + count as f64).ln();
         if most == 0 { 0.0 } else { log(count) / log(most) }
-    }
-}
-
-/// Columns of time, all equally long.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct TimeAxis {
-    /// Show time at which the first column begins, s.
-    pub(crate) from_s: f64,
-    /// Show time at which the last column ends, s.
-    pub(crate) until_s: f64,
-    /// How many there are, at least one.
-    pub(crate) columns: usize,
-}
-
-impl TimeAxis {
-    /// Where a show time is, as a part of the axis; `None` outside.
-    #[must_use]
-    pub(crate) fn part(&self, at_s: f64) -> Option<f64> {
-        let part = (at_s - self.from_s) / (self.until_s - self.from_s);
-        (0.0..=1.0).contains(&part).then_some(part)
     }
 }
 
@@ -161,7 +143,7 @@ impl Band {
 /// An instant of a band that is to be seen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Mark {
-    /// When, show time in s.
+    /// Where on the time axis, s.
     pub(crate) at_s: f64,
     /// Where, in the panel's unit.
     pub(crate) value: f64,
@@ -194,7 +176,7 @@ pub(crate) struct Shade {
 /// A named instant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Flag {
-    /// When, show time in s.
+    /// Where on the time axis, s.
     pub(crate) at_s: f64,
     /// Its name; from anywhere.
     pub(crate) name: String,

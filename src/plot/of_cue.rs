@@ -68,12 +68,13 @@ pub(crate) fn of_cue(subject: Subject<'_>, columns: Columns) -> Picture {
     let Subject { timeline, seats, rate, .. } = subject;
     let strains = strains(timeline, rate, seats, columns.span);
     let stretches = columns.stretches();
-    let time = TimeAxis { from_s: stretches.from, until_s: stretches.end(), columns: stretches.count };
-    let view = View { timeline, strains: &strains, columns, stretches, time };
+    let time = TimeAxis::of_film(stretches.from, stretches.end(), stretches.count);
+    let view = View { timeline, strains: &strains, columns, stretches, time: time.clone() };
     let cue = timeline.cue();
     let title = cue.title().map_or_else(|| cue.path().display().to_string(), str::to_owned);
     let flags =
         cue.markers().iter().map(|marker| Flag { at_s: marker.at.as_secs_f64(), name: marker.name.clone() });
+    let flags = flags.filter(|flag| time.part(flag.at_s).is_some()).collect();
     Picture {
         title,
         sentence: view.sentence(),
@@ -81,7 +82,7 @@ pub(crate) fn of_cue(subject: Subject<'_>, columns: Columns) -> Picture {
         time,
         panels: view.positions().into_iter().chain((0..3).map(|order| view.measured(order))).collect(),
         lanes: view.vibration().into_iter().chain(view.outputs()).collect(),
-        flags: flags.filter(|flag| time.part(flag.at_s).is_some()).collect(),
+        flags,
         histograms: Vec::new(),
         table: Table {
             name: "Most of each axis",

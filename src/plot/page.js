@@ -3,6 +3,9 @@
 const steps = [.001, .002, .005, .01, .02, .05, .1, .2, .5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400];
 const main = document.querySelector('main');
 const from = Number(main.dataset.from), length = Number(main.dataset.until) - from, columns = Number(main.dataset.columns);
+// Stretches of the film beside each other: where on the axis each begins, and the show times of its ends.
+const passes = JSON.parse(main.dataset.passes ?? `[[${from},${from},${from + length}]]`);
+const longest = Math.max(...passes.map(([, first, last]) => last - first));
 let view = [0, 1];
 
 const clock = (at, step) => {
@@ -16,16 +19,25 @@ const clock = (at, step) => {
 function ticks() {
   const [begin, end] = view.map((part) => from + part * length);
   const most = Math.max(2, document.querySelector('.times').clientWidth / 90);
-  const step = steps.find((one) => one >= (end - begin) / most) ?? 28800;
+  // Steps are at most 2.5 times apart, so that the longest pass has a tick.
+  const least = passes.length > 1 ? Math.min((end - begin) / most, longest / 2.5) : (end - begin) / most;
+  const step = steps.find((one) => one >= least) ?? 28800;
+  const places = [];
+  for (const [at, first, last] of passes) {
+    // Ticks of passes that follow each other may come too close.
+    for (let n = Math.ceil(Math.max(first, first + begin - at) / step - 1e-9); n * step <= Math.min(last, first + end - at) + 1e-9; n++) {
+      const place = at + n * step - first;
+      if (places.length === 0 || place - places.at(-1)[0] >= .8 * (end - begin) / most) places.push([place, n * step]);
+    }
+  }
   for (const box of document.querySelectorAll('.ticks')) {
-    const all = [];
-    for (let n = Math.ceil(begin / step - 1e-9); n * step <= end + 1e-9; n++) {
+    const all = places.map(([place, film]) => {
       const tick = document.createElement('i');
       tick.className = 'tick';
-      tick.dataset.at = (n * step - from) / length;
-      if (box.classList.contains('times')) tick.append(Object.assign(document.createElement('span'), { textContent: clock(n * step, step) }));
-      all.push(tick);
-    }
+      tick.dataset.at = (place - from) / length;
+      if (box.classList.contains('times')) tick.append(Object.assign(document.createElement('span'), { textContent: clock(film, step) }));
+      return tick;
+    });
     box.classList.add('fitted'); // as many as there is room for: none has to give way
     box.replaceChildren(...all);
   }

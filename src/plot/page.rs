@@ -9,6 +9,7 @@ use super::path::{self, HEIGHT};
 use super::svg::names;
 use super::text::{clock, number, safe};
 use super::theme::{Theme, classes};
+use super::time_axis::TimeTick;
 use super::{Histogram, Lane, Panel, Picture, Scale, TimeAxis, scale};
 
 const STYLE: &str = include_str!("page.css");
@@ -24,13 +25,14 @@ pub(crate) fn page(picture: &Picture, theme: Theme) -> String {
         "<!doctype html>\n<html lang=\"en\" class=\"plot\">\n<head><meta charset=\"utf-8\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{}'\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>{}\n{STYLE}</style></head>\n\
-         <body><main data-from=\"{}\" data-until=\"{}\" data-columns=\"{}\">\n<h1>{title}</h1>\n<p class=\"sentence\">{}</p>\n{TOOLS}\n\
+         <body><main data-from=\"{}\" data-until=\"{}\" data-columns=\"{}\"{}>\n<h1>{title}</h1>\n<p class=\"sentence\">{}</p>\n{TOOLS}\n\
          {}{}{}{}\n{}{}<footer>{facts}</footer></main>\n<script>{SCRIPT}</script></body></html>\n",
         STANDARD.encode(Sha256::digest(SCRIPT)),
         theme.css(),
         time.from_s,
         time.until_s,
         time.columns,
+        passes(time),
         safe(&picture.sentence),
         flags(picture),
         picture.panels.iter().map(|panel| section(panel, time)).collect::<String>(),
@@ -41,13 +43,27 @@ pub(crate) fn page(picture: &Picture, theme: Theme) -> String {
     )
 }
 
+/// Where each pass begins on the axis, and the show times of its ends; nothing where the axis is show time.
+fn passes(time: &TimeAxis) -> String {
+    let passes =
+        time.passes().iter().map(|one| format!("[{:.6},{:.6},{:.6}]", one.at_s, one.film_s, one.until_s));
+    let passes = passes.collect::<Vec<_>>().join(",");
+    if passes.is_empty() { passes } else { format!(" data-passes=\"[{passes}]\"") }
+}
+
+/// Passes whose begin is a line across each panel.
+const MOST_PASSES: usize = 40;
+
 const TOOLS: &str = "<div class=\"tools\" hidden><button data-does=\"in\" aria-label=\"Larger\">+</button>\
 <button data-does=\"out\" aria-label=\"Smaller\">−</button><button data-does=\"back\" aria-label=\"Earlier\">←</button>\
 <button data-does=\"on\" aria-label=\"Later\">→</button><button data-does=\"whole\">Whole</button>\
 <span>Drag over a stretch of time to see it larger.</span></div>";
 
 fn at(time: &TimeAxis, at_s: f64) -> String {
-    let part = time.part(at_s).unwrap_or_default();
+    at_part(time.part(at_s).unwrap_or_default())
+}
+
+fn at_part(part: f64) -> String {
     format!("data-at=\"{part:.6}\" style=\"left:{:.3}%", 100.0 * part)
 }
 
@@ -70,7 +86,7 @@ fn section(panel: &Panel, time: &TimeAxis) -> String {
         "<section>{}<div class=\"box drag {class}\">",
         head(&format!("{}, {}", panel.name, panel.unit), &note)
     );
-    for tick in scale::of_values(panel.low, panel.high, 4.0).at {
+    for tick in scale::of_values(panel.low, panel.high, 4.0) {
         out += &format!(
             "<div class=\"y\" style=\"top:{:.2}%\"><span>{}</span></div>",
             percent(panel, tick),
@@ -84,6 +100,9 @@ fn section(panel: &Panel, time: &TimeAxis) -> String {
         );
     }
     out += "<div class=\"clip ticks\"></div>";
+    for pass in time.passes().iter().skip(1).take(MOST_PASSES) {
+        out += &format!("<i class=\"pass\" {}\"></i>", at(time, pass.at_s));
+    }
     let range = if panel.scale == Scale::Range { " range" } else { "" };
     let paths = panel.bands.iter().map(|band| {
         format!("<path class=\"curve{range} {}\" d=\"{}\"/>", classes(band.style), path::band(panel, band))
@@ -136,7 +155,7 @@ fn flags(picture: &Picture) -> String {
             at(&picture.time, flag.at_s),
             20 * (row % 3),
             name = safe(&flag.name),
-            time = clock(flag.at_s, 0.0)
+            time = clock(picture.time.film_s(flag.at_s), 0.0)
         )
     };
     let flags: String = picture.flags.iter().enumerate().map(flag).collect();
@@ -145,12 +164,12 @@ fn flags(picture: &Picture) -> String {
 
 /// Ticks as they are without the script.
 fn times(time: &TimeAxis) -> String {
-    let ticks = scale::of_time(time.from_s, time.until_s, 10.0);
-    let tick = |tick: &f64| {
-        let place = at(time, *tick);
-        format!("<i class=\"tick\" {place}\"><span>{}</span></i>", clock(*tick, ticks.step))
+    let (step, ticks) = time.ticks(10.0);
+    let tick = |tick: &TimeTick| {
+        let place = at_part(tick.part);
+        format!("<i class=\"tick\" {place}\"><span>{}</span></i>", clock(tick.film_s, step))
     };
-    format!("<div class=\"box times ticks\">{}</div>", ticks.at.iter().map(tick).collect::<String>())
+    format!("<div class=\"box times ticks\">{}</div>", ticks.iter().map(tick).collect::<String>())
 }
 
 /// Bars of equal width, each over the end of its bin.

@@ -3,6 +3,7 @@
 use super::path::{self, HEIGHT};
 use super::text::{clock, number, safe};
 use super::theme::{Theme, classes};
+use super::time_axis::TimeTick;
 use super::{Histogram, Lane, Panel, Picture, Scale, TimeAxis, scale};
 
 /// The whole, px.
@@ -91,7 +92,7 @@ fn drawn(panel: &Panel, time: &TimeAxis, y: &mut f64) -> String {
         if panel.scale == Scale::Limit { panel.high.max(100.0) } else { panel.high },
         4.0,
     );
-    for tick in &ticks.at {
+    for tick in &ticks {
         let y = at(*tick);
         out += &format!("<path class=\"grid\" d=\"M{LEFT} {y:.1}h{LENGTH}\"/>");
         out += &format!(
@@ -256,14 +257,14 @@ fn flag_lines(picture: &Picture, top: f64, bottom: f64) -> String {
 }
 
 fn times(time: &TimeAxis, y: f64) -> String {
-    let ticks = scale::of_time(time.from_s, time.until_s, 12.0);
-    let tick = |at: &f64| {
-        let x = LEFT + LENGTH * time.part(*at).unwrap_or_default();
+    let (step, ticks) = time.ticks(12.0);
+    let tick = |tick: &TimeTick| {
+        let x = LEFT + LENGTH * tick.part;
         format!(
             "<path class=\"grid\" d=\"M{x:.1} {y:.1}v6\"/><text class=\"quiet\" text-anchor=\"middle\" x=\"{x:.1}\" y=\"{:.1}\">{}</text>",
             y + 20.0,
-            clock(*at, ticks.step)
+            clock(tick.film_s, step)
         )
     };
-    ticks.at.iter().map(tick).collect()
+    ticks.iter().map(tick).collect()
 }

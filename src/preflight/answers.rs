@@ -3,11 +3,15 @@
 use std::time::Duration;
 
 use super::{Check, Notes, Subject, wanted};
-use crate::device::survey::ROUND_TIMEOUT;
-use crate::device::{Address, Fault};
+use crate::device::change::dialect_name;
+use crate::device::survey::{ROUND_TIMEOUT, Survey};
+use crate::device::{Address, Fault, table};
+use crate::wire::Dialect;
 
 /// Answers slower than this are noted.
 const SLOW: Duration = Duration::from_millis(20);
+/// Firmware may lack a register or two.
+const FEW: usize = 3;
 /// Of 20 reads: more than a tenth lost is what a show calls degraded.
 const LOST: usize = 2;
 
@@ -29,7 +33,18 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         );
         return;
     }
-    judge_unread(subject, &survey.unread, notes);
+    let missing = missing(subject);
+    match other_dialect(subject, survey, &missing) {
+        Some((found, other)) => notes.add(
+            Check::Dialect,
+            found,
+            format!(
+                "write dialect = \"{}\" for this controller, and run preflight again; if its integrator says otherwise, do not play to it",
+                dialect_name(other)
+            ),
+        ),
+        None => judge_unread(&missing, &survey.unread, notes),
+    }
     if let Some(value) = subject.pa(0x15).filter(|value| *value != 1) {
         notes.add(
             Check::RepliesDisabled,
@@ -74,18 +89,41 @@ fn silence(fault: &Fault) -> String {
     }
 }
 
+/// What was asked and not told.
+fn missing(subject: &Subject<'_>) -> Vec<Address> {
+    let all = wanted(subject.controller).into_iter();
+    all.filter(|address| subject.register(*address).is_none()).collect()
+}
+
+/// Of which other dialect it is, and what shows that: its reports, or that it refuses all that this dialect alone has.
+fn other_dialect(subject: &Subject<'_>, survey: &Survey, missing: &[Address]) -> Option<(String, Dialect)> {
+    let own = subject.controller.connection.dialect;
+    let name = dialect_name;
+    if let Some(other) = survey.speaks.filter(|speaks| *speaks != own) {
+        let found =
+            format!("reports its state as {} controllers do, but dialect = \"{}\"", name(other), name(own));
+        return Some((found, other));
+    }
+    let is_own = |address: &Address| !table().has(*address, Dialect::Mbox);
+    let refuses = survey.unread.iter().any(Fault::refused) && missing.len() > FEW;
+    if own == Dialect::Mbox || survey.speaks.is_some() || !refuses || !missing.iter().all(is_own) {
+        return None;
+    }
+    let found = format!(
+        "answers as mbox controllers do, but dialect = \"smc\": it refuses {}, which only smc controllers have",
+        runs(missing)
+    );
+    Some((found, Dialect::Mbox))
+}
+
 /// What was asked and not told makes everything that hangs on it unknown.
-fn judge_unread(subject: &Subject<'_>, faults: &[Fault], notes: &mut Notes) {
-    let missing: Vec<Address> = wanted(subject.controller)
-        .into_iter()
-        .filter(|address| subject.register(*address).is_none())
-        .collect();
+fn judge_unread(missing: &[Address], faults: &[Fault], notes: &mut Notes) {
     if missing.is_empty() {
         return;
     }
     let why = faults.iter().find(|fault| !matches!(fault, Fault::Unasked { .. }));
     let why = why.map_or_else(String::new, |fault| format!(": {fault}"));
-    let found = format!("{} could not be read{why}", runs(&missing));
+    let found = format!("{} could not be read{why}", runs(missing));
     notes.add(Check::RegisterUnread, found, "try again; check that dialect fits the controller");
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{Check, Notes};
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Drives, Link};
-use crate::drive::link::{LinkPort, LinkTalk as _, TalkCounts};
+use crate::drive::link::{AT_PARK, LinkPort, LinkTalk as _, STANDS_MM, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
 use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
 use crate::drive::{motors_of, silvermax, sixpack2, units_of};
@@ -16,6 +16,8 @@ use crate::wire::silvermax::{Poll, StatusWord as _};
 /// Answers that begin so late are held back by an adapter, no unit waits so long.
 const HELD_BACK: Duration = Duration::from_millis(12);
 const HOME: &str = "home it, with nobody on the seat";
+/// In so many requests one that something else comes of is noise, and no chance.
+const NOISY: u64 = 20;
 /// What answers may be later than was reckoned with, as a part of it.
 const LATER: f64 = 1.25;
 
@@ -138,6 +140,7 @@ pub(super) fn one(subject: &DriveSubject<'_>) -> Notes {
         if subject.answered() {
             rate(subject, &mut notes);
             home(subject, &mut notes);
+            places(subject, &mut notes);
             subject.facts().for_each(|unit| trouble(unit, &mut notes));
             settings(subject, &mut notes);
         }
@@ -191,6 +194,14 @@ fn sixpack(subject: &DriveSubject<'_>, unit: u8, notes: &mut Notes) {
         );
         notes.add(Check::NotHome, found, HOME);
     }
+    if let Some(seat) = seat.filter(|_| is_home(notes)) {
+        for (axis, motor) in seat.motors.iter().enumerate() {
+            let told = facts.motors.iter().find(|told| told.motor == *motor);
+            if let Some(place) = told.and_then(|told| seat.place(told)) {
+                off_park(subject, axis, [place; 2], notes);
+            }
+        }
+    }
     for motor in facts.motors.iter().filter(|motor| motor.searches()) {
         let found = format!("motor {} of unit {unit} searches for its zero without a command", motor.motor);
         notes.add(Check::DriveError, found, HOME);
@@ -213,20 +224,30 @@ fn answers(subject: &DriveSubject<'_>, notes: &mut Notes) {
 
 /// What came that should not have.
 fn line(subject: &DriveSubject<'_>, notes: &mut Notes) {
-    let (link, TalkCounts { asked, answered, malformed, doubled, echo_differs, .. }) =
+    let (link, TalkCounts { asked, answered, malformed, doubled, echo_differs, echoed, .. }) =
         (&subject.link.name, subject.survey.counts);
     if subject.link.has_echo && 2 * echo_differs > asked {
         let found = format!("{echo_differs} of {asked} requests were not echoed on link {link}");
         notes.add(Check::EchoDiffers, found, "this adapter does not echo what is sent: set echo = false");
-    } else if !subject.link.has_echo && 2 * malformed > asked && 2 * answered > asked {
-        let found = format!("{malformed} lines besides {answered} answers came back on link {link}");
+    } else if !subject.link.has_echo && 2 * echoed > asked {
+        let found =
+            format!("{echoed} of {asked} requests came back besides {answered} answers on link {link}");
         notes.add(Check::EchoDiffers, found, "this adapter echoes what is sent: set echo = true");
     } else if doubled > 0 {
         let found = format!("{doubled} more answers than requests on link {link}");
         notes.add(
             Check::DuplicateUnit,
             found,
-            "connect each unit alone to the line, and set IDT of those that share a number",
+            "connect each unit alone to the line, and give those that share a number another",
+        );
+    } else if NOISY * malformed > asked {
+        let found = format!(
+            "what nobody sent came {malformed} times while {asked} requests were sent on link {link}"
+        );
+        notes.add(
+            Check::LineNoise,
+            found,
+            "check shield, ground, and the resistors at the ends of two wires, and that baud and stop_bits are those of the units",
         );
     }
 }
@@ -287,6 +308,38 @@ fn home(subject: &DriveSubject<'_>, notes: &mut Notes) {
     {
         let found = "its units were homed with other settings than it has now (register 40)".to_owned();
         notes.add(Check::NotHome, found, HOME);
+    }
+}
+
+/// True if nothing is found by which the seat is not home.
+fn is_home(notes: &Notes) -> bool {
+    !notes.0.iter().any(|one| matches!(one.check, Check::NotHome | Check::Restarted))
+}
+
+/// Where the axes of a seat stand that is home.
+fn places(subject: &DriveSubject<'_>, notes: &mut Notes) {
+    let Some(seat) = units_of(subject.controller).filter(|_| is_home(notes)) else { return };
+    for facts in subject.facts() {
+        let axis = seat.units.iter().position(|unit| *unit == facts.unit);
+        if let (Some(axis), Some(places)) = (axis, seat.places(facts)) {
+            off_park(subject, axis, places, notes);
+        }
+    }
+}
+
+/// Whether an axis, from 0, that was read there, and is held there, stands at park.
+fn off_park(subject: &DriveSubject<'_>, axis: usize, [at, held]: [f64; 2], notes: &mut Notes) {
+    let Some(geometry) = subject.controller.seat.own().get(axis) else { return };
+    if (at - geometry.park).abs() <= AT_PARK {
+        return;
+    }
+    let [read, park, held] = [at, geometry.park, held].map(|part| geometry.place(part));
+    let found = format!("axis {} stands at {read:.1} mm, its park place is {park:.1} mm", axis + 1);
+    if (read - held).abs() < STANDS_MM {
+        notes.add(Check::OffPark, found, "park it, or start a show: it joins slowly from there");
+    } else {
+        let found = format!("{found}, and its drive holds it at {held:.1} mm");
+        notes.add(Check::OffPark, found, "free it, or find out why its motor does not hold it");
     }
 }
 

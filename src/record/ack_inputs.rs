@@ -4,9 +4,9 @@ use super::ack_words::{FALLS, of, place};
 use super::cursor::Cursor;
 use crate::health::HealthInput::{
     self, Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew,
-    LostZero, Moved, OtherAxes, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+    LostZero, Moved, OtherAxes, OtherSent, Outside, Part, Pushed, ReadSent, Refused, Seen, Wide, Zero,
 };
-use crate::health::{Continuity, Identity, Sighting};
+use crate::health::{self, Continuity, Identity, Sighting};
 use crate::motion::Pulses;
 use crate::observe::{Look, StopSign};
 
@@ -51,7 +51,12 @@ pub(super) fn write_input(out: &mut Vec<u8>, input: HealthInput) {
         Homed(controller) => put(50, controller, &[]),
         Joined(group) => put(51, group, &[]),
         LookAnew(group) => put(52, group, &[]),
-        BeatKept(controller, at) => put(53, controller, &at.as_nanos().to_le_bytes()),
+        Pushed(controller, pushed) => {
+            put(53, controller, &[pushed.map_or(NONE, |pushed| octet(pushed.axis))]);
+            let places = pushed.map_or([0; 2], |pushed| [pushed.at, pushed.held]);
+            places.iter().for_each(|place| out.extend_from_slice(&place.to_le_bytes()));
+        }
+        BeatKept(controller, at) => put(54, controller, &at.as_nanos().to_le_bytes()),
     }
 }
 
@@ -81,7 +86,12 @@ pub(super) fn read_input(kind: u8, of: usize, from: &mut Cursor<'_>) -> Option<H
         50 => Homed(of),
         51 => Joined(of),
         52 => LookAnew(of),
-        53 => BeatKept(of, from.time()?),
+        53 => {
+            let (axis, mut place) = (from.u8()?, || Some(i32::from_le_bytes(from.take()?)));
+            let (at, held) = (place()?, place()?);
+            Pushed(of, (axis != NONE).then_some(health::Pushed { axis: axis.into(), at, held }))
+        }
+        54 => BeatKept(of, from.time()?),
         _ => return None,
     })
 }

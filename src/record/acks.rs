@@ -197,7 +197,8 @@ mod tests {
     fn what_health_was_told_reads_as_it_was() {
         use HealthInput::{
             Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew,
-            LostZero, Moved, OtherAxes, OtherSent, Outside, Part, ReadSent, Refused, Seen, Wide, Zero,
+            LostZero, Moved, OtherAxes, OtherSent, Outside, Part, Pushed, ReadSent, Refused, Seen, Wide,
+            Zero,
         };
         let (mut tap, mut ring) = ack_tap(3, Rate::from_hz(100.0));
         let identity = Identity { version: 7, minor_version: 8, work_mode: 2, axes: 3 };
@@ -224,6 +225,8 @@ mod tests {
             FellOut(1, Fall::Stale),
             Outside(1, Some((5, Pulses(-3)))),
             Outside(1, None),
+            Pushed(1, Some(crate::health::Pushed { axis: 2, at: 1_400, held: -200 })),
+            Pushed(1, None),
             Ambiguous(1, true),
             Homed(1),
             Joined(1),

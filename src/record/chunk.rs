@@ -37,6 +37,12 @@ impl TickHead {
         let state = State::Playing(crate::state::PlayMode::Following);
         Self { index, deadline, late_ns: 0, missed: 0, film: ShowTime::ZERO, state }
     }
+
+    /// The same with the film there.
+    #[must_use]
+    pub const fn showing(self, film: ShowTime) -> Self {
+        Self { film, ..self }
+    }
 }
 
 /// What was asked of a lane before the limiter saw it.
@@ -119,7 +125,9 @@ pub(crate) const fn longest_frame(slots: usize, datagram: usize) -> usize {
 /// Puts a tick together; allocates once. Tick thread.
 #[derive(Debug)]
 pub(crate) struct ChunkWriter {
-    octets: Vec<u8>,
+    octets: Box<[u8]>,
+    /// Octets that are written.
+    len: usize,
     frames: u16,
     /// A frame found no room.
     is_torn: bool,
@@ -128,14 +136,13 @@ pub(crate) struct ChunkWriter {
 impl ChunkWriter {
     /// One with room for frames of that many octets in all.
     pub(crate) fn with_room(frames: usize) -> Self {
-        let mut octets = Vec::with_capacity(HEAD_LEN + frames);
-        octets.resize(HEAD_LEN, 0);
-        Self { octets, frames: 0, is_torn: false }
+        let octets = vec![0; HEAD_LEN + frames].into_boxed_slice();
+        Self { octets, len: HEAD_LEN, frames: 0, is_torn: false }
     }
 
     /// Octets that it has room for.
     pub(crate) fn room(&self) -> usize {
-        self.octets.capacity()
+        self.octets.len()
     }
 
     /// Adds a frame.
@@ -149,34 +156,35 @@ impl ChunkWriter {
     #[inline]
     pub(super) fn put(&mut self, lane: usize, at: MonoTime, handed: Handed, asked: &Asked, datagram: &[u8]) {
         let slots = asked.slots.min(MAX_AXES);
-        let room = self.octets.capacity() - self.octets.len();
         let (Ok(lane), Ok(len)) = (u16::try_from(lane), u16::try_from(datagram.len())) else { return };
-        if longest_frame(slots, datagram.len()) > room {
+        let longest = longest_frame(slots, datagram.len());
+        // Written where it stays: what is put together elsewhere is copied once more, in 64 frames a tick.
+        let place = self.octets.get_mut(self.len..self.len + longest);
+        let Some((head, rest)) = place.and_then(|place| place.split_first_chunk_mut::<FRAME_LEN>()) else {
             self.is_torn = true;
             return;
-        }
-        self.frames += 1;
-        // Put together in a place of its own, then added at once: each addition asks for room.
-        let mut own = [0; FRAME_LEN + 8 * MAX_AXES];
+        };
         #[expect(clippy::cast_possible_truncation, reason = "some thousand clamps; a level needs few digits")]
         let (clamps, level) = (asked.clamps as u32, asked.level as f32);
-        own[..8].copy_from_slice(&at.as_nanos().to_le_bytes());
-        own[8..12].copy_from_slice(&clamps.to_le_bytes());
-        own[12..16].copy_from_slice(&level.to_le_bytes());
-        own[16..18].copy_from_slice(&lane.to_le_bytes());
-        own[18..20].copy_from_slice(&len.to_le_bytes());
+        head[..8].copy_from_slice(&at.as_nanos().to_le_bytes());
+        head[8..12].copy_from_slice(&clamps.to_le_bytes());
+        head[12..16].copy_from_slice(&level.to_le_bytes());
+        head[16..18].copy_from_slice(&lane.to_le_bytes());
+        head[18..20].copy_from_slice(&len.to_le_bytes());
         #[expect(clippy::cast_possible_truncation, reason = "twelve slots, three fates")]
-        own[20..FRAME_LEN].copy_from_slice(&[slots as u8, handed as u8]);
-        let (places, _) = own[FRAME_LEN..].as_chunks_mut();
+        head[20..].copy_from_slice(&[slots as u8, handed as u8]);
+        let (places, rest) = rest.split_at_mut(8 * slots);
+        let (places, _) = places.as_chunks_mut();
         places.iter_mut().zip(&asked.pose[..slots]).for_each(|(to, place)| *to = place.to_le_bytes());
-        self.octets.extend_from_slice(&own[..FRAME_LEN + 8 * slots]);
-        self.octets.extend_from_slice(datagram);
+        rest.copy_from_slice(datagram);
+        self.len += longest;
+        self.frames += 1;
     }
 
     /// The whole chunk, before which `dropped` ticks were lost; `None` where it is not whole.
     pub(crate) fn close(&mut self, head: &TickHead, dropped: u32) -> Option<&[u8]> {
         let TickHead { index, deadline, late_ns, missed, film, state } = *head;
-        let len = u32::try_from(self.octets.len()).ok().filter(|_| !self.is_torn)?;
+        let len = u32::try_from(self.len).ok().filter(|_| !self.is_torn)?;
         let state = State::ALL.iter().position(|one| *one == state).and_then(|at| u8::try_from(at).ok())?;
         let mut at = 0;
         let mut put = |octets: &[u8]| {
@@ -189,13 +197,12 @@ impl ChunkWriter {
         put(&film.as_nanos().to_le_bytes());
         put(&self.frames.to_le_bytes());
         put(&[state]);
-        Some(&self.octets)
+        Some(&self.octets[..self.len])
     }
 
     /// Begins the next.
     pub(crate) fn clear(&mut self) {
-        self.octets.truncate(HEAD_LEN);
-        (self.frames, self.is_torn) = (0, false);
+        (self.len, self.frames, self.is_torn) = (HEAD_LEN, 0, false);
     }
 }
 

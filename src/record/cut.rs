@@ -42,7 +42,8 @@ pub(crate) struct CutManner {
     /// Time messages by the film rather than by the clock.
     #[arg(long)]
     pub(crate) film_time: bool,
-    /// Omit the names of seats, hall and cue, and addresses, also those in frames and replies.
+    /// Omit what tells whose recording it is: names of seats, hall and cue, the cue's digest, the date, and addresses, also those in
+    /// frames and replies.
     #[arg(long)]
     pub(crate) anonymous: bool,
     /// Also keep the original ticks and replies, so that the cut is itself a full recording.
@@ -219,10 +220,10 @@ impl<W: Write + Seek> Cutting<W> {
             hall: entry("hall"),
             cue: entry("cue"),
             title: entry("title"),
-            cue_sha256: contents.entry("cue_sha256").to_owned(),
+            cue_sha256: entry("cue_sha256"),
             rate_hz: contents.rate_hz(),
             mode: if manner.whole { Mode::Full } else { Mode::Sampled },
-            clocks: (MonoTime::default(), if manner.film_time { 0 } else { origin }),
+            clocks: (MonoTime::default(), if manner.film_time || manner.anonymous { 0 } else { origin }),
         };
         let taken: Vec<bool> = contents.seats.iter().map(|seat| stretch.has(seat)).collect();
         let own = contents.judging();

@@ -85,9 +85,9 @@ impl Watchman {
         Self { period, state: None, is_moving: false, clamps: vec![0; lanes], may_move: vec![false; lanes] }
     }
 
-    /// Looks at a tick; gives what it finds to `found`.
-    pub(crate) fn look(&mut self, chunk: &Chunk<'_>, found: &mut impl FnMut(IncidentCause, MonoTime)) {
-        let head = chunk.head;
+    /// Looks at a tick; gives what it finds to `found`, and how often the limiter held a seat back since the last.
+    pub(crate) fn look(&mut self, chunk: &Chunk<'_>, found: &mut impl FnMut(IncidentCause, MonoTime)) -> u64 {
+        let (head, mut held_back) = (chunk.head, 0);
         let before = self.state.replace(head.state);
         if before.is_some_and(|before| before != head.state) {
             match head.state {
@@ -111,14 +111,15 @@ impl Watchman {
             }
             let Some(clamps) = self.clamps.get_mut(frame.lane) else { continue };
             // A frame that no tick asked for, and a show that was exchanged, begin anew.
-            let is_clamped = frame.asked.slots > 0 && frame.asked.clamps > *clamps;
             if frame.asked.slots > 0 {
-                *clamps = frame.asked.clamps;
-            }
-            if is_clamped {
-                found(IncidentCause::Clamp, head.deadline);
+                let more = frame.asked.clamps.saturating_sub(std::mem::replace(clamps, frame.asked.clamps));
+                held_back += more;
+                if more > 0 {
+                    found(IncidentCause::Clamp, head.deadline);
+                }
             }
         }
+        held_back
     }
 
     /// Looks at what the ack thread took.

@@ -36,6 +36,10 @@ pub(crate) struct Counts {
     pub(crate) refused: u64,
     /// Records of the ack thread that found no room.
     pub(crate) dropped_records: u64,
+    /// How often the limiter held a seat back.
+    pub(crate) clamps: u64,
+    /// Moments that were marked.
+    pub(crate) marks: u64,
 }
 
 impl Counts {
@@ -48,12 +52,14 @@ impl Counts {
             acked: self.acked - before.acked,
             refused: self.refused - before.refused,
             dropped_records: self.dropped_records - before.dropped_records,
+            clamps: self.clamps - before.clamps,
+            marks: self.marks - before.marks,
         }
     }
 
     /// Each by its name in `kinocue.end`.
-    pub(crate) fn named(&self) -> [(&'static str, String); 6] {
-        let Self { ticks, frames, dropped, acked, refused, dropped_records } = *self;
+    pub(crate) fn named(&self) -> [(&'static str, String); 8] {
+        let Self { ticks, frames, dropped, acked, refused, dropped_records, clamps, marks } = *self;
         [
             ("ticks", ticks),
             ("frames", frames),
@@ -61,6 +67,8 @@ impl Counts {
             ("acked", acked),
             ("refused", refused),
             ("dropped_records", dropped_records),
+            ("clamps", clamps),
+            ("marks", marks),
         ]
         .map(|(name, count)| (name, count.to_string()))
     }
@@ -130,6 +138,11 @@ impl Intake {
         counts.into_iter().chain([("most", most)]).collect()
     }
 
+    /// A moment was marked.
+    pub(crate) const fn marked(&mut self) {
+        self.counts.marks += 1;
+    }
+
     /// What was found since it was asked last that is worth an incident.
     pub(crate) fn take_found(&mut self) -> Vec<(IncidentCause, MonoTime)> {
         std::mem::take(&mut self.found)
@@ -161,7 +174,7 @@ impl Intake {
             counts.ticks += 1;
             counts.dropped += u64::from(chunk.dropped);
             counts.frames += chunk.frames().count() as u64;
-            watchman.look(&chunk, &mut |cause, at| found.push((cause, at)));
+            counts.clamps += watchman.look(&chunk, &mut |cause, at| found.push((cause, at)));
             margins.take(&chunk, seats, &mut |_, _, _| ());
             fold.take(&chunk, tell);
             if let Some(whole) = whole {

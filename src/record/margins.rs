@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::RecordedSeat;
 use super::chunk::{Chunk, Handed};
-use crate::motion::{Measure, Reading, Spacing};
+use crate::motion::{MeasurePlaces, MeasureTimes, Reading, Spacing};
 use crate::plain::escaped;
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::wire::Timing;
@@ -85,12 +85,13 @@ struct LaneMargins {
     /// When its last frame is reached by the Times of its frames, which seats go by; and the Time of that.
     reached: ShowTime,
     time_ms: u32,
+    times: MeasureTimes,
     axes: Vec<AxisMargins>,
 }
 
 #[derive(Debug)]
 struct AxisMargins {
-    measure: Measure,
+    places: MeasurePlaces,
     /// The greatest so far, and the show time of each.
     most: [(f64, ShowTime); 3],
 }
@@ -102,11 +103,12 @@ impl Margins {
     /// A measure of frames at that rate.
     pub(crate) fn new(seats: &[RecordedSeat], rate: Rate) -> Self {
         let spacing = Spacing::at_rate(rate.hz());
-        let axis = || AxisMargins { measure: Measure::new(spacing), most: [(0.0, ShowTime::ZERO); 3] };
+        let axis = || AxisMargins { places: MeasurePlaces::NONE, most: [(0.0, ShowTime::ZERO); 3] };
         let lane = |seat: &RecordedSeat| LaneMargins {
             last: None,
             reached: ShowTime::ZERO,
             time_ms: 0,
+            times: MeasureTimes::new(spacing),
             axes: seat.axes().iter().map(|_| axis()).collect(),
         };
         Self { spacing, lanes: seats.iter().map(lane).collect() }
@@ -143,12 +145,15 @@ impl Margins {
             let before = std::mem::replace(&mut lane.time_ms, time_ms);
             let lasts = if timing == Timing::Relative { time_ms } else { time_ms.saturating_sub(before) };
             lane.reached += Duration::from_millis(u64::from(lasts.max(1)));
+            if !goes_on {
+                lane.times = MeasureTimes::new(*spacing);
+            }
+            let (now, spans) = (lane.reached, lane.times.push(lane.reached));
             for (index, (axis, place)) in lane.axes.iter_mut().zip(places.iter()).enumerate() {
-                if !goes_on {
-                    axis.measure = Measure::new(*spacing);
-                }
-                let limits = seat.axes()[index].limits();
-                tell(frame.lane, index, axis.push(lane.reached, head.film, *place, limits));
+                let seen = axis.places.push(&spans, *place);
+                let shown = [seen.velocity, seen.acceleration, seen.jerk];
+                axis.keep(shown, now, head.film);
+                tell(frame.lane, index, parts(shown, now, head.film, seat.axes()[index].limits()));
             }
         }
     }
@@ -180,20 +185,24 @@ impl Margins {
 }
 
 impl AxisMargins {
-    /// Takes a place, and gives what that showed.
-    fn push(&mut self, now: ShowTime, film: ShowTime, place: f64, limits: [f64; 3]) -> Parts {
-        let seen = self.measure.push(now, place);
-        let shown = [seen.velocity, seen.acceleration, seen.jerk];
-        // What is shown was half a difference ago, and the film went on since.
-        let then = |reading: Reading| {
-            if reading.value == 0.0 { film } else { film.since(now.since(reading.at)) }
-        };
+    /// Keeps what is greater than all before.
+    fn keep(&mut self, shown: [Reading; 3], now: ShowTime, film: ShowTime) {
         for (most, reading) in self.most.iter_mut().zip(shown) {
             if reading.value.abs() > most.0 {
-                *most = (reading.value.abs(), then(reading));
+                *most = (reading.value.abs(), then(reading, now, film));
             }
         }
-        let part = |order: usize| (then(shown[order]), shown[order].value.abs() / limits[order]);
-        [part(0), part(1), part(2)]
     }
+}
+
+/// What was shown as parts of the limits. Nobody asks for it while it is recorded, and it costs nothing there.
+#[inline]
+fn parts(shown: [Reading; 3], now: ShowTime, film: ShowTime, limits: [f64; 3]) -> Parts {
+    std::array::from_fn(|order| (then(shown[order], now, film), shown[order].value.abs() / limits[order]))
+}
+
+/// The show time of what was seen: it was half a difference ago, and the film went on since.
+#[inline]
+fn then(reading: Reading, now: ShowTime, film: ShowTime) -> ShowTime {
+    if reading.value == 0.0 { film } else { film.since(now.since(reading.at)) }
 }

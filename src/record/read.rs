@@ -12,7 +12,7 @@ use super::ack_columns;
 use super::full;
 use super::judging::Judging;
 use super::margins::Margin;
-use super::recording::{ACKS, REPORT, SENT, VERSION};
+use super::recording::{ACKS, END, REPORT, SENT, VERSION};
 use super::sampled::{SeatSample, TickSample};
 use super::seat::RecordedSeat;
 use crate::container::{self, ChannelRecord, Trouble};
@@ -256,7 +256,7 @@ impl Reading<'_, '_> {
                 Some(("kinocue", entries)) if self.contents.begin.is_empty() => {
                     self.contents.begun(entries)?
                 }
-                Some(("kinocue.end", entries)) if body.len() <= KEPT => self.contents.end = owned(entries),
+                Some((END, entries)) if body.len() <= KEPT => self.contents.end = owned(entries),
                 _ => {}
             },
             op::CHANNEL => {

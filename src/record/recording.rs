@@ -23,6 +23,8 @@ pub(super) const VERSION: &str = "2";
 pub(super) const SENT: &str = "/full/sent";
 /// That of what the ack thread took.
 pub(crate) const ACKS: &str = "/full/acks";
+/// The metadata record that a file ends with.
+pub(super) const END: &str = "kinocue.end";
 /// The attachment that has the report.
 pub(super) const REPORT: &str = "report.json";
 /// Samples a second of each seat.
@@ -272,7 +274,7 @@ impl<W: Write + Seek> Recording<W> {
             self.attach(REPORT, "application/json", report)?;
         }
         let end = end.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
-        write_metadata(&mut self.writer, "kinocue.end", end)?;
+        write_metadata(&mut self.writer, END, end)?;
         self.writer.finish()?;
         Ok(self.writer.into_inner())
     }

@@ -5,7 +5,7 @@ use std::io::Read;
 use serde::Serialize;
 
 use super::read::{Contents, ReadError, Told, Wanted, read};
-use super::{Chunk, Falls, Margin, Margins};
+use super::{Chunk, Falls, Margin, Margins, TickSample};
 use crate::plain::escaped;
 use crate::state::State;
 use crate::time::{MonoTime, Rate};
@@ -33,6 +33,50 @@ pub(crate) struct SeatTotals {
     /// When it fell out, and came back.
     #[serde(skip)]
     pub(crate) falls: Falls,
+}
+
+/// A stretch of the film that ran without going back, as the samples tell it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FilmPass {
+    /// The last sample before it.
+    pub(crate) begin: MonoTime,
+    /// Show time of its first sample, s.
+    pub(crate) from_s: f64,
+    /// Show time of its last sample, s.
+    pub(crate) until_s: f64,
+    /// Its ticks may be of so much before the first sample, s.
+    pub(crate) before_s: f64,
+    /// And of so much after the last one, s.
+    pub(crate) after_s: f64,
+}
+
+impl FilmPass {
+    /// Adds the show time of a sample that is as long as that, s; where the film has gone back since the one before, which was `before`,
+    /// that begins the next pass.
+    fn take(passes: &mut Vec<Self>, before: MonoTime, film_s: f64, length_s: f64) {
+        /// What is no seek: a playhead that is led may go back a little.
+        const BACK_S: f64 = 0.25;
+        if let Some(pass) = passes.last_mut() {
+            if film_s > pass.until_s - BACK_S {
+                pass.until_s = pass.until_s.max(film_s);
+                return;
+            }
+            // The ticks of the sample in which it went back are of either pass.
+            pass.after_s = length_s;
+        }
+        passes.push(Self {
+            begin: before,
+            from_s: film_s,
+            until_s: film_s,
+            before_s: length_s,
+            after_s: 0.0,
+        });
+    }
+
+    /// False of a film that stood.
+    pub(crate) fn has_run(&self) -> bool {
+        self.until_s > self.from_s
+    }
 }
 
 /// Something that happened.
@@ -65,6 +109,9 @@ pub(crate) struct Summary {
     pub(crate) late_film_s: f64,
     /// Show times of the first and the last tick while the film ran, s.
     pub(crate) film: Option<(f64, f64)>,
+    /// What the film ran through, pass by pass.
+    #[serde(skip)]
+    pub(crate) passes: Vec<FilmPass>,
     /// What happened.
     pub(crate) happenings: Vec<Happening>,
     /// How much more did.
@@ -77,6 +124,23 @@ impl Summary {
     /// What comes nearest to its limit.
     pub(crate) fn nearest(&self) -> Option<&Margin> {
         self.most.iter().max_by(|one, other| one.part().total_cmp(&other.part()))
+    }
+
+    /// Takes a sample; `last` is when the one before was, and its show time.
+    fn tick(&mut self, at: MonoTime, sample: &TickSample, last: &mut (MonoTime, Option<f64>), rate_hz: f64) {
+        let film_s = sample.film_s;
+        self.ticks += u64::from(sample.ticks);
+        self.missed = self.missed.saturating_add(sample.missed);
+        self.dropped = self.dropped.saturating_add(sample.dropped);
+        if sample.late_max_us > self.late_max_us {
+            (self.late_max_us, self.late_film_s) = (sample.late_max_us, film_s);
+        }
+        let (before, last_film) = std::mem::replace(last, (at, Some(film_s)));
+        if last_film != Some(film_s) && film_s.is_finite() {
+            let (first, last) = self.film.unwrap_or((film_s, film_s));
+            self.film = Some((first.min(film_s), last.max(film_s)));
+            FilmPass::take(&mut self.passes, before, film_s, f64::from(sample.ticks) / rate_hz);
+        }
     }
 
     fn happened(&mut self, contents: &Contents, at: MonoTime, topic: &str, text: &str, film_s: f64) {
@@ -97,7 +161,7 @@ impl Summary {
 pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadError> {
     let mut summary = Summary::default();
     let mut margins: Option<Margins> = None;
-    let (mut film_s, mut last_film) = (0.0, f64::NAN);
+    let mut last = (MonoTime::default(), None);
     let contents = read(input, Wanted::ALL, &mut |contents, at, told| {
         if summary.seats.is_empty() {
             let named =
@@ -115,22 +179,9 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
                     (seat.apart, seat.apart_film_s) = (sample.apart(), sample.film_s);
                 }
             }
-            Told::Tick(sample) => {
-                film_s = sample.film_s;
-                summary.ticks += u64::from(sample.ticks);
-                summary.missed = summary.missed.saturating_add(sample.missed);
-                summary.dropped = summary.dropped.saturating_add(sample.dropped);
-                if sample.late_max_us > summary.late_max_us {
-                    (summary.late_max_us, summary.late_film_s) = (sample.late_max_us, film_s);
-                }
-                if last_film != film_s && film_s.is_finite() {
-                    let (first, last) = summary.film.unwrap_or((film_s, film_s));
-                    summary.film = Some((first.min(film_s), last.max(film_s)));
-                }
-                last_film = film_s;
-            }
+            Told::Tick(sample) => summary.tick(at, &sample, &mut last, contents.rate_hz()),
             Told::State(state) => {
-                summary.happened(contents, at, "/hall", state_word(state), film_s);
+                summary.happened(contents, at, "/hall", state_word(state), last.1.unwrap_or(0.0));
             }
             Told::Chunks(chunks) => {
                 let rate = Rate::from_hz(contents.rate_hz());
@@ -139,6 +190,7 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
             }
             Told::Drains(_) => {}
             Told::Other(topic, data) => {
+                let film_s = last.1.unwrap_or(0.0);
                 summary.happened(contents, at, topic, &String::from_utf8_lossy(data), film_s);
             }
         }

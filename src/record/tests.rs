@@ -83,18 +83,29 @@ pub(crate) fn recorded_falling(
     ticks: impl Iterator<Item = (f64, f64)>,
     standing: impl Fn(u64) -> Option<HealthState>,
 ) -> Vec<u8> {
-    recorded_of(mode, ticks.map(|(wanted, sent)| (wanted, sent, None)), standing)
+    recorded_of(mode, ticks.map(|(wanted, sent)| (wanted, sent, None)), standing, |tick| 10 * tick)
+}
+
+/// The same of ticks at which the film was there, ms.
+pub(crate) fn recorded_filmed(
+    mode: Mode,
+    ticks: impl Iterator<Item = (f64, f64)>,
+    film_ms: impl Fn(u64) -> u64,
+) -> Vec<u8> {
+    recorded_of(mode, ticks.map(|(wanted, sent)| (wanted, sent, None)), |_| None, film_ms)
 }
 
 /// The same of ticks of places sent, at which the seat was measured to be elsewhere.
 pub(crate) fn recorded_measured(ticks: impl Iterator<Item = (f64, Option<f64>)>) -> Vec<u8> {
-    recorded_of(Mode::Sampled, ticks.map(|(sent, measured)| (sent, sent, measured)), |_| None)
+    let ticks = ticks.map(|(sent, measured)| (sent, sent, measured));
+    recorded_of(Mode::Sampled, ticks, |_| None, |tick| 10 * tick)
 }
 
 fn recorded_of(
     mode: Mode,
     ticks: impl Iterator<Item = (f64, f64, Option<f64>)>,
     standing: impl Fn(u64) -> Option<HealthState>,
+    film_ms: impl Fn(u64) -> u64,
 ) -> Vec<u8> {
     let seats = [seat()];
     let (Taps { ticks: mut tap, mut acks }, intake) =
@@ -114,7 +125,7 @@ fn recorded_of(
             tap.asked(asked(wanted));
             tap.frame(0, frame(sent, &mut buf), MonoTime::from_nanos(tick * 10 * MS), Delivery::Sent);
         }
-        tap.tick(&head(tick * 10));
+        tap.tick(&TickHead { film: head(film_ms(tick)).film, ..head(tick * 10) });
         // Every second frame is acked, 2 ms after it was sent.
         if tick % 2 == 0 {
             let fate = Fate::Answered(ReplyCode::Running);

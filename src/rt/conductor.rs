@@ -277,6 +277,7 @@ impl Conductor {
             State::Boot | State::Recovering => Directive::Off,
             State::Homing | State::Parked | State::Armed => Directive::Wait,
             State::Playing(_) if self.film().is_none_or(FilmLead::leads) => Directive::Play,
+            State::Playing(_) if self.film().is_some_and(FilmLead::is_lost_briefly) => Directive::HoldBriefly,
             State::Playing(_) | State::Paused => Directive::Hold,
             State::Stopping | State::Stopped | State::Fault => Directive::Stop,
             State::Parking => Directive::Park,

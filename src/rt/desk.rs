@@ -2,9 +2,10 @@
 //! value wins, so that no flood of changes can hold up the tick thread, or a stop.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use std::sync::atomic::AtomicBool as Signal;
 
 use crate::engine::Mix;
+use crate::published::atomics::{AtomicBool, AtomicI32, AtomicU32, Ordering};
 
 /// What operators set. Anyone may write; the tick thread reads all of it every tick.
 #[derive(Debug)]
@@ -13,7 +14,7 @@ pub struct Desk {
     trim_ms: AtomicI32,
     strips: Box<[Strip]>,
     /// Set by a signal: the program is to end.
-    ended: Arc<AtomicBool>,
+    ended: Arc<Signal>,
 }
 
 /// What is set for one seat.
@@ -50,7 +51,7 @@ impl Desk {
 
     /// The same for a program that a signal ends by that flag.
     #[must_use]
-    pub(crate) fn ended_by(self, signal: Arc<AtomicBool>) -> Self {
+    pub(crate) fn ended_by(self, signal: Arc<Signal>) -> Self {
         Self { ended: signal, ..self }
     }
 
@@ -74,12 +75,14 @@ impl Desk {
     pub fn mix(&self, lane: usize) -> Mix {
         let strip = &self.strips[lane];
         let level = |level: &AtomicU32| f64::from(f32::from_bits(level.load(Ordering::Relaxed)));
+        // First: a seat that is on is on at what was set before that.
+        let on = strip.on.load(Ordering::Acquire);
         Mix {
             motion: level(&strip.motion),
             vibration: level(&strip.vibration),
             effects: strip.effects.load(Ordering::Relaxed),
             switches: strip.switches.load(Ordering::Relaxed),
-            on: strip.on.load(Ordering::Relaxed),
+            on,
         }
     }
 
@@ -87,16 +90,33 @@ impl Desk {
     ///
     /// # Panics
     /// Where there is no such lane.
-    #[expect(clippy::cast_possible_truncation, reason = "a level needs no more than seven digits")]
     pub fn set(&self, lane: usize, mix: Mix) {
+        self.set_levels(lane, mix.motion, mix.vibration);
+        let strip = &self.strips[lane];
+        strip.effects.store(mix.effects, Ordering::Relaxed);
+        strip.switches.store(mix.switches, Ordering::Relaxed);
+        strip.on.store(mix.on, Ordering::Release);
+    }
+
+    /// Sets the levels alone: whatever else is set meanwhile, be it that the seat is off, stays.
+    ///
+    /// # Panics
+    /// Where there is no such lane.
+    #[expect(clippy::cast_possible_truncation, reason = "a level needs no more than seven digits")]
+    pub(crate) fn set_levels(&self, lane: usize, motion: f64, vibration: f64) {
         let strip = &self.strips[lane];
         // Not-a-number is no motion.
         let bits = |level: f64| (level.clamp(0.0, 1.0).max(0.0) as f32).to_bits();
-        strip.motion.store(bits(mix.motion), Ordering::Relaxed);
-        strip.vibration.store(bits(mix.vibration), Ordering::Relaxed);
-        strip.effects.store(mix.effects, Ordering::Relaxed);
-        strip.switches.store(mix.switches, Ordering::Relaxed);
-        strip.on.store(mix.on, Ordering::Relaxed);
+        strip.motion.store(bits(motion), Ordering::Relaxed);
+        strip.vibration.store(bits(vibration), Ordering::Relaxed);
+    }
+
+    /// Leaves a seat out, and all else of it as it is set.
+    ///
+    /// # Panics
+    /// Where there is no such lane.
+    pub(crate) fn leave_out(&self, lane: usize) {
+        self.strips[lane].on.store(false, Ordering::Release);
     }
 
     /// How much later than the film the motion is to be, milliseconds.
@@ -120,31 +140,5 @@ impl Desk {
     pub fn take_stop(&self) -> bool {
         // A plain load in all the ticks in which there is none.
         self.stop.load(Ordering::Acquire) && self.stop.swap(false, Ordering::AcqRel)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_set_is_read_and_levels_stay_within_their_range() {
-        let desk = Desk::new([Mix::FULL; 2].into_iter());
-        assert_eq!((desk.lanes(), desk.mix(1)), (2, Mix::FULL));
-        for (set, read) in [(0.5, 0.5), (7.0, 1.0), (-1.0, 0.0), (f64::NAN, 0.0)] {
-            desk.set(1, Mix { motion: set, vibration: set, effects: 5, switches: 2, on: false });
-            assert_eq!(
-                desk.mix(1),
-                Mix { motion: read, vibration: read, effects: 5, switches: 2, on: false }
-            );
-        }
-        assert_eq!(desk.mix(0), Mix::FULL, "the other seat is as it was");
-    }
-
-    #[test]
-    fn a_stop_is_taken_once() {
-        let desk = Desk::new(std::iter::empty());
-        desk.stop();
-        assert_eq!([desk.take_stop(), desk.take_stop()], [true, false]);
     }
 }

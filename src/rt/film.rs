@@ -86,6 +86,11 @@ impl FilmLead {
         self.chase.state() == ChaseState::Following
     }
 
+    /// Whether seats may follow it again in a moment.
+    pub(super) fn is_lost_briefly(&self) -> bool {
+        self.chase.is_held_briefly()
+    }
+
     /// How often seats have joined it, in all shows.
     pub(super) const fn joins(&self) -> u64 {
         self.joins

@@ -1,7 +1,7 @@
 //! What anyone may look at while a play runs: atomics that the playing threads store, and nobody waits for. Only the times
 //! are behind a lock, which the ack thread and whoever looks share, never the tick thread.
 
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -9,6 +9,7 @@ use super::TickReport;
 use super::table::Row;
 use crate::belief::LaneEvidence;
 use crate::engine::Engine;
+use crate::published::SharedWord;
 use crate::state::{Machine, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker::{Histogram, histogram};
@@ -16,31 +17,32 @@ use crate::tracker::{Histogram, histogram};
 /// Where a hall stands, in one word: its state by its place in [`State::ALL`], whether motion frames leave, and how often a person
 /// has cleared.
 #[derive(Debug, Default)]
-struct HallWord(AtomicU32);
+struct HallWord(SharedWord);
 
-const STATE: u32 = 0xf;
-const MOVING: u32 = 1 << 4;
+const STATE: u64 = 0xf;
+const MOVING: u64 = 1 << 4;
 const CLEARS: u32 = 5;
 
 impl HallWord {
     fn state(&self) -> State {
-        // Acquire: who sees the state sees the homing that it speaks of.
-        let place = self.0.load(Ordering::Acquire) & STATE;
-        State::ALL.get(place as usize).copied().unwrap_or(State::Boot)
+        // Who sees the state sees the homing that it speaks of.
+        let place = usize::try_from(self.0.get() & STATE).unwrap_or(usize::MAX);
+        State::ALL.get(place).copied().unwrap_or(State::Boot)
     }
 
     fn set(&self, state: State, moving: bool, clears: u32) {
         let place = (0..).zip(State::ALL).find_map(|(place, known)| (known == state).then_some(place));
         let moving = if moving { MOVING } else { 0 };
-        self.0.store(place.unwrap_or(0) | moving | clears << CLEARS, Ordering::Release);
+        self.0.put(place.unwrap_or(0) | moving | u64::from(clears) << CLEARS);
     }
 
     fn is_moving(&self) -> bool {
-        self.0.load(Ordering::Acquire) & MOVING != 0
+        self.0.get() & MOVING != 0
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "what was put together is taken apart")]
     fn clears(&self) -> u32 {
-        self.0.load(Ordering::Acquire) >> CLEARS
+        (self.0.get() >> CLEARS) as u32
     }
 }
 
@@ -66,8 +68,8 @@ impl Default for Times {
 pub struct Live {
     times: Mutex<Times>,
     hall: HallWord,
-    parking: AtomicU32,
-    parking_ms: AtomicU32,
+    /// Seats that are brought to park, and below that how long the slowest takes, ms.
+    parking: SharedWord,
     show_ns: AtomicI64,
     /// Twice how far ahead of the film the seats are, and 1; 0 while they follow none.
     film_error_ns: AtomicI64,
@@ -85,9 +87,9 @@ pub struct Live {
     /// Which controllers have said anything at all.
     heard: Box<[AtomicBool]>,
     /// Up to when it has told all that arrived.
-    told_ns: AtomicU64,
+    told_ns: SharedWord,
     /// Since when a reading of all seats is waited for, and whether anybody reads them.
-    wanted_ns: AtomicU64,
+    wanted_ns: SharedWord,
     reads: AtomicBool,
     /// By when it is to have told more.
     due_ns: AtomicU64,
@@ -127,19 +129,19 @@ impl Live {
     /// The instant up to which the ack thread has told all that arrived; the clock's zero before it did.
     #[must_use]
     pub(crate) fn told(&self) -> MonoTime {
-        // Acquire: whoever sees the instant sees the evidence from before it.
-        MonoTime::from_nanos(self.told_ns.load(Ordering::Acquire))
+        // Whoever sees the instant sees the evidence from before it.
+        MonoTime::from_nanos(self.told_ns.get())
     }
 
     /// Since when a reading of all seats is waited for; the clock's zero before one was.
     #[must_use]
     pub(crate) fn wanted(&self) -> MonoTime {
-        MonoTime::from_nanos(self.wanted_ns.load(Ordering::Acquire))
+        MonoTime::from_nanos(self.wanted_ns.get())
     }
 
     /// Asks for a reading of all seats, later than `since`. Tick thread, and whoever leads before anything moves.
     pub(crate) fn want(&self, since: MonoTime) {
-        self.wanted_ns.store(since.as_nanos(), Ordering::Release);
+        self.wanted_ns.put(since.as_nanos());
     }
 
     /// Whether somebody reads seats when that is asked for.
@@ -154,7 +156,7 @@ impl Live {
 
     /// Notes that all that arrived before an instant was told.
     pub(crate) fn on_told(&self, until: MonoTime) {
-        self.told_ns.store(until.as_nanos(), Ordering::Release);
+        self.told_ns.put(until.as_nanos());
     }
 
     /// How often the limiter held a lane back since the program started; 0 where that is not told.
@@ -179,8 +181,8 @@ impl Live {
     /// Seats that are brought to park before the show, and how long the slowest of them takes to get there.
     #[must_use]
     pub(crate) fn parking(&self) -> (u32, Duration) {
-        let ms = self.parking_ms.load(Ordering::Relaxed);
-        (self.parking.load(Ordering::Relaxed), Duration::from_millis(u64::from(ms)))
+        let word = self.parking.get();
+        (u32::try_from(word >> 32).unwrap_or(u32::MAX), Duration::from_millis(word & u64::from(u32::MAX)))
     }
 
     /// Show time after the newest tick.
@@ -275,10 +277,11 @@ impl Live {
         self.times.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes one more seat that is on its slow way to park before the show, `time_ms` long.
+    /// Notes one more seat that is on its slow way to park before the show, `time_ms` long. Only one thread may.
     pub(crate) fn on_parking(&self, time_ms: u32) {
-        self.parking_ms.fetch_max(time_ms, Ordering::Relaxed);
-        self.parking.fetch_add(1, Ordering::Relaxed);
+        let word = self.parking.get();
+        let longest = (word & u64::from(u32::MAX)).max(time_ms.into());
+        self.parking.put(((word >> 32) + 1) << 32 | longest);
     }
 
     /// Notes a state by itself.

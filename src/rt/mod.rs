@@ -6,6 +6,8 @@
 mod acks;
 mod conductor;
 mod desk;
+#[cfg(test)]
+mod desk_tests;
 mod film;
 mod line;
 mod links;

@@ -12,7 +12,7 @@ const AT_A_TIME: usize = 32;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// Its accounts since the program started.
-    pub(crate) counts: Counts,
+    pub counts: Counts,
     /// Latency of its acks, ns; none where there were none.
     pub(crate) ack_ns: Option<AckTimes>,
     /// How its group stands.

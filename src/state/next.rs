@@ -106,6 +106,7 @@ impl Machine {
             State::Playing(PlayMode::Holding) => Next::AwaitJoin,
             State::Playing(PlayMode::Waiting) => match self.cause {
                 Cause::FilmAwaited(HoldCause::Unstable | HoldCause::Asks) => Next::LetJoin,
+                Cause::FilmAwaited(HoldCause::Behind) => Next::AwaitJoin,
                 _ => Next::AwaitFilm,
             },
             State::Playing(_) => Next::Watch,

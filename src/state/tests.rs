@@ -1,4 +1,5 @@
 mod chance;
+mod every_hall;
 mod remedies;
 mod table;
 

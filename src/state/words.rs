@@ -215,7 +215,7 @@ impl Cause {
             Self::Rebooted(_) => ("rebooted", "a controller has rebooted; its position is unknown"),
             Self::GapOver => ("gap-over", "the seats join after a gap"),
             Self::Joined => ("joined", "the seats that take part are on the cue"),
-            Self::Late => ("late", "a frame came more than 50 ms late"),
+            Self::Late => ("late", "this machine sent the seats a frame more than 50 ms late"),
             Self::CueEnded => ("cue-ended", "the cue is over"),
             Self::FilmLeads => ("film-leads", "the seats join the film"),
             Self::FilmAwaited(why) => why.row(),

@@ -324,3 +324,10 @@ fn where_few_frames_ask_the_last_ten_that_did_tell_whether_a_controller_is_lost(
     assert!(lost(9_001) && lost(0));
     assert!(!lost(10_001));
 }
+
+#[test]
+fn nothing_is_known_of_the_number_before_the_first_frame() {
+    let mut tracker = Tracker::new(1, 1);
+    tracker.on_sent(0, FrameNo(1), true, ms(1));
+    assert_eq!((tracker.sent_at(0, FrameNo(1)), tracker.sent_at(0, FrameNo(0))), (Some(ms(1)), None));
+}

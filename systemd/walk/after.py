@@ -72,7 +72,7 @@ def smooth(table, by_port, log):
     worst = {name: max(found[name] for found, _ in judged) for name in judge.LIMITS}
     said = ", ".join(f"{name} {100 * part:.0f} %" for name, part in worst.items())
     table.saw(4, f"all {count} frames of the walk, of their limits at the most", said, all(part <= 1.01 for part in worst.values()))
-    slept = log.count("a frame came more than 50 ms late")
+    slept = log.count("a frame more than 50 ms late")
     cuts = max(cuts for _, cuts in judged)
     table.saw(4, "moves that were cut short", f"{cuts}: one by the crash, {slept} where this machine slept", cuts <= 1 + slept)
 

@@ -15,6 +15,9 @@
 )]
 
 #[expect(dead_code, reason = "shared with tests that need more of it")]
+#[path = "../no_alloc/counting.rs"]
+mod counting;
+#[expect(dead_code, reason = "shared with tests that need more of it")]
 #[allow(unreachable_pub, clippy::unwrap_used, reason = "whatever fails there fails the test")]
 #[path = "../common/http.rs"]
 mod http;
@@ -43,5 +46,6 @@ mod plays;
 mod processes;
 mod rules;
 mod seat;
+mod soak;
 mod town;
 mod words;

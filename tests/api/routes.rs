@@ -9,13 +9,14 @@ use crate::client::{Request, problem};
 use crate::hall::Hall;
 use crate::programs::is_there;
 
-const GETS: [&str; 18] = [
+const GETS: [&str; 19] = [
     "/api/v1/controllers",
     "/api/v1/controllers/{name}",
     "/api/v1/cues",
     "/api/v1/cues/{id}",
     "/api/v1/cues/{id}/curve",
     "/api/v1/events",
+    "/api/v1/history",
     "/api/v1/openapi.json",
     "/api/v1/playlists",
     "/api/v1/recordings",

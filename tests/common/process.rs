@@ -65,6 +65,16 @@ impl Guarded {
         Self::spawn(command.args(args).env("PATH", path), Stdio::null(), Stdio::piped())
     }
 
+    /// The same of another program, which becomes this one.
+    pub(crate) fn start_command(command: &mut Command) -> Self {
+        Self::spawn(command, Stdio::null(), Stdio::piped())
+    }
+
+    /// The number of its process.
+    pub(crate) fn pid(&self) -> u32 {
+        self.child.as_ref().expect("it was not taken").id()
+    }
+
     fn start_with(args: &[&str], stdin: Stdio, stderr: Stdio) -> Self {
         Self::spawn(Command::new(env!("CARGO_BIN_EXE_kinocue")).args(args), stdin, stderr)
     }

@@ -106,6 +106,11 @@ impl Serving {
         Self { guarded, said, reader }
     }
 
+    /// The number of its process.
+    pub(crate) fn pid(&self) -> u32 {
+        self.guarded.pid()
+    }
+
     /// Waits until it has said a line of which `find` makes something.
     pub(crate) fn heard<T>(&self, mut find: impl FnMut(&str) -> Option<T>) -> T {
         let mut so_far = self.said.so_far.lock().unwrap_or_else(PoisonError::into_inner);

@@ -429,6 +429,15 @@ fn a_moment_is_marked_by_a_key_and_its_recording_is_looked_at_seat_by_seat() {
     browser.reads("state", "parked");
     browser.wait("document.querySelectorAll('#recordings tbody tr').length === 2");
     browser.wait("[...document.querySelectorAll('#recordings td')].some((cell) => cell.textContent.startsWith('stopped'))");
+    // The show is in the history, with what its recording says of it, and its picture.
+    browser.wait("/^stopped, .*1 marked/.test(document.querySelector('#history tbody tr td:nth-child(3)')?.textContent)");
+    let margin = text(&browser, "#history tbody tr td:nth-child(4)");
+    assert!(margin.contains("% left, axis ") && margin.contains(" a"), "{margin}");
+    assert!(text(&browser, "#history tbody tr td:nth-child(2)").to_lowercase().contains("swell"));
+    browser.press("#history tbody tr button");
+    browser.wait("document.getElementById('picture').naturalWidth > 500");
+    assert!(text(&browser, "#picture-title").contains("show"));
+    browser.shot("32-history-of-shows");
     // The incident is the newer of the two.
     browser.press("#recordings tbody tr:nth-child(2) button");
     browser.wait("document.getElementById('picture').naturalWidth > 500");

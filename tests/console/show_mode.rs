@@ -13,8 +13,17 @@ const REACHED: &str = "
     return all.filter((one) => one.checkVisibility({ visibilityProperty: true }) && !one.closest('[inert]') && !one.disabled)
       .map((one) => one.id || one.textContent).filter((name) => !name.startsWith('Skip'));";
 
+/// Two fingers touch the lock and leave it: how many long presses are still waited for.
+const TWO_FINGERS: &str = "
+    const [lock, set, clear, waits] = [document.getElementById('lock'), setTimeout, clearTimeout, new Set()];
+    window.setTimeout = (what, ms) => { const id = set(what, ms); if (ms === 1500) waits.add(id); return id; };
+    window.clearTimeout = (id) => { waits.delete(id); clear(id); };
+    for (const kind of ['pointerdown', 'pointerdown', 'pointerup', 'pointerup']) lock.dispatchEvent(new PointerEvent(kind));
+    [window.setTimeout, window.clearTimeout] = [set, clear];
+    return waits.size;";
+
 #[test]
-fn a_locked_page_leaves_stop_pause_park_and_go_until_the_lock_is_held() {
+fn a_locked_page_leaves_stop_pause_resume_park_and_go_until_the_lock_is_held() {
     let Some(browser) = Browser::start() else { return };
     let hall = Hall::open();
     enter(&browser, &hall);
@@ -42,6 +51,9 @@ fn a_locked_page_leaves_stop_pause_park_and_go_until_the_lock_is_held() {
 
     browser.press("#pause");
     browser.reads("state", "paused");
+    browser.wait("document.getElementById('resume').disabled === false");
+    assert_eq!(browser.eval(REACHED), json!(["lock", "resume", "park", "stop"]), "paused");
+    assert_eq!(browser.eval(TWO_FINGERS), json!(0), "no press goes on when all fingers are off");
     browser.touch("#lock");
     browser.wait("!document.documentElement.hasAttribute('data-locked')");
     browser.let_go();

@@ -79,7 +79,12 @@ impl Hall {
     pub(crate) fn serve_alone(&mut self) {
         let nothing = self.path("cues");
         let start = |args: &[&str]| Guarded::start_with_path(args, &nothing);
-        self.serving = Some(Serving::start_by(self.dir.path(), start));
+        self.serves_by(Serving::start_by(self.dir.path(), start));
+    }
+
+    /// The daemon was started so.
+    pub(crate) fn serves_by(&mut self, serving: Serving) {
+        self.serving = Some(serving);
         self.begins();
     }
 

@@ -45,3 +45,36 @@ fn a_name_that_is_a_path_names_nothing() {
     names.retain(|name| name.to_str().unwrap().ends_with(".csv"));
     assert!(names.is_empty(), "{names:?}");
 }
+
+#[test]
+fn a_shell_completes_what_the_running_service_knows_and_nothing_where_none_runs() {
+    let hall = Hall::open();
+    let bash = hall.done(&["completions", "bash"]).stdout;
+    hall.write("kinocue.bash", &bash);
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_kinocue")).parent().unwrap();
+    let completed = |line: &str, socket: &str| {
+        let script = format!(
+            "source {}; COMP_WORDS=({line}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); current=${{COMP_WORDS[COMP_CWORD]}}; \
+             _kinocue_known kinocue \"$current\" \"${{COMP_WORDS[COMP_CWORD-1]}}\"; echo ${{COMPREPLY[@]}}",
+            hall.path("kinocue.bash").display()
+        );
+        let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
+        let mut bash = std::process::Command::new("bash");
+        bash.args(["--norc", "-c", &script]).env("PATH", path).env("KINOCUE_SOCKET", hall.path(socket));
+        let output = bash.output().expect("bash runs");
+        String::from_utf8(output.stdout).unwrap().trim().to_owned()
+    };
+    let cases = [
+        ("kinocue load r", "ride"),
+        ("kinocue load ''", "night ride"),
+        ("kinocue disable A", "A1 A2"),
+        ("kinocue preset k", "kids"),
+        ("kinocue effects off wa", "water"),
+    ];
+    for (line, wanted) in cases {
+        assert_eq!(completed(line, "control.sock"), wanted, "{line}");
+        assert_eq!(completed(line, "none.sock"), "", "{line}");
+    }
+    assert!(completed("kinocue load --s", "control.sock").contains("--socket"), "options as ever");
+    assert!(completed("kinocue pre", "control.sock").contains("preset"), "commands as ever");
+}

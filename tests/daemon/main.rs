@@ -25,12 +25,15 @@ mod statuses;
 mod wav;
 
 mod begin;
+mod buttons;
+mod disks;
 mod drives;
 mod film;
 mod hall;
 mod lasting;
 mod library;
 mod mbox;
+mod notify;
 mod player;
 mod playlist;
 mod recordings;

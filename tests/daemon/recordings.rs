@@ -11,7 +11,7 @@ use mcap::{MessageStream, Summary};
 use serde_json::{Value, json};
 
 use crate::hall::Hall;
-use crate::http::Request;
+use crate::http::{Request, problem};
 
 /// A recording as a viewer reads it.
 struct Recorded {
@@ -156,6 +156,33 @@ fn a_marked_moment_is_kept_with_what_was_before_it_at_full_rate() {
     assert!(recorded.full > 10, "{} blocks", recorded.full);
     assert!(hall.status()["state"] == "playing", "it plays on");
     assert_eq!(hall.status()["record"]["incidents"]["mark"], 1);
+}
+
+#[test]
+fn of_marks_without_end_few_are_kept_and_the_rest_is_counted_in_the_answers_and_in_the_file() {
+    const ASKED: u64 = 300;
+    let hall = Hall::open();
+    let mut kept = 0;
+    for _ in 0..ASKED {
+        let reply = Request::new("POST", "/api/v1/record/mark").send(&hall.socket());
+        if reply.status == 200 {
+            kept += 1;
+            continue;
+        }
+        assert_eq!(reply.problem(), problem(429, "busy"));
+        assert!(reply.text().contains("mark again in"), "{}", reply.text());
+    }
+    assert!((1..ASKED / 2).contains(&kept), "{kept} of {ASKED}");
+    let recorded = Recorded::read(&closed(&hall, "-incident-mark"));
+    assert_eq!(recorded.of("/mark").count() as u64, kept);
+    let more = recorded.of("/event").filter(|(.., event)| event["kind"] == "marks");
+    let count =
+        |text: &str| text.split(' ').nth(1).and_then(|word| word.parse::<u64>().ok()).expect("a count");
+    let more: u64 = more.map(|(.., event)| count(event["text"].as_str().unwrap())).sum();
+    assert_eq!(more, ASKED - kept);
+    assert_eq!(hall.status()["record"]["more_marks"], more);
+    // Nor does what was asked fill it: repeats are told once in ten seconds.
+    assert!(recorded.of("/action").count() < 30, "{}", recorded.of("/action").count());
 }
 
 #[test]

@@ -96,6 +96,31 @@ fn a_configuration_whose_port_is_taken_is_given_up_and_the_hall_goes_on_with_the
     assert_eq!(hall.end().motion(), 0);
 }
 
+#[test]
+fn a_reload_is_over_once_the_hall_has_opened_with_the_new_configuration_or_has_the_old_one_again() {
+    let hall = Hall::open();
+    for name in ["Hall 2", "Hall 3"] {
+        hall.rewrite(|config| {
+            let line = |line: &str| {
+                if line.starts_with("name = \"Hall") { format!("name = \"{name}\"") } else { line.to_owned() }
+            };
+            config.lines().map(line).collect::<Vec<_>>().join("\n") + "\n"
+        });
+        let run = hall.done(&["reload"]);
+        assert!(run.stderr.contains("has opened with this configuration"), "{run:?}");
+        let status = hall.status();
+        assert_eq!((&status["hall"], &status["state"]), (&name.into(), &"parked".into()));
+    }
+    let held = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let port = held.local_addr().unwrap().to_string();
+    hall.rewrite(|config| config.replace("Hall 3", "Hall 4").replace("127.0.0.1:0", &port));
+    let run = hall.run(&["reload"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(run.stderr.contains("has the old one") && run.stderr.contains(&port), "{run:?}");
+    assert_eq!(hall.status()["hall"], "Hall 3");
+    hall.end();
+}
+
 /// A hall whose seats stand up, stopped in mid-show, and which has read its configuration anew, changed like that.
 fn reloaded_up(change: fn(String) -> String) -> Hall {
     let hall = Hall::open();

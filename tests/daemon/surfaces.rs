@@ -80,6 +80,40 @@ fn a_token_does_what_its_role_may_and_no_more() {
     assert_eq!(hall.end().motion(), 0);
 }
 
+/// A token of that text, in a configuration.
+fn token(name: &str) -> String {
+    let sha256: String = Sha256::digest(name).iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("[[api.token]]\nname = \"{name}\"\nrole = \"operate\"\nsha256 = \"{sha256}\"\n")
+}
+
+#[test]
+fn a_token_is_added_and_another_revoked_by_a_reload_and_who_watches_with_that_one_is_cut_off() {
+    let hall = Hall::open_with(|config| config + "[api]\nlisten = [\"127.0.0.1:0\"]\n" + &token("old"));
+    let address: SocketAddr =
+        hall.serving().heard(|line| line.split("http://").nth(1)?.split('/').next()?.parse().ok());
+    let may = |token: &str| {
+        let reply = Request::new("GET", "/api/v1/who").token(token).send(&To::Tcp(address));
+        reply.status == 200
+    };
+    assert_eq!((may("old"), may("new")), (true, false));
+    let mut watches = TcpStream::connect(address).unwrap();
+    watches.set_read_timeout(Some(PATIENCE)).unwrap();
+    let head = format!("GET /api/v1/events HTTP/1.0\r\nHost: {address}\r\nAuthorization: Bearer old\r\n\r\n");
+    watches.write_all(head.as_bytes()).unwrap();
+    let mut lines = BufReader::new(watches).lines();
+    assert!(lines.next().unwrap().unwrap().contains(" 200 "));
+    hall.rewrite(|config| config.replace(&token("old"), &token("new")));
+    hall.done(&["reload"]);
+    assert_eq!((may("old"), may("new")), (false, true));
+    assert!(lines.all(|line| line.is_ok()), "it ends");
+    let restart = |status: &Value| status["warnings"].to_string().contains("restart the service");
+    assert!(!restart(&hall.status()), "tokens need none");
+    hall.rewrite(|config| config + "[osc]\nlisten = \"127.0.0.1:1\"\nsources = [\"127.0.0.1\"]\n");
+    hall.done(&["reload"]);
+    hall.wait(|status| status["warnings"].to_string().contains("[osc] has changed; restart the service"));
+    hall.end();
+}
+
 /// Show-control gear that speaks OSC.
 struct Gear {
     socket: UdpSocket,

@@ -200,7 +200,7 @@ fn another_machine_that_drives_a_seat_at_rest_is_a_fault_and_the_seat_is_homed_b
     assert_eq!(hall.run(&["go"]).code, Some(75));
     let excluded = hall.wait(|status| [0, 1].map(|one| health(status, one)) == ["excluded"; 2]);
     let remedy = warning(&excluded, "A1").expect("it is told")["remedy"].as_str().expect("text");
-    assert!(remedy.starts_with("stop the other machine"), "{remedy}");
+    assert_eq!(remedy, "stop the other machine; then clear, and home it with nobody on the seat");
     assert!(rival.wait().expect("it is ours").success());
     assert_eq!(excluded["controllers"][0]["sent"], 0, "nothing was sent from here");
 

@@ -22,7 +22,7 @@ use kinocue::harness::time::{MonoTime, ShowTime, Tick};
 use kinocue::wire::FrameNo;
 use stage::{CONTROLLERS, Deed, Outcome, PERIOD, play};
 
-const NOTHING: Calls = Calls { allocations: 0, frees: 0 };
+const NOTHING: Calls = Calls { allocations: 0, frees: 0, held: 0 };
 
 /// Plays ten thousand ticks with that spin, in which `missed` are missed.
 fn assert_quiet(spin: Duration, missed: u64) {
@@ -148,7 +148,7 @@ fn refusal(news: &News) -> Option<Why> {
 fn the_allocator_counts_its_own_thread_and_no_other() {
     let before = Calls::so_far();
     drop(std::hint::black_box(Box::new(1)));
-    assert_eq!(Calls::so_far().since(before), Calls { allocations: 1, frees: 1 });
+    assert_eq!(Calls::so_far().since(before), Calls { allocations: 1, frees: 1, held: 0 });
     let there = thread::spawn(|| {
         let before = Calls::so_far();
         let mut grown = std::hint::black_box(vec![1_u8; 1]);
@@ -160,7 +160,7 @@ fn the_allocator_counts_its_own_thread_and_no_other() {
         thread::yield_now();
     }
     assert_eq!(Calls::so_far(), here);
-    assert_eq!(there.join().unwrap(), Calls { allocations: 2, frees: 1 });
+    assert_eq!(there.join().unwrap(), Calls { allocations: 2, frees: 1, held: 101 });
 }
 
 #[test]
@@ -188,7 +188,7 @@ fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_s
         let _refused = hall.request(Transition::Go, now);
         hall.tick(now);
     }
-    assert_eq!(Calls::so_far().since(before), Calls { allocations: 0, frees: 0 });
+    assert_eq!(Calls::so_far().since(before), Calls { allocations: 0, frees: 0, held: 0 });
     assert!(notices > 2, "groups were lost");
 }
 

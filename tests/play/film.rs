@@ -52,6 +52,13 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
         run.stderr
     );
     assert!(seen.rest_in_park());
+    // While they wait and join, too, it is said where the film is, and who says so.
+    for state in ["waiting: ", "joining: the seats join the film", "playing: "] {
+        let lines = || run.stderr.lines().filter(|line| line.starts_with(&format!("kinocue: {state}")));
+        let says = |line: &str| line.contains("; film ") && line.contains(" by ltc:/");
+        assert!(lines().count() > 0 && lines().all(says), "{state}: {}", run.stderr);
+    }
+    assert!(run.stderr.contains(" the cue by ltc:/"), "{}", run.stderr);
     let said = |what: &str| run.stderr.find(what).unwrap_or_else(|| panic!("{what}: {}", run.stderr));
     assert!(
         said("joining: the seats join the film") < said("playing: the seats that take part are on the cue")
@@ -239,7 +246,7 @@ fn a_recording_that_is_none_of_16_bits_is_refused_with_what_it_is_and_what_to_do
     wav[34] = 24;
     std::fs::write(&reel, wav).expect("it can be written");
     let run = Playing::start(&rise(&folder, 4), &sim.to(), &["--chase", &format!("ltc:{reel}")]).finish();
-    assert_eq!(run.code, Some(71), "{run:?}");
+    assert_eq!(run.code, Some(65), "{run:?}");
     for said in ["reel.wav cannot be read", "uncompressed sound of 24 bits", "-c:a pcm_s16le"] {
         assert!(run.stderr.contains(said), "{said}: {run:?}");
     }
@@ -252,13 +259,14 @@ fn a_source_that_is_none_is_refused_and_so_is_what_a_film_cannot_be_led_with() {
     let cue = rise(&folder, 2);
     let refused = [
         (&["--chase", "tape:1"][..], 64, "is not a source; use mpv:SOCKET"),
-        (&["--chase", "ltc:nothing.wav"], 71, "nothing.wav cannot be opened"),
+        (&["--chase", "mpv:/s", "--chase", "ltc:-", "--chase", "mpv:/s"], 64, "mpv:/s is named twice"),
+        (&["--chase", "ltc:nothing.wav"], 66, "nothing.wav cannot be opened: No such file"),
         (&["--chase", "ltc:-", "--start", "1"], 64, "cannot be used with"),
         (&["--chase", "ltc:-", "--film-fps", "26"], 64, "is not a frame rate; take"),
         (&["--chase", "ltc:-", "--film-fps", "25", "--tc-start", "01:00:00:25"], 64, "outside 0..=24"),
         (&["--film-fps", "25"], 64, "--chase"),
         (&["--chase", "artnet:anybody"], 64, "has no sender"),
-        (&["--chase", "mtc:/nowhere/midi"], 71, "/nowhere/midi cannot be opened"),
+        (&["--chase", "mtc:/nowhere/midi"], 66, "ls /dev/snd/midi*"),
         (&["--at", "soon"], 64, "is not a time; write"),
         (&["--at", "19:00", "--chase", "ltc:-"], 64, "cannot be used with"),
         (&["--at", "19:00,max_error=0ms"], 71, "have chrony or"),
@@ -268,6 +276,87 @@ fn a_source_that_is_none_is_refused_and_so_is_what_a_film_cannot_be_led_with() {
         assert_eq!(run.code, Some(code), "{args:?}: {}", run.stderr);
         assert!(run.stderr.contains(says), "{args:?}: {}", run.stderr);
     }
+}
+
+#[test]
+fn a_source_that_is_no_input_ends_the_play_with_what_is_wrong_and_what_to_do_before_anybody_moves() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let cue = rise(&folder, 2);
+    let path = |name: &str, octets: &[u8]| folder.write(name, octets).to_str().expect("text").to_owned();
+    let (text, empty) = (path("notes.txt", b"01:00:00:00 reel one"), path("empty.wav", b""));
+    let deaf = path("deaf.wav", &film_sound(1));
+    let place = folder.path("").to_str().expect("text").to_owned();
+    let refused = [
+        (format!("ltc:{text}"), 65, "notes.txt cannot be read: it is not a WAV file; make one of it"),
+        (format!("ltc:{empty}"), 65, "empty.wav cannot be read: it is empty; make it again"),
+        (format!("ltc:{place}"), 66, "it is not a file; give a WAV file"),
+        (
+            format!("ltc:fifo:{text}"),
+            66,
+            "notes.txt cannot be opened: it is not a FIFO; make one with mkfifo",
+        ),
+        (format!("ltc:fifo:{place}none"), 66, "No such file or directory (os error 2); make one with mkfifo"),
+        (
+            format!("ltc:relay:{text}"),
+            66,
+            "it is not a socket; give the path of a socket of `kinocue sync relay`",
+        ),
+        (
+            format!("mtc:relay:{text}"),
+            66,
+            "it is not a socket; give the path of a socket of `kinocue sync relay`",
+        ),
+        (
+            format!("mtc:{text}"),
+            66,
+            "it is neither a raw MIDI device nor a FIFO; see with `ls /dev/snd/midi*`",
+        ),
+        (format!("mpv:{text}"), 66, "it is not a socket; give the path that mpv has as --input-ipc-server"),
+        (
+            format!("sound:-,index={text}"),
+            65,
+            "notes.txt cannot be used: this is not an index of a film's sound",
+        ),
+        (
+            format!("sound:-,index={place}"),
+            66,
+            "it is not a file; make the index with `kinocue sync index FILM",
+        ),
+        (format!("sound:-,index={place}none"), 66, "No such file or directory (os error 2); make the index"),
+        (format!("ltc:{deaf}"), 65, "deaf.wav: ended, and nothing of a film was heard in it; see with"),
+        ("ltc:pipe:true".to_owned(), 65, "ltc:pipe: ended, and nothing of a film was heard in it; see with"),
+    ];
+    for (source, code, says) in refused {
+        let run = Playing::start(&cue, &sim.to(), &["--chase", &source]).finish();
+        assert_eq!(run.code, Some(code), "{source}: {}", run.stderr);
+        assert!(run.stderr.contains(says), "{source}: {}", run.stderr);
+    }
+    assert!(sim.end().rows.iter().all(|row| row.commanded[0] == 0), "nobody was moved");
+}
+
+#[test]
+fn what_may_still_come_is_waited_for_and_why_it_is_not_there_is_said() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let cue = rise(&folder, 2);
+    let place = folder.path("none.sock").to_str().expect("text").to_owned();
+    for (source, says) in [
+        (format!("mpv:{place}"), "no player is there; start mpv with --input-ipc-server="),
+        (
+            format!("ltc:relay:{place}"),
+            "no relay is there; start kinocue-sync.service, or `kinocue sync relay`",
+        ),
+        (
+            "ltc:pipe:exit 3".to_owned(),
+            "its command has failed (exit status: 3), and is started again each second",
+        ),
+    ] {
+        let mut playing = Playing::start(&cue, &sim.to(), &["--chase", &source]);
+        playing.wait_for(says);
+        playing.signal(Signal::INT);
+        let run = playing.finish();
+        assert_eq!(run.code, Some(0), "{source}: {}", run.stderr);
+    }
+    assert!(sim.end().rows.iter().all(|row| row.commanded[0] == 0), "nobody was moved");
 }
 
 /// Addresses of this machine that no other test and no other run of them has.

@@ -42,7 +42,9 @@ const ROWS: &[Row] = &[
     // Two more for columns of bits, which are written and read by the same steps, and for a lag that is sought as differences are.
     // One more for beats that the kernel did not take, a row beside those that went out.
     // 31 more with cues that are edited on the command line, codes and words of the status in rows, and units on a bus; not taken apart yet.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 100.0, 43.0),
+    // Two more for clamps and marks in a list of counts.
+    // One more: an axis that is pushed takes the way of one outside of its stroke through health and its recordings.
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 101.0, 43.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 8.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
@@ -65,15 +67,21 @@ const ROWS: &[Row] = &[
     // 30 more for what real links found: beats that are not taken, a descriptor for a stop, what to do where too many files are open.
     // 2,200 more for cues that are edited, rehearsals and one exit code for one thing, SIXpack 2 units on a CAN bus, codes and margins for a page in six
     // languages, doors for what is fuzzed, and what a newcomer and two attacks found.
-    ("lines of code", counts::lines_of_code, Less, 88_280.0, 39_800.0),
+    // 180 more for sources of a film that are refused with a remedy, where a film is while its seats join, and doors for what reads films.
+    // 540 more for a history of shows, passes of a film in pictures, a budget of marks, and datagrams that name nobody.
+    // 330 more for seats that are pushed, told with where, and off park in preflight, noise and units with one number told apart, targets that make up gently
+    // for a host that was held up, and units that are known by their serial numbers.
+    ("lines of code", counts::lines_of_code, Less, 88_791.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
     // Three more that tests make or ask: frames that were withdrawn, acks of links, what the hall lets a film do.
     // Four more: the doors that a fuzzer and tests go through.
-    ("public items and fields", counts::public_items, Less, 1_234.0, 400.0),
+    // One more: where the film is in a tick that a bench makes.
+    // One more: an axis that is pushed, in why a seat stands as it does.
+    ("public items and fields", counts::public_items, Less, 1_235.0, 400.0),
     // A table: a row for each reason why a seat stands as it does.
-    ("lines of the longest function", counts::longest_function, Less, 60.0, 48.0),
+    ("lines of the longest function", counts::longest_function, Less, 61.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 466.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 3.4, 3.0),
     ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),

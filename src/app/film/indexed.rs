@@ -1,6 +1,6 @@
 //! Indexes of films' sound: made of a WAV file, or of any film by way of mpv; and read for a show.
 
-use std::fs::File;
+use std::fs::{File, FileType};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -8,14 +8,20 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::FilmError;
 use super::riff::{Channels, RiffFault, SampleStream};
+use super::{FilmError, WantedFile};
 use crate::film::sound::{IndexFault, IndexMaker, MOST_OCTETS, SoundIndex};
 
 /// What of a film is read at a time.
 const CHUNK: usize = 64 * 1024;
 /// A film that is shorter is not found in time.
 const LEAST_S: f64 = 5.0;
+
+const INDEX: WantedFile = WantedFile {
+    is_one: FileType::is_file,
+    other: "it is not a file",
+    remedy: "make the index with `kinocue sync index FILM -o FILE.kidx`",
+};
 
 /// Why a film cannot be indexed.
 #[derive(Debug, thiserror::Error)]
@@ -137,6 +143,7 @@ pub(super) fn read_all(paths: &[PathBuf]) -> Result<Arc<[SoundIndex]>, FilmError
 }
 
 fn read(path: &Path) -> Result<SoundIndex, FilmError> {
+    INDEX.check(path)?;
     let failed = |source| FilmError::Open { what: path.display().to_string(), source };
     let mut octets = Vec::new();
     File::open(path).and_then(|file| file.take(MOST_OCTETS + 1).read_to_end(&mut octets)).map_err(failed)?;

@@ -7,10 +7,12 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 
 use super::relayed::{BLOCK, RelayedRead};
-use super::{LeftRead, WordSink};
+use super::{LeftRead, WantedFile, WordSink};
 use crate::film::source::LineKind;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
+
+pub(super) const RELAY: WantedFile = WantedFile::socket("give the path of a socket of `kinocue sync relay`");
 
 /// Takes what is read of a line, from its begin to its end, and when that was read.
 pub(super) trait LineTaker {
@@ -42,12 +44,20 @@ impl ByteLine {
 
     /// Reads what a relay sends of its device, with the instants at which it was read there.
     pub(super) fn read_relayed(&self, socket: &Path, kind: LineKind) -> io::Result<()> {
-        let stream = LeftRead::new(UnixStream::connect(socket)?, &self.told);
+        let stream = UnixStream::connect(socket).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::ConnectionRefused => {
+                let why = "no relay is there; start kinocue-sync.service, or `kinocue sync relay`";
+                io::Error::new(error.kind(), why)
+            }
+            _ => error,
+        })?;
+        let stream = LeftRead::new(stream, &self.told);
         let silent =
             format!("{} accepts and says nothing; restart the service that has the line", socket.display());
         self.told.note(|notes| notes.trouble = Some(silent));
         let mut relayed = RelayedRead::begin(stream, kind)?;
-        let mut taker = self.begin();
+        self.told.note(|notes| notes.trouble = None);
+        let mut taker = (self.open)();
         while let Some((bytes, at)) = relayed.next()? {
             taker.take(bytes, at)?;
         }
@@ -55,17 +65,17 @@ impl ByteLine {
     }
 
     fn read_left(&self, mut stream: impl Read) -> io::Result<()> {
-        let (mut taker, mut bytes) = (self.begin(), [0; BLOCK]);
+        let (mut taker, mut bytes, mut is_heard) = ((self.open)(), [0; BLOCK], false);
         loop {
-            match stream.read(&mut bytes)? {
-                0 => return Ok(()),
-                count => taker.take(&bytes[..count], Monotonic.now())?,
+            let count = stream.read(&mut bytes)?;
+            if count == 0 {
+                return Ok(());
             }
+            // What was wrong before is so until something comes: a command that fails is started again and again.
+            if !std::mem::replace(&mut is_heard, true) {
+                self.told.note(|notes| notes.trouble = None);
+            }
+            taker.take(&bytes[..count], Monotonic.now())?;
         }
-    }
-
-    fn begin(&self) -> Box<dyn LineTaker> {
-        self.told.note(|notes| notes.trouble = None);
-        (self.open)()
     }
 }

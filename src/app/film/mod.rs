@@ -3,6 +3,8 @@
 
 mod clock;
 mod datagrams;
+#[cfg(feature = "harness")]
+pub(crate) mod doors;
 mod hall;
 mod heard;
 mod indexed;
@@ -22,7 +24,9 @@ mod table;
 mod tests;
 mod told;
 
+use std::fs::FileType;
 use std::io;
+use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -64,6 +68,16 @@ pub(crate) enum FilmError {
         what: String,
         /// Why.
         source: io::Error,
+    },
+    /// A file of that name is not there, or is something else.
+    #[error("{} cannot be opened: {why}; {remedy}", path.display())]
+    NoInput {
+        /// Which.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A file is none that can be read as sound.
     #[error("{what} cannot be read")]
@@ -111,6 +125,9 @@ pub(crate) enum FilmError {
     /// There are too many of them.
     #[error("{0} sources are too many; {MOST_SOURCES} can be ranked")]
     Many(usize),
+    /// Two of them are one.
+    #[error("{0} is named twice; name each source once, the best first")]
+    Twice(String),
     /// There is no line that could be relayed.
     #[error(
         "{0} is not a line that a relay reads; take ltc:alsa:DEVICE, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:- or mtc:DEVICE"
@@ -119,6 +136,42 @@ pub(crate) enum FilmError {
     /// The system starts no further thread.
     #[error("no thread could be started; allow more with `ulimit -u`")]
     Thread(#[from] io::Error),
+}
+
+/// What a path of a source has to be.
+struct WantedFile {
+    is_one: fn(&FileType) -> bool,
+    /// What one is that is not.
+    other: &'static str,
+    remedy: &'static str,
+}
+
+impl WantedFile {
+    /// A socket at which somebody may listen later.
+    const fn socket(remedy: &'static str) -> Self {
+        Self { is_one: FileType::is_socket, other: "it is not a socket", remedy }
+    }
+
+    /// That path, if it is one: said before anything waits for what it brings.
+    fn check(&self, path: &Path) -> Result<PathBuf, FilmError> {
+        let (path, remedy) = (path.to_path_buf(), self.remedy);
+        let why = match path.metadata() {
+            Ok(found) if (self.is_one)(&found.file_type()) => return Ok(path),
+            Ok(_) => self.other.to_owned(),
+            Err(error) => error.to_string(),
+        };
+        Err(FilmError::NoInput { path, why, remedy })
+    }
+
+    /// The same of what may come later.
+    fn check_if_there(&self, path: &Path) -> Result<PathBuf, FilmError> {
+        if path.exists() { self.check(path) } else { Ok(path.to_path_buf()) }
+    }
+}
+
+/// What bytes come from that are read as they come.
+fn is_line(kind: &FileType) -> bool {
+    kind.is_fifo() || kind.is_char_device()
 }
 
 /// What holds for all sources of a show.
@@ -194,6 +247,10 @@ impl FilmReader {
         if sources.len() > MOST_SOURCES {
             return Err(FilmError::Many(sources.len()));
         }
+        let is_named = |place: usize| sources[..place].iter().any(|one| one.source == sources[place].source);
+        if let Some(twice) = (1..sources.len()).find(|place| is_named(*place)) {
+            return Err(FilmError::Twice(sources[twice].source.to_string()));
+        }
         let (to, heard) = sync_channel(WAITING);
         let notes: Vec<Notes> = sources.iter().map(SourceNotes::shared).collect();
         let ranking = Ranking::new(sources, &notes, rules);
@@ -242,7 +299,7 @@ fn read(args: &FilmArgs, told: WordSink, child: ChildSlot) -> Result<(), FilmErr
             let films = Listening::Sound(indexed::read_all(&sound.indexes)?);
             sound_line::start_reading(&sound.line, films, args, told, &child)
         }
-        FilmSource::Mpv(socket) => Ok(mpv::start_reading(socket, args, told)?),
+        FilmSource::Mpv(socket) => mpv::start_reading(socket, args, told),
         FilmSource::Mtc(device) => mtc::start_reading(device, args, told),
         FilmSource::ArtNet(sender) => network::hear_artnet(sender, args, told),
         FilmSource::Osc(sender) => network::hear_osc(sender, args, told),

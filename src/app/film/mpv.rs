@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::left::{LOOK, brings};
 use super::told::AGAIN;
-use super::{WordSink, start};
+use super::{FilmError, WantedFile, WordSink, start};
 use crate::film::mpv::MpvClient;
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::source::FilmArgs;
@@ -14,9 +14,11 @@ use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
 
 /// Begins to ask the player at that socket; the cue begins where its film is at the begin of those arguments.
-pub(super) fn start_reading(socket: &Path, args: &FilmArgs, told: WordSink) -> io::Result<()> {
-    let player = MpvPlayer { socket: socket.to_path_buf(), begin: args.begin(), args: args.clone(), told };
-    start("mpv", move || while player.talk() {})
+pub(super) fn start_reading(socket: &Path, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
+    let wanted = WantedFile::socket("give the path that mpv has as --input-ipc-server");
+    let socket = wanted.check_if_there(socket)?;
+    let player = MpvPlayer { socket, begin: args.begin(), args: args.clone(), told };
+    Ok(start("mpv", move || while player.talk() {})?)
 }
 
 struct MpvPlayer {

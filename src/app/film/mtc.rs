@@ -1,14 +1,18 @@
 //! MIDI timecode from a raw device, a FIFO or a relay: bytes as they come, and when they were read, into what they say of the film.
 
 use std::io;
-use std::os::unix::fs::FileTypeExt as _;
-use std::path::Path;
 
-use super::line::{ByteLine, LineTaker};
-use super::{FilmError, WordSink, start};
+use super::line::{ByteLine, LineTaker, RELAY};
+use super::{FilmError, WantedFile, WordSink, is_line, start};
 use crate::film::mtc::MtcReader;
 use crate::film::source::{FilmArgs, LineKind, MtcInput};
 use crate::time::MonoTime;
+
+const DEVICE: WantedFile = WantedFile {
+    is_one: is_line,
+    other: "it is neither a raw MIDI device nor a FIFO",
+    remedy: "see with `ls /dev/snd/midi*` which devices there are",
+};
 
 /// Begins to read a line of MIDI as timecode.
 pub(super) fn start_reading(input: &MtcInput, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
@@ -19,24 +23,17 @@ pub(super) fn start_reading(input: &MtcInput, args: &FilmArgs, told: WordSink) -
 
 /// Begins to read a line of MIDI; a device that is pulled out may come back, a FIFO have another writer.
 pub(super) fn start_line(input: &MtcInput, line: ByteLine) -> Result<(), FilmError> {
-    match input.clone() {
+    match input {
         MtcInput::Relay(socket) => {
+            let socket = RELAY.check_if_there(socket)?;
             start("mtc", move || while line.told.again(line.read_relayed(&socket, LineKind::Mtc)) {})?;
         }
         MtcInput::Device(path) => {
-            check(&path).map_err(|source| FilmError::Open { what: path.display().to_string(), source })?;
+            let path = DEVICE.check(path)?;
             start("mtc", move || while line.told.again(line.read_at(&path)) {})?;
         }
     }
     Ok(())
-}
-
-fn check(path: &Path) -> io::Result<()> {
-    let kind = path.metadata()?.file_type();
-    if kind.is_fifo() || kind.is_char_device() {
-        return Ok(());
-    }
-    Err(io::Error::new(io::ErrorKind::InvalidInput, "it is neither a raw MIDI device nor a FIFO"))
 }
 
 /// Hears timecode in the bytes of a line.

@@ -80,7 +80,7 @@ pub(super) fn hear_osc(sender: &NamedSender, args: &FilmArgs, told: WordSink) ->
 }
 
 /// The position of a datagram, if it is one message that tells of one.
-fn osc_position(bytes: &[u8]) -> Option<FilmPosition> {
+pub(super) fn osc_position(bytes: &[u8]) -> Option<FilmPosition> {
     // A bundle is not looked into: it says when something is to be done, not when it was so.
     let Ok((_, OscPacket::Message(message))) = decoder::decode_udp(bytes) else { return None };
     (message.addr == ADDRESS).then(|| FilmPosition::of_osc(&message.args, wall_now_ns())).flatten()

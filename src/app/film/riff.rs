@@ -25,8 +25,12 @@ pub(crate) enum RiffFault {
     NoFormat,
     #[error("it has {has} channels, but timecode is read from channel {wanted}; see channel in [sync.ltc]")]
     Channel { has: usize, wanted: u8 },
-    #[error("it begins like a WAV file but has no samples")]
+    #[error("it begins like a WAV file but has no samples; make it again")]
     NoData,
+    #[error("it is empty; make it again")]
+    Empty,
+    #[error("it is not a WAV file; make one of it, as with ffmpeg -i IN -c:a pcm_s16le OUT.wav")]
+    Foreign,
 }
 
 /// What a header says of samples.
@@ -85,8 +89,14 @@ impl SampleStream {
         Self { channels, ..Self::default() }
     }
 
-    /// Whether a file that begins so can be read; `begin` is all of it, or [`HEADER`] octets.
+    /// Whether a file that begins so can be read; `begin` is all of it, or [`HEADER`] octets. Only streams may be raw: of a file that is
+    /// none, all that would be known is that nothing was heard in it.
     pub(super) fn check(mut self, begin: &[u8]) -> Result<(), RiffFault> {
+        match begin {
+            [] => return Err(RiffFault::Empty),
+            [b'R', b'I', b'F', b'F', ..] => {}
+            _ => return Err(RiffFault::Foreign),
+        }
         self.push(begin, &mut Vec::new())?;
         self.format.map(drop).ok_or(RiffFault::NoData)
     }
@@ -234,6 +244,7 @@ mod tests {
         }
         let check = |octets: &[u8]| SampleStream::default().check(octets);
         assert_eq!((check(&wav(1, 1, 16, 4, &[])), check(b"RIFF")), (Ok(()), Err(RiffFault::NoData)));
+        assert_eq!((check(b""), check(b"01:00:00:00")), (Err(RiffFault::Empty), Err(RiffFault::Foreign)));
         let mut endless = b"RIFF\0\0\0\0WAVE".to_vec();
         endless.extend(b"junk\xff\xff\xff\xff");
         assert_eq!(push(&endless), Err(RiffFault::NoData));

@@ -1,25 +1,36 @@
 //! Sound from wherever it comes, heard as LTC or as the film's own: bytes as they are read, and when that was, into what they say of
 //! the film.
 
-use std::fs::File;
+use std::fs::{File, FileType};
 use std::io::{self, Read as _};
 use std::os::fd::AsFd as _;
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::heard::{Listener, Listening};
-use super::line::{ByteLine, LineTaker};
+use super::line::{ByteLine, LineTaker, RELAY};
 use super::riff::{Channels, HEADER, SampleStream};
-use super::{ChildSlot, FilmError, WordSink, start};
+use super::{ChildSlot, FilmError, WantedFile, WordSink, is_line, start};
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::source::{FilmArgs, LineKind, SoundLine};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
+
+const RECORDING: WantedFile = WantedFile {
+    is_one: FileType::is_file,
+    other: "it is not a file",
+    remedy: "give a WAV file; a FIFO is written fifo:PATH, a sound card alsa:DEVICE",
+};
+const FIFO: WantedFile = WantedFile {
+    is_one: is_line,
+    other: "it is not a FIFO",
+    remedy: "make one with mkfifo; a WAV file is written without fifo:",
+};
 
 /// Begins to read an input, and to listen to it; a command that is started for it is put there.
 pub(super) fn start_reading(
@@ -54,6 +65,7 @@ pub(super) fn start_reading(
 
 /// Whether a recording can be read: said before anything waits for what it brings.
 fn check(path: &Path, channels: Channels) -> Result<(), FilmError> {
+    RECORDING.check(path)?;
     let mut begin = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEADER as u64).read_to_end(&mut begin));
     read.map_err(failed(path))?;
@@ -84,12 +96,11 @@ pub(super) fn start_line(
             start("line", move || end(&line, line.read(File::from(input))))?;
         }
         SoundLine::Fifo(path) => {
-            let path = path.clone();
-            path.metadata().map_err(failed(&path))?;
+            let path = FIFO.check(path)?;
             start("line", move || while line.told.again(line.read_at(&path)) {})?;
         }
         SoundLine::Relay(socket) => {
-            let socket = socket.clone();
+            let socket = RELAY.check_if_there(socket)?;
             start("line", move || while line.told.again(line.read_relayed(&socket, LineKind::Ltc)) {})?;
         }
         SoundLine::Pipe(command) => {
@@ -127,7 +138,7 @@ fn run(mut command: Command, name: &str, line: ByteLine, child: &ChildSlot) -> R
             if matches!(ended, Some(Ok(status)) if status.success()) {
                 return end(&line, read);
             }
-            if !line.told.again(read) {
+            if !line.told.again(read.and_then(|()| ended.map_or(Ok(()), |ended| failure(ended?)))) {
                 return;
             }
             output = command.spawn().ok().and_then(|one| put(one, &child));
@@ -135,6 +146,13 @@ fn run(mut command: Command, name: &str, line: ByteLine, child: &ChildSlot) -> R
         kill(&child);
     })?;
     Ok(())
+}
+
+/// Why nothing comes of a command any more.
+fn failure(status: ExitStatus) -> io::Result<()> {
+    let why =
+        format!("its command has failed ({status}), and is started again each second; see what it reports");
+    Err(io::Error::other(why))
 }
 
 /// Keeps a command that runs, so that it ends with whoever started it; gives what it writes.

@@ -238,6 +238,24 @@ impl FilmTable {
         row.filter(|row| row.state == FilmState::Locked && row.may_lead)?.media_s.map(ShowTime::from_secs_f64)
     }
 
+    /// Where in a cue of that length the film is, by whom, and what that source says of it; nothing where there is no source.
+    pub(crate) fn place(&self, length: ShowTime) -> Option<String> {
+        let row = self.sources.get(self.leads.unwrap_or(0))?;
+        let place = row.media_s.map(ShowTime::from_secs_f64).map(|at| match at {
+            at if at < ShowTime::ZERO => format!(", {} before the cue", ShowTime::ZERO.since(at)),
+            at if at > length => format!(", {} behind the end of the cue", at.since(length)),
+            at => format!(", at {at} of the cue"),
+        });
+        Some(format!("{}{} by {}", row.state.word(), place.unwrap_or_default(), row.source))
+    }
+
+    /// Sources that have all ended without a position of a film.
+    pub(crate) fn unheard(&self) -> Option<String> {
+        let is_unheard = self.over && self.sources.iter().all(|row| row.used == 0);
+        let names = || self.sources.iter().map(|row| row.source.as_str()).collect::<Vec<_>>().join(", ");
+        is_unheard.then(names)
+    }
+
     /// How long so many frames of the film last, as the source that leads has it, else the first; of 24 a second where none knows.
     pub(crate) fn frames_ms(&self, frames: i32) -> i32 {
         let rate =

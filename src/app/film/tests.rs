@@ -14,7 +14,7 @@ use super::*;
 use crate::film::point::FilmState;
 use crate::film::source::MtcInput;
 use crate::sys::clock::Monotonic;
-use crate::time::Clock as _;
+use crate::time::{Clock as _, ShowTime};
 
 /// How long a source may take to be where it is expected, on a machine that has much to do.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -432,4 +432,18 @@ fn a_source_that_a_hall_does_not_find_at_first_is_heard_once_it_is_there() {
     assert_eq!(table.sources[0].state, FilmState::Absent);
     let _film = RunningFilm::by_fifo(&path, "00:00:10:00");
     in_state(&reader, FilmState::Locked);
+}
+
+#[test]
+fn where_the_film_is_in_the_cue_is_said_with_who_says_so() {
+    let place = |media_s| {
+        let row = SourceRow { media_s, ..SourceRow::named("ltc:-", FilmState::Locked) };
+        let table = FilmTable { sources: vec![row], ..FilmTable::default() };
+        table.place(ShowTime::from_millis(60_000)).expect("there is a source")
+    };
+    assert_eq!(place(None), "locked by ltc:-");
+    assert_eq!(place(Some(-1.25)), "locked, 00:01.250 before the cue by ltc:-");
+    assert_eq!(place(Some(7.5)), "locked, at 00:07.500 of the cue by ltc:-");
+    assert_eq!(place(Some(61.0)), "locked, 00:01.000 behind the end of the cue by ltc:-");
+    assert_eq!(FilmTable::default().place(ShowTime::ZERO), None);
 }

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::control::RecordStatus;
-use crate::record::{IncidentCause, Note};
+use crate::record::{IncidentCause, MarkBudget, MarkNote, MarkRefusal, Note};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -84,6 +84,7 @@ struct SharedFigures {
     octets_a_s: AtomicU64,
     room: AtomicU64,
     status: Mutex<RecordStatus>,
+    marks: Mutex<MarkBudget>,
 }
 
 impl RecordLink {
@@ -105,6 +106,24 @@ impl RecordLink {
     /// Has that kept.
     pub(crate) fn keep(&self, note: Note) {
         self.put(RecordAsk::Keep(note));
+    }
+
+    /// Has a moment marked.
+    ///
+    /// # Errors
+    /// Why it is one too many; the recorder says how many there were.
+    pub(crate) fn mark(&self, note: MarkNote, now: MonoTime) -> Result<(), MarkRefusal> {
+        let taken = self.shared.marks.lock().unwrap_or_else(PoisonError::into_inner).take(now);
+        match taken {
+            Ok(()) => self.keep(Note::Mark(note)),
+            Err(_) => self.tell(|status| status.more_marks += 1),
+        }
+        taken
+    }
+
+    /// Marks that were not kept since this was asked last.
+    pub(super) fn take_more_marks(&self) -> u64 {
+        self.shared.marks.lock().unwrap_or_else(PoisonError::into_inner).take_more()
     }
 
     /// How it stands.
@@ -132,6 +151,12 @@ impl RecordLink {
         let needs = octets_a_s.saturating_mul(length_s.max(0.0).ceil() as u64);
         // Before the first look at the disk nothing is known.
         (self.asks.is_some() && room > 0 && needs > room).then_some((needs, room))
+    }
+
+    /// There is a flight recorder.
+    #[cfg(test)]
+    pub(in crate::app) fn flies(&self) {
+        self.tell(|status| status.flight_s = 60.0);
     }
 
     /// Changes how it stands.

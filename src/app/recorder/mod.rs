@@ -141,7 +141,7 @@ impl Drop for TellsOfPanic {
 }
 
 /// Tables of a configuration that nobody is shown.
-const SECRET: [&str; 3] = ["api", "osc", "text"];
+const SECRET: [&str; 4] = ["api", "osc", "text", "notify"];
 /// Texts of these tables that are shorter are words and addresses, which stand elsewhere, too; a token's hash has 64 characters.
 const SECRET_LEN: usize = 16;
 
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn a_configuration_is_attached_without_what_opens_its_doors() {
         let text = "[show]\nname = \"one\"\n[api]\nlisten = \"127.0.0.1:1\"\n[[api.token]]\nsha256 = \"secret-one\"\n\
-            role = \"operate\"\n[osc]\nfrom = [\"10.0.0.1\"]\n[text]\nword = \"secret-two\"\n[log]\nmax_age_days = 3\n";
+            role = \"operate\"\n[osc]\nfrom = [\"10.0.0.1\"]\n[text]\nword = \"secret-two\"\n[notify.webhook]\nurl = \"http://10.0.0.9/secret-three\"\n[log]\nmax_age_days = 3\n";
         let safe = safe_configuration(text.as_bytes()).unwrap();
         assert_eq!(safe, "[show]\nname = \"one\"\n[log]\nmax_age_days = 3\n");
         let safe = safe_configuration(b"api.token = \"secret-one\"\n[show]\nname = \"one\"\n").unwrap();

@@ -1,6 +1,8 @@
 //! The thread behind the taps: takes what comes, and writes it to the flight recorder, to the recording of a show and to that of an
 //! incident. What cannot be written is told, and tried again; it never holds up whoever it comes from.
 
+mod incident;
+
 use std::collections::VecDeque;
 use std::io;
 use std::path::Path;
@@ -16,10 +18,7 @@ use super::link::{RecordAsk, RecordLink, RecordPart, ShowStart};
 use super::open::{OpenFile, OpenRecording};
 use crate::app::recording::in_io;
 use crate::config::{Record, RecordMode};
-use crate::record::{
-    Counts, Entry, EntryMaker, EventNote, Flight, IncidentCause, IncidentStep, Incidents, Intake, Message,
-    Note, Opening,
-};
+use crate::record::{Entry, EntryMaker, Flight, IncidentCause, Incidents, Intake, Message, Note, Opening};
 use crate::sys::file::want_of_files;
 use crate::sys::realtime;
 use crate::time::{Clock, MonoTime};
@@ -151,6 +150,7 @@ impl Worker {
             self.flush_at = now + FLUSH;
         }
         if now >= self.sync_at {
+            self.tell_more_marks(now);
             self.sync(now);
             self.sync_at = now + SYNC;
         }
@@ -164,6 +164,7 @@ impl Worker {
                     let is_mark = matches!(note, Note::Mark(_));
                     self.keep(at, note);
                     if is_mark {
+                        self.intake.marked();
                         self.link.tell(|status| status.marks += 1);
                         self.on_incident(IncidentCause::Mark, at, now);
                     }
@@ -302,58 +303,10 @@ impl Worker {
         self.link.trouble(RecordPart::Show, Some(trouble));
     }
 
-    fn fail_incident(&mut self, error: &io::Error) {
-        self.incident = None;
-        self.incidents.give_up();
-        let dir = self.disk.dir().display();
-        let remedy = want_of_files(error).unwrap_or("free space on that disk, or set [record] dir");
-        let trouble = format!("an incident is not kept: {dir}: {error}; {remedy}");
-        self.link.trouble(RecordPart::Incident, Some(trouble));
-    }
-
-    /// Something is worth an incident.
-    fn on_incident(&mut self, cause: IncidentCause, at: MonoTime, now: MonoTime) {
-        if self.flight.is_none() {
-            return;
-        }
-        match self.incidents.on(cause, at) {
-            IncidentStep::TooMany => {}
-            IncidentStep::Join => self.say_incident(cause, now),
-            IncidentStep::Begin => match self.begin_incident(cause, at) {
-                Ok(()) => self.say_incident(cause, now),
-                Err(error) => self.fail_incident(&error),
-            },
-        }
-    }
-
-    fn say_incident(&mut self, cause: IncidentCause, now: MonoTime) {
-        self.link.count(cause);
-        let event = EventNote { kind: "incident", seat: String::new(), text: cause.word().to_owned() };
-        self.keep(now, Note::Event(event));
-    }
-
-    /// Begins a file with all that the flight recorder holds.
-    fn begin_incident(&mut self, cause: IncidentCause, at: MonoTime) -> io::Result<()> {
-        let Some(flight) = &mut self.flight else { return Ok(()) };
-        flight.write()?;
-        self.disk.clear_out_for_more()?;
-        let (disk, out) = self.disk.create_incident(cause)?;
-        let disk = disk.until_begun();
-        let opening = self.opening.clone().with("of", "incident").with("cause", cause.word());
-        let oldest = self.maker.wall(at).saturating_sub(1_000_000_000 * u64::from(self.record.flight_s));
-        let held = flight.read()?;
-        let entries = self.hall.iter().chain(held.iter().filter(|entry| entry.log_time >= oldest));
-        let mut file = begun(out, &opening, self.maker, self.safe.as_deref(), entries)?;
-        file.flush().map_err(in_io)?;
-        self.incident = Some(OpenFile { file, disk: disk.begun(), counts: Counts::default() });
-        self.link.trouble(RecordPart::Incident, None);
-        Ok(())
-    }
-
     /// Closes what is over.
     fn mind_ends(&mut self, now: MonoTime) {
         if self.incidents.take_over(now) {
-            self.close_incident();
+            self.close_incident(now);
         }
         let Some(show) = &self.show else { return };
         if show.until.is_some_and(|until| now >= until) {
@@ -387,6 +340,7 @@ impl Worker {
 
     fn close_show(&mut self, now: MonoTime) {
         if self.show.is_some() {
+            self.tell_more_marks(now);
             self.cut();
         }
         let Some(OpenRecording { file, report, .. }) = self.show.take() else { return };
@@ -397,13 +351,6 @@ impl Worker {
             Some(Err(error)) => self.fail_show(&error, now),
             // What was wrong with it is over, as the log and its files say.
             _ => self.link.trouble(RecordPart::Show, None),
-        }
-    }
-
-    fn close_incident(&mut self) {
-        self.cut();
-        if let Some(Err(error)) = self.incident.take().map(|open| self.close_file(open, None)) {
-            self.fail_incident(&error);
         }
     }
 
@@ -456,7 +403,7 @@ impl Worker {
 
     fn end(mut self, now: MonoTime) {
         self.close_show(now);
-        self.close_incident();
+        self.close_incident(now);
         self.link.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
     }
 }

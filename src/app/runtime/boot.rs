@@ -7,7 +7,8 @@ use crate::config::{Config, cue_axes};
 use crate::cue::CueBuilder;
 use crate::drive::Manner;
 use crate::engine::Show;
-use crate::net::{Ports, Receiver, Sender};
+use crate::net::{Ports, Receiver, SendCost, Sender};
+use crate::sys::clock::Monotonic;
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
@@ -15,6 +16,14 @@ use crate::timeline::Timeline;
 pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> {
     let peers: Vec<_> = config.stations().iter().map(|one| one.connection.address).collect();
     Ok(Ports::open(config.show.bind, &peers).map_err(RuntimeError::Net)?.split())
+}
+
+/// What to do where frames to the controllers take too much of the time between ticks. Where that cannot be measured nothing is said.
+pub(super) fn crowding(config: &Config) -> Option<String> {
+    let (controllers, rate) = (config.stations().len(), Rate::from_hz(config.show.rate_hz));
+    let cost = SendCost::measured(&Monotonic).ok()?;
+    let remedy = cost.remedy(controllers, rate)?;
+    Some(format!("{}: ticks may be missed and seats lost; {remedy}", cost.words(controllers, rate)))
 }
 
 /// A show of nothing, whose frames go on from these numbers.

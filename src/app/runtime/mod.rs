@@ -145,6 +145,8 @@ pub struct RuntimeHandle {
     pub(crate) links: Vec<LinkEnd>,
     /// What the system granted the tick thread.
     pub(crate) granted: RealTime,
+    /// What to do where frames take too much of the time between ticks, as was measured when it opened.
+    pub(crate) crowding: Option<String>,
 }
 
 /// What a hall came to when it closed.
@@ -172,7 +174,10 @@ impl Runtime {
         let _ = realtime::raise_open_files();
         let ports = links::open(&config, &purpose)?;
         let halves = boot::bind(&config)?;
-        Self::over_all(config, purpose, numbers, signals, halves, ports)
+        let crowding = boot::crowding(&config);
+        let mut runtime = Self::over_all(config, purpose, numbers, signals, halves, ports)?;
+        runtime.handle.crowding = crowding;
+        Ok(runtime)
     }
 
     /// The same of a hall without links, by sockets, or another network, that are open.
@@ -235,7 +240,18 @@ impl Runtime {
             .hearing(heard);
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let (leave, granted) = (Arc::default(), RealTime::NOTHING);
-        let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, links, granted };
+        let handle = RuntimeHandle {
+            config,
+            desk,
+            live,
+            leave,
+            commands,
+            news,
+            orders,
+            links,
+            granted,
+            crowding: None,
+        };
         let silent = manner.silent;
         let ticks = Ticks { engine, lanes, film, sink, mail };
         Ok(Self { handle, line, silent, acks, watch, plans, links: loops, ticks })
@@ -278,6 +294,11 @@ impl Runtime {
     #[must_use]
     pub(crate) const fn config(&self) -> &Arc<Config> {
         &self.handle.config
+    }
+
+    /// What to do where frames take too much of the time between ticks.
+    pub(crate) fn crowding(&self) -> Option<&str> {
+        self.handle.crowding.as_deref()
     }
 
     /// The control plane's ends of its serial links.

@@ -47,6 +47,8 @@ words! {
         BeltUntold = "belt-untold",
         /// What the system refused.
         NotRealTime = "not-real-time",
+        /// What frames take of the time between ticks.
+        Sending = "sending",
         /// Of the film.
         Film = "film",
         /// The cue follows none.
@@ -57,6 +59,10 @@ words! {
         Player = "player",
         /// Of a serial link.
         Link = "link",
+        /// Of a pad.
+        Buttons = "buttons",
+        /// Of alarms that nobody was told.
+        Notify = "notify",
         /// Of the recording of a show.
         RecordShow = "record-show",
         /// Of an incident.
@@ -112,7 +118,8 @@ mod tests {
     use crate::control::{Code, MarginOf, Role};
     use crate::film::chase::{HoldCause, ParkCause};
     use crate::film::point::FilmState;
-    use crate::health::{HealthState, Why as Standing};
+    use crate::film::words::FilmLed;
+    use crate::health::{HealthState, Pushed as PushedAxis, Why as Standing};
     use crate::motion::Pulses;
     use crate::state::{Cause, Next, Readiness, State, Transition, Trouble, Why};
 
@@ -134,7 +141,7 @@ mod tests {
         let troubles =
             each!(Trouble { Limiter, Planner, Deaf, Homing(0), HomingTime, ParkingTime, OtherMaster(0) });
         let over = each!(ParkCause { FilmEnded, FilmCutShort, CueLeft, HeldTooLong });
-        let awaited = each!(HoldCause { Film(FilmState::Lost), Apart, Unstable, Asks });
+        let awaited = each!(HoldCause { Film(FilmState::Lost), Apart, Behind, Unstable, Asks });
         let mut all = each!(Cause {
             Started, Crashed, AwayFromPark, FoundParked, Asked(Transition::Go), StoppedHoming, Homed, ArrivedAtPark, ArmLapsed,
             NotReady(Readiness::NoCue), Rebooted(0), GapOver, Joined, Late, CueEnded, PausedTooLong, GroupOut(0), EmergencyStop(0),
@@ -176,7 +183,8 @@ mod tests {
     fn standings() -> Vec<Standing> {
         let mut all = each!(Standing {
             Acked, AcksOff, AcksMissing(0), Silent(0), NotSeenYet, SeenAgain, Moved(0), Unsure(0), CutShort(0), Astray(0), Unsteady(0),
-            Unread(0), Ambiguous(0), Outside { controller: 0, axis: 1, pulses: Pulses(2) }, EmergencyStop(0), HeldUntilReset(0),
+            Unread(0), Ambiguous(0), Outside { controller: 0, axis: 1, pulses: Pulses(2) },
+            Pushed { controller: 0, pushed: PushedAxis { axis: 1, at: 1_400, held: 0 } }, EmergencyStop(0), HeldUntilReset(0),
             Error { controller: 0, error: 21 }, Drive { controller: 0, axis: 1, error: 2 },
             Alarm { controller: 0, register: 0x30, value: 1 }, Refuses(0), Wide(0), OtherAxes { controller: 0, drives: 6 },
             Rebooted(0), OtherMaster(0), NotHome(0), Other(0), Gap(0), Unproved(0),
@@ -232,7 +240,9 @@ mod tests {
             add("warning", code.word(), values);
         }
         for state in FilmState::ALL {
-            [true, false].iter().for_each(|followed| add("film-next", state.next(*followed).0, 0));
+            for led in each!(FilmLed { Nobody, Joining, Following }) {
+                add("film-next", state.next(led).0, 0);
+            }
         }
         MarginOf::ALL.iter().for_each(|of| add("margin", of.word(), 0));
         [Role::View, Role::Operate, Role::Engineer].iter().for_each(|role| add("role", &role.to_string(), 0));

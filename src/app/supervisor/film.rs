@@ -5,6 +5,8 @@ use super::hall::HallContext;
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::control::{Coded, FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
 use crate::film::point::FilmState;
+use crate::film::words::FilmLed;
+use crate::state::State;
 use crate::time::ShowTime;
 
 /// The film by the source that leads, or by the first while none does.
@@ -14,7 +16,7 @@ pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
     let best = table.leads.or(Some(0)).and_then(|place| table.sources.get(place));
     let state = best.map_or(FilmState::Absent, |row| row.state);
     let error_ms = hall.live.film_error_s().map(|error_s| error_s * 1e3);
-    let (code, next) = state.next(error_ms.is_some());
+    let (code, next) = state.next(led(hall, error_ms));
     FilmStatus {
         state: state.word().to_owned(),
         cause: best.map(cause).unwrap_or_default(),
@@ -34,6 +36,15 @@ pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
         switches: table.switches,
         joins: hall.live.film_joins(),
         sources: table.sources.iter().map(|row| source(row, begin_s)).collect(),
+    }
+}
+
+/// What the hall's seats do with a film that can be followed.
+fn led(hall: &HallContext, error_ms: Option<f64>) -> FilmLed {
+    match hall.mirror.state {
+        _ if error_ms.is_some() => FilmLed::Following,
+        State::Playing(_) => FilmLed::Joining,
+        _ => FilmLed::Nobody,
     }
 }
 

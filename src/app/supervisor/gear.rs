@@ -1,10 +1,10 @@
-//! What show-control gear may do in a hall that people lead: go on where it paused itself, take in what it took out itself,
+//! What show-control gear and buttons may do in a hall that people lead: go on where it paused itself, take in what it took out itself,
 //! and set levels up to what a person has set. The address that its messages come from proves nothing.
 
 use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::{HallContext, ShowChange};
 use super::hall_settings::HallSettings;
-use crate::control::{Code, Command, Desired, Levels, LevelsChange, Problem};
+use crate::control::{Code, Command, Desired, Levels, LevelsChange, Problem, Surface};
 use crate::state::{PlayMode, State};
 use crate::time::MonoTime;
 
@@ -27,6 +27,9 @@ impl GearLimits {
     /// Where gear would undo what a person did.
     pub(super) fn may_ask(&self, desired: &Desired, hall: &HallContext) -> Result<(), Problem> {
         let Desired { ask, who } = desired;
+        if who.surface == Surface::Buttons {
+            return of_button(ask, hall);
+        }
         if !who.surface.is_gear() || matches!(ask, Command::Stop | Command::Pause) {
             return Ok(());
         }
@@ -70,6 +73,21 @@ impl Feature for GearLimits {
             _ => {}
         }
     }
+}
+
+/// True if a button may ask it: it moves no seat that nobody has armed, as a park would in a hall that is parked or recovering.
+fn of_button(ask: &Command, hall: &HallContext) -> Result<(), Problem> {
+    let state = hall.mirror.state;
+    if *ask != Command::Park || hall.is_on_cue() || matches!(state, State::Armed | State::Parking) {
+        return Ok(());
+    }
+    let detail =
+        format!("a button may not park while {state}: nobody has armed the seats that this may move");
+    Err(Problem::new(
+        Code::Role,
+        detail,
+        "look at the seats, then park on the console or with `kinocue park`",
+    ))
 }
 
 /// Sets levels for gear: no higher than a person has set, which it is told where it asked for more.
@@ -128,8 +146,7 @@ impl HallSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::supervisor::testing::{Rig, desired};
-    use crate::control::Surface;
+    use crate::app::supervisor::testing::{Rig, desired, hall};
 
     fn role(result: Result<std::sync::Arc<crate::control::Status>, Problem>) -> String {
         let problem = result.unwrap_err();
@@ -162,6 +179,28 @@ mod tests {
         role(rig.ask_as(Surface::Osc, Command::Resume));
         rig.ask(Command::Stop).unwrap();
         role(rig.ask_as(Surface::Osc, Command::Resume));
+    }
+
+    #[test]
+    fn a_button_parks_what_a_person_has_armed_and_moves_no_other_seat() {
+        let park = desired(Surface::Buttons, Command::Park);
+        let may = |state| GearLimits::default().may_ask(&park, &hall(state, "one")).is_ok();
+        for state in
+            [State::Playing(PlayMode::Following), WAITING, State::Paused, State::Armed, State::Parking]
+        {
+            assert!(may(state), "{state}");
+        }
+        for state in
+            [State::Boot, State::Recovering, State::Parked, State::Homing, State::Stopped, State::Fault]
+        {
+            assert!(!may(state), "{state}");
+        }
+        let mut rig = Rig::playing();
+        rig.ask(Command::Pause).unwrap();
+        rig.ask_as(Surface::Buttons, Command::Park).unwrap();
+        let mut rig = Rig::parked();
+        assert!(role(rig.ask_as(Surface::Buttons, Command::Park)).contains("nobody has armed"));
+        assert!(rig.ask_as(Surface::Buttons, Command::Go).is_err(), "nobody has armed it");
     }
 
     #[test]

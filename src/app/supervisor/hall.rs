@@ -8,7 +8,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::hall_settings::HallSettings;
 use super::show::ProvedShow;
 use super::state_mirror::StateMirror;
+use crate::app::buttons::PadTable;
 use crate::app::film::SharedTable;
+use crate::app::notify::NotifyTable;
 use crate::app::player::PlayerLink;
 use crate::app::recorder::RecordLink;
 use crate::app::runtime::RuntimeHandle;
@@ -35,6 +37,8 @@ pub(super) struct HallContext {
     pub(super) leave: Arc<AtomicBool>,
     /// What the system granted the tick thread.
     pub(super) granted: RealTime,
+    /// What to do where frames take too much of the time between ticks.
+    pub(super) crowding: Option<String>,
     pub(super) mirror: StateMirror,
     pub(super) settings: HallSettings,
     /// What is loaded.
@@ -51,6 +55,10 @@ pub(super) struct HallContext {
     pub(super) player: Option<PlayerLink>,
     /// What has come to the port for OSC, if there is one.
     pub(super) osc: Option<Arc<Counts>>,
+    /// How the pads are, if there are any.
+    pub(super) buttons: Option<PadTable>,
+    /// How the ways to tell alarms are, if there are any.
+    pub(super) notify: Option<NotifyTable>,
     /// The way to the recorder.
     pub(super) recorder: RecordLink,
     /// The serial links that have seats.
@@ -114,6 +122,7 @@ impl HallContext {
             live: Arc::clone(&runtime.live),
             leave: Arc::clone(&runtime.leave),
             granted: runtime.granted.clone(),
+            crowding: runtime.crowding.clone(),
             mirror: StateMirror::new(now),
             settings,
             cued: None,
@@ -123,6 +132,8 @@ impl HallContext {
             film: None,
             player: None,
             osc: None,
+            buttons: None,
+            notify: None,
             recorder: RecordLink::default(),
             links: runtime.links.clone(),
             job: None,

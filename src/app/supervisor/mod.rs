@@ -56,6 +56,7 @@ use std::time::Duration;
 
 use jiff::Zoned;
 
+use super::buttons::PadTable;
 use super::film::SharedTable;
 use super::player::PlayerLink;
 use super::recorder::RecordLink;
@@ -66,7 +67,7 @@ use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, Stat
 use crate::journal::Journal;
 use crate::library::Library;
 use crate::osc::Counts;
-use crate::record::{ActionNote, LogNote, Note};
+use crate::record::{LogNote, Note};
 use crate::rt::{News, Ticket};
 use crate::settings::{Settings, SettingsFile};
 use crate::state::State;
@@ -79,11 +80,14 @@ use job::{Jobs, Tools};
 use list::List;
 use procedures::Procedures;
 use record::ShowRecords;
+use recorded::AsksTold;
 use shared_link::SharedLink;
 use status::StatusParts;
 
 /// From one status to the next.
 const TELL: Duration = Duration::from_millis(100);
+/// How long whoever has the configuration read anew waits for controllers that do not answer.
+const OPENS: Duration = Duration::from_secs(10);
 /// Notes that are kept.
 const NOTES: usize = 5;
 
@@ -112,6 +116,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) player: Option<PlayerLink>,
     /// What has come to the port for OSC, where there is one.
     pub(crate) osc: Option<Arc<Counts>>,
+    /// How the pads are, where there are any.
+    pub(crate) buttons: Option<PadTable>,
     /// The way to the recorder.
     pub(crate) recorder: RecordLink,
 }
@@ -149,7 +155,10 @@ pub(crate) struct Supervisor {
     told: MonoTime,
     /// What went wrong lately and no state says, newest last.
     notes: VecDeque<String>,
+    asks_told: AsksTold,
     reload: Option<Arc<Config>>,
+    /// Who asked for another configuration, this one or the next, and what came of it.
+    reloading: Option<(Asked, Result<(), Problem>)>,
 }
 
 impl Supervisor {
@@ -169,7 +178,8 @@ impl Supervisor {
         examine(library.clone());
         let mut hall = HallContext::new(&runtime, settings, now);
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
-        hall.recorder = ports.recorder.clone();
+        (hall.buttons, hall.recorder) = (ports.buttons.clone(), ports.recorder.clone());
+        hall.notify = ports.service_log.notify_table();
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,
@@ -189,7 +199,9 @@ impl Supervisor {
             jobs: Jobs::new(tools),
             told: now,
             notes: carryover.notes,
+            asks_told: AsksTold::default(),
             reload: None,
+            reloading: carryover.reloading,
         };
         carryover.untold.into_iter().for_each(|note| supervisor.note(note));
         supervisor.hall.set_desk();
@@ -323,9 +335,21 @@ impl Supervisor {
         let log = &self.ports.service_log;
         self.features.records.settle_folds(now).iter().for_each(|action| log.say_ask(action));
         log.say_journal(self.features.records.news());
+        self.asks_told.settle(&self.hall);
         log.say_settings(self.ports.settings_file.news());
         self.keep_settings();
         self.publish();
+        self.answer_reload();
+    }
+
+    /// Answers whoever asked for this configuration, once the hall knows its seats, or has looked for them for long enough.
+    fn answer_reload(&mut self) {
+        let has_opened = self.hall.mirror.state != State::Boot || self.hall.now.since(self.opened) > OPENS;
+        if self.reload.is_none()
+            && let Some((asked, result)) = self.reloading.take_if(|_| has_opened)
+        {
+            self.answer(asked, result);
+        }
     }
 
     /// The next time at which there is something to do.
@@ -350,12 +374,7 @@ impl Supervisor {
     /// Writes down what somebody asked, and what came of it.
     fn write_down(&mut self, desired: &Desired, result: &Result<(), Problem>) {
         let state = self.hall.mirror.state;
-        self.hall.recorder.keep(Note::Action(ActionNote {
-            who: recorded::name_of(&desired.who, &self.hall),
-            what: desired.ask.to_string(),
-            result: result.as_ref().map_or_else(ToString::to_string, |()| "done".to_owned()),
-            state: state.to_string(),
-        }));
+        self.asks_told.take(desired, result, &self.hall);
         let due = self.features.records.write_down(desired, result, state, self.hall.now);
         due.iter().for_each(|action| self.ports.service_log.say_ask(action));
     }
@@ -414,6 +433,7 @@ impl Supervisor {
             latched,
             notes: std::mem::take(&mut self.notes),
             untold: Vec::new(),
+            reloading: self.reloading.take(),
         }
     }
 

@@ -4,7 +4,7 @@ use super::act::{Act, ShowBegun, SupervisorEvent};
 use super::hall::{ShowChange, Undo};
 use super::job::Job;
 use super::procedures::Awaited;
-use super::reload::reload;
+use super::reload::{not_taken, reload};
 use super::state_mirror::{ANSWER, busy};
 use super::{Supervisor, belts, player};
 use crate::control::{Problem, Surface};
@@ -83,8 +83,12 @@ impl Supervisor {
             Act::Order(order) => drop(self.runtime.orders.push(order)),
             Act::Reload => {
                 let config = reload(&self.hall, &self.ports.config)?;
-                if config.api != self.hall.config.api {
-                    self.note("[api] has changed; restart the service, a reload does not take it".to_owned());
+                for table in not_taken(&self.hall.config, &config) {
+                    self.note(format!("{table} has changed; restart the service, a reload does not take it"));
+                }
+                // Whoever asks is answered once the next hall is there.
+                if !self.procedures.is_empty() {
+                    self.reloading = self.procedures.first().asked.take().map(|asked| (asked, Ok(())));
                 }
                 self.reload = Some(config);
                 self.hall.close();

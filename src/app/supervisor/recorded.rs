@@ -5,10 +5,13 @@ use std::time::Duration;
 use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::HallContext;
 use crate::app::recorder::{RecordAsk, ShowStart};
-use crate::control::{Code, Problem, Who};
+use crate::control::{Code, Desired, Problem, Who};
 use crate::film::point::FilmState;
 use crate::health::HealthState;
-use crate::record::{EventNote, HallNote, IncidentCause, MarkNote, Note, TimecodeNote, state_number};
+use crate::journal::{Action, Folds};
+use crate::record::{
+    ActionNote, EventNote, HallNote, IncidentCause, MarkNote, MarkRefusal, Note, TimecodeNote, state_number,
+};
 use crate::rt::Row;
 use crate::settings::{LONGEST_WHY, Out};
 use crate::state::{Cause, State};
@@ -132,8 +135,39 @@ fn tell_film(hall: &HallContext) {
     }));
 }
 
+/// What the recorder is told of what is asked: of repeats once in ten seconds, as in the journal, so that no flood of them takes the
+/// room of what happened.
+#[derive(Debug, Default)]
+pub(super) struct AsksTold(Folds);
+
+impl AsksTold {
+    pub(super) fn take(&mut self, desired: &Desired, result: &Result<(), Problem>, hall: &HallContext) {
+        let action = Action {
+            at: String::new(),
+            who: name_of(&desired.who, hall),
+            what: desired.ask.to_string(),
+            result: result.as_ref().map_or_else(ToString::to_string, |()| "done".to_owned()),
+            state: hall.mirror.state.to_string(),
+            times: 1,
+        };
+        tell_asks(self.0.take(action.shortened(), desired.ask.word(), hall.now), hall);
+    }
+
+    /// Tells of the repeats whose time is over.
+    pub(super) fn settle(&mut self, hall: &HallContext) {
+        tell_asks(self.0.due(hall.now), hall);
+    }
+}
+
+fn tell_asks(due: Vec<Action>, hall: &HallContext) {
+    for Action { who, what, result, state, times, .. } in due {
+        let result = if times > 1 { format!("{result}, {times} times") } else { result };
+        hall.recorder.keep(Note::Action(ActionNote { who, what, result, state }));
+    }
+}
+
 /// Who it is, as recordings have it.
-pub(super) fn name_of(who: &Who, hall: &HallContext) -> String {
+fn name_of(who: &Who, hall: &HallContext) -> String {
     if hall.config.record.names { who.to_string() } else { who.role.to_string() }
 }
 
@@ -148,8 +182,26 @@ pub(super) fn mark(text: Option<&str>, who: &Who, hall: &HallContext) -> Result<
     })?;
     let film_s = hall.live.show().as_secs_f64();
     let note = MarkNote { film_s, text: text.unwrap_or_default(), who: name_of(who, hall) };
-    hall.recorder.keep(Note::Mark(note));
+    hall.recorder.mark(note, hall.now).map_err(one_too_many)?;
     Ok(Vec::new())
+}
+
+fn one_too_many(refusal: MarkRefusal) -> Problem {
+    match refusal {
+        MarkRefusal::Same => Problem::new(
+            Code::Busy,
+            "this moment was marked within the last second",
+            "that mark stands for both; mark again in a second if it is another moment",
+        ),
+        MarkRefusal::TooMany(wait) => Problem::new(
+            Code::Busy,
+            "too many moments are marked: 60, and one a minute, are kept",
+            format!(
+                "mark again in {} s; how many are left out is counted in the recording",
+                wait.as_secs() + 1
+            ),
+        ),
+    }
 }
 
 /// Has what the flight recorder holds written out.
@@ -201,6 +253,35 @@ mod tests {
         .who;
         let problem = mark(Some("F4 jerked"), &who, &hall).unwrap_err();
         assert!(problem.remedy.contains("[record]"), "{problem}");
+    }
+
+    #[test]
+    fn a_thousand_marks_in_a_second_are_one_and_whoever_asks_is_told_so() {
+        let mut hall = hall(State::Playing(crate::state::PlayMode::Following), "one");
+        let (link, told_asks) = crate::app::recorder::RecordLink::new();
+        link.flies();
+        hall.recorder = link;
+        let marks = crate::control::Command::Mark { text: None };
+        let desired = crate::app::supervisor::testing::desired(crate::control::Surface::Http, marks);
+        let mut asks = AsksTold::default();
+        for number in 0..1_000 {
+            let result = mark(None, &desired.who, &hall).map(|_| ());
+            if let Err(problem) = &result {
+                assert!(
+                    number > 0 && problem.status == 429 && problem.remedy.contains("in a second"),
+                    "{problem}"
+                );
+            }
+            asks.take(&desired, &result, &hall);
+        }
+        hall.now = hall.now + Duration::from_secs(10);
+        asks.settle(&hall);
+        let told: Vec<_> = told_asks.try_iter().map(|(_, ask)| ask).collect();
+        let is_mark = |ask: &&RecordAsk| matches!(ask, RecordAsk::Keep(Note::Mark(_)));
+        assert_eq!((told.iter().filter(is_mark).count(), told.len()), (1, 1 + 3), "{told:?}");
+        let RecordAsk::Keep(Note::Action(last)) = &told[3] else { panic!("{told:?}") };
+        assert!(last.result.ends_with(", 998 times"), "{last:?}");
+        assert_eq!(hall.recorder.status().more_marks, 999);
     }
 
     #[test]

@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::hall::HallContext;
 use super::hall_settings::HallSettings;
 use super::lasting::Lasting;
-use crate::config::{self, Config};
-use crate::control::{Code, Problem};
+use crate::config::{self, Api, Config};
+use crate::control::{Asked, Code, Problem};
 use crate::rt::Desk;
 use crate::settings::{Kept, Settings};
 use crate::state::State;
@@ -27,6 +27,8 @@ pub(crate) struct Carryover {
     pub(super) notes: VecDeque<String>,
     /// What happened between the halls, and was not said yet.
     pub(super) untold: Vec<String>,
+    /// Who asked for another configuration, and what came of it.
+    pub(super) reloading: Option<(Asked, Result<(), Problem>)>,
 }
 
 impl Carryover {
@@ -48,9 +50,12 @@ impl Carryover {
             .map_or_else(|| HallSettings::new(config), |before| HallSettings::with(config, before))
     }
 
-    /// Adds something that a person should know.
-    pub(crate) fn note(&mut self, note: String) {
-        self.untold.push(note);
+    /// Another configuration was not taken: a person should know that, whoever asked for it first.
+    pub(crate) fn refuse(&mut self, why: String) {
+        if let Some((_, result)) = &mut self.reloading {
+            *result = Err(Problem::new(Code::Check, why.clone(), "correct it, and reload again"));
+        }
+        self.untold.push(why);
     }
 }
 
@@ -69,6 +74,19 @@ impl SystemSignals {
     pub(crate) fn is_leaving(&self) -> bool {
         self.leave.load(Ordering::Acquire)
     }
+}
+
+/// The tables of a configuration that surfaces were opened with, and that are others in the next one.
+pub(super) fn not_taken(now: &Config, next: &Config) -> Vec<&'static str> {
+    let api = Api { tokens: now.api.tokens.clone(), ..next.api.clone() };
+    let changed = [
+        ("[api], beside its tokens,", api != now.api),
+        ("[osc]", next.osc != now.osc),
+        ("[text]", next.text != now.text),
+        ("[buttons]", next.buttons != now.buttons),
+        ("[notify]", next.notify != now.notify),
+    ];
+    changed.into_iter().filter(|(_, changed)| *changed).map(|(table, _)| table).collect()
 }
 
 /// Reads the configuration anew, to open the hall with it. The old one is kept where the new one is bad, and while anything is

@@ -1,9 +1,10 @@
-//! Unsolicited messages of the supervisor: to the service manager, and to the log.
+//! Unsolicited messages of the supervisor: to the service manager, to the log, and of alarms to people elsewhere.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 use super::coded::WarningCode;
+use crate::app::notify::{AlarmTeller, NotifyTable};
 use crate::control::{Severity, Status, Warning};
 use crate::journal::Action;
 use crate::log::{Line, Log, Priority};
@@ -21,6 +22,7 @@ pub(crate) struct ServiceLog {
     log: Log,
     ready: bool,
     stopping: bool,
+    alarms: AlarmTeller,
     /// Warnings that are in effect, by what and whom they are about.
     warned: BTreeMap<(String, Option<String>), Severity>,
 }
@@ -28,8 +30,14 @@ pub(crate) struct ServiceLog {
 impl ServiceLog {
     /// One that speaks to the service manager and to a log.
     #[must_use]
-    pub(crate) fn new(log: Log) -> Self {
-        Self { notifier: Notifier::default(), log, ready: false, stopping: false, warned: BTreeMap::new() }
+    pub(crate) fn new(log: Log, alarms: AlarmTeller) -> Self {
+        let (notifier, warned) = (Notifier::default(), BTreeMap::new());
+        Self { notifier, log, ready: false, stopping: false, alarms, warned }
+    }
+
+    /// How the ways to tell alarms are, if there are any.
+    pub(super) fn notify_table(&self) -> Option<NotifyTable> {
+        self.alarms.table()
     }
 
     fn warn(&mut self, warnings: &[Warning]) {
@@ -61,6 +69,14 @@ impl ServiceLog {
     pub(super) fn speak(&mut self, status: &Status, opened: MonoTime, ends: bool, now: MonoTime) {
         let line = format!("{}: {}; next: {}", status.state, status.cause, status.next);
         self.warn(&status.warnings);
+        let fault = (status.state == State::Fault).then(|| Warning {
+            id: "state-fault".to_owned(),
+            severity: Severity::Error,
+            text: format!("{}: {}", status.state, status.cause),
+            remedy: status.next.clone(),
+            ..Warning::default()
+        });
+        self.alarms.take(status.warnings.iter().chain(&fault));
         let heard = status.controllers.iter().all(|one| one.heard_s.is_some() || !one.enabled);
         let told = if !self.ready && (heard || now.since(opened) >= ROUND) {
             self.ready = true;

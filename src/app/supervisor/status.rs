@@ -8,12 +8,16 @@ use super::hall::HallContext;
 use super::readiness::CORRECT;
 use super::seat_places::SeatPlaces;
 use super::{belts, film};
+use crate::app::buttons::PadTable;
 use crate::app::links;
+use crate::app::notify::NotifyTable;
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
     Coded, ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
+use crate::drive::link::AT_PARK;
+use crate::motion::AxisGeometry;
 use crate::rt::Row;
 use crate::state::{Next, PlayMode, State};
 use crate::time::{MonoTime, ShowTime};
@@ -80,6 +84,8 @@ impl StatusParts<'_> {
             playlist: features.onward.list.as_ref().map(|list| list.status(&Zoned::now())),
             film: hall.film.as_ref().map(|table| film::status(&table.read(), hall)),
             osc: hall.osc.as_ref().map(|counts| counts.by_word()),
+            buttons: hall.buttons.as_ref().map(PadTable::status).unwrap_or_default(),
+            notify: hall.notify.as_ref().map(NotifyTable::status).unwrap_or_default(),
             trim_ms: hall.settings.trim_ms,
             levels: hall.settings.levels.clone(),
             presets: hall.config.presets.iter().map(|preset| preset.name.clone()).collect(),
@@ -109,13 +115,20 @@ impl StatusParts<'_> {
         }
     }
 
-    /// Why the hall is in its state; of one that is armed also which seats that are on will not move, of one that waits where the film is.
+    /// Why the hall is in its state; of one that is parked also which seats that are on were read elsewhere, of one that is armed which of
+    /// them will not move, of one that waits where the film is.
     fn cause(&self, table: &[Row]) -> String {
         let (hall, cause) = (self.hall, self.hall.cause());
         if hall.mirror.state == State::Playing(PlayMode::Waiting) {
             let outside = film::outside(hall);
             return outside
                 .map_or(cause.clone(), |side| format!("{cause}: {side}; kinocue sync shows where"));
+        }
+        if hall.mirror.state == State::Parked {
+            let away: Vec<String> = hall.lanes_on().filter_map(|lane| off_park(hall, table, lane)).collect();
+            let more = if away.len() > FEW { " ..." } else { "" };
+            let named = away.iter().take(FEW).map(String::as_str).collect::<Vec<_>>().join(", ");
+            return if away.is_empty() { cause } else { format!("{cause}; not at park: {named}{more}") };
         }
         let stays = |&lane: &usize| table.get(lane).is_some_and(|row| !row.standing.may_move());
         let word = |lane: usize| format!("{} {}", hall.config.controllers[lane].name, table[lane].standing);
@@ -198,6 +211,17 @@ impl StatusParts<'_> {
             ..nameplate(controller)
         }
     }
+}
+
+/// Where the seat of a lane was read whose drives or controller tell that it is not at park.
+fn off_park(hall: &HallContext, table: &[Row], lane: usize) -> Option<String> {
+    let (controller, row) = (&hall.config.controllers[lane], table.get(lane)?);
+    let SeatPlaces { positions_mm, measured, .. } = SeatPlaces::of(controller, &row.state);
+    let read = positions_mm.filter(|_| measured.is_some() && row.homed == Some(true))?;
+    let mut axes = controller.seat.own().iter().zip(read).enumerate();
+    let is_off = |axis: &AxisGeometry, at: f64| (at - axis.place(axis.park)).abs() > AT_PARK * axis.stroke();
+    let (index, (axis, at)) = axes.find(|(_, (axis, at))| is_off(axis, *at))?;
+    Some(format!("{} (axis {} at {at:.1} {})", controller.name, index + 1, axis.unit.name()))
 }
 
 /// What a controller is, and nothing of how it is.

@@ -18,6 +18,7 @@ use super::hall::HallContext;
 use super::hall_settings::HallSettings;
 use super::show::ProvedShow;
 use super::{Carryover, ServiceLog, Supervisor, SupervisorPorts, SystemSignals};
+use crate::app::notify::AlarmTeller;
 use crate::app::runtime::RuntimeHandle;
 use crate::config::{self, Config};
 use crate::control::{
@@ -203,6 +204,7 @@ fn runtime(config: &Arc<Config>) -> (RuntimeHandle, Consumer<TickCommand>, NewsO
         orders: RingBuffer::new(16).0,
         links: Vec::new(),
         granted: RealTime::NOTHING,
+        crowding: None,
     };
     (runtime, commands_end, news)
 }
@@ -400,7 +402,7 @@ impl Double {
 fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, SupervisorPorts) {
     let (handle, inbox, source): (Handle, Inbox, StatusSource) =
         handle(Arc::clone(desk), Status::starting("Hall 1"));
-    let service_log = ServiceLog::new(Log::start(|_| {}).unwrap());
+    let service_log = ServiceLog::new(Log::start(|_| {}).unwrap(), AlarmTeller::default());
     let config = folder.join("hall.toml");
     let (began, signals) = (Monotonic.now(), SystemSignals::default());
     let (settings_file, _) = SettingsFile::open(folder);
@@ -418,6 +420,7 @@ fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, Supe
             film: None,
             player: None,
             osc: None,
+            buttons: None,
             recorder: crate::app::recorder::RecordLink::default(),
         },
     )

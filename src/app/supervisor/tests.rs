@@ -13,9 +13,12 @@ use crate::app::film::{FilmTable, SharedTable};
 use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
 use crate::health::HealthState;
+use crate::motion::Pulses;
+use crate::observe::Heard;
 use crate::rt::{News, Row};
 use crate::state::{Event, Next, PlayMode, Trouble};
 use crate::time::ShowTime;
+use crate::wire::PerAxis;
 
 const ARM: Command = Command::Arm { seats_empty: false };
 
@@ -394,6 +397,26 @@ fn an_entry_that_is_about_to_start_by_itself_does_not_in_a_hall_that_begins_to_c
     rig.supervisor.hall.leave.store(false, Ordering::Release);
     rig.does(go());
     assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
+}
+
+#[test]
+fn a_hall_is_not_said_to_be_parked_without_a_word_where_a_seat_was_read_elsewhere() {
+    let rig = Rig::parked();
+    let at = rig.supervisor.hall.now;
+    let cause = rig.supervisor.status().cause;
+    let stroke = rig.supervisor.hall.config.controllers[1].seat.own()[0].stroke_pulses();
+    let stands = |part: f64, homed: Option<bool>| {
+        let mut moved = row(at);
+        #[expect(clippy::cast_possible_truncation, reason = "a part of a stroke")]
+        let value = PerAxis::new(&[Pulses((part * stroke) as i32)]);
+        (moved.state.measured, moved.homed) = (Some(Heard { value, at }), homed);
+        rig.supervisor.hall.live.on_table(|table| *table = vec![row(at), moved]);
+        rig.supervisor.status().cause
+    };
+    let told = stands(0.25, Some(true));
+    assert!(told.starts_with(&cause) && told.ends_with("; not at park: B1 (axis 1 at 37.5 mm)"), "{told}");
+    assert_eq!(stands(0.001, Some(true)), cause, "what a loaded motor is beside its place");
+    assert_eq!(stands(0.25, Some(false)), cause, "what one tells that is not home is no place");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use super::readiness::CORRECT;
 use super::status::StatusParts;
 use super::{belts, player, recorded};
 use crate::app::links;
+use crate::app::notify::NotifyTable;
 use crate::control::{Coded, Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -55,6 +56,14 @@ impl StatusParts<'_> {
         warnings.extend(failed.map(|trouble| in_two(WarningCode::Playlist.word(), trouble)));
         warnings
             .extend(links::troubles(&hall.links).map(|trouble| in_two(WarningCode::Link.word(), &trouble)));
+        warnings.extend(hall.buttons.iter().flat_map(|pads| pads.warnings(WarningCode::Buttons.word())));
+        let untold = hall.notify.iter().flat_map(NotifyTable::status).filter_map(|way| {
+            Some(in_two(
+                WarningCode::Notify.word(),
+                &format!("alarms by {} are not sent: {}", way.way, way.trouble?),
+            ))
+        });
+        warnings.extend(untold);
         warnings.extend(features.lasting.warnings(hall));
         let troubles = hall.recorder.status().troubles;
         warnings.extend(troubles.iter().map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));
@@ -155,7 +164,9 @@ impl StatusParts<'_> {
     }
 
     fn of_the_machine(&self) -> impl Iterator<Item = Warning> {
-        self.hall.granted.refusals.iter().map(|refusal| in_two(WarningCode::NotRealTime.word(), refusal))
+        let crowding = self.hall.crowding.iter().map(|words| in_two(WarningCode::Sending.word(), words));
+        let refusals = &self.hall.granted.refusals;
+        refusals.iter().map(|refusal| in_two(WarningCode::NotRealTime.word(), refusal)).chain(crowding)
     }
 
     /// A cue that follows nothing in a hall whose film others show: it starts as soon as it is let go.

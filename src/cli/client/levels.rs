@@ -150,11 +150,13 @@ pub(super) fn run(command: &LevelsCommand) -> Result<Exit, Failure> {
             Ok(told(server, &status))
         }
         LevelsCommand::Enable(NameArgs { name, server }) => {
-            server.act(&format!("/api/v1/controllers/{}/enable", in_path(name)), &json!({}))
+            let status = server.post(&format!("/api/v1/controllers/{}/enable", in_path(name)), &json!({}))?;
+            Ok(told_of_seat(server, &status, name))
         }
         LevelsCommand::Disable(DisableArgs { name, why, server }) => {
             let body = why.as_ref().map_or_else(|| json!({}), |why| json!({ "why": why }));
-            server.act(&format!("/api/v1/controllers/{}/disable", in_path(name)), &body)
+            let status = server.post(&format!("/api/v1/controllers/{}/disable", in_path(name)), &body)?;
+            Ok(told_of_seat(server, &status, name))
         }
     }
 }
@@ -202,6 +204,23 @@ fn set(server: &ServerArgs, change: &LevelsChange) -> Result<Exit, Failure> {
     Ok(told(server, &status))
 }
 
+/// Says whether the seat of a controller takes part by now, and the state as ever.
+fn told_of_seat(server: &ServerArgs, status: &Status, name: &str) -> Exit {
+    seat(status, name).iter().for_each(|text| print::tell(&format!("kinocue: {text}")));
+    server.tell(status)
+}
+
+/// Whether the seat of a controller takes part, with all controllers that share it.
+fn seat(status: &Status, name: &str) -> Option<String> {
+    let one = status.controllers.iter().find(|one| one.name == name)?;
+    let group = status.controllers.iter().filter(|other| other.group == one.group);
+    let (names, why) = (group.map(|other| other.name.as_str()).collect::<Vec<_>>().join(", "), &one.why);
+    Some(match one.enabled {
+        true => format!("{names} takes part again ({}: {why})", one.health),
+        false => format!("{names} is out of the show until it is enabled: {why}"),
+    })
+}
+
 /// Says what the levels are by now, and the state as ever.
 fn told(server: &ServerArgs, status: &Status) -> Exit {
     print::tell(&format!("kinocue: {}", status.mix()));
@@ -211,6 +230,7 @@ fn told(server: &ServerArgs, status: &Status) -> Exit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::ControllerStatus;
 
     #[test]
     fn a_level_is_for_both_for_one_or_for_rows() {
@@ -221,6 +241,24 @@ mod tests {
         assert_eq!(level("vibration", Some("0%"), None), Ok(LevelsChange { vibration: Some(0.0), ..none() }));
         let rows = [("A".to_owned(), 0.5), ("B".to_owned(), 0.5)].into();
         assert_eq!(level("50%", None, Some("A-B")), Ok(LevelsChange { rows, ..none() }));
+    }
+
+    #[test]
+    fn a_seat_that_is_taken_out_or_in_is_named_with_all_that_share_it() {
+        let one = |name: &str, group: &str, enabled| ControllerStatus {
+            name: name.to_owned(),
+            group: group.to_owned(),
+            enabled,
+            why: "disabled by anna: broken leg".to_owned(),
+            ..ControllerStatus::default()
+        };
+        let status = Status {
+            controllers: vec![one("A1", "one", false), one("A2", "one", false), one("B1", "two", true)],
+            ..Status::default()
+        };
+        let out = seat(&status, "A2").unwrap();
+        assert_eq!(out, "A1, A2 is out of the show until it is enabled: disabled by anna: broken leg");
+        assert!(seat(&status, "B1").unwrap().starts_with("B1 takes part again ("));
     }
 
     #[test]

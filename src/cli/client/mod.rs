@@ -4,6 +4,7 @@ mod cues;
 mod events;
 mod film;
 mod http;
+mod known;
 mod levels;
 mod panel;
 mod playlist;
@@ -19,6 +20,7 @@ mod view;
 mod watch;
 
 pub(super) use film::{UseArgs, choose as choose_film_source, show as show_film};
+pub(super) use known::{KnownArgs, known};
 pub(super) use record::dump as dump_record;
 pub(super) use server::ServerArgs;
 pub(super) use show::{home, preflight};

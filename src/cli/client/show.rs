@@ -69,7 +69,7 @@ All positions are read again before anything moves.")]
     Clear(ServerArgs),
     /// Reloads the daemon's configuration.
     ///
-    /// Only while nothing is armed; a bad configuration changes nothing.
+    /// Only while nothing is armed; a bad configuration changes nothing. It returns once the hall has opened with the new one.
     #[command(after_help = "Example:\n  kinocue check /etc/kinocue/kinocue.toml && kinocue reload")]
     Reload(ServerArgs),
 }
@@ -128,9 +128,7 @@ pub(super) fn run(command: &ShowCommand) -> Result<Exit, Failure> {
         }
         ShowCommand::Reload(server) => {
             let exit = server.act("/api/v1/reload", &json!({}))?;
-            print::tell(
-                "kinocue: the hall now opens with the new configuration; kinocue watch shows when it is ready",
-            );
+            print::tell("kinocue: the hall has opened with this configuration");
             return Ok(exit);
         }
     };

@@ -2,14 +2,14 @@
 
 use std::env;
 use std::io::{IsTerminal as _, stderr, stdin};
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::path::PathBuf;
 
 use anyhow::Context as _;
 
 use super::play;
 use super::sim::SimFamily;
-use super::token::Token;
+use super::token::{Token, link};
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::serve::{Parts, Places, serve};
 use crate::app::supervisor::SystemSignals;
@@ -97,11 +97,6 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     folder.remove().context("the folder of the demo is left").or_exit(Exit::Io)?;
     guided.or_exit(Exit::Internal)?;
     reported
-}
-
-/// The console with the token in the fragment, which no browser sends anywhere.
-fn link(address: SocketAddr, token: &str) -> String {
-    format!("http://{address}/#token={token}")
 }
 
 fn welcome(seats: &VirtualHall, console: &str, cue_name: &str) {

@@ -120,7 +120,7 @@ impl Leader {
         let part = f64::from(self.percent) / f64::from(percent(&self.begun).max(1));
         for (lane, begun) in self.begun.iter().enumerate() {
             let (motion, vibration) = (begun.motion * part, begun.vibration * part);
-            self.control.desk.set(lane, Mix { motion, vibration, ..self.control.desk.mix(lane) });
+            self.control.desk.set_levels(lane, motion, vibration);
         }
     }
 

@@ -68,12 +68,20 @@ impl Messages {
         if let Some(name) = self.name(cause) {
             let _ = write!(text, " ({name})"); // a String takes it
         }
+        if let Some(film) = self.film_place().filter(|_| matches!(state, State::Playing(_))) {
+            let _ = write!(text, "; film {film}");
+        }
         // Parked, the play is over.
         if state != State::Parked {
             let next = next.by_keys().map_or_else(|| next.to_string(), str::to_owned);
             let _ = write!(text, "; {}", self.next(next));
         }
         Some(text)
+    }
+
+    /// Where the film is in the cue, and by whom that is known.
+    pub(super) fn film_place(&self) -> Option<String> {
+        self.film.as_ref()?.read().place(self.length)
     }
 
     fn unplanned(&self, what: Unplanned) -> String {

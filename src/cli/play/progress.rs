@@ -190,7 +190,8 @@ impl Teller {
                 Some((state, next)) => (self.said.figures(state), self.said.next(next)),
                 None => (self.said.preparing(), self.said.next("wait")),
             };
-            bar.set_prefix(next);
+            let film = self.said.film_place().map(|film| format!("film {film}\n"));
+            bar.set_prefix(film.unwrap_or_default() + &next);
             bar.set_message(figures);
             bar.set_position(ms(self.said.show()));
             thread::park_timeout(LOOK);

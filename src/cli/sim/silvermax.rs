@@ -15,6 +15,8 @@ use crate::time::Clock as _;
 
 /// Bits a second unless others are named (command reference, page 67).
 const WAKING_BAUD: u32 = 57_600;
+/// Of an axis of them: 4,000 counts a turn, at a lead of 5 mm.
+const COUNTS_A_MM: f64 = 800.0;
 
 /// Runs units until a signal comes.
 pub(super) fn run(args: &Args, path: &Path, signals: SignalSocket) -> Result<Exit, Failure> {
@@ -84,8 +86,8 @@ fn unit(unit: &crate::sim::silvermax::Unit) -> Value {
     })
 }
 
-const COMMANDS: &str = "commands of a unit are reset, hot=1, blocked=1, dead=1, X2=0, as=16 and ppm=200, those of the line \
-                        lost, doubled, flipped, late, answer_lost, lose, held, echo, unplug and break";
+const COMMANDS: &str = "commands of a unit are reset, hot=1, blocked=1, pushed=0.6, dead=1, X2=0, as=16 and ppm=200, those of the line \
+                        lost, doubled, flipped, late, answer_lost, lose, noise, held, echo, unplug and break";
 
 fn action(name: &str, value: Option<&str>) -> anyhow::Result<Action> {
     let Some(value) = value else {
@@ -98,6 +100,11 @@ fn action(name: &str, value: Option<&str>) -> anyhow::Result<Action> {
     Ok(match (name, name.strip_prefix(['X', 'x'])) {
         ("hot", _) => Action::Hot(parse::switch(value)?),
         ("blocked", _) => Action::Blocked(parse::switch(value)?),
+        ("pushed", _) => {
+            let mm = value.parse().ok().filter(|mm: &f64| mm.abs() <= 50.0).context("not -50 to 50 mm")?;
+            #[expect(clippy::cast_possible_truncation, reason = "some thousand counts")]
+            Action::Pushed((mm * COUNTS_A_MM).round() as i32)
+        }
         ("dead", _) => Action::Dead(parse::switch(value)?),
         ("as", _) => {
             let other: u8 = value.parse().context("not the number of a unit, or 0")?;

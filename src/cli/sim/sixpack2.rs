@@ -102,7 +102,7 @@ fn motor(motor: &SixpackMotor) -> Value {
 }
 
 const COMMANDS: &str = "commands of a unit are reset, dead=1, celsius=80, volts=51, jump=14400, blocked2=1 and broken2=1, \
-                        those of the line lost, doubled, flipped, late, answer_lost, lose, held, echo, unplug and break";
+                        those of the line lost, doubled, flipped, late, answer_lost, lose, noise, held, echo, unplug and break";
 
 fn fault(name: &str, value: Option<&str>) -> anyhow::Result<SixpackFault> {
     let Some(value) = value else {

@@ -140,6 +140,10 @@ fn fault(name: &str, value: &str) -> anyhow::Result<Option<LineChange>> {
             let count = value.parse().context("not a number of answers")?;
             set(count, |faults, count| faults.lose_answers = count)
         }
+        "noise" => {
+            let hz = value.parse().ok().filter(|hz: &u32| *hz <= 10_000);
+            set(hz.context("not 0 to 10000 bytes a second")?, |faults, hz| faults.noise = hz)
+        }
         "held" => set(span(value)?, |faults, held| faults.held = held),
         "echo" => set(parse::switch(value)?, |faults, echo| faults.echo = echo),
         "unplug" => set(parse::switch(value)?, |faults, unplugged| faults.unplugged = unplugged),

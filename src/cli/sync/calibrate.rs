@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::LabelArgs;
 use crate::app::film::{FilmReader, FilmTable, SourceRow, SourceRules};
-use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::cli::{Exit, Failure, exit, print};
 use crate::film::point::FilmState;
 use crate::film::source::{FilmArgs, FilmSource};
 use crate::sys::clock::Monotonic;
@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     };
     let sources = [of(&args.source)?, of(&args.against)?];
     let rules = SourceRules { allows_coarse: true, ..SourceRules::default() };
-    let reader = FilmReader::start(&sources, rules).or_system()?;
+    let reader = FilmReader::start(&sources, rules).map_err(exit::of_film)?;
     wait_for_both(&reader)?;
     let table = reader.table();
     let (begun, span) = (Monotonic.now(), Duration::from_secs(args.seconds.into()));

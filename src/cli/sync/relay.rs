@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::app::film::FilmReader;
-use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::cli::{Exit, Failure, exit, print};
 use crate::film::source::{FilmArgs, FilmSource};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
@@ -28,7 +28,7 @@ const EVERY: Duration = Duration::from_millis(500);
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sources: Vec<FilmArgs> = args.sources.iter().cloned().map(FilmArgs::of).collect();
-    let reader = FilmReader::relay(&sources, &args.folder).or_system()?;
+    let reader = FilmReader::relay(&sources, &args.folder).map_err(exit::of_film)?;
     let (table, mut said) = (reader.table(), BTreeMap::new());
     let mut at = Monotonic.now();
     loop {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::LabelArgs;
 use crate::app::film::{FilmReader, FilmTable, SourceRow, SourceRules};
-use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::cli::{Exit, Failure, exit, print};
 use crate::film::source::FilmSource;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
@@ -35,7 +35,7 @@ const EVERY: Duration = Duration::from_millis(500);
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sources = args.sources.iter().map(|source| args.labels.of(source)).collect::<Result<Vec<_>, _>>()?;
     let rules = SourceRules { allows_coarse: args.allow_coarse, ..SourceRules::default() };
-    let reader = FilmReader::start(&sources, rules).or_system()?;
+    let reader = FilmReader::start(&sources, rules).map_err(exit::of_film)?;
     let (table, draws) = (reader.table(), io::stdout().is_terminal() && !args.json);
     let mut drawn = 0;
     let mut at = Monotonic.now();

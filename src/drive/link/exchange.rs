@@ -7,6 +7,12 @@ use crate::config::Link;
 use crate::config::link::LinkWiring;
 use crate::time::MonoTime;
 
+/// Octets that are no answer and are listened to at the most, one after the other: a line that babbles holds nobody up for ever.
+pub(crate) const MOST_STRAY: usize = 4_096;
+
+/// So long after one unit another may answer the same question.
+const TWIN: Duration = Duration::from_millis(30);
+
 /// What a line is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TalkTerms {
@@ -52,6 +58,8 @@ pub(crate) struct TalkCounts {
     pub(crate) foreign: u64,
     /// The echo was not what was sent.
     pub(crate) echo_differs: u64,
+    /// What was sent came back from a line that has no echo.
+    pub(crate) echoed: u64,
 }
 
 impl TalkCounts {
@@ -66,6 +74,7 @@ impl TalkCounts {
             malformed: self.malformed - before.malformed,
             foreign: self.foreign - before.foreign,
             echo_differs: self.echo_differs - before.echo_differs,
+            echoed: self.echoed - before.echoed,
         }
     }
 }
@@ -154,6 +163,40 @@ pub(crate) trait LinkTalk {
     fn octets(&self, count: u32) -> Duration {
         let TalkTerms { baud, octet_bits, .. } = self.state().terms;
         Duration::from_nanos(u64::from(count * octet_bits) * 1_000_000_000 / u64::from(baud.max(1)))
+    }
+
+    /// Counts what came unasked: whole answers, and what is none.
+    fn count_unasked(&mut self);
+
+    /// True if more than one unit answers a question, one after the other: all of them obey what is meant for one.
+    ///
+    /// # Errors
+    /// That of the question.
+    fn has_twins<E>(&mut self, mut ask: impl FnMut(&mut Self) -> Result<(), E>) -> Result<bool, E> {
+        // Once it may be an answer that came late.
+        for _ in 0..2 {
+            ask(self)?;
+            let until = self.now() + TWIN;
+            self.port().sleep_until(until);
+            let before = self.counts().doubled;
+            self.count_unasked();
+            if self.counts().doubled == before {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Takes what came unasked.
+    fn take_unasked(&mut self) -> Vec<u8> {
+        let (port, mut came, mut octets) = (self.port(), Vec::new(), [0; 64]);
+        // A port that is gone is found by whoever asks next.
+        while came.len() < MOST_STRAY
+            && let Ok(count @ 1..) = port.receive(&mut octets, MonoTime::default())
+        {
+            came.extend_from_slice(&octets[..count]);
+        }
+        came
     }
 
     /// Takes the echo of what was sent back, where there is one; it has to be there at the deadline.

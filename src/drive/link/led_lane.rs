@@ -10,6 +10,8 @@ use crate::wire::FrameNo;
 
 /// A seat stands where it is led from so near, mm: as far as a loaded motor may be beside its target.
 pub(crate) const STANDS_MM: f64 = 0.1;
+/// Poses that differ by less, in strokes, stand still.
+const STILL: f64 = 1e-7;
 
 /// One axis of a lane, whatever drives it.
 pub(crate) trait LinkAxis: Debug {
@@ -38,6 +40,8 @@ pub(crate) struct LedLane<F: Family> {
     pub(crate) own: F::LaneState,
     /// The last pose since it began, and when it came.
     pub(crate) last: Option<LinkPose>,
+    /// That differs from the one before it.
+    was_led_on: bool,
     heard: MonoTime,
 }
 
@@ -45,7 +49,8 @@ impl<F: Family> LedLane<F> {
     /// Out until somebody has it looked at.
     pub(crate) fn new(axes: Vec<F::Axis>, terms: StreamTerms, own: F::LaneState, now: MonoTime) -> Self {
         let (stage, unconfirmed) = (Stage::Out, FrameNo::FIRST);
-        Self { axes, stage, terms, moves: true, was_stopped: false, unconfirmed, own, last: None, heard: now }
+        let (moves, was_stopped, was_led_on, last) = (true, false, false, None);
+        Self { axes, stage, terms, moves, was_stopped, unconfirmed, own, last, was_led_on, heard: now }
     }
 
     /// Begins to follow poses; the first is that frame.
@@ -61,8 +66,18 @@ impl<F: Family> LedLane<F> {
     }
 
     /// Hears a pose, whether it leads it or not.
-    pub(super) const fn hear(&mut self, pose: LinkPose, now: MonoTime) {
+    pub(super) fn hear(&mut self, pose: LinkPose, now: MonoTime) {
+        self.was_led_on = self.leads_on(&pose);
         (self.last, self.heard) = (Some(pose), now);
+    }
+
+    /// True if a pose leads elsewhere than the one before it.
+    pub(crate) fn leads_on(&self, pose: &LinkPose) -> bool {
+        let differs = |last: LinkPose| {
+            let pairs = last.axes.iter().zip(pose.axes).take(self.axes.len());
+            pairs.into_iter().any(|(a, b)| (a - b).abs() > STILL)
+        };
+        self.last.is_some_and(differs)
     }
 
     /// The first axis that is farther from a pose than so many mm, and how far.
@@ -74,7 +89,8 @@ impl<F: Family> LedLane<F> {
 
     /// True if a pose that comes now is the first of a motion: one that was cut off while it moved is over before another begins.
     pub(super) fn may_begin(&self, now: MonoTime) -> bool {
-        self.is_left_alone(now) || self.last.is_some_and(|last| self.off(&last, STANDS_MM).is_none())
+        let rested = |last: LinkPose| !self.was_led_on && self.off(&last, STANDS_MM).is_none();
+        self.is_left_alone(now) || self.last.is_some_and(rested)
     }
 
     /// True if no pose came for so long that none will.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::bus::BusPort;
-use super::{LinkFault, LinkPort};
+use super::{LinkFault, LinkPort, MOST_STRAY};
 use crate::config::Link;
 use crate::config::link::LinkWiring;
 #[cfg(test)]
@@ -129,7 +129,9 @@ impl LinkPort for LinkLine {
     fn flush(&mut self) -> usize {
         let (mut octets, mut dropped) = ([0; 64], 0);
         // A port that is gone is found by whoever asks next.
-        while let Ok(count @ 1..) = self.receive(&mut octets, MonoTime::default()) {
+        while dropped < MOST_STRAY
+            && let Ok(count @ 1..) = self.receive(&mut octets, MonoTime::default())
+        {
             dropped += count;
         }
         dropped

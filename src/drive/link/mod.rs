@@ -19,11 +19,11 @@ mod virtual_play;
 mod virtual_port;
 
 pub(crate) use delays::Delays;
-pub(crate) use exchange::{LinkTalk, Moment, TalkCounts, TalkState, TalkTerms};
+pub(crate) use exchange::{LinkTalk, MOST_STRAY, Moment, TalkCounts, TalkState, TalkTerms};
 pub(crate) use homing::{Step, canary, sum_of};
 pub(crate) use led_lane::{LedLane, LinkAxis, STANDS_MM};
 pub(crate) use line::LinkLine;
-pub(crate) use peer::{LaneWants, LinkPeer};
+pub(crate) use peer::{AT_PARK, LaneWants, LinkPeer};
 pub(crate) use port::{LinkFault, LinkPort};
 pub(crate) use stream::{Family, IDLE, LinkPlay, Stream};
 pub(crate) use streaming::{
@@ -31,9 +31,9 @@ pub(crate) use streaming::{
     lane_number,
 };
 #[cfg(test)]
-pub(crate) use virtual_play::{TICK, VirtualPlay, back, ride_about, there};
+pub(crate) use virtual_play::{TICK, VirtualPlay, back, ride_about, ride_for_a_minute, soaks, there};
 #[cfg(test)]
-pub(crate) use virtual_port::{Damage, VirtualPort};
+pub(crate) use virtual_port::{Damage, Stalls, VirtualPort};
 
 use crate::channel::ChannelId;
 use crate::cue::Vibration;

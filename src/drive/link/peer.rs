@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
 use super::{BrakeReason, StreamEvent};
-use crate::belief::{Fall, Reading, Source};
+use crate::belief::{ASTRAY, Fall, Reading, Source};
 use crate::config::Controller;
 use crate::drive::{Evidence, EvidenceList, Lane, Need, Seen, Whereabouts};
-use crate::health::{Continuity, Identity, Sighting};
+use crate::health::{Continuity, Identity, Pushed, Sighting};
 use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
 use crate::time::MonoTime;
 use crate::wire::PerAxis;
@@ -21,7 +21,9 @@ const REST: Duration = Duration::from_millis(15);
 /// Readings further apart say nothing of what was between them.
 const APART: Duration = Duration::from_millis(1_500);
 /// How far from park a seat at rest may stand, strokes.
-const AT_PARK: f64 = 0.002;
+pub(crate) const AT_PARK: f64 = 0.002;
+/// How far beside where its drive holds it an axis may stand that is led from there, as a part of how far it may be beside where it is led.
+const LED_BESIDE: f64 = 0.8;
 
 /// What is wanted of a lane by the thread of its link: levels, so that none is lost, and nobody waits.
 #[derive(Debug, Default)]
@@ -48,6 +50,8 @@ impl LaneWants {
 #[derive(Debug, Clone, Copy)]
 struct Told {
     place: f64,
+    /// Where its drive holds it; none while that is not known.
+    held: Option<f64>,
     at: MonoTime,
     /// Where it has been since then, and whether it was elsewhere before.
     stays: (f64, MonoTime),
@@ -61,6 +65,8 @@ pub(crate) struct LinkPeer {
     /// The place of its first own axis in a pose.
     first_slot: usize,
     park: Pose,
+    /// How far beside where its drive holds it each axis may stand that is led from there, strokes.
+    beside: Pose,
     told: [Option<Told>; MAX_AXES],
     /// Its units are known to be home.
     homed: bool,
@@ -73,7 +79,14 @@ pub(crate) struct LinkPeer {
 impl LinkPeer {
     /// One of which nothing is known yet.
     pub(crate) fn new(controller: &Controller, lane: &Lane) -> Self {
+        let mut beside = [0.0; MAX_AXES];
+        // Past its error limit a drive lets go of its motor by itself, where it is told to.
+        if let Some(silvermax) = controller.drives().and_then(|drives| drives.drive.silvermax.as_ref()) {
+            let most = |stroke: f64| (silvermax.hold_error_mm / stroke).min(LED_BESIDE * ASTRAY);
+            beside.iter_mut().zip(controller.seat.own()).for_each(|(cell, axis)| *cell = most(axis.stroke()));
+        }
         Self {
+            beside,
             seat: Arc::clone(&controller.seat),
             first_slot: controller.first_slot(),
             park: lane.window.park(),
@@ -114,10 +127,10 @@ impl LinkPeer {
             | StreamEvent::Withdrawn { .. }
             | StreamEvent::Rests { .. }
             | StreamEvent::Moves { .. } => {}
-            StreamEvent::Read { axis, position, at, .. } => {
+            StreamEvent::Read { axis, position, held, at, .. } => {
                 out.extend([Evidence::Answered, Evidence::Alive]);
                 if self.homed {
-                    out.push(Evidence::Position(self.read(usize::from(axis), position, at)));
+                    out.push(Evidence::Position(self.read(usize::from(axis), (position, held), at)));
                 }
             }
             StreamEvent::Homed { homed, .. } => {
@@ -147,15 +160,15 @@ impl LinkPeer {
         out.push(Evidence::LostZero);
     }
 
-    /// An axis was read.
-    fn read(&mut self, axis: usize, place: f64, at: MonoTime) -> Whereabouts {
+    /// An axis was read there, and its drive holds it there.
+    fn read(&mut self, axis: usize, (place, held): (f64, Option<f64>), at: MonoTime) -> Whereabouts {
         if let Some(told) = self.told.get_mut(axis) {
             let before = told.filter(|told| at.since(told.at) <= APART);
             let stays = before.map(|told| told.stays).filter(|(stay, _)| (place - stay).abs() <= STILL);
             let moved = before.is_some_and(|told| told.moved || stays.is_none());
             // Where it stood before all poses were over says nothing of whether it rests.
             let stays = stays.filter(|(_, since)| *since > self.sent).unwrap_or((place, at));
-            *told = Some(Told { place, at, stays, moved });
+            *told = Some(Told { place, held, at, stays, moved });
         }
         let reading = self.reading();
         let slot = self.first_slot + axis;
@@ -169,19 +182,33 @@ impl LinkPeer {
             passing: Some(passing),
             told: self.pulses(),
             outside: None,
+            pushed: self.pushed(),
             is_ambiguous: false,
-            is_off_park: reading.is_some_and(|reading| !self.is_at_park(&reading)),
+            is_off_park: reading.is_some() && !self.is_at_park(),
         }
     }
 
-    /// The seat as it was told last; none while an axis has not told since the last pose went to it.
+    /// The first axis that stands farther beside where its drive holds it than one may that is led from there.
+    fn pushed(&self) -> Option<Pushed> {
+        let mut axes = self.told.iter().zip(&self.beside).enumerate();
+        axes.find_map(|(axis, (told, beside))| {
+            let Told { place, held, .. } = (*told)?;
+            let held = held.filter(|held| (place - held).abs() > *beside)?;
+            let place_of = |part: f64| Pushed::thousandths(self.seat.each[axis].place(part));
+            Some(Pushed { axis, at: place_of(place), held: place_of(held) })
+        })
+    }
+
+    /// The seat as it was told last; none while an axis has not told since the last pose went to it. One that is pushed off a little is
+    /// where its drive holds it: a motion begins there, by which it stands as before.
     fn reading(&self) -> Option<Reading> {
         let mut reading = Reading::at_rest([0.0; MAX_AXES], MonoTime::from_nanos(u64::MAX));
         reading.slots = 0;
         for axis in 0..self.seat.axes {
             let told = self.told[axis].filter(|told| told.at > self.sent)?;
             let slot = self.first_slot + axis;
-            reading.pose[slot] = told.place;
+            let held = told.held.filter(|held| (told.place - held).abs() <= self.beside[axis]);
+            reading.pose[slot] = held.unwrap_or(told.place);
             reading.slots |= 1 << slot;
             reading.at = reading.at.min(told.at);
             let rests = told.at.since(told.stays.1) >= REST;
@@ -191,9 +218,10 @@ impl LinkPeer {
         Some(reading)
     }
 
-    fn is_at_park(&self, reading: &Reading) -> bool {
-        let own = self.first_slot..self.first_slot + self.seat.axes;
-        own.into_iter().all(|slot| (reading.pose[slot] - self.park[slot]).abs() <= AT_PARK)
+    /// Whether it was read at park, wherever its drives hold it.
+    fn is_at_park(&self) -> bool {
+        let own = self.told.iter().zip(&self.park[self.first_slot..]).take(self.seat.axes);
+        own.into_iter().all(|(told, park)| told.is_some_and(|told| (told.place - park).abs() <= AT_PARK))
     }
 
     fn pulses(&self) -> Option<PerAxis<Pulses>> {
@@ -217,7 +245,7 @@ impl LinkPeer {
             // Whoever does not know its zero is led nowhere.
             rests: rests.is_some() || !self.homed,
             sways: false,
-            at_park: rests.is_some_and(|reading| self.is_at_park(&reading)),
+            at_park: rests.is_some() && self.is_at_park(),
         }
     }
 }

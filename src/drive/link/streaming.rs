@@ -81,6 +81,8 @@ pub(crate) enum StreamEvent {
         axis: u8,
         /// Where it is, in strokes.
         position: f64,
+        /// Where its drive holds it, in strokes, while it stands; none while it does not, and of one that cannot tell.
+        held: Option<f64>,
         /// When.
         at: MonoTime,
     },

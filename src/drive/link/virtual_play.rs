@@ -12,10 +12,12 @@ use std::time::Duration;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::{
-    Family, LedPose, LinkPlay as _, LinkPose, LinkTalk as _, Stream, StreamEvent, StreamTerms, VirtualPort,
+    Family, LedPose, LinkPlay as _, LinkPose, LinkTalk as _, Stalls, Stream, StreamEvent, StreamTerms,
+    VirtualPort,
 };
 use crate::cue::Vibration;
 use crate::motion::MAX_AXES;
+use crate::sim::chance::Chance;
 use crate::sim::serial::{Bus, SerialLine};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
@@ -143,6 +145,21 @@ impl<F: Family, B: Bus> VirtualPlay<F, B> {
         }
     }
 
+    /// So many shows of a minute each, over a thread that is held up as one of a real-time priority is; nothing is to happen in them that
+    /// should not.
+    pub(crate) fn shows(&mut self, count: u64, course: fn(f64, usize) -> f64) {
+        self.judged = false;
+        self.stream.talk.port().stalls = Some(Stalls(Chance::new(7, 0)));
+        for show in 0..count {
+            self.begin(course);
+            self.play(57.0, 0);
+            self.wait(3.0);
+            assert!(self.rare().is_empty() && self.all_ready(), "show {show}: {:?}", self.rare());
+            self.told.clear();
+            self.stream.talk.port().sent.clear();
+        }
+    }
+
     /// What happened that should not, as words.
     pub(crate) fn rare(&self) -> Vec<String> {
         let rare = |event: &&(_, StreamEvent)| {
@@ -173,6 +190,17 @@ pub(crate) fn ride_about(middle: f64, at: f64, axis: usize) -> f64 {
     let grown = grown * grown * grown * (10.0 - grown * (15.0 - 6.0 * grown));
     let swing = |hz: f64, mm: f64| mm * (TAU * hz * at + phase).sin();
     grown * (middle + swing(0.31, 35.0) + swing(0.83, 12.0) + swing(1.7, 7.0))
+}
+
+/// The same for a minute less three seconds, ended as gently.
+pub(crate) fn ride_for_a_minute(middle: f64, at: f64, axis: usize) -> f64 {
+    let ends = ((at - 52.0) / 4.0).clamp(0.0, 1.0);
+    ride_about(middle, at, axis) * (1.0 - ends * ends * ends * (10.0 - ends * (15.0 - 6.0 * ends)))
+}
+
+/// How many shows of a minute are played in the two soaks: 60 are an hour.
+pub(crate) fn soaks() -> u64 {
+    std::env::var("KINOCUE_SHOWS").map_or(1, |shows| shows.parse().expect("a number"))
 }
 
 /// To 40, 50 and 60 mm in two seconds, in mm.

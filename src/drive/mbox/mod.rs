@@ -212,6 +212,7 @@ impl MboxPeer {
             passing,
             told: self.position.told(),
             outside: self.position.outside(),
+            pushed: None,
             is_ambiguous: self.position.is_ambiguous(),
             is_off_park: reading.is_some_and(|reading| !self.rests_at_park(&reading.pose)),
             reading,

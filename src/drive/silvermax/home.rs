@@ -70,6 +70,12 @@ fn run<P: LinkPort>(
     canary: i32,
     around: &mut Homing<'_>,
 ) -> Result<(), HomeError> {
+    for axis in axes {
+        let poll = |talk: &mut Talk<P>| talk.insist(axis.unit, Request::Poll).map(drop);
+        if talk.has_twins(poll)? {
+            return Err(HomeError::Twins { unit: axis.unit });
+        }
+    }
     for (index, axis) in axes.iter().enumerate() {
         goes_on(around)?;
         axis.disarm(talk, around.canary)?;

@@ -1,5 +1,6 @@
 //! The settings of the units of a seat: written where a person is, at rest, and read back (command reference, pages 47 to 75).
 
+use super::look::UnitFacts;
 use super::scale::DriveScale;
 use super::talk::{Answer, Talk, TalkFault};
 use crate::config::drive::{SeatDrive, SilverMaxDrive};
@@ -105,6 +106,14 @@ pub(crate) enum HomeError {
         /// The same in counts.
         counts: f64,
     },
+    /// Two with one number.
+    #[error(
+        "two units answer as unit {unit}; connect each alone to the line, and give one of them another number (IDT)"
+    )]
+    Twins {
+        /// Their number.
+        unit: u8,
+    },
     /// Too hot.
     #[error("unit {unit} is too hot; let it cool, find out what loads it, then home")]
     Hot {
@@ -208,6 +217,13 @@ impl<'a> SeatUnits<'a> {
     pub(super) fn canary(&self, chance: i32) -> Result<i32, HomeError> {
         // Never 0, however it falls out.
         Ok(chance & !HALF | (HALF + 1) | self.sum()?)
+    }
+
+    /// Where the axis of a unit was read, and where that holds it, parts of its stroke; none of a unit that is not of the seat.
+    pub(crate) fn places(&self, facts: &UnitFacts) -> Option<[f64; 2]> {
+        let axes = self.axes().ok()?;
+        let axis = axes.iter().find(|axis| axis.unit == facts.unit)?;
+        Some([facts.position, facts.target].map(|counts| axis.scale.fraction(counts.into())))
     }
 
     /// One such number.

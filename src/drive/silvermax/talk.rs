@@ -6,10 +6,10 @@
 
 use std::time::Duration;
 
-use crate::drive::link::{LinkFault, LinkPort, LinkTalk, Moment, TalkState, TalkTerms};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk, MOST_STRAY, Moment, TalkState, TalkTerms};
 use crate::time::MonoTime;
 use crate::wire::silvermax::{
-    ALL_UNITS, Collected, Internal, LineCollector, MAX_LINE, NakReason, Reply, Request, Words,
+    ALL_UNITS, AnyRequest, Collected, Internal, LineCollector, MAX_LINE, NakReason, Reply, Request, Words,
 };
 
 /// What the unit makes of a request, beyond its octets and its delay.
@@ -48,7 +48,7 @@ pub(crate) enum TalkFault {
     Link(#[from] LinkFault),
     /// Nothing that can be read came in time: whether it was taken is not known.
     #[error(
-        "unit {unit} does not answer; check its number (decimal here, hexadecimal in its answers), baud and wiring"
+        "unit {unit} does not answer; check its number (decimal here, hexadecimal in its answers), that no other has it, baud and wiring"
     )]
     Silent {
         /// Who was asked.
@@ -80,6 +80,19 @@ impl<P: LinkPort> LinkTalk for Talk<P> {
     fn state_mut(&mut self) -> &mut TalkState<P> {
         &mut self.state
     }
+
+    fn count_unasked(&mut self) {
+        let (came, mut collector) = (self.take_unasked(), LineCollector::of_replies());
+        let counts = &mut self.state.counts;
+        for octet in came {
+            match collector.push(octet) {
+                Some(Collected::Line(line)) if Reply::parse(line).is_ok() => counts.doubled += 1,
+                Some(_) => counts.malformed += 1,
+                None => {}
+            }
+        }
+        counts.malformed += u64::from(!collector.rest().is_empty());
+    }
 }
 
 impl<P: LinkPort> Talk<P> {
@@ -107,8 +120,7 @@ impl<P: LinkPort> Talk<P> {
     /// # Errors
     /// A [`TalkFault`]; [`Talk::fence`] has to follow where that is not the port.
     pub(crate) fn exchange(&mut self, unit: u8, request: Request) -> Result<Answer, TalkFault> {
-        let stale = self.state.port.flush();
-        self.state.counts.doubled += u64::from(stale > 0);
+        self.count_unasked();
         let sending = self.send(unit, request)?;
         self.state.counts.asked += 1;
         let sent = self.now() + sending;
@@ -239,8 +251,9 @@ impl<P: LinkPort> Talk<P> {
     fn answer(&mut self, sent: MonoTime, deadline: MonoTime) -> Result<Option<Reply>, LinkFault> {
         let mut collector = LineCollector::of_replies();
         let mut octet = [0];
-        let mut begun = None;
-        while self.state.port.receive(&mut octet, deadline)? > 0 {
+        let (mut begun, mut left) = (None, MOST_STRAY);
+        while left > 0 && self.state.port.receive(&mut octet, deadline)? > 0 {
+            left -= 1;
             begun.get_or_insert(self.now());
             let malformed = match collector.push(octet[0]) {
                 Some(Collected::Line(line)) => match Reply::parse(line) {
@@ -253,7 +266,11 @@ impl<P: LinkPort> Talk<P> {
                     }
                     Err(_) => true,
                 },
-                Some(Collected::Stray(_)) => true,
+                Some(Collected::Stray(stray)) => {
+                    let stray = stray.strip_suffix(b"\r").unwrap_or(stray);
+                    self.state.counts.echoed += u64::from(AnyRequest::parse(stray).is_ok());
+                    true
+                }
                 None => false,
             };
             if malformed {

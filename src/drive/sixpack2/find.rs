@@ -24,8 +24,8 @@ pub(crate) enum FindError {
     Silent(TalkFault),
     /// It answers at neither rate.
     #[error(
-        "unit {unit} answers neither at {baud} nor at {waking} baud, its power-on rate; check its number, its power and the \
-         wiring, and whether another program has changed its rate"
+        "unit {unit} answers neither at {baud} nor at {waking} baud, its power-on rate; check its number, that no other has it, its power \
+         and the wiring, and whether another program has changed its rate"
     )]
     Nowhere {
         /// Who was asked.

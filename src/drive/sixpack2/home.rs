@@ -53,7 +53,11 @@ pub(crate) fn home<P: LinkPort>(
     mut around: Homing<'_>,
 ) -> Result<(), HomeError> {
     let axes = seat.axes()?;
-    find(talk, &[seat.unit])?;
+    let unit = seat.unit;
+    find(talk, &[unit])?;
+    if talk.has_twins(|talk| talk.insist(unit, WHO).map(drop))? {
+        return Err(HomeError::Twins { unit });
+    }
     let done = run(talk, seat, &axes, &mut around);
     if done.is_err() {
         // What is wrong already is told; that the line is gone, too, is no news.

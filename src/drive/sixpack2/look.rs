@@ -99,6 +99,13 @@ impl SeatMotors<'_> {
         axes.iter().filter(is_stranger).map(|axis| axis.motor).collect()
     }
 
+    /// Where the axis of a motor is by its counter, a part of its stroke; none of a motor that is not of the seat.
+    pub(crate) fn place(&self, facts: &MotorFacts) -> Option<f64> {
+        let axes = self.axes().ok()?;
+        let axis = axes.iter().find(|axis| axis.motor == facts.motor)?;
+        Some(axis.scale.fraction(facts.position.into()))
+    }
+
     /// What the counters of its motors read at the lower end of the stroke once it is home.
     #[cfg(test)]
     pub(crate) fn at_low(&self) -> Vec<i32> {

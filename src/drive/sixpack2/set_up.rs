@@ -59,6 +59,14 @@ pub(crate) enum HomeError {
     /// It is not to be had.
     #[error(transparent)]
     Find(#[from] FindError),
+    /// Two with one number.
+    #[error(
+        "two units answer as unit {unit}; connect each alone to the line, and give one of them another number"
+    )]
+    Twins {
+        /// Their number.
+        unit: u8,
+    },
     /// The clock is too slow for the seat.
     #[error("{0}")]
     TooSlow(String),
@@ -225,15 +233,19 @@ impl<'a> SeatMotors<'a> {
         Ok(axes.iter().map(counting).collect())
     }
 
+    /// How many mm/s the motor of an axis may be asked for at once, where it gets a target in each period.
+    pub(super) fn jump_mm_s(&self, axis: &AxisGeometry, period: Duration) -> f64 {
+        self.sixpack2.jump_mm_s.unwrap_or(axis.max_acceleration * period.as_secs_f64())
+    }
+
     /// How an axis follows: a setting of the seat type, by its limits and not by what it plays, as a proof has it.
     fn lag(&self, index: usize, axis: &AxisGeometry) -> Result<Lag, HomeError> {
         let divider = self.sixpack2.clock_divider;
         if let PropDiv::Fixed(propdiv) = self.sixpack2.propdiv {
             return Ok(Lag::new(divider, propdiv));
         }
-        let (speed, period) = (axis.max_velocity, self.period);
-        let jump = self.sixpack2.jump_mm_s.unwrap_or(axis.max_acceleration * period.as_secs_f64());
-        let lag = Lag::gentlest(divider, period, speed, jump);
+        let (speed, jump) = (axis.max_velocity, self.jump_mm_s(axis, self.period));
+        let lag = Lag::gentlest(divider, self.period, speed, jump);
         lag.ok_or(HomeError::NoPropdiv { axis: index + 1, divider, speed, jump })
     }
 }

@@ -8,7 +8,7 @@
 
 use std::time::Duration;
 
-use crate::drive::link::{LinkFault, LinkPort, LinkTalk, Moment, TalkState, TalkTerms};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk, MOST_STRAY, Moment, TalkState, TalkTerms};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{
     BAUD_CLOCK, BaudSwitch, FRAME_LEN, SixpackFrame, SixpackOrder, SixpackReply, WAKING_DIVISOR, baud_of,
@@ -41,7 +41,9 @@ pub(crate) enum TalkFault {
     #[error(transparent)]
     Link(#[from] LinkFault),
     /// Nothing that answers the question came in time.
-    #[error("unit {unit} does not answer at {baud} baud; check its number, its power and the wiring")]
+    #[error(
+        "unit {unit} does not answer at {baud} baud; check its number, that no other has it, its power and the wiring"
+    )]
     Silent {
         /// Who was asked.
         unit: u8,
@@ -58,6 +60,8 @@ pub(crate) struct Talk<P> {
     own_baud: u32,
     /// Until when somebody drives the line.
     busy: MonoTime,
+    /// When the last frame that was sent has wholly arrived.
+    arrived: MonoTime,
 }
 
 impl<P: LinkPort> LinkTalk for Talk<P> {
@@ -70,13 +74,26 @@ impl<P: LinkPort> LinkTalk for Talk<P> {
     fn state_mut(&mut self) -> &mut TalkState<P> {
         &mut self.state
     }
+
+    fn count_unasked(&mut self) {
+        let came = self.take_unasked();
+        let is_answer = |octets: &[u8]| {
+            let frame = octets.try_into().map(SixpackFrame::from_octets);
+            frame.is_ok_and(|frame| {
+                frame.address == ANSWER && !matches!(SixpackReply::of(frame), SixpackReply::Other { .. })
+            })
+        };
+        let has_answer = came.windows(FRAME_LEN).any(is_answer);
+        self.state.counts.doubled += u64::from(has_answer);
+        self.state.counts.malformed += u64::from(!has_answer && !came.is_empty());
+    }
 }
 
 impl<P: LinkPort> Talk<P> {
     /// Over a port that is open.
     pub(crate) fn new(port: P, terms: TalkTerms) -> Self {
         let busy = port.now();
-        Self { state: TalkState::over(port, terms), own_baud: terms.baud, busy }
+        Self { state: TalkState::over(port, terms), own_baud: terms.baud, busy, arrived: busy }
     }
 
     /// The rate of the link.
@@ -94,6 +111,11 @@ impl<P: LinkPort> Talk<P> {
     pub(crate) fn arrival(&self) -> (MonoTime, Duration) {
         let frame = self.octets(NINE);
         (self.now().max(self.busy) + self.octets(BREAK) + frame, frame)
+    }
+
+    /// When the last frame that was sent has wholly arrived.
+    pub(crate) const fn arrived(&self) -> MonoTime {
+        self.arrived
     }
 
     /// How long a question holds up what is said next.
@@ -204,12 +226,12 @@ impl<P: LinkPort> Talk<P> {
         frames: &[SixpackFrame],
         question: SixpackOrder,
     ) -> Result<SixpackReply, TalkFault> {
-        self.state.counts.doubled += u64::from(self.state.port.flush() > 0);
+        self.count_unasked();
         self.send(frames)?;
         self.state.counts.asked += 1;
         let sent = self.busy;
         let deadline = sent + self.patience();
-        let Some((reply, begun)) = self.answer(question, deadline)? else {
+        let Some((reply, begun)) = self.answer(unit, question, deadline)? else {
             return Err(TalkFault::Silent { unit, baud: self.state.terms.baud });
         };
         self.state.counts.answered += 1;
@@ -236,6 +258,7 @@ impl<P: LinkPort> Talk<P> {
         let takes = self.octets(u32::try_from(octets.len()).unwrap_or(u32::MAX));
         self.state.port.send(&octets)?;
         self.busy = self.now() + takes;
+        self.arrived = self.busy;
         if self.state.terms.has_echo {
             let deadline = self.busy + SLACK;
             self.take_echo(&octets, deadline)?;
@@ -247,11 +270,13 @@ impl<P: LinkPort> Talk<P> {
     /// The answer to a question, with when it began to arrive; none at the deadline. Among other octets it is found where it begins.
     fn answer(
         &mut self,
+        unit: u8,
         question: SixpackOrder,
         deadline: MonoTime,
     ) -> Result<Option<(SixpackReply, MonoTime)>, LinkFault> {
-        let (mut window, mut count, mut octet) = ([0; FRAME_LEN], 0, [0]);
-        while self.state.port.receive(&mut octet, deadline)? > 0 {
+        let (mut window, mut count, mut octet, mut left) = ([0; FRAME_LEN], 0, [0], MOST_STRAY);
+        while left > 0 && self.state.port.receive(&mut octet, deadline)? > 0 {
+            left -= 1;
             if count == FRAME_LEN {
                 window.rotate_left(1);
                 self.state.counts.malformed += 1;
@@ -263,6 +288,7 @@ impl<P: LinkPort> Talk<P> {
                 continue;
             }
             let frame = SixpackFrame::from_octets(window);
+            self.state.counts.echoed += u64::from(frame == question.frame(unit));
             if let Some(reply) = question.answered_by(frame) {
                 return Ok(Some((reply, self.now().before(self.octets(NINE)))));
             }

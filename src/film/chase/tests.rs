@@ -16,12 +16,15 @@ struct Stand {
     state: FilmState,
     ahead_s: f64,
     trim_ms: i32,
+    /// Ticks that are missed before the next.
+    missed: u64,
 }
 
 impl Stand {
     fn new(rules: ChaseRules) -> Self {
         let chase = Chase::new(rules, mono(0.0));
-        Self { chase, index: 0, leave: FilmLeave::Lead, state: FilmState::Locked, ahead_s: 10.0, trim_ms: 0 }
+        let (leave, state) = (FilmLeave::Lead, FilmState::Locked);
+        Self { chase, index: 0, leave, state, ahead_s: 10.0, trim_ms: 0, missed: 0 }
     }
 
     /// One whose seats follow.
@@ -37,9 +40,10 @@ impl Stand {
     }
 
     fn tick(&mut self) -> ChaseVerdict {
-        self.index += 1;
+        let missed = std::mem::take(&mut self.missed);
+        self.index += 1 + missed;
         let at = mono(self.now_s());
-        let tick = Tick { index: self.index, deadline: at, late: Duration::ZERO, missed: 0 };
+        let tick = Tick { index: self.index, deadline: at, late: Duration::ZERO, missed };
         let media = ShowTime::from_secs_f64(self.ahead_s + self.now_s());
         let point = FilmPoint { at, media, rate: 1.0, epoch: 0, state: self.state };
         let (trim_ms, leave) = (self.trim_ms, self.leave);
@@ -166,6 +170,26 @@ fn up_to_a_frame_is_slewed_and_more_is_joined() {
     stand.ahead_s += 0.043;
     assert_eq!(stand.tick(), ChaseVerdict::Hold(HoldCause::Apart));
     assert!(matches!(stand.tick(), ChaseVerdict::Follow { join: 2, pace: 1.0, .. }));
+}
+
+#[test]
+fn seats_that_fell_behind_the_film_by_missed_ticks_blame_no_film() {
+    let mut stand = Stand::following(rules());
+    stand.missed = 5;
+    assert_eq!(stand.tick(), ChaseVerdict::Hold(HoldCause::Behind));
+    assert!(matches!(stand.tick(), ChaseVerdict::Follow { join: 2, .. }));
+}
+
+#[test]
+fn seats_hold_briefly_for_a_film_that_is_being_found_and_rest_for_one_that_may_stay_away() {
+    for state in FilmState::ALL.into_iter().filter(|state| !state.may_lead() && *state != FilmState::Ended) {
+        let mut stand = Stand::following(rules());
+        assert!(!stand.chase.is_held_briefly(), "they follow");
+        stand.state = state;
+        stand.tick();
+        let is_brief = matches!(state, FilmState::Jumped | FilmState::Acquiring);
+        assert_eq!(stand.chase.is_held_briefly(), is_brief, "{state:?}");
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::Look;
+use super::film_axis::Moment;
 use crate::plot::{Band, Flag, Shade, TimeAxis};
 use crate::record::{Contents, Falls, Margins, SeatSample, TickSample, Told, each_chunk, state_word};
 use crate::time::{MonoTime, Rate, ShowTime};
@@ -40,6 +41,18 @@ impl Traces {
         }
     }
 
+    /// What is known on an axis of show time alone, on one of passes.
+    pub(super) fn on(self, plain: &TimeAxis, axis: &TimeAxis) -> Self {
+        let column = |trace: &[Option<[f32; 2]>], column: usize| {
+            // Columns of both are as wide, and need not begin alike.
+            let ends = [axis.place(column), axis.place(column + 1)].map(|at| plain.column(axis.film_s(at)));
+            let known = ends.into_iter().flatten().filter_map(|column| trace[column]);
+            known.reduce(|[low, high], [least, most]| [low.min(least), high.max(most)])
+        };
+        let trace = |trace: Vec<_>| (0..axis.columns).map(|index| column(&trace, index)).collect();
+        Self(self.0.into_iter().map(trace).collect())
+    }
+
     pub(super) fn ends(&self) -> Option<(f64, f64)> {
         let known = self.0.iter().flatten().flatten();
         let ends = known.fold(None, |ends: Option<(f32, f32)>, [low, high]| {
@@ -67,8 +80,8 @@ pub(crate) struct Gathered {
     pub(super) measured: Traces,
     pub(super) apart: Traces,
     pub(super) parts: Traces,
-    /// The most of each axis and quantity in the stretch: part, show time.
-    pub(super) most: Vec<[(f64, f64); 3]>,
+    /// The most of each axis and quantity in the stretch: part, and when.
+    pub(super) most: Vec<[(f64, Moment); 3]>,
     pub(super) margins: Option<Margins>,
     pub(super) late: Vec<Vec<f32>>,
     pub(super) acks: Traces,
@@ -100,11 +113,11 @@ pub(super) struct SeatCounts {
     pub(super) missed: u64,
     pub(super) dropped: u64,
     pub(super) late_us: f64,
-    pub(super) late_s: f64,
+    pub(super) late_at: Moment,
     pub(super) ack_us: f64,
-    /// The greatest distance of asked and sent, and its show time.
+    /// The greatest distance of asked and sent, and when.
     pub(super) apart: f64,
-    pub(super) apart_s: f64,
+    pub(super) apart_at: Moment,
     /// How long they were apart in one piece, about the greatest; and the piece that is not over, with its own greatest.
     pub(super) held: f64,
     pub(super) piece: Option<(MonoTime, f64)>,
@@ -113,7 +126,7 @@ pub(super) struct SeatCounts {
 impl Gathered {
     /// Nothing yet. `is_whole` where the file has every tick.
     pub(crate) fn new(contents: &Contents, look: Look, is_whole: bool) -> Self {
-        let (axes, columns) = (contents.seats[look.lane].axes().len(), look.time.columns);
+        let (axes, columns) = (contents.seats[look.lane].axes().len(), look.axis.time.columns);
         let lane = |name| (name, vec![Shade::default(); columns], 0);
         let margins = is_whole.then(|| Margins::new(&contents.seats, Rate::from_hz(contents.rate_hz())));
         Self {
@@ -123,7 +136,7 @@ impl Gathered {
             measured: Traces::of(axes, columns),
             apart: Traces::of(axes, columns),
             parts: Traces::of(3, columns),
-            most: vec![[(0.0, 0.0); 3]; axes],
+            most: vec![[(0.0, Moment::default()); 3]; axes],
             margins,
             late: vec![Vec::new(); columns],
             acks: Traces::of(1, columns),
@@ -145,12 +158,12 @@ impl Gathered {
     pub(crate) fn take(&mut self, contents: &Contents, at: MonoTime, told: Told<'_>) {
         match told {
             Told::Seat(lane, sample) if lane == self.look.lane => self.seat(at, &sample),
-            Told::Tick(sample) => self.tick(&sample),
+            Told::Tick(sample) => self.tick(at, &sample),
             Told::State(state) => self.state = Some(state_word(state)),
             Told::Chunks(chunks) => self.chunks(contents, &chunks),
             Told::Other(topic @ ("/mark" | "/event" | "/action"), data) => {
                 let seat = &contents.seats[self.look.lane].name;
-                let at_s = self.at_s();
+                let at_s = self.look.axis.time.place(self.column);
                 let Some(name) = flag_name(topic, data, seat) else { return };
                 if self.flags.len() < FLAGS {
                     self.flags.push(Flag { at_s, name });
@@ -162,28 +175,14 @@ impl Gathered {
         }
     }
 
-    /// The show time of the column that was taken last.
-    #[expect(clippy::cast_precision_loss, reason = "some thousand columns")]
-    fn at_s(&self) -> f64 {
-        let TimeAxis { from_s, until_s, columns } = self.look.time;
-        from_s + (until_s - from_s) * self.column as f64 / columns as f64
-    }
-
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "0 to the number of columns"
-    )]
-    fn place(&mut self, film_s: f64) -> Option<usize> {
-        let time = &self.look.time;
-        let part = time.part(film_s)?;
-        self.column = ((part * time.columns as f64) as usize).min(time.columns - 1);
-        Some(self.column)
+    fn place(&mut self, at: MonoTime, film_s: f64) -> Option<(usize, Moment)> {
+        let moment = self.look.axis.moment(at, film_s)?;
+        self.column = self.look.axis.time.column(moment.at_s)?;
+        Some((self.column, moment))
     }
 
     fn seat(&mut self, at: MonoTime, sample: &SeatSample) {
-        let Some(column) = self.place(sample.film_s) else { return };
+        let Some((column, moment)) = self.place(at, sample.film_s) else { return };
         let falls = self.falls.count;
         self.falls.take(sample);
         self.on(OUT, column, self.falls.count - falls);
@@ -202,7 +201,7 @@ impl Gathered {
             self.latency[bin(ack)] += 1;
         }
         if !self.is_whole {
-            self.frame(at, sample.film_s, column, &sample.asked_mm, &sample.sent_mm);
+            self.frame(at, moment, column, [&sample.asked_mm, &sample.sent_mm]);
             self.counts.sent += u64::from(sample.sent);
             self.counts.unsent += u64::from(sample.unsent);
             self.counts.clamps += sample.clamps;
@@ -211,18 +210,18 @@ impl Gathered {
         }
     }
 
-    fn frame(&mut self, at: MonoTime, film_s: f64, column: usize, asked: &[f64], sent: &[f64]) {
+    fn frame(&mut self, at: MonoTime, moment: Moment, column: usize, [asked, sent]: [&[f64]; 2]) {
         self.asked.take(column, asked.iter().copied());
         self.sent.take(column, sent.iter().copied());
         let apart = || asked.iter().zip(sent).map(|(asked, sent)| asked - sent);
         self.apart.take(column, apart());
-        self.counts.apart(at, film_s, apart().map(f64::abs).fold(0.0, f64::max));
+        self.counts.apart(at, moment, apart().map(f64::abs).fold(0.0, f64::max));
     }
 
-    fn tick(&mut self, sample: &TickSample) {
-        let Some(column) = self.place(sample.film_s) else { return };
+    fn tick(&mut self, at: MonoTime, sample: &TickSample) {
+        let Some((column, moment)) = self.place(at, sample.film_s) else { return };
         if let Some(word) = self.state {
-            let columns = self.look.time.columns;
+            let columns = self.look.axis.time.columns;
             let known = self.states.iter().position(|(one, _)| *one == word);
             let index = known.unwrap_or_else(|| {
                 self.states.push((word, vec![Shade::default(); columns]));
@@ -239,18 +238,18 @@ impl Gathered {
             self.lanes[OUT].1[column] = Shade { height: 1.0, tone: 1.0 };
         }
         if !self.is_whole {
-            self.late(column, sample.film_s, sample.late_max_us);
+            self.late(column, moment, sample.late_max_us);
         }
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "a picture is no finer")]
-    fn late(&mut self, column: usize, film_s: f64, late_us: f64) {
+    fn late(&mut self, column: usize, moment: Moment, late_us: f64) {
         if self.late[column].len() < KEPT {
             self.late[column].push((late_us / 1e3) as f32);
         }
         self.lateness[bin(late_us)] += 1;
         if late_us > self.counts.late_us {
-            (self.counts.late_us, self.counts.late_s) = (late_us, film_s);
+            (self.counts.late_us, self.counts.late_at) = (late_us, moment);
         }
     }
 
@@ -264,19 +263,19 @@ impl Gathered {
             if let Some(margins) = &mut margins {
                 margins.take(chunk, &contents.seats, &mut |of, axis, parts| {
                     if of == lane {
-                        self.parts_of(axis, parts);
+                        self.parts_of(at, axis, parts);
                     }
                 });
             }
-            let Some(column) = self.place(film_s) else { return };
-            self.late(column, film_s, micros(chunk.head.late_ns));
+            let Some((column, moment)) = self.place(at, film_s) else { return };
+            self.late(column, moment, micros(chunk.head.late_ns));
             for frame in chunk.frames().filter(|frame| frame.lane == lane) {
                 let is_taken = frame.handed.is_taken();
                 self.counts.sent += u64::from(is_taken);
                 self.counts.unsent += u64::from(!is_taken);
                 self.on(4, column, (!is_taken).into());
                 let (asked, sent) = (seat.asked(&frame.asked), seat.sent(&frame));
-                self.frame(at, film_s, column, &asked, &sent);
+                self.frame(at, moment, column, [&asked, &sent]);
                 if !asked.is_empty() {
                     let more = frame
                         .asked
@@ -290,14 +289,13 @@ impl Gathered {
         self.margins = margins;
     }
 
-    fn parts_of(&mut self, axis: usize, parts: [(ShowTime, f64); 3]) {
-        for (order, (at, part)) in parts.into_iter().enumerate() {
-            let at_s = at.as_secs_f64();
-            if let Some(column) = self.place(at_s) {
+    fn parts_of(&mut self, at: MonoTime, axis: usize, parts: [(ShowTime, f64); 3]) {
+        for (order, (film, part)) in parts.into_iter().enumerate() {
+            if let Some((column, moment)) = self.place(at, film.as_secs_f64()) {
                 let place = |index| if index == order { 100.0 * part } else { f64::NAN };
                 self.parts.take(column, (0..3).map(place));
                 if part > self.most[axis][order].0 {
-                    self.most[axis][order] = (part, at_s);
+                    self.most[axis][order] = (part, moment);
                 }
             }
         }
@@ -313,7 +311,7 @@ impl Gathered {
 
 impl SeatCounts {
     /// Notes how far asked and sent are apart, and for how long in one piece.
-    fn apart(&mut self, at: MonoTime, film_s: f64, apart: f64) {
+    fn apart(&mut self, at: MonoTime, moment: Moment, apart: f64) {
         if apart <= APART {
             self.piece = None;
             return;
@@ -322,7 +320,7 @@ impl SeatCounts {
         let most = most.max(apart);
         self.piece = Some((since, most));
         if apart > self.apart {
-            (self.apart, self.apart_s) = (apart, film_s);
+            (self.apart, self.apart_at) = (apart, moment);
         }
         if most >= self.apart {
             self.held = at.since(since).as_secs_f64();

@@ -1,27 +1,29 @@
 //! A recording of one seat as a picture: asked, sent and measured, how far they are apart, lateness and acks, what was on, and the
 //! sentence that says what happened.
 
+mod film_axis;
 mod gather;
 mod panels;
 mod words;
 
 use std::mem::take;
 
+pub(crate) use self::film_axis::FilmAxis;
 pub(crate) use self::gather::Gathered;
 use self::gather::{BINS_US, CountedLane};
 use self::panels::panels;
 use self::words::{facts, seats, sentence, title};
 use super::text::number;
-use super::{Histogram, Lane, Picture, Shade, TimeAxis};
+use super::{Flag, Histogram, Lane, Picture, Shade, TimeAxis};
 use crate::record::{Contents, Summary};
 
 /// What a recording is looked at for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Look {
     /// The seat, by its place.
     pub(crate) lane: usize,
-    /// The time axis, in show time.
-    pub(crate) time: TimeAxis,
+    /// The time axis.
+    pub(crate) axis: FilmAxis,
     /// Whether asked positions and percentiles are drawn as well: a terminal has no room for them.
     pub(crate) is_detailed: bool,
 }
@@ -39,10 +41,10 @@ pub(crate) fn of_recording(
     Picture {
         title: title(contents, &seat.name),
         sentence: sentence(&seat.name, &gathered, contents.rate_hz()),
-        facts: facts(contents, summary, gathered.more_flags),
-        time: gathered.look.time,
+        facts: facts(contents, summary, &gathered),
+        time: gathered.look.axis.time.clone(),
         lanes: strips(take(&mut gathered.lanes), take(&mut gathered.states)),
-        flags: take(&mut gathered.flags),
+        flags: flags_of_passes(&gathered.look.axis.time).chain(take(&mut gathered.flags)).collect(),
         table: seats(summary),
         histograms: histograms
             .into_iter()
@@ -50,6 +52,16 @@ pub(crate) fn of_recording(
             .collect(),
         panels: panels(seat, gathered, other),
     }
+}
+
+/// A flag where each pass but the first begins; of many every few.
+fn flags_of_passes(time: &TimeAxis) -> impl Iterator<Item = Flag> {
+    /// At the most.
+    const MOST: usize = 12;
+    let passes = time.passes();
+    let each = passes.len().div_ceil(MOST).max(1);
+    let flag = |index: usize| Flag { at_s: passes[index].at_s, name: format!("pass {}", index + 1) };
+    (each..passes.len()).step_by(each).map(flag)
 }
 
 /// What was on, and the states of the hall.
@@ -79,7 +91,7 @@ mod tests {
     use super::super::{Theme, braille, page, svg};
     use super::*;
     use crate::health::HealthState;
-    use crate::record::{Mode, Wanted, read, recorded_as, recorded_falling, summarize};
+    use crate::record::{Mode, Wanted, read, recorded_as, recorded_falling, recorded_filmed, summarize};
 
     /// What a seat at rest in the middle, that was asked for a tenth of the stroke more in some ticks, looks like.
     fn drawn(mode: Mode, asked: std::ops::Range<u32>, columns: usize) -> Picture {
@@ -89,9 +101,9 @@ mod tests {
 
     fn drawn_of(mode: Mode, file: &[u8], columns: usize) -> Picture {
         let (contents, summary) = summarize(file).unwrap();
-        let time = TimeAxis { from_s: 0.0, until_s: 2.99, columns };
+        let axis = FilmAxis::over(&summary.passes, (f64::NEG_INFINITY, f64::INFINITY), columns).unwrap();
         let mut gathered =
-            Gathered::new(&contents, Look { lane: 0, time, is_detailed: true }, mode == Mode::Full);
+            Gathered::new(&contents, Look { lane: 0, axis, is_detailed: true }, mode == Mode::Full);
         read(file, Wanted::ALL, &mut |contents, at, told| gathered.take(contents, at, told)).unwrap();
         of_recording(&contents, &summary, gathered, None)
     }
@@ -133,6 +145,66 @@ mod tests {
             assert!(out.columns[299].height > 0.0 && out.columns[100].height == 0.0);
             let back = drawn_of(mode, &recorded_falling(mode, ticks(), comes_back), 300);
             assert!(back.sentence.contains("fell out (lost), back in play at 00:02.0"), "{}", back.sentence);
+        }
+    }
+
+    /// The film ran from 0 to 2 s, from 1 to 2.5 s and from 0.5 to 1.5 s, with the seat at another place each time; after that it stood
+    /// at its begin, with the seat high up.
+    fn thrice(mode: Mode) -> Vec<u8> {
+        let film_ms = |tick: u64| match tick {
+            0..200 => 10 * tick,
+            200..350 => 1_000 + 10 * (tick - 200),
+            350..450 => 500 + 10 * (tick - 350),
+            _ => 0,
+        };
+        let place = |tick| match tick {
+            0..200 => 0.5,
+            200..350 => 0.7,
+            350..450 => 0.3,
+            _ => 0.9,
+        };
+        // For one tick of the second pass it was held back.
+        let ticks = (0..500).map(|tick| (place(tick) + if tick == 260 { 0.1 } else { 0.0 }, place(tick)));
+        recorded_filmed(mode, ticks, film_ms)
+    }
+
+    #[test]
+    fn passes_of_the_film_over_the_same_places_stand_beside_each_other() {
+        for mode in [Mode::Full, Mode::Sampled] {
+            let picture = drawn_of(mode, &thrice(mode), 450);
+            let passes = picture.time.passes();
+            assert_eq!(passes.len(), 3, "{passes:?}");
+            let sent = &picture.panels[0].bands[0].columns;
+            for (pass, place) in passes.iter().zip([75.0, 105.0, 45.0]) {
+                let ends = [pass.at_s + 0.1, pass.at_s + pass.until_s - pass.film_s - 0.1];
+                let [from, until] = ends.map(|at| picture.time.column(at).unwrap());
+                let known: Vec<_> = sent[from..until].iter().flatten().collect();
+                assert!(
+                    known.len() > (until - from) / 8 && known.iter().all(|ends| **ends == [place; 2]),
+                    "{known:?}"
+                );
+            }
+            assert!(sent.iter().flatten().all(|[_, most]| *most < 130.0), "what came after is in no pass");
+            let held = "A1 at 00:01.600 in pass 2: held back by the limiter";
+            assert!(picture.sentence.starts_with(held), "{}", picture.sentence);
+            let flags: Vec<_> = picture.flags.iter().map(|flag| flag.name.as_str()).collect();
+            assert_eq!(flags, ["pass 2", "pass 3"]);
+            assert!(picture.facts.iter().any(|fact| fact.contains("3 times")), "{:?}", picture.facts);
+            for drawn in [braille(&picture), svg(&picture, Theme::Auto), page(&picture, Theme::Auto)] {
+                assert!(drawn.contains("pass 2") && drawn.contains("in pass 2: held back"), "{drawn}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_loop_of_a_thousand_passes_is_no_larger_than_another_picture() {
+        let ticks = (0..30_000).map(|tick| (f64::from(tick % 7) / 10.0, f64::from(tick % 7) / 10.0));
+        let file = recorded_filmed(Mode::Sampled, ticks, |tick| 10 * (tick % 40));
+        let picture = drawn_of(Mode::Sampled, &file, 900);
+        assert!((700..=760).contains(&picture.time.passes().len()), "{}", picture.time.passes().len());
+        assert!(picture.flags.len() <= 12, "{}", picture.flags.len());
+        for drawn in [braille(&picture), svg(&picture, Theme::Auto), page(&picture, Theme::Auto)] {
+            assert!(drawn.len() < 200_000, "{}", drawn.len());
         }
     }
 

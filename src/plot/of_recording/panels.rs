@@ -1,10 +1,10 @@
 //! The panels of a picture of a recording.
 
+use super::film_axis::Moment;
 use super::gather::{APART, Gathered, SeatCounts, Traces};
 use super::words::places;
 use crate::plot::{Band, Mark, Panel, Scale};
 use crate::record::RecordedSeat;
-use crate::time::ShowTime;
 
 /// All of them, those of what is there alone.
 pub(super) fn panels(seat: &RecordedSeat, gathered: Gathered, other: Option<Gathered>) -> Vec<Panel> {
@@ -12,7 +12,9 @@ pub(super) fn panels(seat: &RecordedSeat, gathered: Gathered, other: Option<Gath
     let unit = seat.axes().first().map_or("mm", |axis| axis.unit.name());
     let ends = range(seat, &asked, &sent);
     let over = if let Some(other) = other {
-        Some(("dashed: the other recording", other.sent))
+        let (plain, axis) = (&other.look.axis.time, &look.axis.time);
+        let sent = if plain == axis { other.sent } else { other.sent.on(plain, axis) };
+        Some(("dashed: the other recording", sent))
     } else {
         (look.is_detailed && counts.apart > APART).then_some(("dashed: where it was asked to be", asked))
     };
@@ -60,7 +62,7 @@ fn apart_panel(unit: &'static str, apart: Traces, counts: &SeatCounts) -> Panel 
     let ends = apart.ends().unwrap_or((0.0, 1.0));
     Panel {
         note: format!("{} {unit} apart at most", places(counts.apart)),
-        place: ShowTime::from_secs_f64(counts.apart_s).to_string(),
+        place: counts.apart_at.to_string(),
         ..panel("Asked less sent", unit, (ends.0.min(0.0), ends.1.max(0.0)), apart.bands(named("Δ"), 0))
     }
 }
@@ -90,12 +92,12 @@ fn panel(name: &str, unit: &'static str, (low, high): (f64, f64), bands: Vec<Ban
 }
 
 /// Speed, acceleration and jerk as parts of their limits, the most of all axes.
-fn limits(parts: Traces, most: &[[(f64, f64); 3]]) -> Vec<Panel> {
+fn limits(parts: Traces, most: &[[(f64, Moment); 3]]) -> Vec<Panel> {
     let of = |(order, columns): (usize, Vec<Option<[f32; 2]>>)| {
-        let of_axis = |(axis, most): (usize, &[(f64, f64); 3])| (axis, most[order]);
+        let of_axis = |(axis, most): (usize, &[(f64, Moment); 3])| (axis, most[order]);
         let worst = most.iter().enumerate().map(of_axis).max_by(|one, other| one.1.0.total_cmp(&other.1.0));
-        let (axis, (part, at_s)) = worst.unwrap_or_default();
-        let (value, at) = (100.0 * part, ShowTime::from_secs_f64(at_s));
+        let (axis, (part, at)) = worst.unwrap_or_default();
+        let value = 100.0 * part;
         let columns = columns.into_iter().map(|column| column.map(|[_, most]| [0.0, most])).collect();
         let words = format!("a{}: {value:.0} % at {at}", axis + 1);
         Panel {
@@ -103,7 +105,7 @@ fn limits(parts: Traces, most: &[[(f64, f64); 3]]) -> Vec<Panel> {
             place: format!("a{} {at}", axis + 1),
             scale: Scale::Limit,
             high: if part > 1.0 { (108.0 * part).ceil() } else { 108.0 },
-            marks: vec![Mark { at_s, value, style: order, words }],
+            marks: vec![Mark { at_s: at.at_s, value, style: order, words }],
             ..panel(
                 ["Speed", "Acceleration", "Jerk"][order],
                 "%",
@@ -138,6 +140,6 @@ fn lateness_panel(late: &[Vec<f32>], is_detailed: bool, counts: &SeatCounts) -> 
     bands[0].last()?;
     let mut panel = panel("Lateness", "ms", (0.0, (counts.late_us / 1e3).max(0.001)), bands);
     panel.note = format!("{:.3} ms at most", counts.late_us / 1e3);
-    panel.place = ShowTime::from_secs_f64(counts.late_s).to_string();
+    panel.place = counts.late_at.to_string();
     Some(panel)
 }

@@ -1,8 +1,8 @@
 //! What a picture of a recording says in words: the sentence, the facts below it, a row for each seat.
 
 use super::gather::{APART, Gathered};
-use crate::plot::Table;
 use crate::plot::text::number;
+use crate::plot::{Table, TimeAxis};
 use crate::record::{Contents, Falls, Summary};
 use crate::time::ShowTime;
 
@@ -34,7 +34,7 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
     let held = counts.apart > APART || counts.clamps > 0;
     let mut words = fallen(name, &gathered.falls);
     words += &if held {
-        let at = ShowTime::from_secs_f64(counts.apart_s);
+        let at = counts.apart_at;
         // From tick to tick it is one period longer than from the first instant to the last.
         let ms = 1_000.0 * (counts.held + if gathered.is_whole { 1.0 / rate_hz } else { 0.05 });
         let about = if gathered.is_whole { "" } else { "about " };
@@ -46,7 +46,7 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
     let late = if counts.missed > 0 {
         format!("{} ticks missed", counts.missed)
     } else if counts.late_us > LATE_US {
-        format!("latest {:.1} ms at {}", counts.late_us / 1e3, ShowTime::from_secs_f64(counts.late_s))
+        format!("latest {:.1} ms at {}", counts.late_us / 1e3, counts.late_at)
     } else {
         "nothing late".to_owned()
     };
@@ -79,7 +79,7 @@ fn fallen(name: &str, falls: &Falls) -> String {
     format!("{name} at {}: fell out{times} ({standing}), {back}. ", time(at))
 }
 
-pub(super) fn facts(contents: &Contents, summary: &Summary, more_flags: u64) -> Vec<String> {
+pub(super) fn facts(contents: &Contents, summary: &Summary, gathered: &Gathered) -> Vec<String> {
     let entry = |key| contents.entry(key);
     let nearest =
         summary.nearest().map(|margin| format!("Nearest to its limit in all of it: {}.", margin.in_words()));
@@ -104,9 +104,11 @@ pub(super) fn facts(contents: &Contents, summary: &Summary, more_flags: u64) -> 
     if fell.peek().is_some() {
         facts.push(format!("Fell out: {}.", fell.collect::<Vec<_>>().join(", ")));
     }
-    if more_flags > 0 {
+    facts.extend(passes(&gathered.look.axis.time));
+    if gathered.more_flags > 0 {
         facts.push(format!(
-            "{more_flags} more marks, events and requests have no flag; record info lists them."
+            "{} more marks, events and requests have no flag; record info lists them.",
+            gathered.more_flags
         ));
     }
     if summary.dropped > 0 {
@@ -116,6 +118,24 @@ pub(super) fn facts(contents: &Contents, summary: &Summary, more_flags: u64) -> 
         facts.push(format!("The file {trouble}."));
     }
     facts
+}
+
+/// That the film ran over what is shown more than once, and what each pass is.
+fn passes(time: &TimeAxis) -> Option<String> {
+    /// Of more it is said how many there are.
+    const TOLD: usize = 8;
+    let passes = time.passes();
+    let clock = ShowTime::from_secs_f64;
+    let told = passes.iter().take(TOLD).zip(1..);
+    let told =
+        told.map(|(pass, number)| format!("{number}: {} to {}", clock(pass.film_s), clock(pass.until_s)));
+    let told = told.collect::<Vec<_>>().join(", ");
+    let more = passes.len().saturating_sub(TOLD);
+    let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+    let count = passes.len();
+    (count > 0).then(|| {
+        format!("The film ran through this {count} times, side by side in the picture; {told}{more}.")
+    })
 }
 
 /// A row for each seat.

@@ -15,8 +15,16 @@ use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
 use crate::wire::sixpack2::action;
 
-const COUNTS: TalkCounts =
-    TalkCounts { asked: 51, answered: 51, late: 0, doubled: 0, malformed: 0, foreign: 0, echo_differs: 0 };
+const COUNTS: TalkCounts = TalkCounts {
+    asked: 51,
+    answered: 51,
+    late: 0,
+    doubled: 0,
+    malformed: 0,
+    foreign: 0,
+    echo_differs: 0,
+    echoed: 0,
+};
 
 /// A seat that was homed, on units 16 to 18.
 struct Case {
@@ -156,13 +164,38 @@ fn who_does_not_answer_and_who_answers_for_another_is_told() {
 #[test]
 fn an_adapter_that_repeats_what_is_sent_has_to_be_known_for_it() {
     let mut case = Case::new();
-    case.survey.counts.malformed = 51;
-    case.assert_found(Check::EchoDiffers, "51 lines besides 51 answers came back");
+    (case.survey.counts.malformed, case.survey.counts.echoed) = (51, 51);
+    case.assert_found(Check::EchoDiffers, "51 of 51 requests came back besides 51 answers");
     let mut case = Case::new();
     case.hall.links.iter_mut().for_each(|link| link.has_echo = true);
     assert_eq!(case.found(), []);
     case.survey.counts.echo_differs = 40;
     case.assert_found(Check::EchoDiffers, "40 of 51 requests were not echoed");
+}
+
+#[test]
+fn noise_is_told_as_noise_and_not_as_an_echo_or_as_two_units_with_one_number() {
+    let mut case = Case::new();
+    case.survey.counts.malformed = 2;
+    assert_eq!(case.found(), [], "a chance");
+    case.survey.counts.malformed = 60;
+    case.assert_found(Check::LineNoise, "what nobody sent came 60 times while 51 requests were sent");
+}
+
+#[test]
+fn a_seat_that_does_not_stand_at_park_is_told_with_where_it_stands_and_where_it_is_held() {
+    let at = |position: i32, target: i32| {
+        Case::new().with(move |facts| (facts.position, facts.target) = (position, target))
+    };
+    // The second axis counts downwards, 800 a millimetre.
+    assert_eq!(at(-160, 0).found(), [], "a loaded motor");
+    at(-33_040, -33_040).assert_found(Check::OffPark, "axis 2 stands at 41.3 mm, its park place is 0.0 mm");
+    at(-640, 0).assert_found(
+        Check::OffPark,
+        "stands at 0.8 mm, its park place is 0.0 mm, and its drive holds it at 0.0 mm",
+    );
+    let not_home = at(-640, 0).all(|facts| facts.canary = 0).found();
+    assert!(not_home.iter().all(|(check, _)| *check != Check::OffPark), "{not_home:?}");
 }
 
 #[test]

@@ -96,6 +96,7 @@ impl Watch {
         // While frames lead a seat from a place that is known, each answer is held against where they led it.
         let is_led = self.live.is_moving() && self.stands(controller).may_move();
         self.judge(HealthInput::Outside(controller, place.outside));
+        self.judge(HealthInput::Pushed(controller, place.pushed));
         self.judge(HealthInput::Ambiguous(controller, !is_led && place.is_ambiguous));
         let reading = place.reading.or(place.passing.filter(|_| self.live.is_moving()));
         if let (Some(reading), Some(evidence)) = (reading, self.live.evidence(controller)) {

@@ -23,6 +23,8 @@ pub(crate) struct LineFaults {
     pub(crate) held: Duration,
     /// The adapter returns what is sent, as on two wires.
     pub(crate) echo: bool,
+    /// Octets a second that nobody sent, by chance in time and in what they are.
+    pub(crate) noise: u32,
     /// The adapter is unplugged.
     pub(crate) unplugged: bool,
 }

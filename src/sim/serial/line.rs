@@ -26,6 +26,8 @@ pub(crate) struct SerialLine<B> {
     back: Wire<u8>,
     /// The answer that is being sent is lost.
     is_losing: bool,
+    /// When the next octet comes that nobody sent, and which way.
+    noise: Option<(MonoTime, bool)>,
 }
 
 /// One direction.
@@ -61,6 +63,7 @@ impl<B: Bus> SerialLine<B> {
             out: Wire::empty(),
             back: Wire::empty(),
             is_losing: false,
+            noise: None,
         }
     }
 
@@ -108,6 +111,7 @@ impl<B: Bus> SerialLine<B> {
 
     /// All that happens up to now, in its order.
     pub(crate) fn advance(&mut self, now: MonoTime) {
+        self.make_noise(now);
         loop {
             let arrival = self.out.octets.front().map(|(at, _)| *at);
             let due = [arrival, self.bus.next()].into_iter().flatten().min();
@@ -145,7 +149,33 @@ impl<B: Bus> SerialLine<B> {
     pub(crate) fn next(&self) -> Option<MonoTime> {
         let arrival = self.out.octets.front().map(|(at, _)| *at);
         let back = self.back.octets.front().map(|(at, _)| self.released(*at));
-        [arrival, back, self.bus.next()].into_iter().flatten().min()
+        let noise = self.noise.map(|(at, _)| at);
+        [arrival, back, noise, self.bus.next()].into_iter().flatten().min()
+    }
+
+    /// Puts on the wires what nobody sends by now.
+    fn make_noise(&mut self, now: MonoTime) {
+        if self.faults.noise == 0 {
+            self.noise = None;
+            return;
+        }
+        while let Some((at, is_out)) = self.noise.filter(|(at, _)| *at <= now) {
+            let takes = self.octet_time(self.host_baud.unwrap_or_else(|| self.bus.baud()));
+            #[expect(clippy::cast_possible_truncation, reason = "any octet")]
+            let octet = self.chance.bits() as u8;
+            match is_out {
+                _ if self.faults.unplugged => {}
+                true => self.out.put(Some((octet, self.host_baud)), at, takes),
+                false => self.back.put(octet, at, takes),
+            }
+            self.noise = Some(self.next_noise(at));
+        }
+        self.noise = self.noise.or_else(|| Some(self.next_noise(now)));
+    }
+
+    fn next_noise(&mut self, at: MonoTime) -> (MonoTime, bool) {
+        let seconds = -(1.0 - self.chance.draw()).ln() / f64::from(self.faults.noise);
+        (at + Duration::from_secs_f64(seconds), self.chance.bits().is_multiple_of(2))
     }
 
     /// When an adapter hands over what has come at `at`: where its latency timer runs out next.

@@ -12,6 +12,8 @@ pub(crate) enum Action {
     Hot(bool),
     /// Its axis is held by something, or let go.
     Blocked(bool),
+    /// Something pushes its axis so many counts off where its motor holds it, slowly.
+    Pushed(i32),
     /// An input is high, or low.
     Input {
         /// 1 to 7.
@@ -34,6 +36,7 @@ impl Unit {
             Action::Reset => self.reset(),
             Action::Hot(is_hot) => self.world.is_hot = is_hot,
             Action::Blocked(is_blocked) => self.axis.is_blocked = is_blocked,
+            Action::Pushed(counts) => self.axis.push(counts),
             Action::Input { input, is_high } => self.axis.set_input(input, is_high),
             Action::Dead(is_dead) => self.world.is_dead = is_dead,
             Action::AnswersAs(other) => self.world.answers_as = other,

@@ -16,6 +16,8 @@ pub(super) struct Axis {
     levels: u8,
     /// Nothing moves it.
     pub(super) is_blocked: bool,
+    /// How far something pushes it off where its motor holds it by now, and how far it will.
+    pushed: [i64; 2],
     pub(super) executed: Executed,
 }
 
@@ -25,17 +27,29 @@ impl Axis {
         let place = i64::from(setup.place) << shift;
         let top = i64::from(setup.top) << shift;
         let executed = Executed::at(f64::from(setup.place));
-        Self { place, top, shift, setup, levels: 0x7f, is_blocked: false, executed }
+        Self { place, top, shift, setup, levels: 0x7f, is_blocked: false, pushed: [0; 2], executed }
     }
 
     pub(super) const fn place(&self) -> i64 {
         self.place
     }
 
-    /// The motor pulls it to a place, as far as stops and what blocks it let it.
+    /// Something pushes it so many counts off from now on.
+    pub(super) fn push(&mut self, counts: i32) {
+        self.pushed[1] = i64::from(counts) << self.shift;
+    }
+
+    /// True if it gives way to that still.
+    pub(super) const fn gives_way(&self) -> bool {
+        self.pushed[0] != self.pushed[1]
+    }
+
+    /// The motor pulls it to a place, as far as stops, and what pushes or blocks it, let it; it gives way by a count a tick, 10 mm/s.
     pub(super) fn pull(&mut self, wanted: i64, tick: u64) {
+        let ([now, then], count) = (self.pushed, 1 << self.shift);
+        self.pushed[0] = now + (then - now).clamp(-count, count);
         if !self.is_blocked {
-            self.place = wanted.clamp(0, self.top);
+            self.place = (wanted + self.pushed[0]).clamp(0, self.top);
         }
         self.executed.see(tick, self.counts());
     }

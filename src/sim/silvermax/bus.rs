@@ -70,7 +70,7 @@ impl SilverBus {
     }
 }
 
-/// What units say together: where two speak at once a bit is 0 if one of them has it so.
+/// What units say together: where two speak at once a bit is 0 if one of them has it so, and their bits do not fall on each other.
 #[derive(Debug, Default)]
 struct LineAnswer {
     octets: Vec<(MonoTime, u8)>,
@@ -82,7 +82,7 @@ impl LineAnswer {
         let octets = reply.emit(&mut buf);
         for (index, octet) in octets.iter().enumerate() {
             match self.octets.get_mut(index) {
-                Some((_, both)) => *both &= octet,
+                Some((_, both)) => *both &= octet.rotate_right(3),
                 None => self.octets.push((at, *octet)),
             }
         }

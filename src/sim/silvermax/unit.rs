@@ -234,7 +234,7 @@ impl Unit {
             MoverMode::Queue { running, .. } => running.is_none() && self.queue.len() == 0,
             MoverMode::Move { .. } => false,
         };
-        waits && self.pending.is_none() && self.status.settling == 0
+        waits && self.pending.is_none() && self.status.settling == 0 && !self.axis.gives_way()
     }
 
     fn run_tick(&mut self) {

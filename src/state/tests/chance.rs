@@ -53,7 +53,7 @@ fn turn() -> impl Strategy<Value = Turn> {
 }
 
 /// How much a hall does in a state; only a person may make it do more.
-const fn height(state: State) -> u8 {
+pub(super) const fn height(state: State) -> u8 {
     match state {
         State::Stopped => 0,
         State::Fault => 1,

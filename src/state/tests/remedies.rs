@@ -4,6 +4,17 @@ use std::time::Duration;
 
 use super::*;
 
+/// All there are.
+pub(super) const TROUBLES: [Trouble; 7] = [
+    Trouble::Limiter,
+    Trouble::Planner,
+    Trouble::Deaf,
+    Trouble::Homing(2),
+    Trouble::HomingTime,
+    Trouble::ParkingTime,
+    Trouble::OtherMaster(0),
+];
+
 /// Does what is named, by a request that has to be taken, or as somebody at the seats or the hall itself does it.
 fn follow(hall: &mut Machine, now: MonoTime) {
     let next = hall.next();
@@ -55,16 +66,7 @@ pub(super) fn follow_to_the_show(hall: &mut Machine, mut now: MonoTime) {
 
 #[test]
 fn whatever_goes_wrong_wherever_what_is_named_next_can_be_done_and_leads_to_a_show() {
-    let troubles = [
-        Trouble::Limiter,
-        Trouble::Planner,
-        Trouble::Deaf,
-        Trouble::Homing(2),
-        Trouble::HomingTime,
-        Trouble::ParkingTime,
-        Trouble::OtherMaster(0),
-    ];
-    let events = troubles.map(Event::Trouble).into_iter().chain([
+    let events = TROUBLES.map(Event::Trouble).into_iter().chain([
         Event::EmergencyStop(1),
         Event::Rebooted(1),
         Event::Latched(Latch::Held),

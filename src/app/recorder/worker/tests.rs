@@ -213,6 +213,40 @@ fn a_show_that_follows_at_once_has_the_counts_of_its_own_and_says_how_the_hall_s
     }
 }
 
+#[test]
+fn a_disk_that_stands_still_for_a_second_and_a_half_loses_nothing_and_for_ten_what_its_file_says() {
+    let mut bench = Bench::new();
+    bench.worker.record.part_mib = 1_000;
+    bench.begin();
+    bench.ticks(1_000);
+    // What was dropped is told by the next tick that found room.
+    let still = |bench: &mut Bench, ticks: u64| {
+        (0..ticks).for_each(|_| bench.tick());
+        bench.worker.look(at(bench.tick));
+        bench.ticks(1_000);
+        bench.worker.intake.counts().dropped
+    };
+    assert_eq!(still(&mut bench, 1_500), 0);
+    let dropped = still(&mut bench, 10_000);
+    assert!((7_000..=8_000).contains(&dropped), "at least two of ten seconds are held: {dropped}");
+    bench.worker.close_show(at(bench.tick));
+    let file = std::fs::read(&bench.files()[0]).expect("it is there");
+    let (mut ticks, mut gaps, mut last) = (0, 0, None);
+    let mut take = |_: &Contents, _, told: Told<'_>| {
+        let Told::Chunks(chunks) = told else { return };
+        each_chunk(&chunks, |chunk| {
+            let index = chunk.head.index;
+            let before = last.replace(index).map_or(0, |last: u64| last + 1);
+            assert_eq!(index - before, u64::from(chunk.dropped), "at tick {index}");
+            (ticks, gaps) = (ticks + 1, gaps + index - before);
+        });
+    };
+    let contents = read(file.as_slice(), Wanted::ALL, &mut take).expect("a recording");
+    assert_eq!((gaps, ticks + gaps), (dropped, bench.tick));
+    assert_eq!(contents.end["dropped"], dropped.to_string());
+    assert!(bench.worker.link.status().troubles.is_empty(), "the next look found the disk as it was");
+}
+
 /// A file that takes no more than it has, whoever writes.
 fn full(begin: impl FnOnce(File) -> Recording<BufWriter<File>>) -> Recording<BufWriter<File>> {
     let place =

@@ -24,7 +24,7 @@ use crate::health::HealthState;
 use crate::net::{Delivery, DrainGrid, Network, Origin};
 use crate::rt::{Command, Ticked};
 use crate::sim::serial::{Bus, LineFaults, SerialLine};
-use crate::sim::silvermax::{SilverBus, Unit, UnitSetup};
+use crate::sim::silvermax::{Action, SilverBus, Unit, UnitSetup};
 use crate::state::{Event, Finding, Readiness, State, Transition};
 use crate::time::{Clock, MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -191,6 +191,27 @@ impl<B: Bus> Hall<'_, '_, B> {
         self.loops.ticks.engine.lane(0).gets_a_frame()
     }
 
+    /// In a ride the port vanishes, and comes back under its name as the line of another seat: that it is not led.
+    fn moves_nobody_on_another_line(
+        &mut self,
+        show: StagedShow,
+        other: &SharedLine<B>,
+        places: impl Fn(&B) -> Vec<f64>,
+    ) {
+        self.go(show);
+        self.run(6.0, |_| {});
+        assert!(self.is_led());
+        self.line.lock().is_gone = true;
+        self.run(0.3, |_| {});
+        std::mem::swap(&mut self.line.lock().line, &mut other.lock().line);
+        self.line.lock().is_gone = false;
+        let before = places(self.line.lock().line.bus());
+        self.run(10.0, |hall| hall.runtime.live.want(NOW.get()));
+        let row = self.runtime.live.table().swap_remove(0);
+        assert!(!self.is_led() && row.standing == HealthState::Excluded, "{row:?}");
+        assert_eq!(places(self.line.lock().line.bus()), before, "{}", row.why);
+    }
+
     /// That a seat which is held up for a second is read before it is led again, and not led while it is said to be lost.
     fn comes_back_after_a_second(&mut self, show: StagedShow, later: Duration) {
         self.go(show);
@@ -247,6 +268,14 @@ impl Hall<'_, '_> {
     fn places_mm(&self) -> Vec<f64> {
         self.units(|unit| (unit.place() - ZERO) / MM)
     }
+
+    /// Something pushes an axis so many mm off where its drive holds it, and is done with that after a second.
+    fn push(&mut self, unit: Option<u8>, mm: f64) {
+        let at = self.line.lock().now;
+        self.line.lock().line.bus_mut().act(unit, Action::Pushed((mm * MM) as i32), at);
+        self.run(1.0, |hall| hall.runtime.live.want(NOW.get()));
+        self.line.lock().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
+    }
 }
 
 /// Reads a configuration.
@@ -267,17 +296,32 @@ fn hall_over(
     over: impl FnOnce(SharedLine) -> Port,
     lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline),
 ) {
+    hall_of(HALL, over, lead);
+}
+
+/// The same of another hall.
+fn hall_of(
+    text: &str,
+    over: impl FnOnce(SharedLine) -> Port,
+    lead: impl FnOnce(&mut Hall<'_, '_>, StagedShow, &Timeline),
+) {
+    let config = Arc::new(read(text));
+    let line = homed_line(&config, 7 << 16);
+    let port = over(line.clone());
+    homed((config, 1.0), line, port, lead);
+}
+
+/// A line with three units whose seat was homed.
+fn homed_line(config: &Config, canary: i32) -> SharedLine {
     NOW.set(MonoTime::from_nanos(3_000_000_000));
-    let config = Arc::new(read(HALL));
     let setups = [16, 17, 18].map(|unit| UnitSetup { place: 12_000, ..UnitSetup::new(unit) });
     let line = SharedLine::new(SilverBus::new(&setups, BAUD, NOW.get()), 11);
     let seat = units_of(&config.controllers[0]).expect("it has units");
-    let homing = Homing { canary: 7_311, goes_on: &|| true, told: &mut |_| {} };
+    let homing = Homing { canary, goes_on: &|| true, told: &mut |_| {} };
     home(&mut Talk::new(line.clone(), TalkTerms::of(&config.links[0])), seat, homing)
         .expect("it finds its zero");
     line.lock().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
-    let port = over(line.clone());
-    homed((config, 1.0), line, port, lead);
+    line
 }
 
 /// Opens a hall whose seat was homed over a line, which its play has by a port, with a cue on it at a level.

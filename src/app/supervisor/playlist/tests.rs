@@ -397,3 +397,14 @@ fn a_show_that_waits_says_on_which_side_of_its_cue_the_film_is() {
     assert_eq!(side(61.0), None);
     assert_eq!(side(66.0), Some("it is behind the end of the cue"));
 }
+
+#[test]
+fn what_is_next_about_a_film_that_runs_depends_on_whether_its_show_was_started() {
+    let row = SourceRow::named("ltc", FilmState::Locked);
+    let table = FilmTable { sources: vec![row], ..FilmTable::default() };
+    let next = |state| crate::app::supervisor::film::status(&table, &hall(state, "one")).next;
+    assert_eq!(next(JOINING), "nothing; the seats join it as soon as it is in the cue");
+    for state in [State::Parked, State::Armed, State::Paused] {
+        assert_eq!(next(state), "nothing; seats follow it once a person starts or resumes the show");
+    }
+}

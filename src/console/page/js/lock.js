@@ -1,5 +1,5 @@
-// Show mode: a lock of this page that leaves STOP, PAUSE, PARK and GO, so that no other press is made in the dark. A press locks; it
-// takes a long one to unlock, by finger or key. It is kept as long as the page is open.
+// Show mode: a lock of this page that leaves STOP, PAUSE, RESUME, PARK and GO, so that no other press is made in the dark. A press
+// locks; it takes a long one to unlock, by finger or key. It is kept as long as the page is open.
 
 import { byId, setAttribute, setProperty } from './dom.js';
 import { words } from './language.js';
@@ -34,6 +34,8 @@ export function startLock() {
 }
 
 function hold() {
+  // A second finger begins anew: of two, one would go on when both are off.
+  clearTimeout(timer);
   isEnding = false;
   if (!isLocked()) return;
   setProperty(byId('lock'), 'className', 'lock held');

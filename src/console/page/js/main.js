@@ -8,6 +8,7 @@ import { showCurves, startCurves } from './curves.js';
 import { showFilm, startFilm } from './film.js';
 import { showFollow, startFollow } from './follow.js';
 import { showHistograms } from './histogram.js';
+import { showHistory } from './history.js';
 import { learn, startLanguage } from './language.js';
 import { showLevels } from './levels.js';
 import { showLock, startLock } from './lock.js';
@@ -33,7 +34,7 @@ const STARTS = [
 ];
 const SHOWS = [
   showHeadline, showTransport, showNext, showFilm, showFollow, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,
-  showLinks, showHistograms, showReports, showCurves, showRecordings, showLock,
+  showLinks, showHistograms, showReports, showCurves, showHistory, showRecordings, showLock,
 ];
 
 // Before it is in one language nothing is shown; STOP works meanwhile.

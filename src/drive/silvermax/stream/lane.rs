@@ -13,8 +13,6 @@ use crate::wire::FrameNo;
 const FRAMES: usize = 64;
 /// How much of each tick the grid is stretched at most to come back to when poses are to be there.
 const STRETCH: f64 = 0.01;
-/// Poses that differ by less, in strokes, stand still.
-const STILL: f64 = 1e-7;
 
 /// The axes of one seat on SilverMax units.
 pub(super) type SilverLane = LedLane<SilverMax>;
@@ -66,11 +64,7 @@ impl SilverLane {
 
     /// True if a pose leads elsewhere than the one before it, or vibrates.
     fn moves_to(&self, pose: &LinkPose) -> bool {
-        let differs = |last: LinkPose| {
-            let pairs = last.axes.iter().zip(pose.axes).take(self.axes.len());
-            pairs.into_iter().any(|(a, b)| (a - b).abs() > STILL)
-        };
-        self.last.is_some_and(differs) || pose.vibration.iter().any(|swing| swing.amplitude > 0.0)
+        self.leads_on(pose) || pose.vibration.iter().any(|swing| swing.amplitude > 0.0)
     }
 
     /// Whether its units are home, once all have told: they hold the one number that homing wrote.

@@ -3,7 +3,9 @@
 use super::axis::Doubt;
 use super::polls::Question;
 use super::{LOST, PROBES, SilverMax, number};
-use crate::drive::link::{BrakeReason, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
+use crate::drive::link::{
+    BrakeReason, LinkAxis as _, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number,
+};
 use crate::drive::silvermax::talk::{Answer, TalkFault, internal_word};
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{CANARY, KILL_CAUSE};
@@ -47,14 +49,21 @@ impl<P: LinkPort> Stream<SilverMax, P> {
                 axis.figures.position = scale.fraction(f64::from(value));
                 let course = if axis.has_started() { axis.course_at(sent) } else { axis.course };
                 axis.figures.error_mm = scale.mm(f64::from(value) - course.position());
-                let position = axis.figures.position;
+                let (position, place) = (axis.figures.position, axis.place());
                 if axis.figures.error_mm.abs() > FAR_MM {
                     // A segment that was damaged leads it there, or its load does: the target tells.
                     axis.polls.hurry(Question::Target, self.talk.now());
                 }
-                if !matches!(self.lanes[l].stage, Stage::Out | Stage::Lost) {
-                    let (lane, axis) = (number(l), axis_number(a));
-                    self.tell(StreamEvent::Read { lane, axis, position, at: sent });
+                let stage = self.lanes[l].stage;
+                if !matches!(stage, Stage::Out | Stage::Lost) {
+                    let held = (stage == Stage::Ready).then_some(place);
+                    self.tell(StreamEvent::Read {
+                        lane: number(l),
+                        axis: axis_number(a),
+                        position,
+                        held,
+                        at: sent,
+                    });
                 }
             }
             Question::Target if self.lanes[l].stage == Stage::Runs => self.compare(l, a, value, sent),

@@ -6,10 +6,13 @@ use std::time::Duration;
 use super::bench::*;
 use crate::config::drive::SeatDrive;
 use crate::config::drive::homing::{HomeWay, Side};
-use crate::drive::link::{LinkPort as _, LinkTalk as _, Step};
+use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Step, TalkTerms};
 use crate::drive::silvermax::*;
+use crate::drive::sixpack2;
 use crate::motion::SeatType;
-use crate::sim::silvermax::{Action, UnitSetup};
+use crate::sim::serial::{LineFaults, SerialLine};
+use crate::sim::silvermax::{Action, SilverBus, UnitSetup};
+use crate::time::MonoTime;
 
 fn three() -> Vec<UnitSetup> {
     [(16, 63_200), (17, 400), (18, 120_000)]
@@ -227,7 +230,6 @@ fn a_unit_that_is_not_there_too_hot_or_of_another_count_is_told_with_its_remedy(
 
 #[test]
 fn a_homing_over_a_bad_line_ends_at_the_edge_or_says_what_is_wrong() {
-    use crate::sim::serial::LineFaults;
     let mut homes = 0;
     for seed in 0..12_u64 {
         let mut talk = talk_to(&[UnitSetup { place: 20_000 + 700 * seed as i32, ..UnitSetup::new(16) }]);
@@ -243,4 +245,100 @@ fn a_homing_over_a_bad_line_ends_at_the_edge_or_says_what_is_wrong() {
         }
     }
     assert!(homes >= 6, "{homes}");
+}
+
+#[test]
+fn two_units_with_one_number_are_told_before_either_moves() {
+    for place in [63_200, 63_201, 20_000] {
+        let twin = UnitSetup { place, ppm: 40, ..UnitSetup::new(16) };
+        let mut talk = talk_to(&[UnitSetup::new(16), twin]);
+        let words = home_as(&mut talk, &drive(SWITCH), &[16]).0.unwrap_err().to_string();
+        assert!(
+            words.starts_with("unit 16 does not answer") && words.contains("that no other has it"),
+            "{words}"
+        );
+        assert!([0, 1].iter().all(|index| unit(&mut talk, *index).executed().velocity == 0.0), "{place}");
+    }
+}
+
+#[test]
+fn a_line_at_another_rate_is_told_by_its_baud_and_nothing_moves() {
+    for baud in [9_600, 19_200, 38_400, 115_200] {
+        let now = MonoTime::from_nanos(3_000_000_000);
+        let mut line =
+            SerialLine::new(SilverBus::new(&[UnitSetup::new(16)], baud, now), 11, LineFaults::default(), 7);
+        line.set_host_baud(Some(BAUD));
+        let terms =
+            TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false, is_two_wires: false, is_bus: false };
+        let mut talk = Talk::new(VirtualPort::new(line, now), terms);
+        let words = home_as(&mut talk, &drive(SWITCH), &[16]).0.unwrap_err().to_string();
+        assert!(words.starts_with("unit 16 does not answer") && words.contains("baud"), "{words}");
+        assert!(look(&mut talk, 16).is_err() && unit(&mut talk, 0).executed().velocity == 0.0, "{baud}");
+    }
+}
+
+/// Frames of nine octets are what it makes of requests: none of them is an order to move, whatever its number.
+#[test]
+fn a_sixpack_where_a_silvermax_was_is_told_and_moves_by_nothing_that_is_said_there() {
+    use crate::sim::sixpack2::{MOTORS, ShaftSetup, SixpackBus, SixpackSetup};
+    let now = MonoTime::from_nanos(3_000_000_000);
+    let shafts = [ShaftSetup::default(); MOTORS];
+    let setups =
+        (1..=254).map(|unit| SixpackSetup { unit, serial: 9, shafts, is_two_wires: false, can_baud: None });
+    let line = SerialLine::new(SixpackBus::waking(setups, now), 11, LineFaults::default(), 7);
+    let terms = TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false, is_two_wires: false, is_bus: false };
+    let mut talk = Talk::new(crate::drive::link::VirtualPort::new(line, now), terms);
+    let (drive, seat) = (drive(SWITCH), seat());
+    let silvermax = drive.silvermax.clone().unwrap();
+    let of = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16, 17, 18] };
+    let homed = home(&mut talk, of, Homing { canary: CANARY, goes_on: &|| true, told: &mut |_| {} });
+    assert!(homed.unwrap_err().to_string().starts_with("unit 16 does not answer"));
+    assert!(look(&mut talk, 16).is_err());
+    let motors = talk.port().line.bus().units().iter().flat_map(|unit| &unit.motors);
+    assert!(motors.into_iter().all(|motor| motor.shaft.executed().velocity == 0.0));
+}
+
+/// A port from which octets come without an end.
+#[derive(Debug)]
+struct Babble(MonoTime, usize);
+
+impl LinkPort for Babble {
+    fn now(&self) -> MonoTime {
+        self.0
+    }
+
+    fn send(&mut self, _: &[u8]) -> Result<(), LinkFault> {
+        Ok(())
+    }
+
+    fn receive(&mut self, buf: &mut [u8], _: MonoTime) -> Result<usize, LinkFault> {
+        (self.0, self.1) = (self.0 + Duration::from_micros(1), self.1 + 1);
+        assert!(self.1 < 1_000_000, "it is listened to for ever");
+        buf[0] = b"*# 10\r"[self.1 % 6];
+        Ok(1)
+    }
+
+    fn flush(&mut self) -> usize {
+        0
+    }
+
+    fn send_break(&mut self, _: Duration) -> Result<(), LinkFault> {
+        Ok(())
+    }
+
+    fn set_baud(&mut self, _: u32) -> Result<(), LinkFault> {
+        Ok(())
+    }
+
+    fn sleep_until(&mut self, at: MonoTime) {
+        self.0 = self.0.max(at);
+    }
+}
+
+#[test]
+fn a_line_that_babbles_without_an_end_holds_up_neither_family() {
+    let terms = TalkTerms { baud: BAUD, octet_bits: 11, has_echo: false, is_two_wires: false, is_bus: false };
+    let port = || Babble(MonoTime::from_nanos(3_000_000_000), 0);
+    assert!(look(&mut Talk::new(port(), terms), 16).is_err());
+    assert!(sixpack2::find(&mut sixpack2::Talk::new(port(), terms), &[1]).is_err());
 }

@@ -102,3 +102,28 @@ fn a_first_pose_elsewhere_moves_nothing() {
     assert_eq!(off.len(), 1, "{off:?}");
     assert!(play.stream.figures().poses_skipped > 90);
 }
+
+#[test]
+fn a_pose_that_passes_where_a_seat_stands_is_not_the_first_of_a_motion() {
+    let mut play = Play::with_ppm([0; 3]);
+    play.begin(|at, _| there(at, 0));
+    play.play(2.5, 0);
+    play.judged = false;
+    play.wait(1.0);
+    assert!(play.stream.is_ready(0));
+    // A tenth of them is where it stands, at 40 mm/s.
+    play.begin(|at, _| 36.0 + 40.0 * at);
+    play.play(1.0, 0);
+    play.assert_at([40.0; 3]);
+    assert!(play.has("Elsewhere"), "{:?}", play.rare());
+}
+
+/// Three axes at 57,600 baud; `KINOCUE_SHOWS` is how many shows, 60 for an hour.
+#[test]
+fn no_queue_runs_dry_in_shows_whose_thread_is_held_up_as_a_real_time_thread_is() {
+    let mut play = Play::with_ppm([100, 0, -100]);
+    play.shows(soaks(), |at, axis| ride_for_a_minute(60.0, at, axis));
+    let dry = [0, 1, 2].map(|axis| (play.unit(axis).tally().dry, play.figures()[axis].dry));
+    assert_eq!(dry, [(0, 0); 3]);
+    play.assert_gentle();
+}

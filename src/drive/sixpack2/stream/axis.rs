@@ -34,8 +34,12 @@ pub(crate) struct Axis {
     /// By then it stands that was told to stop, whatever it did: longer than its ramp takes from full speed.
     pub(super) brakes: Duration,
     lag: Lag,
+    /// The greatest speed, and jump of speed, that its motor is asked for, microsteps a second.
+    most: [f64; 2],
     maker: TargetMaker,
     target: i32,
+    /// The one before.
+    before: i32,
     /// Where its motor is by its targets, and until when that was reckoned.
     model: Motor,
     reckoned: MonoTime,
@@ -64,7 +68,7 @@ impl LinkAxis for Axis {
 }
 
 impl Axis {
-    pub(super) fn new(of: &MotorAxis<'_>, now: MonoTime) -> Self {
+    pub(super) fn new(of: &MotorAxis<'_>, period: Duration, now: MonoTime) -> Self {
         let stroke = of.axis.stroke();
         let limits = Limits {
             velocity: of.axis.max_velocity / stroke,
@@ -81,6 +85,9 @@ impl Axis {
             shaker: Shaker::default(),
             brakes: brakes.map_or(BRAKES, |brakes| brakes.max(BRAKES)),
             lag,
+            most: [of.axis.max_velocity.max(of.axis.shaken_velocity()), of.of.jump_mm_s(of.axis, period)]
+                .map(|mm_s| mm_s / scale.mm_of(1.0).abs()),
+            before: scale.whole(of.axis.low),
             maker: TargetMaker::at_rest(lag, scale.reach(0.0), scale.at(0.0)),
             target: scale.whole(of.axis.low),
             model: Motor::at_rest(lag, scale.at(0.0)),
@@ -99,7 +106,7 @@ impl Axis {
         self.maker = TargetMaker::at_rest(self.lag, self.scale.reach(0.0), position.into());
         self.model = Motor::at_rest(self.lag, position.into());
         self.shaker = Shaker::default();
-        (self.target, self.reckoned, self.strayed) = (position, now, 0);
+        (self.target, self.before, self.reckoned, self.strayed) = (position, position, now, 0);
         (self.rests, self.holds) = (true, true);
     }
 
@@ -107,13 +114,36 @@ impl Axis {
     /// that is not known.
     pub(super) fn aim(&mut self, middle: Option<Middle>, at: MonoTime) -> i32 {
         self.run(at);
+        self.before = self.target;
         if let Some(Middle { position, velocity }) = middle {
             let (position, velocity) = (self.scale.at(position), self.scale.way_of(velocity));
-            self.target = self.maker.push(Middle { position, velocity });
+            let asked = self.maker.push(Middle { position, velocity });
+            self.target = self.gently(asked);
         }
         self.figures.account.made += 1;
         self.figures.account.sent += 1;
         self.target
+    }
+
+    /// What is asked, or where a slice comes late, and the motor lags behind more than a ride makes it, so much of the way there that it
+    /// makes up for that no faster, and jumps by no more, than its seat may. No farther than one of both leads: each is inside the stroke.
+    #[expect(clippy::cast_possible_truncation, reason = "between two targets")]
+    fn gently(&self, asked: i32) -> i32 {
+        let ([most, jump], lag) = (self.most, self.lag.tau());
+        let (place, speed) = (self.model.position(), self.model.velocity());
+        let wanted = (f64::from(asked) - place) / lag;
+        if (wanted - speed).abs() <= jump && wanted.abs() <= most {
+            return asked;
+        }
+        let kept = wanted.clamp(speed - jump, speed + jump).clamp(-most, most);
+        (place + lag * kept).round() as i32
+    }
+
+    /// What was told last arrives so much later than was reckoned with: until then its motor did what it was told before.
+    pub(super) fn come_late(&mut self, late: Duration) {
+        let last = std::mem::replace(&mut self.target, self.before);
+        self.run(self.reckoned + late);
+        (self.target, self.before) = (last, last);
     }
 
     /// Reckons where its motor is at an instant.

@@ -39,6 +39,8 @@ pub(crate) struct LaneState {
     pub(super) asked_who: bool,
     /// Who it is was asked last; none where that is to be found out.
     pub(super) known: Option<MonoTime>,
+    /// The serial number of its unit, once that told it twice, and what it told last.
+    pub(super) serial: [Option<u16>; 2],
 }
 
 impl LaneState {
@@ -56,7 +58,14 @@ impl LaneState {
             not_before: now,
             asked_who: false,
             known: Some(now),
+            serial: [None; 2],
         }
+    }
+
+    /// True if another unit answers than before: its counters may read as if they knew the seat. What is told once may be damaged.
+    pub(super) fn is_another(&mut self, serial: u16) -> bool {
+        let [known, last] = &mut self.serial;
+        last.replace(serial) == Some(serial) && *known.get_or_insert(serial) != serial
     }
 }
 

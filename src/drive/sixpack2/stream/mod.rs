@@ -84,7 +84,7 @@ impl Family for Sixpack2 {
     }
 
     fn lane(seat: &SeatMotors<'_>, terms: StreamTerms, now: MonoTime) -> Result<SixpackLane, HomeError> {
-        let axes = seat.axes()?.iter().map(|axis| Axis::new(axis, now)).collect();
+        let axes = seat.axes()?.iter().map(|axis| Axis::new(axis, terms.period, now)).collect();
         Ok(SixpackLane::new(axes, terms, LaneState::new(seat.unit, terms.tick, now), now))
     }
 
@@ -209,7 +209,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let now = self.talk.now();
         if let Some(lane) = self.lanes.get_mut(usize::from(lane)) {
             lane.stage = Stage::Out;
-            lane.own.is_failing = false;
+            (lane.own.is_failing, lane.own.serial) = (false, [None; 2]);
             lane.make_ready(now);
         }
     }
@@ -233,9 +233,14 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
             frames.extend(lane.orders(at, frame_time, half));
             at = at + frame_time * u32::try_from(lane.axes.len()).unwrap_or(u32::MAX);
         }
-        frames.extend(self.end_of_search());
+        let end_of_search = self.end_of_search();
+        let last = if end_of_search.is_some() { at } else { at.before(frame_time) };
+        frames.extend(end_of_search);
         if !frames.is_empty() {
             self.talk.send(&frames)?;
+            // Between what was reckoned and what was sent this thread may have been held up.
+            let late = self.talk.arrived().since(last);
+            self.lanes.iter_mut().flat_map(|lane| &mut lane.axes).for_each(|axis| axis.come_late(late));
         }
         (0..self.lanes.len()).for_each(|lane| self.tell_motion(lane, at + half));
         Ok(())

@@ -90,8 +90,9 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
     fn ask_who(&mut self, index: usize, now: MonoTime) -> Result<(), LinkFault> {
         let answer = self.talk.ask(self.lanes[index].own.unit, WHO);
         if let Some(SixpackReply::UnitTold(told)) = self.heard(index, answer)? {
-            self.lanes[index].own.known = Some(now);
-            if told.reset != 0 {
+            let own = &mut self.lanes[index].own;
+            own.known = Some(now);
+            if told.reset != 0 || own.is_another(told.serial) {
                 return self.is_not_home(index, 0);
             }
             if self.lanes[index].is_led() {
@@ -115,7 +116,8 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         let position = axis.scale.fraction(told.position.into());
         axis.figures.position = position;
         let at = self.talk.moment().sent;
-        self.tell(StreamEvent::Read { lane: number(index), axis: a, position, at });
+        // It counts the steps that it asked for: that its motor is pushed off, it cannot know.
+        self.tell(StreamEvent::Read { lane: number(index), axis: a, position, held: None, at });
         Ok(Some(told))
     }
 
@@ -325,7 +327,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         self.own.next_asked = (index + 1) % self.lanes.len();
         self.lanes[index].own.not_before = now + PROBES;
         let Some(told) = self.seek(index)? else { return Ok(()) };
-        if told.reset != 0 {
+        if told.reset != 0 || self.lanes[index].own.is_another(told.serial) {
             return self.is_not_home(index, 0);
         }
         let lane = &mut self.lanes[index];

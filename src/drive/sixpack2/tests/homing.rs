@@ -12,7 +12,7 @@ use crate::drive::link::{LinkTalk as _, Step};
 use crate::drive::sixpack2::*;
 use crate::motion::SeatType;
 use crate::sim::serial::LineFaults;
-use crate::sim::sixpack2::{ShaftSetup, SixpackFault, SixpackMotor};
+use crate::sim::sixpack2::{ShaftSetup, SixpackFault, SixpackMotor, SixpackSetup};
 
 /// What the counter of a motor reads.
 fn counts(talk: &mut Talk<VirtualPort>, index: usize) -> i32 {
@@ -303,4 +303,35 @@ fn over_a_bad_line_a_homing_ends_at_the_edge_or_says_what_is_wrong() {
         }
     }
     assert!(homes >= 8, "{homes}");
+}
+
+#[test]
+fn two_units_with_one_number_are_told_before_either_moves() {
+    for is_two_wires in [false, true] {
+        let setup = SixpackSetup { is_two_wires, ..unit_with(1, shaft()) };
+        let mut talk = talk_to(&[setup, SixpackSetup { serial: 7, ..setup }]);
+        let words = home_as(&mut talk, &drive(SWITCH), &[0, 1, 2]).0.unwrap_err().to_string();
+        assert!(words.starts_with("two units answer as unit 1; connect each alone"), "{words}");
+        let motors = talk.port().line.bus().units().iter().flat_map(|unit| &unit.motors);
+        assert!(motors.into_iter().all(|motor| motor.shaft.executed().velocity == 0.0));
+    }
+}
+
+/// What it makes of frames are octets that are no line: nothing but a line that begins with @ is a request.
+#[test]
+fn a_silvermax_where_a_sixpack_was_is_told_and_moves_by_nothing_that_is_said_there() {
+    use crate::drive::link::TalkTerms;
+    use crate::sim::serial::SerialLine;
+    use crate::sim::silvermax::{SilverBus, UnitSetup};
+    let now = crate::time::MonoTime::from_nanos(3_000_000_000);
+    let setups: Vec<_> = (1..=254).map(UnitSetup::new).collect();
+    let line = SerialLine::new(SilverBus::new(&setups, BAUD, now), 10, LineFaults::default(), 7);
+    let terms = TalkTerms { baud: BAUD, octet_bits: 10, has_echo: false, is_two_wires: false, is_bus: false };
+    let mut talk = Talk::new(crate::drive::link::VirtualPort::new(line, now), terms);
+    let (drive, seat) = (drive(SWITCH), seat());
+    let of = on_motors(&seat, &drive, &[0, 1, 2], PERIOD);
+    let homed = home(&mut talk, of, Homing { goes_on: &|| true, told: &mut |_| {} });
+    assert!(homed.unwrap_err().to_string().starts_with("unit 1 answers neither at 56818 nor at 19231 baud"));
+    let units = talk.port().line.bus().units();
+    assert!(units.iter().all(|unit| unit.executed().velocity == 0.0 && unit.tally().requests == 0));
 }

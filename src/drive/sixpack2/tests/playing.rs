@@ -128,3 +128,11 @@ fn two_units_on_two_wires_ride_together() {
     assert!(play.rare().is_empty(), "{:?}", play.rare());
     play.assert_gentle();
 }
+
+/// Three axes at 56,818 baud; `KINOCUE_SHOWS` is how many shows, 60 for an hour.
+#[test]
+fn no_motor_runs_out_of_targets_in_shows_whose_thread_is_held_up_as_a_real_time_thread_is() {
+    let mut play = Play::homed(&[wired(1, false)], BAUD);
+    play.shows(soaks(), |at, axis| ride_for_a_minute(72.0, at, axis));
+    play.assert_gentle();
+}

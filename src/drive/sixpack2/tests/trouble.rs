@@ -192,6 +192,22 @@ fn what_was_not_heard_while_a_line_was_cut_is_not_made_up_for_at_once() {
     }
 }
 
+/// Nobody knows that it did not hear them, before two questions were not answered: it makes up for all of it at once.
+#[expect(clippy::print_stdout, reason = "the figures are for who asks to see them")]
+#[test]
+fn after_a_cut_that_nobody_notices_a_motor_jumps_by_no_more_than_its_speed_over_its_lag_for_as_long() {
+    // 25 units of the distance: 81.9 ms; whole units of speed and the loop of its unit beside.
+    let (lag, fastest) = (0.081_9, 195.0);
+    for ms in [10, 25, 40, 50, 60, 70] {
+        let jumps = [0, 4].map(|phase| jump_after(Duration::from_millis(ms), phase));
+        let most = jumps.iter().map(|(jump, _)| *jump).fold(0.0, f64::max);
+        let lost = jumps.iter().filter(|(_, play)| play.has("Lost")).count();
+        println!("{ms} ms: {most:.0} mm/s, {lost} of 2 lost");
+        let bound = fastest * (ms as f64 * 1e-3 + PERIOD.as_secs_f64()) / lag + 5.0;
+        assert!(most <= bound.max(32.0), "{ms} ms: {most} of {bound}");
+    }
+}
+
 #[test]
 fn what_a_seat_was_not_told_while_its_thread_was_held_up_is_not_made_up_for_at_once() {
     for ms in [60, 100, 400, 1_000] {
@@ -207,6 +223,33 @@ fn what_a_seat_was_not_told_while_its_thread_was_held_up_is_not_made_up_for_at_o
             play.assert_inside();
         }
     }
+}
+
+/// The greatest jump of speed in a ride at one of some moments of which the thread, and the ticks with it or not, were held up for so long, mm/s.
+fn jump_held_up(us: u64, is_whole: bool) -> f64 {
+    let mut play = riding(8.0 + 0.000_037_3 * (us % 40_000) as f64);
+    play.bus_mut().forget();
+    let until = play.now() + Duration::from_micros(us);
+    play.stream.talk.port().sleep_until(until);
+    play.play(2.0, if is_whole { (us / 10_000) as u32 } else { 0 });
+    play.assert_inside();
+    let motors = play.bus().units()[0].motors[..3].iter();
+    motors.map(|motor| motor.shaft.executed().jump / MM).fold(0.0, f64::max)
+}
+
+/// What the acceleration of its seat makes in a slice, 28.5 mm/s, and the whole units of speed and the loop of its unit, which falls
+/// anywhere.
+#[expect(clippy::print_stdout, reason = "the figure is for who asks to see it")]
+#[test]
+fn however_long_its_thread_is_held_up_a_motor_is_asked_for_no_greater_jump_than_its_seat_may() {
+    let lengths = (0..20).map(|index| 1_000 + 3_449 * index);
+    let jumps = lengths.map(|us| {
+        let is_whole = us % 2 == 0;
+        (jump_held_up(us, is_whole), us, is_whole)
+    });
+    let most = jumps.max_by(|one, other| one.0.total_cmp(&other.0));
+    println!("{most:?}");
+    assert!(most.is_some_and(|(jump, ..)| jump <= 32.0), "mm/s, us, whole program: {most:?}");
 }
 
 /// A seat that was ridden to 40, 50 and 60 mm and waits there.

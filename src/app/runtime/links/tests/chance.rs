@@ -11,7 +11,6 @@ use super::*;
 use crate::drive::sixpack2::{OrderGap, Reach};
 use crate::motion::AxisGeometry;
 use crate::sim::chance::Chance;
-use crate::sim::silvermax::Action;
 use crate::sim::sixpack2::{SixpackBus, SixpackFault};
 
 /// What an axis executed.
@@ -217,13 +216,14 @@ impl Sum {
         let mut is_hard = false;
         for done in hall.line.lock().line.bus().done() {
             let what = format!("seed {seed}, {failing:?}: {done:?}");
-            let room = if failing == Failing::Digits { B::damaged_mm() } else { 0.1 };
+            let damages = matches!(failing, Failing::Digits | Failing::Noise);
+            let room = if damages { B::damaged_mm() } else { 0.1 };
             let beyond = (-done.lowest).max(done.highest - 150.0);
             assert!(beyond < room && done.wrong == 0.0, "{what}");
-            assert!(done.restarts <= fate.resets || failing == Failing::Digits, "{what}");
+            assert!(done.restarts <= fate.resets || damages, "{what}");
             let exceeds = done.velocity > 241.0 || done.hardest > B::HARDEST;
             // A unit that is restarted stops as no seat does, by itself; whoever missed targets makes up for them with the next.
-            let may = failing == Failing::Digits || done.restarts > 0 || B::ANSWER.is_some();
+            let may = damages || done.restarts > 0 || B::ANSWER.is_some();
             assert!(!exceeds || may, "{what}");
             is_hard |= exceeds && done.restarts == 0;
             self.beyond = self.beyond.max(beyond);
@@ -284,6 +284,16 @@ fn whatever_a_unit_of_motors_does_beside_no_motor_leaves_its_stroke_or_loses_a_s
 #[test]
 fn targets_that_are_damaged_lead_no_motor_farther_than_it_goes_until_the_next() {
     plays::<SixpackBus>(Failing::Digits);
+}
+
+#[test]
+fn noise_on_a_line_leads_no_axis_beyond_its_soft_limits() {
+    plays::<SilverBus>(Failing::Noise);
+}
+
+#[test]
+fn noise_on_a_line_leads_no_motor_farther_than_it_goes_until_the_next_order() {
+    plays::<SixpackBus>(Failing::Noise);
 }
 
 /// With both of these the last target before a seat stood still had an octet twice.

@@ -2,40 +2,90 @@
 
 use super::*;
 
+/// Plays the cue whole; how far an axis was beside it at the most, mm.
+fn beside_a_ride(hall: &mut Hall<'_, '_>, show: StagedShow, cue: &Timeline) -> f64 {
+    let lead = show.lanes[0].window.lead();
+    hall.go(show);
+    let (mut worst, mut rode) = (0.0_f64, false);
+    let mut begun = None;
+    hall.run(25.0, |hall| {
+        // Frame 0 is reached a lead and a tick after it was sent.
+        if hall.runtime.live.ticks() == 1 && begun.is_none() {
+            begun = Some(NOW.get());
+        }
+        let Some(begun) = begun else { return };
+        // The line is ahead of the ticks by up to an exchange.
+        let show_ns = hall.line.lock().now().since(begun).as_nanos() as i64 - lead.as_nanos() as i64;
+        let at = ShowTime::from_nanos(show_ns);
+        if hall.state().may_send_motion() && show_ns > 0 && at < cue.duration() {
+            let wanted = cue.sample(at, &mut crate::timeline::Hint::default());
+            for (place, wanted) in hall.places_mm().iter().zip(wanted) {
+                rode |= wanted > 0.5;
+                worst = worst.max((place - 150.0 * wanted).abs());
+            }
+        }
+    });
+    assert!(rode && hall.state() == State::Parked, "{:?}", hall.state());
+    worst
+}
+
 #[test]
 fn a_cue_is_executed_within_an_eighth_of_a_millimetre_its_lead_after_the_ticks() {
     hall(|hall, show, cue| {
-        let lead = show.lanes[0].window.lead();
-        hall.go(show);
-        let (mut worst, mut rode) = (0.0_f64, false);
-        let mut begun = None;
-        hall.run(25.0, |hall| {
-            // Frame 0 is reached a lead and a tick after it was sent.
-            if hall.runtime.live.ticks() == 1 && begun.is_none() {
-                begun = Some(NOW.get());
-            }
-            let Some(begun) = begun else { return };
-            // The line is ahead of the ticks by up to an exchange.
-            let show_ns = hall.line.lock().now().since(begun).as_nanos() as i64 - lead.as_nanos() as i64;
-            let at = ShowTime::from_nanos(show_ns);
-            if hall.state().may_send_motion() && show_ns > 0 && at < cue.duration() {
-                let wanted = cue.sample(at, &mut crate::timeline::Hint::default());
-                for (place, wanted) in hall.places_mm().iter().zip(wanted) {
-                    rode |= wanted > 0.5;
-                    worst = worst.max((place - 150.0 * wanted).abs());
-                }
-            }
-            if rode && hall.state() == State::Parked {
-                assert!(hall.places_mm().iter().all(|place| place.abs() < 0.05), "{:?}", hall.places_mm());
-            }
-        });
-        assert_eq!(hall.state(), State::Parked);
-        assert!(rode && worst < 0.12, "{worst} mm");
+        let worst = beside_a_ride(hall, show, cue);
+        assert!(worst < 0.12, "{worst} mm");
         assert_gentle(hall);
         for place in hall.places_mm() {
             assert!(place.abs() < 0.02, "{place} mm off park");
         }
     });
+}
+
+#[test]
+fn a_seat_that_is_pushed_a_little_at_rest_is_led_from_where_its_drives_hold_it() {
+    for mm in [-0.95, 0.2, 0.6] {
+        hall(|hall, show, cue| {
+            hall.push(None, mm);
+            let worst = beside_a_ride(hall, show, cue);
+            // It is beside the cue by what it is pushed, no more, and begins without a jerk.
+            assert!((worst - mm.abs()).abs() < 0.12, "{mm}: {worst} mm");
+            for unit in hall.units(|unit| unit.executed().clone()) {
+                assert!(unit.velocity < 241.0 * MM && unit.acceleration < 3_030.0 * MM, "{mm}: {unit:?}");
+            }
+            assert_eq!(hall.runtime.live.table()[0].standing, HealthState::Ok, "{mm}");
+        });
+    }
+}
+
+#[test]
+fn a_seat_that_is_pushed_too_far_is_not_led_and_told_with_where_it_stands_until_it_is_let_go() {
+    let text = HALL.replace("full = 20000 }\n", "full = 20000 }\nhold_error_mm = 3.0\n");
+    hall_of(
+        &text,
+        |line| Box::new(line),
+        |hall, show, _| {
+            hall.push(Some(17), 2.0);
+            hall.go(show);
+            hall.run(5.0, |hall| hall.runtime.live.want(NOW.get()));
+            let row = hall.runtime.live.table().swap_remove(0);
+            let told = "its axis 2 stands at 2.0 mm, and its drive holds it at 0.0 mm: something pushes it";
+            assert!(
+                row.standing == HealthState::Lost && row.why.to_string().starts_with(told),
+                "{}",
+                row.why
+            );
+            assert!(row.why.next().is_some_and(|next| next.starts_with("free it")), "{row:?}");
+            assert!(
+                hall.units(|unit| unit.executed().velocity).iter().all(|speed| *speed == 0.0),
+                "nobody led it"
+            );
+            hall.push(Some(17), 0.0);
+            hall.run(15.0, |_| {});
+            let row = hall.runtime.live.table().swap_remove(0);
+            assert!(hall.is_led() && row.standing == HealthState::Ok, "{row:?}");
+            assert_gentle(hall);
+        },
+    );
 }
 
 #[test]
@@ -104,5 +154,14 @@ fn a_line_that_is_cut_brings_the_seat_to_rest_within_the_lead_and_puts_its_lane_
         assert_eq!(hall.places_mm(), places);
         assert!(!hall.is_led(), "no pose goes to it");
         assert_gentle(hall);
+    });
+}
+
+#[test]
+fn a_port_that_comes_back_as_the_line_of_another_seat_moves_nobody_there() {
+    let other = homed_line(&read(HALL), 9 << 16);
+    hall(|hall, show, _| {
+        let places = |bus: &SilverBus| bus.units().iter().map(Unit::place).collect();
+        hall.moves_nobody_on_another_line(show, &other, places);
     });
 }

@@ -31,22 +31,28 @@ pub(super) fn hall_over(
     over: impl FnOnce(SharedLine<SixpackBus>) -> Port,
     lead: impl FnOnce(&mut SixHall<'_, '_>, StagedShow, &Timeline),
 ) {
-    NOW.set(MonoTime::from_nanos(3_000_000_000));
     let config = Arc::new(read(HALL));
+    let line = homed_line(&config, 1_001);
+    let port = over(line.clone());
+    homed((config, LEVEL), line, port, lead);
+}
+
+/// A line with a unit of that serial number whose seat was homed.
+fn homed_line(config: &Config, serial: u16) -> SharedLine<SixpackBus> {
+    NOW.set(MonoTime::from_nanos(3_000_000_000));
     let shaft = ShaftSetup { switch: Some(-2.0 * MM), ..ShaftSetup::default() };
     let setup =
-        SixpackSetup { unit: 1, serial: 1_001, shafts: [shaft; MOTORS], is_two_wires: false, can_baud: None };
+        SixpackSetup { unit: 1, serial, shafts: [shaft; MOTORS], is_two_wires: false, can_baud: None };
     let line = SharedLine::new(SixpackBus::waking([setup], NOW.get()), 10);
     line.lock().line.set_host_baud(Some(config.links[0].baud));
-    let terms = StreamTerms::of(&config.links[0], &config).expect("it plays").expect("there is a seat");
+    let terms = StreamTerms::of(&config.links[0], config).expect("it plays").expect("there is a seat");
     let mut talk = sixpack2::Talk::new(line.clone(), TalkTerms::of(&config.links[0]));
     sixpack2::find(&mut talk, &[1]).expect("it is there");
     let seat = motors_of(&config.controllers[0], terms.period).expect("it has motors");
     let homing = sixpack2::Homing { goes_on: &|| true, told: &mut |_| {} };
     sixpack2::home(&mut talk, seat, homing).expect("it finds its zero");
     line.lock().line.bus_mut().forget();
-    let port = over(line.clone());
-    homed((config, LEVEL), line, port, lead);
+    line
 }
 
 impl SixHall<'_, '_> {
@@ -190,5 +196,16 @@ fn a_unit_that_is_restarted_in_a_play_stands_and_is_not_led_again_until_it_is_ho
             assert!(!hall.is_led() && reading.is_none_or(|reading| reading.at < now), "{now:?} {reading:?}");
         }
         hall.assert_rests();
+    });
+}
+
+/// Its counters read as those of this seat do: both are set by the same settings.
+#[test]
+fn a_port_that_comes_back_as_the_line_of_another_seat_moves_nobody_there() {
+    let other = homed_line(&read(HALL), 1_002);
+    hall(|hall, show, _| {
+        let places =
+            |bus: &SixpackBus| bus.units()[0].motors[..3].iter().map(|motor| motor.shaft.place()).collect();
+        hall.moves_nobody_on_another_line(show, &other, places);
     });
 }

@@ -15,6 +15,8 @@ pub(super) enum Failing {
     Units,
     /// Octets that units hear: a digit that is another one is obeyed.
     Digits,
+    /// Octets that nobody sent, between those that somebody did, in both directions.
+    Noise,
 }
 
 /// What happens to the octets that go next.
@@ -231,6 +233,11 @@ impl Fate {
         self.in_motion += u64::from(places != self.places);
         let kinds = if self.failing == Failing::Line { 8 } else { 12 };
         match self.below(kinds) {
+            _ if self.failing == Failing::Noise => {
+                hall.line.lock().line.faults.noise = 3 << self.below(9);
+                self.mends = NOW.get() + self.span(0.1, 3.0);
+                *self.kinds.entry("noise").or_default() += 1;
+            }
             _ if self.failing == Failing::Digits => {
                 let (at, harm) = self.octet();
                 let twice = self.below(8) == 0;
