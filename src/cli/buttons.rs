@@ -15,7 +15,7 @@ use crate::sys::clock::Monotonic;
 use crate::sys::evdev::{InputFacts, facts, open_shared};
 use crate::time::Clock as _;
 
-/// Shows the pads and keyboards of this machine, and what their keys are called.
+/// Shows pads and keyboards, and what their keys are called.
 ///
 /// Without a command it lists the devices, best by the name that stays (`/dev/input/by-id`), with their keys and lamps. `[buttons]`
 /// of a configuration says what keys ask of a hall.

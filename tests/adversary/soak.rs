@@ -89,12 +89,15 @@ impl Operator<'_, '_, '_> {
 
     /// Whatever the hall is in, and whoever is out, people bring it to park.
     fn come_to_parked(&mut self) {
-        for _ in 0..20 {
+        self.hall.diary = Some(Vec::new());
+        for tried in 0..20 {
             let request = match self.hall.state {
                 State::Parked if self.all_may_move() => return,
                 State::Parked => Transition::Home,
                 State::Stopped | State::Fault => Transition::Clear,
                 State::Armed => Transition::Disarm,
+                // Where a seat is not home, or has to be looked after, parking is refused.
+                State::Recovering if tried % 2 == 1 => Transition::Home,
                 _ => Transition::Park,
             };
             self.day.helped += u64::from(matches!(request, Transition::Clear | Transition::Home));
@@ -103,7 +106,7 @@ impl Operator<'_, '_, '_> {
             self.hall
                 .comes_to(|state| matches!(state, State::Parked | State::Stopped | State::Fault), 20_000);
         }
-        panic!("it does not come to park: {:?}", self.hall.state);
+        panic!("it does not come to park: {:?}, {:#?}", self.hall.state, self.hall.diary);
     }
 
     fn all_may_move(&self) -> bool {
