@@ -63,7 +63,8 @@ const ROWS: &[Row] = &[
     // seats that take no part, effects and markers for the page, and a film that was off its speed.
     // 2,200 more for cues that are edited, rehearsals and one exit code for one thing, SIXpack 2 units on a CAN bus, codes and margins for a page in six
     // languages, doors for what is fuzzed, and what a newcomer and two attacks found.
-    ("lines of code", counts::lines_of_code, Less, 88_250.0, 39_800.0),
+    // 484 more for edits: curves, vibration and effects beside what is edited stay, what cannot stay is told, and remedies are tried.
+    ("lines of code", counts::lines_of_code, Less, 88_734.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
