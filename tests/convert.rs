@@ -196,3 +196,94 @@ fn a_fade_leaves_park_and_comes_back_and_is_within_all_limits() {
     assert_eq!(cells("8000,").as_deref(), Some("0,20,0"), "{text}");
     assert!(cells("5000,").is_some_and(|cells| cells.starts_with("40,20,0.2")), "{text}");
 }
+
+/// A hall with two types of seats: one parks at the lower end, one in the middle.
+const HALL_OF_TWO: &str = "[show]\nbind = \"127.0.0.1:8712\"\n\
+    [seat.low]\naxes = 1\nstroke_mm = 150.0\nlead_mm = 5.0\npulses_per_rev = 10000\nmax_velocity_mm_s = 240.0\n\
+    max_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\n\
+    [seat.mid]\naxes = 1\nstroke_mm = 300.0\nlead_mm = 5.0\npulses_per_rev = 10000\nmax_velocity_mm_s = 240.0\n\
+    max_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\npark = [0.5]\n\
+    [[controller]]\nname = \"A1\"\nseat = \"low\"\naddress = \"127.0.0.1:7908\"\n\
+    [[controller]]\nname = \"B1\"\nseat = \"mid\"\naddress = \"127.0.0.1:7909\"\n";
+
+#[test]
+fn a_remedy_that_an_edit_names_works_and_where_none_does_none_is_named() {
+    let folder = folder_with("rise.csv", RISE);
+    // A jump in the middle of a short cue: only a low-pass cures it.
+    let (code, said) = edit(folder.path(), &["join", "rise.csv", "rise.csv", "-o", "two.csv"]);
+    assert_eq!(code, Some(1), "{said}");
+    let remedy = said.lines().find_map(|line| line.split_once("; kinocue fit ").map(|(_, rest)| rest));
+    let remedy = remedy.and_then(|rest| rest.strip_suffix(" makes one that keeps them"));
+    match remedy {
+        Some(remedy) => {
+            let remedy = remedy.replace("OUT", "fit.csv");
+            let args: Vec<&str> = remedy.split(' ').collect();
+            let (code, said) = run("fit", folder.path(), &args);
+            assert_eq!(code, Some(0), "{remedy}: {said}");
+        }
+        None => {
+            assert!(said.contains("kinocue fit cannot mend that"), "{said}");
+            for more in [&[][..], &["--smooth"]] {
+                let args = [&["two.csv", "-o", "fit.csv"], more].concat();
+                assert_eq!(run("fit", folder.path(), &args).0, Some(1), "{args:?}");
+            }
+        }
+    }
+    let (code, said) = edit(
+        folder.path(),
+        &["replace", "two.csv", "--with", "rise.csv", "--at", "1", "--blend", "0s", "-o", "mixed.csv"],
+    );
+    assert!(code == Some(1) && said.contains("jumps") && said.contains("; --blend SPAN"), "{said}");
+    assert!(!said.contains("--gap"), "{said}");
+}
+
+#[test]
+fn an_edit_of_what_nothing_can_play_ends_as_a_check_of_it_does() {
+    let folder = folder_with("turn.csv", "# units: deg\ntime_ms,a1\n0,10\n5000,20\n");
+    let (code, said) = edit(folder.path(), &["mirror", "turn.csv", "--axes", "1", "-o", "back.csv"]);
+    assert_eq!(code, Some(65), "{said}");
+    assert!(said.contains("cannot be played; kinocue fit cannot mend that"), "{said}");
+}
+
+#[test]
+fn a_hall_whose_seats_park_elsewhere_has_no_fade_but_one_of_a_type() {
+    let folder =
+        folder_with("rise.csv", "# interpolation: monotone\ntime_ms,a1\n0,0.5\n4000,0.6\n8000,0.5\n");
+    fs::write(folder.path().join("two.toml"), HALL_OF_TWO).unwrap();
+    let fade = ["fade", "rise.csv", "--in", "3s", "--config", "two.toml", "-o", "soft.csv"];
+    let (code, said) = edit(folder.path(), &fade);
+    assert_eq!(code, Some(64), "{said}");
+    assert!(said.contains("park pose of seat type low is 0, of mid 0.5; --seat NAME"), "{said}");
+    assert!(!folder.path().join("soft.csv").exists());
+    let (code, said) = edit(folder.path(), &[&fade[..], &["--seat", "mid"]].concat());
+    assert_eq!(code, Some(0), "{said}");
+    assert!(fs::read_to_string(folder.path().join("soft.csv")).unwrap().contains("\n0,0.5\n"));
+}
+
+#[test]
+fn a_cue_that_is_edited_in_place_keeps_its_mode_its_link_its_comments_and_its_columns() {
+    use std::os::unix::fs::{PermissionsExt as _, symlink};
+    let folder = folder_with(
+        "true.csv",
+        "# author: Ada\n# units: mm\n#\n# interpolation: monotone\ntime_ms,a1,dac1\n0,10,0\n3000,20,0.5\n",
+    );
+    let at = |name: &str| folder.path().join(name);
+    fs::set_permissions(at("true.csv"), fs::Permissions::from_mode(0o640)).unwrap();
+    fs::create_dir(at("links")).unwrap();
+    symlink("../true.csv", at("links/a.csv")).unwrap();
+    let (code, said) =
+        edit(folder.path(), &["mirror", "links/a.csv", "--axes", "1", "-o", "links/a.csv", "--force"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(fs::symlink_metadata(at("links/a.csv")).unwrap().is_symlink());
+    assert_eq!(fs::metadata(at("true.csv")).unwrap().permissions().mode() & 0o777, 0o640);
+    assert_eq!(
+        fs::read_to_string(at("true.csv")).unwrap(),
+        "# kinocue-csv: 1\n# units: mm\n# interpolation: monotone\n# author: Ada\n#\ntime_ms,a1,dac1\n0,140,0\n3000,130,0.5\n"
+    );
+    assert_eq!(fs::read_dir(at("links")).unwrap().count(), 1, "nothing is left beside the link");
+    let (code, said) = edit(folder.path(), &["mirror", "true.csv", "--axes", "1", "-o", "a.mcap"]);
+    assert!(code == Some(0) && said.contains("true.csv: 2 lines of comments are left out"), "{said}");
+    fs::create_dir(at("d.csv")).unwrap();
+    let (code, said) = edit(folder.path(), &["mirror", "true.csv", "--axes", "1", "-o", "d.csv", "--force"]);
+    assert!(code == Some(74) && said.contains("is no file"), "{said}");
+}

@@ -1,10 +1,11 @@
 //! `kinocue convert`.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io::{self, BufWriter, Write as _};
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _, PermissionsExt as _, fchown};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, anyhow};
+use anyhow::{Context as _, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::load::cue_exit;
@@ -12,6 +13,9 @@ use super::record::{open, seat_in, unread};
 use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
 use crate::record::{FilmTracks, Places, RecordedAxis, tracks};
+
+/// As many links are followed as the system follows.
+const MAX_LINKS: usize = 40;
 
 /// Converts cues between formats; makes a cue of a recording.
 #[derive(Debug, clap::Args)]
@@ -99,7 +103,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if let Some(title) = &args.title {
         cue.set_title(title.clone());
     }
-    write(&cue, &args.output, target)?;
+    write(&cue, &[], &args.output, target)?;
     let (rows, axes, length) = (cue.rows(), cue.axes(), cue.duration());
     let axes_in_words = if axes == 1 { "1 axis".to_owned() } else { format!("{axes} axes") };
     print::tell(&format!("{}: {rows} rows, {axes_in_words}, {length}", args.output.display()));
@@ -184,8 +188,14 @@ fn tell_lost(cue: &Cue, lost: Option<&Problem>) {
     }
 }
 
-/// Writes beside the output and renames, so that there is the old file or the whole new one at any time.
-pub(super) fn write(cue: &Cue, output: &Path, target: ConvertTarget) -> Result<(), Failure> {
+/// Writes beside the output and renames, so that there is the old file or the whole new one at any time. Comments are lines for the
+/// head of a CSV, each with its `#`.
+pub(super) fn write(
+    cue: &Cue,
+    comments: &[String],
+    output: &Path,
+    target: ConvertTarget,
+) -> Result<(), Failure> {
     let part = ConvertPart::create(output).or_exit(Exit::Io)?;
     let bar = ProgressBar::no_length().with_style(style("writing {bytes}"));
     let mut out = BufWriter::new(bar.wrap_write(&part.file));
@@ -194,7 +204,7 @@ pub(super) fn write(cue: &Cue, output: &Path, target: ConvertTarget) -> Result<(
             if !cue.markers().is_empty() {
                 print::tell(&format!("CSV cannot hold markers; {} are left out", cue.markers().len()));
             }
-            cue::write_csv(cue, &mut out).map_err(|error| match error {
+            cue::write_csv_with(cue, comments, &mut out).map_err(|error| match error {
                 CsvError::Io(error) => failure(error, Exit::Io, output),
                 refused => failure(refused, Exit::BadCue, cue.path()),
             })?;
@@ -224,11 +234,35 @@ fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
+/// The file that a name leads to through links; there may be none yet.
+fn behind_links(output: &Path) -> PathBuf {
+    let mut path = output.to_owned();
+    for _ in 0..MAX_LINKS {
+        let Ok(next) = fs::read_link(&path) else { break };
+        path.pop();
+        path.push(next);
+    }
+    path
+}
+
+/// Gives a file the owner, group and mode of the one that it replaces, as far as the system lets us; where the group cannot be kept, another
+/// one may do no more than anybody.
+fn keep_rights(file: &File, was: &Metadata) -> io::Result<()> {
+    let has_group = fchown(file, None, Some(was.gid())).is_ok();
+    // Only root gives files away, and whoever may write here may own them.
+    let _ = fchown(file, Some(was.uid()), None);
+    let mode = was.mode() & 0o777;
+    let mode = if has_group { mode } else { mode & (0o707 | (mode & 0o007) << 3) };
+    file.set_permissions(Permissions::from_mode(mode))
+}
+
 /// A file on its way to its name; gone again unless it gets there.
 struct ConvertPart {
     file: File,
     path: PathBuf,
     output: PathBuf,
+    /// Of the file that is there.
+    replaced: Option<Metadata>,
 }
 
 impl ConvertPart {
@@ -236,13 +270,20 @@ impl ConvertPart {
         let mut name = std::ffi::OsString::from(".");
         name.push(output.file_name().unwrap_or_default());
         name.push(format!(".{}.part", std::process::id()));
+        let output = behind_links(output);
+        let replaced = fs::metadata(&output).ok();
+        if replaced.as_ref().is_some_and(|there| !there.is_file()) {
+            bail!("{} is no file; give another name", output.display());
+        }
         let path = output.with_file_name(name);
-        let file = OpenOptions::new().write(true).create_new(true).open(&path);
+        let mode = replaced.as_ref().map_or(0o666, Metadata::mode) & 0o777;
+        let file = OpenOptions::new().write(true).create_new(true).mode(mode).open(&path);
         let file = file.with_context(|| format!("cannot write {}", path.display()))?;
-        Ok(Self { file, path, output: output.to_owned() })
+        Ok(Self { file, path, output, replaced })
     }
 
     fn rename(self) -> io::Result<()> {
+        self.replaced.iter().try_for_each(|was| keep_rights(&self.file, was))?;
         self.file.sync_all()?;
         fs::rename(&self.path, &self.output)
     }

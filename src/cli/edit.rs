@@ -6,13 +6,14 @@ use super::{Exit, Failure};
 use crate::config::parse_level;
 use crate::edit::{EditError, Treatment, lay};
 use crate::time::{ShowTime, parse_duration, parse_time};
-use crate::timeline::Timeline;
 
 mod axes;
 mod changes;
 
 use axes::{AxisList, parse_axes};
-use changes::{WrittenArgs, as_it_is, cut, edit, edit_all, fade, join, replace, shift, whole};
+use changes::{
+    Seats, WrittenArgs, as_it_is, cut, edit, edit_all, fade, join, mirror, replace, scale, shift, whole,
+};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,13 +27,14 @@ Examples:
   kinocue edit replace cues/bench-ride.csv --at 0:05 --with cues/seat-demo.csv --blend 3s -o mixed.csv
   kinocue edit axes cues/voyage.csv 1-3 -o three.csv
 
-Exit codes: 0 written, and within all limits; 1 written, but it breaks limits, each told with its place (`kinocue fit` mends most);
-64 wrong use; 65 no cue";
+Exit codes: 0 written, and within all limits; 1 written, but it breaks limits, each told with its place; 64 wrong use; 65 no cue, or
+written, but nothing can play it, as it leaves the stroke or is in another unit";
 
 /// Changes cues in small ways: cuts, joins, shifts, scales, fades …
 ///
-/// Each change writes a new cue, and says where that breaks the limits of its seats, as `kinocue check` does, and where it jumps. The
-/// cue itself is written over only with --force.
+/// Each change writes a new cue, and says where that breaks the limits of its seats, as `kinocue check` does, where it jumps, and where
+/// its curve is another beside what was edited. If `kinocue fit` mends what is broken, that was tried. Comments in the head of a CSV are
+/// kept. The cue itself is written over only with --force; its owner and mode are kept then.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
@@ -66,13 +68,14 @@ enum EditChange {
         /// The cues, in order.
         #[arg(required = true, num_args = 2..)]
         cues: Vec<PathBuf>,
-        /// Time between two of them, in which the curve leads from one to the other.
+        /// Time between two of them, in which the curve leads from one to the other, and vibration, effects and outputs are off; what
+        /// the last row of a cue switches lasts 20 ms.
         #[arg(long, value_name = "SPAN", value_parser = parse_span, default_value = "0s")]
         gap: ShowTime,
         #[command(flatten)]
         written: WrittenArgs,
     },
-    /// Moves a cue in time: later with a rest before it, earlier without its beginning.
+    /// Moves a cue in time: later with a rest before it, in which everything is off, earlier without its beginning.
     #[command(
         after_help = "Examples:\n  kinocue edit shift cues/bench-ride.csv --by +1.5s -o later.csv\n  kinocue edit shift \
                             cues/bench-ride.csv --by -500ms -o earlier.csv"
@@ -111,7 +114,7 @@ enum EditChange {
         #[command(flatten)]
         written: WrittenArgs,
     },
-    /// Leads a cue out of the seats' park pose at its beginning, and back at its end.
+    /// Leads a cue out of the seats' park pose at its beginning, and back at its end. Types of seats that park elsewhere need --seat.
     #[command(
         after_help = "Example:\n  kinocue edit fade cues/coaster.csv --in 2s --out 3s -o faded.csv --plot"
     )]
@@ -142,7 +145,7 @@ enum EditChange {
         #[command(flatten)]
         written: WrittenArgs,
     },
-    /// Replaces a stretch of a cue by another cue, faded in and out over the stretch.
+    /// Replaces a stretch of a cue by another cue, faded in and out over the stretch; before and after it all is as it was.
     #[command(
         after_help = "Example:\n  kinocue edit replace cues/bench-ride.csv --at 0:05 --with cues/seat-demo.csv --blend 3s -o mixed.csv"
     )]
@@ -188,47 +191,41 @@ fn parse_change(text: &str) -> Result<ShowTime, String> {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     match &args.change {
-        EditChange::Cut { cue, from, to, written } => edit(cue, written, |was, _| cut(was, *from, *to)),
-        EditChange::Join { cues, gap, written } => edit_all(cues, written, |all, _| join(all, *gap)),
-        EditChange::Shift { cue, by, written } => edit(cue, written, |was, _| shift(was, *by)),
-        EditChange::Scale { cue, by, axes, written } => edit(cue, written, |was, seats| {
-            let chosen = chosen(axes.as_ref(), was)?;
-            let scaled = |axis: usize, place: f64| seats.neutral(axis) + by * (place - seats.neutral(axis));
-            let how = Treatment {
-                position: &|_, axis, place| if chosen.contains(&axis) { scaled(axis, place) } else { place },
-                strength: &|_, axis| if axis.is_some_and(|axis| chosen.contains(&axis)) { *by } else { 1.0 },
-                ..as_it_is(was)
-            };
-            lay(&[whole(was, ShowTime::ZERO)], &how)
-        }),
-        EditChange::Mirror { cue, axes, written } => edit(cue, written, |was, seats| {
-            let chosen = chosen(Some(axes), was)?;
-            let mirror = |axis: usize, place: f64| {
-                if chosen.contains(&axis) { seats.mirrored(axis, place) } else { place }
-            };
-            let how = Treatment { position: &|_, axis, place| mirror(axis, place), ..as_it_is(was) };
-            lay(&[whole(was, ShowTime::ZERO)], &how)
-        }),
-        EditChange::Fade { cue, rise, fall, written } => {
-            edit(cue, written, |was, seats| fade(was, seats, *rise, *fall))
+        EditChange::Cut { cue, from, to, written } => edit(cue, written, |seats| cut(seats, *from, *to)),
+        EditChange::Join { cues, gap, written } => {
+            let bridge = "--gap 2s leads from one to the other";
+            edit_all(cues, written, bridge, |all, seats| join(all, seats, *gap))
         }
-        EditChange::Mark { cue, name, at, written } => edit(cue, written, |was, _| {
-            let (mut after, seams) = cut(was, None, None)?;
-            after.mark(*at, name).map_err(EditError::Cue)?;
-            Ok((after, seams))
+        EditChange::Shift { cue, by, written } => edit(cue, written, |seats| shift(seats, *by)),
+        EditChange::Scale { cue, by, axes, written } => {
+            edit(cue, written, |seats| scale(seats, *by, chosen(axes.as_ref(), seats)?))
+        }
+        EditChange::Mirror { cue, axes, written } => {
+            edit(cue, written, |seats| mirror(seats, chosen(Some(axes), seats)?))
+        }
+        EditChange::Fade { cue, rise, fall, written } => {
+            edit(cue, written, |seats| fade(seats, *rise, *fall))
+        }
+        EditChange::Mark { cue, name, at, written } => edit(cue, written, |seats| {
+            let mut laid = cut(seats, None, None)?;
+            laid.cue.mark(*at, name).map_err(EditError::Cue)?;
+            Ok(laid)
         }),
         EditChange::Replace { cue, with, at, blend, written } => {
-            edit_all(&[cue.clone(), with.clone()], written, |all, _| replace(&all[0], &all[1], *at, *blend))
+            let bridge = "--blend SPAN, up to half of the other cue, leads from one to the other";
+            let cues = [cue.clone(), with.clone()];
+            edit_all(&cues, written, bridge, |all, seats| replace(seats, &all[1], *at, *blend))
         }
-        EditChange::Axes { cue, axes, written } => edit(cue, written, |was, _| {
-            let how = Treatment { axes: chosen(Some(axes), was)?, ..as_it_is(was) };
-            lay(&[whole(was, ShowTime::ZERO)], &how)
+        EditChange::Axes { cue, axes, written } => edit(cue, written, |seats| {
+            let how = Treatment { axes: chosen(Some(axes), seats)?, ..as_it_is(seats) };
+            lay(&[whole(seats.0, ShowTime::ZERO)], &how)
         }),
     }
 }
 
 /// The axes that are meant, which the cue has.
-fn chosen(axes: Option<&AxisList>, was: &Timeline) -> Result<Vec<usize>, EditError> {
+fn chosen(axes: Option<&AxisList>, seats: &Seats<'_>) -> Result<Vec<usize>, EditError> {
+    let was = seats.0;
     let Some(axes) = axes else { return Ok((0..was.axes()).collect()) };
     match axes.missing(was.axes()) {
         Some(axis) => Err(EditError::NoAxis(axis, was.axes())),

@@ -11,6 +11,7 @@ use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::config::parse_level;
+use crate::cue::Cue;
 use crate::motion::AxisUnit;
 use crate::proof::{self, FitManner, Fitted};
 use crate::timeline::Timeline;
@@ -77,12 +78,12 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let fitted = proof::fit(timeline, &terms, manner)
         .map_err(|error| anyhow!("{}: {error}", args.cue.display()))
         .or_exit(Exit::CheckFailed)?;
-    if !fitted.after.passed() || !judge.stroke(&fitted.timeline).faults.is_empty() {
+    if !is_fit(&fitted, &judge) {
         let error = anyhow!("{}: the fitted cue still breaks limits; nothing is written", args.cue.display());
         return Err(error).or_exit(Exit::CheckFailed);
     }
     refuse_what_links_miss(args, &judge, &fitted)?;
-    convert::write(fitted.timeline.cue(), &args.output, target)?;
+    convert::write(fitted.timeline.cue(), &[], &args.output, target)?;
     let report = FitReport::new(args, &fitted);
     if args.json {
         print::json(&report)?;
@@ -90,6 +91,20 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::tell(&report.text(&fitted));
     }
     Ok(Exit::Done)
+}
+
+fn is_fit(fitted: &Fitted, judge: &Judge) -> bool {
+    fitted.after.passed() && judge.stroke(&fitted.timeline).faults.is_empty()
+}
+
+/// True if a fit of a cue at full level, with these arguments, makes one that keeps all limits.
+pub(super) fn mends(cue: &Cue, judge: &Judge, smooth: bool) -> bool {
+    let timeline = Timeline::new(cue.clone());
+    let terms = judge.terms(&timeline, 1.0);
+    let fitted = proof::fit(timeline, &terms, FitManner { per_axis: false, smooth });
+    fitted.is_ok_and(|fitted| {
+        is_fit(&fitted, judge) && judge.links(&fitted.timeline, 1.0).violations.is_empty()
+    })
 }
 
 /// What a link makes of a cue is a matter of its rate and of the level: it is told, and nothing is changed for it.

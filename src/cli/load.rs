@@ -13,6 +13,7 @@ use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
 use crate::film::follower::PaceLimits;
 use crate::motion::{SeatAxis, SeatType};
+use crate::plain;
 use crate::proof::{Digest, LinksProof, Proof, Terms, prove, prove_in, prove_links};
 use crate::time::Rate;
 use crate::timeline::Timeline;
@@ -104,6 +105,15 @@ impl SeatArgs {
     pub(super) const fn remedy(&self) -> &'static str {
         if self.chase { "kinocue fit CUE -o OUT --chase" } else { "kinocue fit CUE -o OUT" }
     }
+
+    /// These arguments as they were typed, each behind a blank.
+    pub(super) fn as_typed(&self) -> String {
+        let config = self.config.as_ref().map(|config| format!(" --config {}", plain::path(config)));
+        let seat = self.seat.as_ref().map(|seat| format!(" --seat {}", plain::escaped(seat, 200)));
+        let rate = self.rate.map(|rate| format!(" --rate {rate}"));
+        let chase = self.chase.then(|| " --chase".to_owned());
+        [config, seat, rate, chase].into_iter().flatten().collect()
+    }
 }
 
 fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
@@ -119,16 +129,24 @@ fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
 
 /// What each axis of a cue is on: the seat given, else that of the first controller of the hall that takes the axis, else the bench seat.
 pub(super) fn seats(hall: Option<&Config>, seat: Option<&Arc<SeatType>>, axes: usize) -> Vec<SeatAxis> {
+    all_seats(hall, seat, axes).into_iter().map(|(first, _)| first).collect()
+}
+
+/// The same, and behind each the axes of the other controllers that take it.
+fn all_seats(
+    hall: Option<&Config>,
+    seat: Option<&Arc<SeatType>>,
+    axes: usize,
+) -> Vec<(SeatAxis, Vec<SeatAxis>)> {
     let bench = Arc::new(SeatType::bench3(axes));
-    let seat_of = |axis| {
-        let mut controllers = hall.into_iter().flat_map(|hall| &hall.controllers);
-        match (seat, controllers.find(|one| one.takes(axis))) {
-            (Some(seat), _) => SeatAxis::new(seat, axis),
-            (None, Some(taker)) => SeatAxis::new(&taker.seat, axis - taker.axis_offset),
-            (None, None) => SeatAxis::new(&bench, axis),
-        }
+    let seats_of = |axis| {
+        let controllers = hall.into_iter().flat_map(|hall| &hall.controllers);
+        let takers = controllers.filter(|one| seat.is_none() && one.takes(axis));
+        let mut seats = takers.map(|one| SeatAxis::new(&one.seat, axis - one.axis_offset));
+        let first = seats.next();
+        (first.unwrap_or_else(|| SeatAxis::new(seat.unwrap_or(&bench), axis)), seats.collect())
     };
-    (0..axes).map(seat_of).collect()
+    (0..axes).map(seats_of).collect()
 }
 
 impl Judge {
@@ -136,6 +154,11 @@ impl Judge {
     /// else the bench seat.
     pub(super) fn seats(&self, axes: usize) -> Vec<SeatAxis> {
         seats(self.hall.as_ref(), self.seat.as_ref(), axes)
+    }
+
+    /// The same, and behind each the axes of the other controllers that take it.
+    pub(super) fn all_seats(&self, axes: usize) -> Vec<(SeatAxis, Vec<SeatAxis>)> {
+        all_seats(self.hall.as_ref(), self.seat.as_ref(), axes)
     }
 
     /// What a cue has to be proved for: on the seat asked for, else on all seats of the configuration, else on the bench

@@ -22,6 +22,20 @@ pub(super) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
     read_at_most(MAX_ROWS, path, input)
 }
 
+/// The lines before the header of a CSV that declare nothing: what a person noted there. None of a file that is no CSV, or cannot be read.
+pub(crate) fn comments(path: &Path) -> Vec<String> {
+    let Ok(file) = super::open(path) else { return Vec::new() };
+    let (mut lines, mut comments) = (Lines::new(file), Vec::new());
+    while let Ok(Some((_, line))) = lines.next() {
+        let Some(comment) = line.trim_ascii_start().strip_prefix('#') else { break };
+        let key = comment.split_once(':').map(|(key, _)| key.trim().to_ascii_lowercase());
+        if key.is_none_or(|key| !DECLARED.contains(&key.as_str())) {
+            comments.push(line.to_owned());
+        }
+    }
+    comments
+}
+
 fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
     let mut lines = Lines::new(input);
     let mut faults = Collector::default();
@@ -44,6 +58,9 @@ fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cu
         Err(faults.or(path, Problem::TooFewRows(cue.rows())))
     }
 }
+
+/// What a comment line before the header can declare.
+const DECLARED: [&str; 4] = ["kinocue-csv", "title", "units", "interpolation"];
 
 /// What the comment lines before the header say.
 #[derive(Debug, Default)]

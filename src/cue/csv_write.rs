@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::number::{push_millis, push_number};
 use super::{Cue, Effects, Steps};
-use crate::channel::Sample;
+use crate::channel::{Channel, Sample, Scope, TrackId};
 use crate::time::ShowTime;
 
 /// Why a cue cannot be written as CSV.
@@ -30,10 +30,18 @@ pub enum CsvError {
 ///
 /// # Errors
 /// Where writing fails, or what holds until it changes does so between rows.
-pub fn write(cue: &Cue, mut out: impl Write) -> Result<(), CsvError> {
+pub fn write(cue: &Cue, out: impl Write) -> Result<(), CsvError> {
+    write_with(cue, &[], out)
+}
+
+/// The same with comment lines before the header, each with its `#`.
+///
+/// # Errors
+/// As [`write`].
+pub(crate) fn write_with(cue: &Cue, comments: &[String], mut out: impl Write) -> Result<(), CsvError> {
     check_changes(cue)?;
-    out.write_all(head(cue).as_bytes())?;
-    let tracks: Vec<_> = cue.tracks().used().collect();
+    out.write_all(head(cue, comments).as_bytes())?;
+    let tracks: Vec<_> = cue.tracks().used().map(|(track, steps)| (columns(track, steps), steps)).collect();
     let mut found = vec![0; tracks.len()];
     let mut switched = 0;
     let mut line = String::new();
@@ -44,11 +52,11 @@ pub fn write(cue: &Cue, mut out: impl Write) -> Result<(), CsvError> {
             line.push(',');
             push_number(&mut line, *value);
         }
-        for ((track, steps), found) in tracks.iter().zip(&mut found) {
+        for ((parts, steps), found) in tracks.iter().zip(&mut found) {
             let Sample(values) = steps.at(*time, found);
-            for value in &values[..track.channel.row().parts.len()] {
+            for part in parts {
                 line.push(',');
-                push_number(&mut line, *value);
+                push_number(&mut line, values[*part]);
             }
         }
         match cue.effects() {
@@ -64,19 +72,29 @@ pub fn write(cue: &Cue, mut out: impl Write) -> Result<(), CsvError> {
     Ok(out.flush()?)
 }
 
-/// The declarations and the header row.
-fn head(cue: &Cue) -> String {
+/// The parts of a track that have a column. Of outputs of the hall one may stand alone, so those that are never on have none.
+fn columns(track: TrackId, steps: &Steps<Sample>) -> Vec<usize> {
+    let Channel { scope, parts, .. } = track.channel.row();
+    let is_on = |part: &usize| steps.as_slice().iter().any(|step| step.value.0[*part] != 0.0);
+    let all: Vec<usize> = (0..parts.len()).collect();
+    let on: Vec<usize> = all.iter().copied().filter(is_on).collect();
+    if *scope == Scope::Axis || on.is_empty() { all } else { on }
+}
+
+/// The declarations, the comments and the header row.
+fn head(cue: &Cue, comments: &[String]) -> String {
     let mut head = "# kinocue-csv: 1\n".to_owned();
     if let Some(title) = cue.title() {
         let one_line: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
         head.push_str(&format!("# title: {one_line}\n"));
     }
     head.push_str(&format!("# units: {}\n", cue.unit_words()));
-    head.push_str(&format!("# interpolation: {}\ntime_ms", cue.interpolation().name()));
+    head.push_str(&format!("# interpolation: {}\n", cue.interpolation().name()));
+    comments.iter().for_each(|comment| head.push_str(&format!("{comment}\n")));
+    head.push_str("time_ms");
     (1..=cue.axes()).for_each(|axis| head.push_str(&format!(",a{axis}")));
-    for (track, _) in cue.tracks().used() {
-        (0..track.channel.row().parts.len())
-            .for_each(|part| head.push_str(&format!(",{}", track.column(part))));
+    for (track, steps) in cue.tracks().used() {
+        columns(track, steps).into_iter().for_each(|part| head.push_str(&format!(",{}", track.column(part))));
     }
     match cue.effects() {
         Effects::Named { names, .. } => names.iter().for_each(|name| head.push_str(&format!(",fx_{name}"))),

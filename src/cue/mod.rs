@@ -25,8 +25,10 @@ mod unit;
 mod value;
 
 pub(crate) use builder::CueBuilder;
+pub(crate) use csv::comments;
 pub(crate) use csv_write::CsvError;
 pub use csv_write::write as write_csv;
+pub(crate) use csv_write::write_with as write_csv_with;
 pub use fault::CueFaults;
 pub(crate) use fault::{Collector, FAULTS_TOLD, Fault, FaultClass, Place};
 pub use mcap::recover;
@@ -212,6 +214,16 @@ impl Cue {
     #[must_use]
     pub(crate) const fn effects(&self) -> &Effects {
         &self.effects
+    }
+
+    /// True if something that it switches changes at that very time.
+    #[must_use]
+    pub(crate) fn switches_at(&self, at: ShowTime) -> bool {
+        let switches = match &self.effects {
+            Effects::Named { steps, .. } => steps.changes_at(at),
+            Effects::Words(steps) => steps.changes_at(at),
+        };
+        switches || self.tracks.used().any(|(_, steps)| steps.changes_at(at))
     }
 
     /// Named instants, in order of time.

@@ -92,6 +92,12 @@ impl Splice {
         }
     }
 
+    /// Switches off from a time on whatever is on.
+    pub(crate) fn rest(&mut self, at: ShowTime) {
+        self.0.tracks.rest(at);
+        self.switch(at, 0);
+    }
+
     /// Sets a marker.
     pub(crate) fn marker(&mut self, at: ShowTime, name: &str) {
         self.0.markers.push(Marker { at, name: name.to_owned() });

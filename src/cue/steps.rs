@@ -50,6 +50,11 @@ impl<T: Copy + PartialEq + Default> Steps<T> {
         &self.0
     }
 
+    /// True if it changes at that very time.
+    pub(super) fn changes_at(&self, at: ShowTime) -> bool {
+        self.0.binary_search_by_key(&at, |step| step.at).is_ok()
+    }
+
     /// The value that holds at `at`, the type's default before the first. `hint` is where the last answer was found:
     /// asked onwards in time this takes constant time, after a seek the logarithm of the number of changes.
     #[must_use]

@@ -3,6 +3,7 @@
 use super::Steps;
 use crate::channel::{CHANNELS, ChannelId, Sample, TRACKS, TrackId};
 use crate::motion::MAX_AXES;
+use crate::time::ShowTime;
 
 /// A vibration of one axis; none if either part is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -56,6 +57,12 @@ impl Tracks {
     pub fn used(&self) -> impl Iterator<Item = (TrackId, &Steps<Sample>)> {
         let all = CHANNELS.iter().flat_map(|channel| channel.tracks(MAX_AXES));
         all.map(|track| (track, self.of(track))).filter(|(_, steps)| !steps.as_slice().is_empty())
+    }
+
+    /// Ends at a time what each track that the cue has holds then.
+    pub(super) fn rest(&mut self, at: ShowTime) {
+        let used = self.0.iter_mut().filter(|steps| !steps.as_slice().is_empty());
+        used.for_each(|steps| steps.push(at, Sample::default()));
     }
 
     pub(super) fn shrink(&mut self) {

@@ -66,6 +66,12 @@ impl Timeline {
         &self.cue
     }
 
+    /// The same, where the curve is no longer needed.
+    #[must_use]
+    pub(crate) fn into_cue(self) -> Cue {
+        self.cue
+    }
+
     /// Axes, 1 to 12.
     #[must_use]
     pub const fn axes(&self) -> usize {
