@@ -86,11 +86,6 @@ impl Guarded {
         Self::spawn(&mut command, Stdio::null(), Stdio::piped())
     }
 
-    /// Its number.
-    pub(crate) fn pid(&self) -> u32 {
-        self.child.as_ref().expect("it was not taken").id()
-    }
-
     fn spawn(command: &mut Command, stdin: Stdio, stderr: Stdio) -> Self {
         command.current_dir(env!("CARGO_MANIFEST_DIR"));
         command.stdin(stdin).stdout(Stdio::piped()).stderr(stderr);

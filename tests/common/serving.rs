@@ -133,11 +133,6 @@ impl Serving {
         self.said.so_far.lock().unwrap_or_else(PoisonError::into_inner).lines.clone()
     }
 
-    /// The number of its process.
-    pub(crate) fn pid(&self) -> u32 {
-        self.guarded.pid()
-    }
-
     pub(crate) fn signal(&self, signal: Signal) {
         self.guarded.signal(signal);
     }

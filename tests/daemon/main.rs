@@ -16,7 +16,6 @@ mod process;
 #[path = "../common/programs.rs"]
 mod programs;
 #[path = "../common/serving.rs"]
-#[expect(dead_code, reason = "each test uses its own part")]
 mod serving;
 #[path = "../common/statuses.rs"]
 mod statuses;
