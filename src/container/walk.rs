@@ -9,6 +9,8 @@ use super::MAGIC;
 const SLACK: u64 = 16 << 20;
 /// How many times its packed size a chunk may unpack to.
 const MAX_RATIO: u64 = 200;
+/// The same of all chunks together: many small ones that each unpack to as much as one may would be as dear as a large one.
+const SLACK_OF_ALL: u64 = 4 * SLACK;
 /// Bytes of opcode and length.
 const HEAD: usize = 9;
 /// Bytes of a chunk up to the name of its compression.
@@ -33,13 +35,15 @@ pub(super) struct Walk {
     over: bool,
     /// What a chunk may unpack to at the most.
     most: u64,
+    /// Bytes of all chunks so far, packed and unpacked.
+    chunks: [u64; 2],
 }
 
 impl Walk {
     /// At the front of a file that may unpack to so much.
     pub(super) fn new(most: u64) -> Self {
         let left = MAGIC.len() as u64;
-        Self { at: 0, record: 0, head: Vec::new(), left, over: false, most }
+        Self { at: 0, record: 0, head: Vec::new(), left, over: false, most, chunks: [0; 2] }
     }
 
     /// Where the record begins that was gone by last.
@@ -129,12 +133,21 @@ impl Walk {
         }
     }
 
-    fn look_at_chunk(&self) -> Result<(), String> {
+    fn look_at_chunk(&mut self) -> Result<(), String> {
         let name = self.name_len();
         let (unpacked, packed) = (self.u64(HEAD + 16), self.u64(HEAD + CHUNK + name));
         let most = packed.saturating_mul(MAX_RATIO).saturating_add(SLACK).min(self.most);
         if unpacked > most {
             return Err(format!("a chunk of {packed} bytes that unpacks to {unpacked}; the most is {most}"));
+        }
+        let [all_packed, all_unpacked] = &mut self.chunks;
+        *all_packed = all_packed.saturating_add(packed);
+        *all_unpacked = all_unpacked.saturating_add(unpacked);
+        let most = all_packed.saturating_mul(MAX_RATIO).saturating_add(SLACK_OF_ALL);
+        if *all_unpacked > most {
+            return Err(format!(
+                "a chunk with which {all_packed} bytes unpack to {all_unpacked} in all; the most is {most}"
+            ));
         }
         if name == 0 && packed != unpacked {
             return Err(format!("a chunk that is not packed, of {packed} bytes where it says {unpacked}"));
@@ -153,5 +166,26 @@ impl Walk {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_small_chunks_may_not_unpack_to_more_than_one_large_one_might() {
+        let packed = 1_000_u64;
+        let front =
+            [&[0; 16], SLACK.to_le_bytes().as_slice(), &[0; 4], &4_u32.to_le_bytes(), b"zstd"].concat();
+        let body = [&front, packed.to_le_bytes().as_slice(), &[0; 1_000]].concat();
+        let chunk = [&[op::CHUNK], (body.len() as u64).to_le_bytes().as_slice(), &body].concat();
+        let mut walk = Walk::new(u64::MAX);
+        walk.pass(MAGIC).expect("so they begin");
+        for _ in 0..4 {
+            walk.pass(&chunk).expect("64 MiB and what 200 times their size comes to");
+        }
+        let told = walk.pass(&chunk).expect_err("80 MiB of 5 kB");
+        assert!(told.starts_with("a chunk with which 5000 bytes unpack to 83886080 in all"), "{told}");
     }
 }
