@@ -37,7 +37,7 @@ pub fn write(cue: &Cue, out: impl Write) -> Result<(), CsvError> {
 /// The same with comment lines before the header, each with its `#`.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub(crate) fn write_with(cue: &Cue, comments: &[String], mut out: impl Write) -> Result<(), CsvError> {
     check_changes(cue)?;
     out.write_all(head(cue, comments).as_bytes())?;
