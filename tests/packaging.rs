@@ -127,7 +127,11 @@ fn the_units_are_as_closed_as_they_were_measured_to_be() {
 
 #[test]
 fn the_units_let_nothing_run_with_rights() {
-    for (name, user) in [("kinocue", "User=kinocue"), ("kinocue-sync", "User=kinocue-sync")] {
+    for (name, user) in [
+        ("kinocue", "User=kinocue"),
+        ("kinocue-sync", "User=kinocue-sync"),
+        ("kinocue-buttons", "User=kinocue-buttons"),
+    ] {
         let unit = text(&format!("systemd/{name}.service"));
         for line in [user, "CapabilityBoundingSet=", "AmbientCapabilities=", "NoNewPrivileges=yes"] {
             assert!(unit.lines().any(|found| found == line), "{name}: {line}");
@@ -137,17 +141,22 @@ fn the_units_let_nothing_run_with_rights() {
 }
 
 #[test]
-fn who_reads_timecode_devices_has_no_network_and_who_moves_seats_no_device() {
-    let (hall, sync) = (text("systemd/kinocue.service"), text("systemd/kinocue-sync.service"));
+fn who_reads_devices_has_no_network_and_who_moves_seats_no_device() {
+    let hall = text("systemd/kinocue.service");
     let has = |unit: &str, line: &str| unit.lines().any(|found| found == line);
-    assert!(has(&sync, "PrivateNetwork=yes") && has(&sync, "RestrictAddressFamilies=AF_UNIX"));
     assert!(has(&hall, "PrivateDevices=yes") && !hall.contains("\nDeviceAllow"));
-    // The folder of the sockets is one that the one may write and the other read.
+    let bound: Vec<&str> = hall.lines().filter_map(|line| line.strip_prefix("BindReadOnlyPaths=")).collect();
+    for name in ["kinocue-sync", "kinocue-buttons"] {
+        let (unit, folder) = (text(&format!("systemd/{name}.service")), format!("/run/{name}"));
+        assert!(has(&unit, "PrivateNetwork=yes") && has(&unit, "RestrictAddressFamilies=AF_UNIX"), "{name}");
+        // The folder of the sockets is one that the one may write and the other read.
+        assert!(has(&unit, &format!("ReadWritePaths={folder}")), "{name}");
+        assert!(bound.join(" ").split_whitespace().any(|path| path == format!("-{folder}")), "{name}");
+        let tmpfiles = text("systemd/kinocue.tmpfiles");
+        let mut made = tmpfiles.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+        assert!(made.any(|line| line == ["d", &folder, "0750", name, "kinocue", "-"]), "{name}");
+    }
     let folder = "/run/kinocue-sync";
-    assert!(has(&sync, &format!("ReadWritePaths={folder}")));
-    assert!(has(&hall, &format!("BindReadOnlyPaths=-{folder}")));
-    let made = format!("d {folder}           0750 kinocue-sync kinocue -");
-    assert!(has(&text("systemd/kinocue.tmpfiles"), &made));
     let help = kinocue(&["sync", "relay", "--help"]);
     assert!(said(&help).contains(folder), "it is where the sockets are unless another is named");
 }
