@@ -19,7 +19,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::access::one;
 use super::input::whole;
-use super::once::{Asked, KeptReply, Ring};
+use super::once::{KeptReply, KeyRing, KeyedRequest};
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
 use super::rest::BodyRest;
@@ -75,7 +75,7 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
         // A stop is done each time that it comes.
         _ if request.uri().path() == STOP => caught(next.run(request)).await,
         Ok(Some(key)) if request.method() == Method::POST => {
-            let ring = if known { Ring::Of(asker.clone()) } else { Ring::Guests };
+            let ring = if known { KeyRing::Of(asker.clone()) } else { KeyRing::Guests };
             once(shared, (&ring, &asker, &key), request, next)
                 .await
                 .unwrap_or_else(IntoResponse::into_response)
@@ -136,14 +136,14 @@ fn takes_query(path: &str) -> bool {
 /// Does it, or gives the reply to the first request with that key.
 async fn once(
     shared: &Shared,
-    (ring, asker, key): (&Ring, &str, &str),
+    (ring, asker, key): (&KeyRing, &str, &str),
     request: Request,
     next: Next,
 ) -> Result<Response, Problem> {
     let (parts, body) = request.into_parts();
     let body = whole(&parts.headers, body).await?;
     let line = format!("{} {}", parts.method, parts.uri.path());
-    let asked = Asked { line, body: Sha256::digest(&body).into() };
+    let asked = KeyedRequest { line, body: Sha256::digest(&body).into() };
     let first = shared.once.first(ring, asker, key, &asked, Monotonic.now())?;
     let request = Request::from_parts(parts, Body::from(body));
     let reply = first.get_or_init(|| async {

@@ -27,11 +27,11 @@ const AGE: Duration = Duration::from_secs(600);
 /// The keys of late, and the replies to them: those of each asker by themselves, so that nobody has the keys of others forgotten. A request of
 /// theirs that came again would be done again.
 #[derive(Debug, Default)]
-pub(super) struct Once(Mutex<HashMap<Ring, VecDeque<Kept>>>);
+pub(super) struct Once(Mutex<HashMap<KeyRing, VecDeque<Kept>>>);
 
 /// Whose keys are kept together.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) enum Ring {
+pub(super) enum KeyRing {
     /// Of one who has a token, or may open the control socket.
     Of(String),
     /// Of all who come without one, from however many addresses.
@@ -40,7 +40,7 @@ pub(super) enum Ring {
 
 /// A request as it is compared with another of the same key.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Asked {
+pub(super) struct KeyedRequest {
     /// Method and path.
     pub(super) line: String,
     /// SHA-256 of the body.
@@ -56,7 +56,7 @@ struct Kept {
     asker: String,
     key: String,
     /// What was asked with it.
-    asked: Asked,
+    asked: KeyedRequest,
     since: MonoTime,
     first: First,
 }
@@ -73,10 +73,10 @@ impl Once {
     /// The place for the reply to that key of `asker`; whoever finds it empty fills it.
     pub(super) fn first(
         &self,
-        ring: &Ring,
+        ring: &KeyRing,
         asker: &str,
         key: &str,
-        asked: &Asked,
+        asked: &KeyedRequest,
         now: MonoTime,
     ) -> Result<First, Problem> {
         if key.is_empty() || key.len() > MAX_KEY || !key.bytes().all(|byte| byte.is_ascii_graphic()) {
@@ -107,7 +107,7 @@ impl Once {
         self.rings().values_mut().for_each(|kept| kept.retain(|kept| !Arc::ptr_eq(&kept.first, first)));
     }
 
-    fn rings(&self) -> MutexGuard<'_, HashMap<Ring, VecDeque<Kept>>> {
+    fn rings(&self) -> MutexGuard<'_, HashMap<KeyRing, VecDeque<Kept>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -164,12 +164,18 @@ mod tests {
         KeptReply { status: StatusCode::OK, content_type: None, body: vec![b'x'; bytes].into() }
     }
 
-    fn post(path: &str) -> Asked {
-        Asked { line: format!("POST {path}"), body: [0; 32] }
+    fn post(path: &str) -> KeyedRequest {
+        KeyedRequest { line: format!("POST {path}"), body: [0; 32] }
     }
 
-    fn ask(once: &Once, asker: &str, key: &str, asked: &Asked, now: MonoTime) -> Result<First, Problem> {
-        once.first(&Ring::Of(asker.to_owned()), asker, key, asked, now)
+    fn ask(
+        once: &Once,
+        asker: &str,
+        key: &str,
+        asked: &KeyedRequest,
+        now: MonoTime,
+    ) -> Result<First, Problem> {
+        once.first(&KeyRing::Of(asker.to_owned()), asker, key, asked, now)
     }
 
     #[test]
@@ -180,7 +186,7 @@ mod tests {
         assert!(Arc::ptr_eq(&first, &again));
         assert!(!Arc::ptr_eq(&first, &ask(&once, "ben", "k", &post("/go"), at(1)).unwrap()));
         assert_eq!(ask(&once, "anna", "k", &post("/stop"), at(1)).unwrap_err().code, Code::Value);
-        let other = Asked { body: [1; 32], ..post("/go") };
+        let other = KeyedRequest { body: [1; 32], ..post("/go") };
         assert_eq!(ask(&once, "anna", "k", &other, at(1)).unwrap_err().code, Code::Value);
         for bad in ["", "a b", "ä", &"k".repeat(65)] {
             assert_eq!(ask(&once, "anna", bad, &post("/go"), at(1)).unwrap_err().code, Code::Value, "{bad}");
@@ -201,13 +207,13 @@ mod tests {
     #[test]
     fn neither_many_keys_nor_long_replies_fill_the_memory_nor_have_the_keys_of_others_forgotten() {
         let once = Once::default();
-        let of = |asker: &str| once.rings()[&Ring::Of(asker.to_owned())].len();
+        let of = |asker: &str| once.rings()[&KeyRing::Of(asker.to_owned())].len();
         let resume = ask(&once, "carl", "k", &post("/resume"), at(0)).unwrap();
         for n in 0..3000 {
             let guest = format!("10.0.{}.{}", n / 256, n % 256);
-            once.first(&Ring::Guests, &guest, "k", &post("/go"), at(0)).unwrap();
+            once.first(&KeyRing::Guests, &guest, "k", &post("/go"), at(0)).unwrap();
         }
-        assert_eq!(once.rings()[&Ring::Guests].len(), KEYS);
+        assert_eq!(once.rings()[&KeyRing::Guests].len(), KEYS);
         for n in 0..3000 {
             ask(&once, "anna", &n.to_string(), &post("/go"), at(0)).unwrap();
         }

@@ -210,16 +210,14 @@ fn serve_halls(
     let recordings = record_places.recordings.clone();
     let surfaces =
         Surfaces::open(&config, &places.sockets, &handle, library.clone(), recordings, pages, &log)?;
+    let alarms = AlarmTeller::start(&config, &log).map_err(ServeError::System)?;
     let mut ports = SupervisorPorts {
         inbox,
         source,
         config: places.config,
         began,
         signals,
-        service_log: ServiceLog::new(
-            log.clone(),
-            AlarmTeller::start(&config, &log).map_err(ServeError::System)?,
-        ),
+        service_log: ServiceLog::new(log.clone(), alarms),
         carryover: Carryover::of(kept),
         settings_file,
         film: None,

@@ -94,7 +94,9 @@ fn a_real_time_program_that_takes_the_processor_of_the_tick_thread_ends_in_a_hol
     let mut hog = Command::new("taskset");
     hog.args(["--cpu-list", &last, "chrt", "--fifo", "99", "sh", "-c", spin]).stderr(Stdio::null());
     assert!(!hog.status().expect("it starts").success(), "it was ended");
-    hall.serving().heard(|line| line.contains("holding: a frame came more than 50 ms late").then_some(()));
+    hall.serving().heard(|line| {
+        line.contains("holding: this machine sent the seats a frame more than 50 ms late").then_some(())
+    });
     let held = hall.lives_on(50);
     let back = hall.wait(|status| {
         let is_led = (0..2).all(|seat| count(status, seat, "sent") > count(&held, seat, "sent") + 20);
