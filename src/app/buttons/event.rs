@@ -53,7 +53,7 @@ pub(super) fn read(record: &[u8; LEN]) -> InputEvent {
     InputEvent { at: MonoTime::from_nanos(at), kind }
 }
 
-/// Records of a device that somebody watches.
+/// Records that come in pieces.
 #[derive(Debug, Default)]
 pub(crate) struct InputRecords(Vec<u8>);
 
@@ -69,11 +69,26 @@ impl InputRecords {
 
     /// Reads what is whole of what came; the rest is kept.
     pub(super) fn take(&mut self, octets: &[u8]) -> Vec<InputEvent> {
+        self.whole(octets).iter().map(read).collect()
+    }
+
+    /// What is for lamps of what came; the rest that is not whole is kept.
+    pub(super) fn lamps(&mut self, octets: &[u8]) -> Vec<u8> {
+        self.whole(octets).iter().filter(|one| is_for_lamps(one)).flatten().copied().collect()
+    }
+
+    /// As after these, before any were read.
+    #[cfg(test)]
+    pub(super) fn of(octets: &[u8]) -> Self {
+        Self(octets.to_vec())
+    }
+
+    fn whole(&mut self, octets: &[u8]) -> Vec<[u8; LEN]> {
         self.0.extend_from_slice(octets);
-        let (records, rest) = self.0.as_chunks::<LEN>();
-        let (events, rest) = (records.iter().map(read).collect(), rest.to_vec());
+        let (records, rest) = self.0.as_chunks();
+        let (records, rest) = (records.to_vec(), rest.to_vec());
         self.0 = rest;
-        events
+        records
     }
 }
 
@@ -91,7 +106,7 @@ pub(super) fn beat() -> [u8; LEN] {
 }
 
 /// True if a record is for lamps alone: nothing else is ever written to a device.
-pub(super) fn is_for_lamps(record: &[u8; LEN]) -> bool {
+fn is_for_lamps(record: &[u8; LEN]) -> bool {
     matches!(u16::from_ne_bytes([record[16], record[17]]), LED | SYN)
 }
 

@@ -7,7 +7,7 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::event::{LEN, beat, is_for_lamps, lamp};
+use super::event::{InputRecords, LEN, beat, lamp};
 use super::line::{GREETING, wait};
 use crate::sys::clock::Monotonic;
 use crate::sys::evdev;
@@ -35,8 +35,8 @@ pub(crate) struct ButtonRelay {
 #[derive(Debug)]
 struct Listener {
     stream: UnixStream,
-    /// Octets for lamps that are not whole yet.
-    rest: Vec<u8>,
+    /// What it says of lamps.
+    records: InputRecords,
 }
 
 impl ButtonRelay {
@@ -116,12 +116,7 @@ impl ButtonRelay {
                 None
             }
             Ok(count @ 1..) => {
-                hall.rest.extend_from_slice(&octets[..count]);
-                let (records, rest) = hall.rest.as_chunks::<LEN>();
-                let lamps: Vec<u8> =
-                    records.iter().filter(|one| is_for_lamps(one)).flatten().copied().collect();
-                hall.rest = rest.to_vec();
-                let _ = device.write_all(&lamps); // a device that is gone is told as it is read
+                let _ = device.write_all(&hall.records.lamps(&octets[..count])); // a device that is gone is told as it is read
                 None
             }
             _ => Some(self.part("it has closed")),
@@ -146,7 +141,7 @@ impl ButtonRelay {
             return Some("is heard by another hall already; one more was turned away".to_owned());
         }
         stream.set_nonblocking(true).and_then(|()| stream.write_all(GREETING)).ok()?;
-        self.hall = Some(Listener { stream, rest: Vec::new() });
+        self.hall = Some(Listener { stream, records: InputRecords::default() });
         Some("is heard by a hall".to_owned())
     }
 }
@@ -207,7 +202,7 @@ mod tests {
         hall.light(2, true).unwrap();
         // What no lamp is, a hall writes to no device: a key would be pressed by it.
         let forged = key(30, 1, Monotonic.now());
-        desk.relay.hall.as_mut().unwrap().rest = forged.to_vec();
+        desk.relay.hall.as_mut().unwrap().records = InputRecords::of(&forged);
         assert_eq!(desk.relay.light(), None);
         let mut written = [0; 1_000];
         let count = desk.keys.read(&mut written).unwrap();
