@@ -19,7 +19,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::access::one;
 use super::input::whole;
-use super::once::{KeptReply, KeyRing, KeyedRequest};
+use super::once::{KeptReply, KeyHolder, KeyedRequest};
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
 use super::rest::BodyRest;
@@ -63,22 +63,19 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
     let Some(who) = who else {
         return render(caught(next.run(request)).await, None);
     };
-    let asker = format!("{who}");
     // Who has shown a token, or may open the control socket, keeps a place before those who have not.
     let known = who.surface == Surface::Socket || request.headers().contains_key(AUTHORIZATION);
     if let Some(place) = request.extensions().get::<Arc<Place>>().filter(|_| known) {
         place.show(&who.name);
     }
+    let asker = KeyHolder { name: who.to_string(), is_known: known };
     request.extensions_mut().insert(who);
     let key = one(request.headers(), &IDEMPOTENCY_KEY).map(|key| key.map(str::to_owned));
     let response = match key {
         // A stop is done each time that it comes.
         _ if request.uri().path() == STOP => caught(next.run(request)).await,
         Ok(Some(key)) if request.method() == Method::POST => {
-            let ring = if known { KeyRing::Of(asker.clone()) } else { KeyRing::Guests };
-            once(shared, (&ring, &asker, &key), request, next)
-                .await
-                .unwrap_or_else(IntoResponse::into_response)
+            once(shared, &asker, &key, request, next).await.unwrap_or_else(IntoResponse::into_response)
         }
         Ok(_) => caught(next.run(request)).await,
         Err(problem) => problem.into_response(),
@@ -136,7 +133,8 @@ fn takes_query(path: &str) -> bool {
 /// Does it, or gives the reply to the first request with that key.
 async fn once(
     shared: &Shared,
-    (ring, asker, key): (&KeyRing, &str, &str),
+    asker: &KeyHolder,
+    key: &str,
     request: Request,
     next: Next,
 ) -> Result<Response, Problem> {
@@ -144,7 +142,7 @@ async fn once(
     let body = whole(&parts.headers, body).await?;
     let line = format!("{} {}", parts.method, parts.uri.path());
     let asked = KeyedRequest { line, body: Sha256::digest(&body).into() };
-    let first = shared.once.first(ring, asker, key, &asked, Monotonic.now())?;
+    let first = shared.once.first(asker, key, asked, Monotonic.now())?;
     let request = Request::from_parts(parts, Body::from(body));
     let reply = first.get_or_init(|| async {
         KeptReply::of(render(caught(next.run(request)).await, Some(&shared.handle.status()))).await
