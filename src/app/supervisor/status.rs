@@ -14,7 +14,8 @@ use crate::app::notify::NotifyTable;
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
-    Coded, ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
+    Coded, ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, RecordStatus, Status,
+    Times, Warning,
 };
 use crate::drive::link::AT_PARK;
 use crate::motion::AxisGeometry;
@@ -51,6 +52,8 @@ const FEW: usize = 8;
 pub(super) struct StatusParts<'p> {
     pub(super) hall: &'p HallContext,
     pub(super) features: &'p Features,
+    /// How recording stands, looked up once: its warnings are those of the troubles that are told.
+    pub(super) record: &'p RecordStatus,
     /// When the program started.
     pub(super) began: MonoTime,
 }
@@ -58,7 +61,7 @@ pub(super) struct StatusParts<'p> {
 impl StatusParts<'_> {
     /// How all of it stands, with what a person should know besides.
     pub(super) fn status(&self, table: &[Row], warnings: Vec<Warning>) -> Status {
-        let Self { hall, features, began } = *self;
+        let Self { hall, features, record, began } = *self;
         let (now, live, mirror) = (hall.now, &hall.live, &hall.mirror);
         let times = live.times();
         let moving = mirror.state.may_send_motion();
@@ -110,7 +113,7 @@ impl StatusParts<'_> {
             preflight: preflighted.as_ref().map(|it| it.status(now, |lane| hall.settings.is_on(lane))),
             warnings,
             test: features.seats.test.as_ref().map(|test| test.status.clone()),
-            record: hall.recorder.status(),
+            record: record.clone(),
             journal: features.records.newest(),
         }
     }

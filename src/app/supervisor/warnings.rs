@@ -65,8 +65,8 @@ impl StatusParts<'_> {
         });
         warnings.extend(untold);
         warnings.extend(features.lasting.warnings(hall));
-        let troubles = hall.recorder.status().troubles;
-        warnings.extend(troubles.iter().map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));
+        let troubles = self.record.troubles.iter();
+        warnings.extend(troubles.map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));
         warnings.extend(
             recorded::lacks_room(hall).map(|trouble| in_two(WarningCode::RecordRoom.word(), &trouble)),
         );
