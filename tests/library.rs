@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use kinocue::harness::control::{Code, Problem};
-use kinocue::harness::library::{Bounds, CueInfo, Hall, Library, Proved};
+use kinocue::harness::library::{Awaited, Bounds, CueInfo, Hall, Library, Proved};
 use kinocue::harness::playlist::Playlist;
 use tempfile::TempDir;
 
@@ -46,7 +46,7 @@ impl Fixture {
         for part in bytes.chunks(1000) {
             upload.write(part)?;
         }
-        upload.finish()
+        upload.finish(None)
     }
 
     fn cues(&self) -> PathBuf {
@@ -187,7 +187,7 @@ fn a_bomb_is_refused_within_its_bounds() {
 }
 
 /// An upload whose check is a script.
-fn upload_with(script: &str, time: Duration) -> Problem {
+fn upload_with(script: &str, time: Duration, awaited: Option<&Awaited>) -> Problem {
     let fixture = Fixture::new();
     let program = fixture.dir.path().join("check");
     fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("it is ours");
@@ -197,30 +197,40 @@ fn upload_with(script: &str, time: Duration) -> Problem {
     let library = Library::open(&fixture.cues(), hall).expect("the folder is ours");
     let mut upload = library.begin(&"ride".parse().expect("an id")).expect("it is the first");
     upload.write(GOOD.as_bytes()).expect("it is ours");
-    let problem = upload.finish().expect_err("it is refused");
+    let problem = upload.finish(awaited).expect_err("it is refused");
     assert!(fixture.files().is_empty());
     problem
 }
 
 #[test]
+fn a_check_that_nobody_waits_for_any_more_is_ended() {
+    let (waits, awaited) = Awaited::pair().expect("a pipe");
+    drop(waits);
+    let problem = upload_with("exec sleep 60", Duration::from_secs(60), Some(&awaited));
+    assert!(problem.detail.contains("nobody waits"), "{problem}");
+}
+
+#[test]
 fn a_check_that_hangs_or_prints_without_end_is_ended() {
-    let problem = upload_with("exec sleep 60", Duration::from_millis(50));
+    let problem = upload_with("exec sleep 60", Duration::from_millis(50), None);
     assert!(problem.detail.contains("took more than"), "{problem}");
-    let problem = upload_with("exec >&-; exec sleep 60", Duration::from_millis(50));
+    let problem = upload_with("exec >&-; exec sleep 60", Duration::from_millis(50), None);
     assert!(problem.detail.contains("took more than"), "{problem}");
-    let problem = upload_with("exec yes", Duration::from_secs(60));
+    let problem = upload_with("exec yes", Duration::from_secs(60), None);
     assert!(problem.detail.contains("longer than any verdict"), "{problem}");
 }
 
 #[test]
 fn a_check_that_fails_takes_nothing_in() {
     for script in ["exit 0", "kill -9 $$", "echo '{\"passed\":true}'"] {
-        let problem = upload_with(script, Duration::from_secs(60));
+        let problem = upload_with(script, Duration::from_secs(60), None);
         assert!(problem.detail.contains("the check of the cue ended with"), "{problem}");
     }
     let foreign = r#"echo '{"passed":true,"faults":[],"more":0,"led_faults":[],"sha256":"00","effects":[],"mcap":false}'"#;
     assert!(
-        upload_with(foreign, Duration::from_secs(60)).detail.contains("changed while it was being checked")
+        upload_with(foreign, Duration::from_secs(60), None)
+            .detail
+            .contains("changed while it was being checked")
     );
 }
 
@@ -319,13 +329,13 @@ fn curves_are_drawn_once_until_the_file_changes() {
         fs::rename(fixture.cues().join("new"), fixture.cues().join("ride.csv")).unwrap();
     };
     put("time_ms,a1\n0,0.5\n100,0.5\n");
-    let first = fixture.library.curve(&id, 10).unwrap();
-    assert!(std::sync::Arc::ptr_eq(&first, &fixture.library.curve(&id, 10).unwrap()));
-    assert_eq!(fixture.library.curve(&id, 20).unwrap().t_s.len(), 20);
+    let first = fixture.library.curve(&id, 10, None).unwrap();
+    assert!(std::sync::Arc::ptr_eq(&first, &fixture.library.curve(&id, 10, None).unwrap()));
+    assert_eq!(fixture.library.curve(&id, 20, None).unwrap().t_s.len(), 20);
     put("# units: mm\ntime_ms,a1\n0,15\n100,15\n");
-    assert_eq!(fixture.library.curve(&id, 10).unwrap().axes[0].max[0], 0.1);
+    assert_eq!(fixture.library.curve(&id, 10, None).unwrap().axes[0].max[0], 0.1);
     put("time_ms,a1\n0,0.5\n100,7\n");
-    let problem = fixture.library.curve(&id, 10).unwrap_err();
+    let problem = fixture.library.curve(&id, 10, None).unwrap_err();
     assert_eq!(problem.code, Code::Cue);
     assert!(problem.faults.concat().contains("ride.csv:3:5: a1"), "{problem}");
 }
@@ -335,6 +345,6 @@ fn a_curve_that_takes_too_much_memory_is_given_up_by_the_child_alone() {
     let fixture = Fixture::bounded(Bounds { memory_mib: 48, ..Bounds::default() });
     let rows: String = (0..1_000_000).map(|row| format!("{row},0.5\n")).collect();
     fs::write(fixture.cues().join("long.csv"), format!("time_ms,a1\n{rows}")).unwrap();
-    let problem = fixture.library.curve(&"long".parse().unwrap(), 100).unwrap_err();
+    let problem = fixture.library.curve(&"long".parse().unwrap(), 100, None).unwrap_err();
     assert!(problem.remedy.contains("max_memory_mib in [library]"), "{problem}");
 }

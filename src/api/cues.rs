@@ -20,9 +20,9 @@ use super::access::one as one_header;
 use super::asker::Asker;
 use super::input::{Id, check_length};
 use super::problem::bad_value;
-use super::shared::{Shared, turn};
+use super::shared::{Shared, StillAsked, turn};
 use crate::control::{Code, Problem};
-use crate::library::{CueId, CueInfo, CurveData, Library, MAX_POINTS};
+use crate::library::{Awaited, CueId, CueInfo, CurveData, Library, MAX_POINTS};
 
 /// Pieces that wait for the disk at the most.
 const PIECES: usize = 4;
@@ -79,9 +79,9 @@ pub(super) async fn curve(
     let points = query.points.unwrap_or(POINTS);
     let library = shared.library.clone();
     let turn = turn(&shared.curves, "a curve").await?;
-    let curve = shared.blocking(move || {
-        let _turn = turn; // held until it is drawn, also where nobody waits for it any more
-        let curve = library.curve(&id, points)?;
+    let curve = shared.awaiting(StillAsked::of(&request), move |awaited| {
+        let _turn = turn; // held until it is drawn
+        let curve = library.curve(&id, points, Some(awaited))?;
         Ok(serde_json::to_vec(&*curve).expect("numbers and names are written without fail"))
     });
     let json = HeaderValue::from_static("application/json");
@@ -105,10 +105,12 @@ pub(super) async fn upload(
     no_form(&request)?;
     check_length(request.headers(), shared.library.max_bytes())?;
     let (to, pieces) = mpsc::channel(PIECES);
+    let asked = StillAsked::of(&request);
     let library = shared.library.clone();
     let fed =
         async { timeout(WHOLE, feed(request.into_body(), to)).await.unwrap_or_else(|_| Err(slow(WHOLE))) };
-    let (fed, taken) = tokio::join!(fed, shared.blocking(move || take_in(&library, &id, pieces)));
+    let (fed, taken) =
+        tokio::join!(fed, shared.awaiting(asked, move |awaited| take_in(&library, &id, pieces, awaited)));
     fed?;
     taken.map(JsonReply)
 }
@@ -144,12 +146,13 @@ fn take_in(
     library: &Library,
     id: &CueId,
     mut pieces: mpsc::Receiver<UploadPiece>,
+    awaited: &Awaited,
 ) -> Result<CueInfo, Problem> {
     let mut upload = library.begin(id)?;
     loop {
         match pieces.blocking_recv() {
             Some(UploadPiece::Bytes(bytes)) => upload.write(&bytes)?,
-            Some(UploadPiece::End) => return upload.finish(),
+            Some(UploadPiece::End) => return upload.finish(Some(awaited)),
             None => return Err(cut_short()),
         }
     }

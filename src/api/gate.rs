@@ -23,7 +23,7 @@ use super::once::{KeptReply, KeyHolder, KeyedRequest};
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
 use super::rest::BodyRest;
-use super::shared::Shared;
+use super::shared::{Shared, StillAsked};
 use super::show::STOP;
 use crate::control::{Code, Place, Problem, Surface, Who};
 use crate::log::{Line, Priority};
@@ -38,10 +38,13 @@ const TIME: HeaderName = HeaderName::from_static("x-kinocue-time");
 const POLICY: &str =
     "default-src 'self'; img-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
-/// Passes a request on, or refuses it. What was begun is ended also where the connection goes away meanwhile.
+/// Passes a request on, or refuses it. What was begun is ended also where the connection goes away meanwhile, but for what a process of
+/// its own works at ([`StillAsked`]).
 pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
     let of_gate = Arc::clone(&shared);
-    let (request, rest) = BodyRest::of(request);
+    let (mut request, rest) = BodyRest::of(request);
+    let (_here, asked) = StillAsked::new();
+    request.extensions_mut().insert(asked);
     let response = match tokio::spawn(async move { pass(&of_gate, request, next).await }).await {
         Ok(response) => response,
         Err(_) => render(panicked().into_response(), None),

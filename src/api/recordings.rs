@@ -23,7 +23,7 @@ use super::asker::{Asker, StatusReply};
 use super::input::{Nothing, OrNothing};
 use super::pieces::Pieces;
 use super::problem::bad_value;
-use super::shared::{Shared, turn};
+use super::shared::{Shared, StillAsked, turn};
 use crate::control::model::Ending;
 use crate::control::{Code, Command, Problem, is_recording};
 use crate::journal::{Outcome, ShowRecord};
@@ -157,9 +157,9 @@ pub(super) async fn picture(
     let path = path_of(&shared, &name)?;
     let library = shared.library.clone();
     let turn = turn(&shared.pictures, "a picture").await?;
-    let drawn = shared.blocking(move || {
-        let _turn = turn; // held until it is drawn, also where nobody waits for it any more
-        library.picture(&path, query.seat.as_deref())
+    let drawn = shared.awaiting(StillAsked::of(&request), move |awaited| {
+        let _turn = turn; // held until it is drawn
+        library.picture(&path, query.seat.as_deref(), Some(awaited))
     });
     drawn.await.map(JsonReply)
 }

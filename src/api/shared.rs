@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use axum::extract::Request;
 use hyper::body::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
@@ -15,7 +16,7 @@ use super::problem::panicked;
 use super::streams::Streams;
 use super::tries::Tries;
 use crate::control::{Code, Handle, Problem, Status};
-use crate::library::Library;
+use crate::library::{Awaited, Library};
 use crate::log::Log;
 use crate::playlist::Shelf;
 use crate::sys::clock::Monotonic;
@@ -70,6 +71,23 @@ pub(super) struct Shared {
     pub(super) written: Mutex<Option<(Arc<Status>, Bytes)>>,
 }
 
+/// Tells those who work at a request whether whoever sent it is still there.
+#[derive(Debug, Clone)]
+pub(super) struct StillAsked(watch::Receiver<()>);
+
+impl StillAsked {
+    /// It is asked until the other end is dropped.
+    pub(super) fn new() -> (watch::Sender<()>, Self) {
+        let (here, asked) = watch::channel(());
+        (here, Self(asked))
+    }
+
+    /// Whether whoever sent a request is still there.
+    pub(super) fn of(request: &Request) -> Self {
+        request.extensions().get::<Self>().expect("each request has passed the gate").clone()
+    }
+}
+
 /// Room for what waits for a disk.
 pub(super) fn errands() -> Arc<Semaphore> {
     Arc::new(Semaphore::new(ERRANDS))
@@ -104,6 +122,25 @@ impl Shared {
             work()
         });
         done.await.unwrap_or_else(|_| Err(panicked()))
+    }
+
+    /// The same of what a process of its own does, which is ended once whoever asked has gone away.
+    pub(super) async fn awaiting<T: Send + 'static>(
+        &self,
+        mut asked: StillAsked,
+        work: impl FnOnce(&Awaited) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let (waits, awaited) = Awaited::pair().map_err(|error| {
+            let detail = format!("cannot wait for a process: {error}");
+            Problem::new(Code::File, detail, "check the service's limit of open files")
+        })?;
+        let done = self.blocking(move || work(&awaited));
+        tokio::pin!(done);
+        tokio::select! {
+            done = &mut done => return done,
+            _ = asked.0.changed() => drop(waits),
+        }
+        done.await
     }
 
     /// A status as JSON. Of many who ask for the same one it is written once.

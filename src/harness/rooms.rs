@@ -57,7 +57,7 @@ pub mod latency {
     pub use crate::latency::{Percentiles, read};
 }
 pub mod library {
-    pub use crate::library::{Bounds, CueInfo, Hall, Library, Proved};
+    pub use crate::library::{Awaited, Bounds, CueInfo, Hall, Library, Proved};
 }
 pub mod limiter {
     pub use crate::limiter::{Admitted, Limit, Limiter, Provenance};

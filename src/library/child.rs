@@ -1,7 +1,7 @@
 //! The process that checks cues and draws recordings: what comes from outside or is long is taken apart there, at the lowest priority
 //! and within limits, and never in the process that moves seats.
 
-use std::io::{self, Read as _};
+use std::io::{self, PipeReader, PipeWriter, Read as _};
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -32,6 +32,8 @@ struct Chore<'a> {
     file: &'a Path,
     /// The most memory that it may take, MiB.
     memory_mib: u64,
+    /// Whoever waits for it; none where it is done for everybody.
+    awaited: Option<&'a Awaited>,
 }
 
 /// What a picture may take, MiB: it is read piece by piece, and may be drawn beside the check of a cue.
@@ -43,26 +45,56 @@ const FEWER_ROWS: &str =
 const SHORTER: &str =
     "draw it on another machine with `kinocue plot`, or cut it first with `kinocue record cut`";
 
-/// Has a cue file checked for a hall. Blocks until it is.
-pub(super) fn examine(hall: &Hall, cue: &Path) -> Result<Verdict, Problem> {
-    check(hall, cue, &[])
+/// Tells a process that is at work whether somebody still waits for what it makes.
+#[derive(Debug)]
+pub struct Awaited(PipeReader);
+
+impl Awaited {
+    /// It is awaited until the other end is dropped.
+    ///
+    /// # Errors
+    /// Where this process may open nothing more.
+    pub fn pair() -> io::Result<(PipeWriter, Self)> {
+        let (reader, writer) = io::pipe()?;
+        Ok((writer, Self(reader)))
+    }
 }
 
-/// Has the curves of a cue file drawn in so many stretches of time. Blocks until they are.
-pub(super) fn draw(hall: &Hall, cue: &Path, points: usize) -> Result<Drawing, Problem> {
-    check(hall, cue, &["--curve", &points.to_string()])
+/// Has a cue file checked for a hall. Blocks until it is, or is awaited no more.
+pub(super) fn examine(hall: &Hall, cue: &Path, awaited: Option<&Awaited>) -> Result<Verdict, Problem> {
+    check(hall, cue, &[], awaited)
 }
 
-/// Has a recording drawn: that seat, or the one that was held back farthest. Blocks until it is.
-pub(super) fn picture(hall: &Hall, recording: &Path, seat: Option<&str>) -> Result<Sketch, Problem> {
+/// Has the curves of a cue file drawn in so many stretches of time. Blocks until they are, or are awaited no more.
+pub(super) fn draw(
+    hall: &Hall,
+    cue: &Path,
+    points: usize,
+    awaited: Option<&Awaited>,
+) -> Result<Drawing, Problem> {
+    check(hall, cue, &["--curve", &points.to_string()], awaited)
+}
+
+/// Has a recording drawn: that seat, or the one that was held back farthest. Blocks until it is, or is awaited no more.
+pub(super) fn picture(
+    hall: &Hall,
+    recording: &Path,
+    seat: Option<&str>,
+    awaited: Option<&Awaited>,
+) -> Result<Sketch, Problem> {
     let seat = seat.map(|seat| format!("--seat={seat}"));
     let command: Vec<&str> = ["draw-recording"].into_iter().chain(seat.as_deref()).collect();
     let name = "the picture of the recording";
     let memory_mib = hall.bounds.memory_mib.min(PICTURE_MIB);
-    run(hall, &Chore { name, remedy: SHORTER, command: &command, file: recording, memory_mib })
+    run(hall, &Chore { name, remedy: SHORTER, command: &command, file: recording, memory_mib, awaited })
 }
 
-fn check<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<T, Problem> {
+fn check<T: DeserializeOwned>(
+    hall: &Hall,
+    cue: &Path,
+    more: &[&str],
+    awaited: Option<&Awaited>,
+) -> Result<T, Problem> {
     let config = hall.config.to_str().ok_or_else(|| {
         let detail = format!("the path of the configuration, {}, is not UTF-8", hall.config.display());
         Problem::new(Code::File, detail, "rename it")
@@ -70,7 +102,7 @@ fn check<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<
     let command: Vec<&str> =
         ["prove", "--json", "--config", config].into_iter().chain(more.iter().copied()).collect();
     let memory_mib = hall.bounds.memory_mib;
-    run(hall, &Chore { name: CHECK, remedy: FEWER_ROWS, command: &command, file: cue, memory_mib })
+    run(hall, &Chore { name: CHECK, remedy: FEWER_ROWS, command: &command, file: cue, memory_mib, awaited })
 }
 
 /// What the process says of a file.
@@ -81,7 +113,7 @@ fn run<T: DeserializeOwned>(hall: &Hall, chore: &Chore<'_>) -> Result<T, Problem
         Problem::new(Code::File, detail, "check the service's limits on processes and memory")
     })?;
     let deadline = Monotonic.now() + bounds.time;
-    let watched = watch(&mut child, deadline);
+    let watched = watch(&mut child, chore.awaited, deadline);
     if watched.is_err() {
         let _ = child.kill(); // it may have ended meanwhile
     }
@@ -111,12 +143,12 @@ fn spawn(hall: &Hall, chore: &Chore<'_>) -> io::Result<Child> {
 }
 
 /// What it prints, once it has ended.
-fn watch(child: &mut Child, deadline: MonoTime) -> io::Result<Vec<u8>> {
+fn watch(child: &mut Child, awaited: Option<&Awaited>, deadline: MonoTime) -> io::Result<Vec<u8>> {
     let mut stdout = child.stdout.take().expect("its output is a pipe");
     let mut output = Vec::new();
     let mut buf = [0; 4096];
     loop {
-        wait_for(&PollFd::new(&stdout, PollFlags::IN), deadline)?;
+        wait_for(&PollFd::new(&stdout, PollFlags::IN), awaited, deadline)?;
         match stdout.read(&mut buf)? {
             0 => break,
             bytes => output.extend_from_slice(&buf[..bytes]),
@@ -126,20 +158,25 @@ fn watch(child: &mut Child, deadline: MonoTime) -> io::Result<Vec<u8>> {
         }
     }
     let ended = pidfd_open(Pid::from_child(child), PidfdFlags::empty())?;
-    wait_for(&PollFd::new(&ended, PollFlags::IN), deadline)?;
+    wait_for(&PollFd::new(&ended, PollFlags::IN), awaited, deadline)?;
     Ok(output)
 }
 
-/// Waits until there is something to read, or an end.
-fn wait_for(fd: &PollFd<'_>, deadline: MonoTime) -> io::Result<()> {
+/// Waits until there is something to read, or an end; not where nobody waits for it any more.
+fn wait_for(fd: &PollFd<'_>, awaited: Option<&Awaited>, deadline: MonoTime) -> io::Result<()> {
+    let mut fds: Vec<PollFd<'_>> = vec![fd.clone()];
+    fds.extend(awaited.map(|Awaited(pipe)| PollFd::new(pipe, PollFlags::empty())));
     loop {
         let left = deadline.since(Monotonic.now());
         if left == Duration::ZERO {
             return Err(io::ErrorKind::TimedOut.into());
         }
         let left = Timespec::try_from(left).map_err(io::Error::other)?;
-        match poll(&mut [fd.clone()], Some(&left)) {
+        match poll(&mut fds, Some(&left)) {
             Ok(0) | Err(Errno::INTR) => {}
+            Ok(_) if fds[1..].iter().any(|pipe| !pipe.revents().is_empty()) => {
+                return Err(io::Error::other("nobody waits for it any more"));
+            }
             Ok(_) => return Ok(()),
             Err(error) => return Err(error.into()),
         }

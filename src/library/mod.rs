@@ -14,6 +14,7 @@ mod info;
 mod sketch;
 mod upload;
 
+pub use child::Awaited;
 pub(crate) use curve::{CurveData, Drawing, MAX_POINTS, draw, needs_hall};
 pub(crate) use hashed::Hashed;
 pub(crate) use id::{CueId, Id, IdError};
@@ -214,7 +215,7 @@ impl Library {
             return Ok(info);
         }
         let cue = self.cue(id)?;
-        let verdict = child::examine(&inner.hall, &cue.folder.path(&cue.name))?;
+        let verdict = child::examine(&inner.hall, &cue.folder.path(&cue.name), None)?;
         if cue.folder.stamp(&cue.name).ok().flatten() != Some(cue.stamp) {
             let detail = format!("the cue {id} changed while it was being checked");
             return Err(Problem::new(Code::File, detail, "try again when it is all there"));
@@ -270,7 +271,12 @@ impl Library {
     /// # Errors
     /// As for [`Library::read`]; [`Code::Value`] where `points` is out of range, [`Code::Cue`] where the cue cannot be read, [`Code::Check`] where it is in mm or
     /// pulses and the configuration cannot be read, or where drawing it takes too much.
-    pub fn curve(&self, id: &CueId, points: usize) -> Result<Arc<CurveData>, Problem> {
+    pub fn curve(
+        &self,
+        id: &CueId,
+        points: usize,
+        awaited: Option<&Awaited>,
+    ) -> Result<Arc<CurveData>, Problem> {
         if !(1..=MAX_POINTS).contains(&points) {
             let detail = format!("{points} points are outside 1..={MAX_POINTS}");
             return Err(Problem::new(Code::Value, detail, "request as many as the page is wide"));
@@ -282,7 +288,7 @@ impl Library {
         if let Some(drawn) = curves.iter().find(same) {
             return Ok(Arc::clone(&drawn.curve));
         }
-        let curve = match child::draw(&self.inner.hall, &cue.folder.path(&cue.name), points)? {
+        let curve = match child::draw(&self.inner.hall, &cue.folder.path(&cue.name), points, awaited)? {
             Drawing::Curve(curve) => Arc::new(curve),
             Drawing::Faults(lines) => return Err(unplayable(id, lines)),
         };
@@ -296,8 +302,13 @@ impl Library {
     ///
     /// # Errors
     /// [`Code::Unknown`] where the recording, or the seat in it, is not there; as for a check where drawing it takes too much.
-    pub(crate) fn picture(&self, recording: &Path, seat: Option<&str>) -> Result<RecordingPicture, Problem> {
-        match child::picture(&self.inner.hall, recording, seat)? {
+    pub(crate) fn picture(
+        &self,
+        recording: &Path,
+        seat: Option<&str>,
+        awaited: Option<&Awaited>,
+    ) -> Result<RecordingPicture, Problem> {
+        match child::picture(&self.inner.hall, recording, seat, awaited)? {
             Sketch::Picture(picture) => Ok(*picture),
             Sketch::Fault(fault) => {
                 Err(Problem::new(Code::Unknown, fault, "GET /api/v1/recordings lists what is there"))

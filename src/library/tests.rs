@@ -101,7 +101,7 @@ fn a_check_that_cannot_be_started_is_a_problem_and_keeps_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let mut upload = library(dir.path()).begin(&id("a")).unwrap();
     upload.write(CUE.as_bytes()).unwrap();
-    let problem = upload.finish().unwrap_err();
+    let problem = upload.finish(None).unwrap_err();
     assert!(problem.detail.starts_with("cannot start the check"), "{problem}");
     assert!(left(dir.path()).is_empty());
 }
@@ -112,9 +112,9 @@ fn no_curve_is_drawn_in_this_process() {
     fs::write(dir.path().join("ride.csv"), CUE).unwrap();
     let library = library(dir.path());
     for points in [0, MAX_POINTS + 1] {
-        assert_eq!(library.curve(&id("ride"), points).unwrap_err().code, Code::Value);
+        assert_eq!(library.curve(&id("ride"), points, None).unwrap_err().code, Code::Value);
     }
-    let problem = library.curve(&id("ride"), 10).unwrap_err();
+    let problem = library.curve(&id("ride"), 10, None).unwrap_err();
     assert!(problem.detail.starts_with("cannot start the check"), "{problem}");
 }
 

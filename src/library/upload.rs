@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 
 use sha2::{Digest as _, Sha256};
 
-use super::{CueId, CueInfo, Library, child, file_name, file_problem, hex, lock};
+use super::{Awaited, CueId, CueInfo, Library, child, file_name, file_problem, hex, lock};
 use crate::control::{Code, Problem};
 use crate::sys::folder::Folder;
 
@@ -77,18 +77,18 @@ impl Upload {
     }
 
     /// Has the file checked and proved by a process of the lowest priority, one at a time, and puts it into the library.
-    /// Blocks until that is done, minutes for a long cue beside a show; not for a thread that others wait for.
+    /// Blocks until that is done, minutes for a long cue beside a show, or is awaited no more; not for a thread that others wait for.
     ///
     /// # Errors
     /// [`Problem`] with every fault where the cue is refused; where the check cannot be done, or the disk fails.
-    pub fn finish(self) -> Result<CueInfo, Problem> {
+    pub fn finish(self, awaited: Option<&Awaited>) -> Result<CueInfo, Problem> {
         let Self { place, id, file, hash, .. } = self;
         let inner = &place.library.inner;
         file.sync_all().map_err(|error| unwritten(&error))?;
         let print = inner.hall.fingerprint();
         let verdict = {
             let _turn = lock(&inner.proving);
-            child::examine(&inner.hall, &place.folder.path(&place.name))?
+            child::examine(&inner.hall, &place.folder.path(&place.name), awaited)?
         };
         if verdict.sha256 != hex(&hash.finalize()) {
             let detail = "the file changed while it was being checked";

@@ -1,7 +1,7 @@
 //! The library over HTTP: lists, curves, uploads.
 
 use std::fs;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
 
 use crate::client::{Reply, Request, problem};
 use crate::hall::Hall;
@@ -68,6 +68,24 @@ fn an_upload_that_is_too_long_or_cut_short_leaves_nothing() {
     connection.write_all(b"5\r\ntime_\r\nnonsense\r\n").unwrap();
     assert_eq!(Reply::read(&mut *connection).status, 400);
     assert!(files(&hall).is_empty());
+}
+
+#[test]
+fn what_was_asked_by_someone_who_has_gone_away_is_not_worked_at_any_longer() {
+    // Opened by both, the pipe says that the check has begun; it ends with the check, which else would write to it.
+    let hall = Hall::with_checks_by("exec 3>\"${0%/*}/work\"; sleep 10 3>&-; echo done >&3");
+    let pipe = hall.dir.path().join("work");
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).unwrap();
+    let asks = [upload("calm", CUE), Request::new("GET", "/api/v1/cues/there/curve?points=10")];
+    fs::write(hall.dir.path().join("cues/there.csv"), CUE).unwrap();
+    for ask in asks {
+        let mut connection = hall.socket().connect();
+        connection.write_all(&ask.bytes(&hall.socket())).unwrap();
+        let mut at_work = fs::File::open(&pipe).unwrap();
+        drop(connection);
+        assert_eq!(at_work.read(&mut [0]).unwrap(), 0, "it was not ended");
+    }
+    assert_eq!(files(&hall), ["there.csv"]);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::net::SocketAddr;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -52,8 +53,25 @@ impl Hall {
         Self::with(Status::starting("Hall 1"), |api| api)
     }
 
-    pub fn with(first: Status, change: impl FnOnce(config::Api) -> config::Api) -> Self {
+    /// One whose cues are checked by a script, which finds its own folder in `$0`.
+    pub fn with_checks_by(script: &str) -> Self {
         let dir = tempfile::tempdir().unwrap();
+        let program = dir.path().join("check");
+        fs::write(&program, format!("#!/bin/bash\n{script}\n")).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        Self::of(dir, program, Status::starting("Hall 1"), |api| api)
+    }
+
+    pub fn with(first: Status, change: impl FnOnce(config::Api) -> config::Api) -> Self {
+        Self::of(tempfile::tempdir().unwrap(), env!("CARGO_BIN_EXE_kinocue").into(), first, change)
+    }
+
+    fn of(
+        dir: TempDir,
+        program: PathBuf,
+        first: Status,
+        change: impl FnOnce(config::Api) -> config::Api,
+    ) -> Self {
         let config = change(config::Api {
             listen: vec!["127.0.0.1:0".parse().unwrap()],
             tokens: TOKENS
@@ -67,7 +85,7 @@ impl Hall {
             config,
             socket: dir.path().join("control.sock"),
             handle: handle.clone(),
-            library: library(dir.path()),
+            library: library(dir.path(), program),
             playlists: Shelf::new(&dir.path().join("playlists")),
             journal: dir.path().join("journal"),
             recordings: dir.path().join("recordings"),
@@ -233,11 +251,11 @@ fn hash(token: &str) -> [u8; 32] {
     Sha256::digest(token).into()
 }
 
-fn library(dir: &Path) -> Library {
+fn library(dir: &Path, program: PathBuf) -> Library {
     let config = dir.join("hall.toml");
     fs::write(&config, CONFIG).unwrap();
     let bounds = Bounds { max_bytes: 100_000, ..Bounds::default() };
-    let hall = library::Hall { config, program: env!("CARGO_BIN_EXE_kinocue").into(), bounds };
+    let hall = library::Hall { config, program, bounds };
     Library::open(&dir.join("cues"), hall).unwrap()
 }
 
