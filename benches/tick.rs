@@ -281,7 +281,7 @@ impl Film {
     }
 }
 
-fn evidence(live: &Live) -> impl Iterator<Item = &LaneEvidence> {
+fn evidence(live: &Live) -> impl Iterator<Item = LaneEvidence<'_>> {
     (0..).map_while(|lane| live.evidence(lane))
 }
 

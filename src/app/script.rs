@@ -15,7 +15,7 @@ use super::refused::PlayError;
 use super::roll_call::{RollCall, lanes_with};
 use super::runtime::RuntimeHandle;
 use super::staged::StagedShow;
-use crate::belief::{FRESH, KnownPose, LaneEvidence, Reading};
+use crate::belief::{FRESH, KnownPose, Reading};
 use crate::drive::Lane;
 use crate::health::Why;
 use crate::motion::Slot;
@@ -310,7 +310,7 @@ impl PlayScript {
 
     /// True if the last frame to a lane was acked, or asked for no ack.
     fn is_acked(&self, lane: usize) -> bool {
-        let acked = self.handle.live.evidence(lane).and_then(LaneEvidence::acked);
+        let acked = self.handle.live.evidence(lane).and_then(|evidence| evidence.acked());
         self.lanes[lane].ack_every == 0 || acked.is_some_and(|acked| acked.since(self.last[lane]) >= 0)
     }
 

@@ -6,7 +6,7 @@ use crate::published::{SharedWord, SharedWords};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
-/// Where a reading comes from; the place of each is its number in [`LaneEvidence`].
+/// Where a reading comes from; the place of each is its number in [`ReadingWords`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Source {
     /// The position registers DP06 to DP0b and DP21 to DP26 (SMC manual 2.3.3).
@@ -55,13 +55,40 @@ impl Reading {
     }
 }
 
-/// The newest ack of a lane and the newest reading of its seat.
+/// Of a reading the pose, when it was made, how far it sways, and the rest in one word.
+type ReadingWords = SharedWords<{ MAX_AXES + 3 }>;
+
+/// That of all lanes. The acks lie side by side: the tick thread looks at all of them, each tick, after another processor has written
+/// them, and of 64 lanes they take 8 lines of its cache.
 #[derive(Debug, Default)]
-pub struct LaneEvidence {
+pub struct EvidenceTable {
     /// The number of the newest frame that was acked, and [`SOME`]; 0 where there is none.
-    acked: SharedWord,
-    /// Of a reading the pose, when it was made, how far it sways, and the rest in one word.
-    reading: SharedWords<{ MAX_AXES + 3 }>,
+    acked: Box<[SharedWord]>,
+    readings: Box<[ReadingWords]>,
+}
+
+impl EvidenceTable {
+    /// Nothing was seen of so many lanes.
+    #[must_use]
+    pub(crate) fn of(lanes: usize) -> Self {
+        Self {
+            acked: (0..lanes).map(|_| SharedWord::default()).collect(),
+            readings: (0..lanes).map(|_| ReadingWords::default()).collect(),
+        }
+    }
+
+    /// That of a lane; none where there is no such lane.
+    #[must_use]
+    pub(crate) fn lane(&self, lane: usize) -> Option<LaneEvidence<'_>> {
+        Some(LaneEvidence { acked: self.acked.get(lane)?, reading: self.readings.get(lane)? })
+    }
+}
+
+/// The newest ack of a lane and the newest reading of its seat.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneEvidence<'t> {
+    acked: &'t SharedWord,
+    reading: &'t ReadingWords,
 }
 
 const SOME: u64 = 1 << 32;
@@ -69,7 +96,7 @@ const RESTS: u64 = 1 << 16;
 const MOVES: u64 = 1 << 17;
 const BY: u32 = 18;
 
-impl LaneEvidence {
+impl LaneEvidence<'_> {
     /// The newest frame that was acked.
     #[must_use]
     pub(crate) fn acked(&self) -> Option<FrameNo> {

@@ -18,7 +18,7 @@ mod tests;
 use std::time::Duration;
 
 pub(crate) use evidence::Source;
-pub use evidence::{LaneEvidence, Reading};
+pub use evidence::{EvidenceTable, LaneEvidence, Reading};
 use history::History;
 pub use kinds::Taken;
 pub(crate) use kinds::{Fall, Found, Known, Tally};
@@ -170,7 +170,7 @@ impl Belief {
     }
 
     /// Takes up what the ack thread has seen so far; all that arrived before `told` is in it.
-    pub(crate) fn look(&mut self, evidence: &LaneEvidence, told: MonoTime, now: MonoTime) -> Found {
+    pub(crate) fn look(&mut self, evidence: LaneEvidence<'_>, told: MonoTime, now: MonoTime) -> Found {
         if let Some(acked) = evidence.acked()
             && self.acked.is_none_or(|before| acked.since(before) > 0)
         {

@@ -21,7 +21,7 @@ fn window() -> Window {
 /// What the ack thread sees of a lane, and what the tick thread makes of it.
 struct Bench {
     belief: Belief,
-    evidence: LaneEvidence,
+    evidence: EvidenceTable,
     next: u32,
 }
 
@@ -31,7 +31,7 @@ impl Bench {
     }
 
     fn of(window: &Window) -> Self {
-        Self { belief: Belief::new(window, PERIOD, true), evidence: LaneEvidence::default(), next: 1 }
+        Self { belief: Belief::new(window, PERIOD, true), evidence: EvidenceTable::of(1), next: 1 }
     }
 
     /// One that was read at rest there at 0 ms.
@@ -43,13 +43,13 @@ impl Bench {
 
     fn read(&mut self, place: f64, when: u64, rests: bool) {
         let reading = Reading { rests, slots: 1, ..Reading::at_rest(at(place), ms(when)) };
-        self.evidence.on_reading(&reading);
+        self.evidence.lane(0).unwrap().on_reading(&reading);
         self.look(when);
     }
 
     /// A look of a tick up to which the ack thread has told all.
     fn look(&mut self, when: u64) -> Found {
-        self.belief.look(&self.evidence, ms(when), ms(when))
+        self.belief.look(self.evidence.lane(0).unwrap(), ms(when), ms(when))
     }
 
     fn send(&mut self, place: f64, lasts_ms: u32, when: u64) {
@@ -72,7 +72,7 @@ impl Bench {
     }
 
     fn ack(&self, frame: u32) {
-        self.evidence.on_ack(FrameNo(frame));
+        self.evidence.lane(0).unwrap().on_ack(FrameNo(frame));
     }
 
     fn allows(&self, place: f64, lasts_ms: u32, when: u64) -> bool {
@@ -162,7 +162,7 @@ fn that_the_ack_thread_is_slow_is_no_gap_for_a_tenth_of_a_second() {
     let mut bench = Bench::found(0.0);
     for tick in 0..20 {
         let told = ms(10 * tick.min(3));
-        let begins = bench.belief.look(&bench.evidence, told, ms(10 * tick));
+        let begins = bench.belief.look(bench.evidence.lane(0).unwrap(), told, ms(10 * tick));
         assert_eq!(begins == Found::Gap, tick == 11, "at {tick}");
         bench.send(0.0, 10, 10 * tick);
     }
@@ -172,8 +172,9 @@ fn that_the_ack_thread_is_slow_is_no_gap_for_a_tenth_of_a_second() {
 fn frames_that_the_kernel_does_not_take_for_fifty_milliseconds_are_a_gap_with_acks_or_without() {
     for asks in [true, false] {
         let mut belief = Belief::new(&window(), PERIOD, asks);
-        let evidence = LaneEvidence::default();
-        let begins = |belief: &mut Belief, when| belief.look(&evidence, ms(when), ms(when)) == Found::Gap;
+        let table = EvidenceTable::of(1);
+        let evidence = table.lane(0).unwrap();
+        let begins = |belief: &mut Belief, when| belief.look(evidence, ms(when), ms(when)) == Found::Gap;
         belief.refused(ms(0));
         assert!(!begins(&mut belief, 50));
         belief.refused(ms(50));
@@ -218,7 +219,8 @@ fn a_frame_that_waits_for_another_is_counted_as_late_and_one_that_waits_for_seve
 #[test]
 fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() {
     let mut belief = Belief::new(&window(), PERIOD, false);
-    let evidence = LaneEvidence::default();
+    let table = EvidenceTable::of(1);
+    let evidence = table.lane(0).unwrap();
     let pose = at(0.0);
     belief.taken(&Taken {
         frame: FrameNo(1),
@@ -229,9 +231,9 @@ fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() 
         shakes: 0.0,
         at: ms(0),
     });
-    belief.look(&evidence, ms(0), ms(2_000));
+    belief.look(evidence, ms(0), ms(2_000));
     assert!(belief.pose(ms(2_000)).is_none());
-    belief.look(&evidence, ms(0), ms(3_000));
+    belief.look(evidence, ms(0), ms(3_000));
     assert_eq!(belief.pose(ms(3_000)).map(|known| *known.pose()), Some(pose));
 }
 
@@ -239,10 +241,11 @@ fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() 
 fn axes_that_no_reading_tells_are_known_by_confirmed_frames_alone() {
     let seat = SeatType::bench3(2);
     let window = Window::new((0..2).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect());
-    let (mut belief, evidence) = (Belief::new(&window, PERIOD, true), LaneEvidence::default());
+    let (mut belief, table) = (Belief::new(&window, PERIOD, true), EvidenceTable::of(1));
+    let evidence = table.lane(0).unwrap();
     let half = Reading { slots: 1, ..Reading::at_rest(at(0.2), ms(0)) };
     evidence.on_reading(&half);
-    belief.look(&evidence, ms(0), ms(0));
+    belief.look(evidence, ms(0), ms(0));
     assert!(belief.pose(ms(0)).is_none() && belief.is_measured_in_part());
     let pose = [0.1; MAX_AXES];
     belief.taken(&Taken {
@@ -255,21 +258,22 @@ fn axes_that_no_reading_tells_are_known_by_confirmed_frames_alone() {
         at: ms(0),
     });
     evidence.on_ack(FrameNo(1));
-    belief.look(&evidence, ms(500), ms(500));
+    belief.look(evidence, ms(500), ms(500));
     assert!(belief.pose(ms(500)).is_none(), "it is on its way");
-    belief.look(&evidence, ms(700), ms(700));
+    belief.look(evidence, ms(700), ms(700));
     assert_eq!(belief.pose(ms(700)).map(|known| known.pose()[1]), Some(0.1));
     evidence.on_reading(&Reading { pose: at(0.1), at: ms(1_000), ..half });
-    belief.look(&evidence, ms(1_000), ms(1_000));
+    belief.look(evidence, ms(1_000), ms(1_000));
     assert_eq!(belief.pose(ms(1_000)).map(|known| known.pose()[..2].to_vec()), Some(vec![0.1, 0.1]));
     evidence.on_reading(&Reading { at: ms(1_200), ..half });
-    belief.look(&evidence, ms(1_200), ms(1_200));
+    belief.look(evidence, ms(1_200), ms(1_200));
     assert!(belief.pose(ms(1_200)).is_none(), "whoever moved the first may have moved the second");
 }
 
 #[test]
 fn a_reading_is_taken_whole_or_not_at_all() {
-    let evidence = LaneEvidence::default();
+    let table = EvidenceTable::of(1);
+    let evidence = table.lane(0).unwrap();
     assert_eq!(evidence.reading(), None);
     let reading = Reading { slots: 5, rests: false, by: Source::Homing, ..Reading::at_rest(at(0.3), ms(7)) };
     evidence.on_reading(&reading);
@@ -309,7 +313,7 @@ fn ridden() -> Bench {
 fn passes(bench: &mut Bench, place: f64, made: u64, when: u64) -> Found {
     let reading =
         Reading { rests: false, slots: 1, by: Source::Passing, ..Reading::at_rest(at(place), ms(made)) };
-    bench.evidence.on_reading(&reading);
+    bench.evidence.lane(0).unwrap().on_reading(&reading);
     bench.look(when)
 }
 
@@ -413,7 +417,7 @@ fn a_seat_that_vibrates_on_may_be_anywhere_in_its_swing_and_no_motion_begins_bef
     assert_eq!(bench.look(100), Found::Gap);
     assert!((bench.belief.shakes() - 0.02).abs() < 1e-12);
     let sways = Reading { rests: false, moves: true, sways: 0.041, ..Reading::at_rest(at(0.21), ms(900)) };
-    bench.evidence.on_reading(&sways);
+    bench.evidence.lane(0).unwrap().on_reading(&sways);
     bench.look(1_000);
     assert_eq!(
         (bench.belief.pose(ms(1_000)), bench.belief.vibrates_about(ms(1_000))),

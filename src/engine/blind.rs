@@ -207,7 +207,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::belief::{Belief, LaneEvidence, Reading, Taken};
+    use crate::belief::{Belief, EvidenceTable, Reading, Taken};
     use crate::motion::{Measure, SeatType, Slot, Window};
     use crate::time::{MonoTime, ShowTime};
     use crate::wire::FrameNo;
@@ -304,12 +304,13 @@ mod tests {
     /// is led.
     fn in_a_gap(window: &Window, speed: f64) -> (Belief, Pose) {
         let mut belief = Belief::new(window, Duration::from_millis(10), true);
-        let evidence = LaneEvidence::default();
+        let table = EvidenceTable::of(1);
+        let evidence = table.lane(0).unwrap();
         let mut pose = [0.0; MAX_AXES];
         pose[0] = 0.5;
         evidence.on_reading(&Reading::at_rest(pose, ms(0)));
         for tick in 0..9 {
-            belief.look(&evidence, ms(10 * tick), ms(10 * tick));
+            belief.look(evidence, ms(10 * tick), ms(10 * tick));
             pose[0] += speed / 150.0 * 0.010;
             belief.taken(&taken(tick, &pose, 10, 10 * tick));
             if tick == 0 {

@@ -13,7 +13,7 @@ pub mod app {
     }
 }
 pub mod belief {
-    pub use crate::belief::{LaneEvidence, Reading, Taken};
+    pub use crate::belief::{EvidenceTable, LaneEvidence, Reading, Taken};
 }
 pub mod channel {
     pub use crate::channel::Sample;

@@ -7,7 +7,7 @@
 //! sums goes to the long test.
 
 use super::limits::AxisLimits;
-use crate::motion::{MAX_AXES, Pose, Spacing};
+use crate::motion::{AxisState, MAX_AXES, Pose, Spacing};
 
 // Any shares below 1 are right; why these: docs/limiter.md, section 3.
 /// Shares of the acceleration and of the jerk up to which frames are calm, and with which an axis is thought to brake.
@@ -54,6 +54,9 @@ struct Glance {
     acceleration: f64,
     /// Acceleration and jerk beyond the level.
     beyond: [f64; 2],
+    /// At the pose itself, of the cubic through the newest four.
+    speed: f64,
+    pull: f64,
     calm: bool,
 }
 
@@ -155,7 +158,14 @@ impl FastPath {
 
     /// True if an axis is calm at that position.
     pub(super) fn is_calm(&self, axis: usize, position: f64) -> bool {
-        self.groups[axis / WIDTH].glance(axis % WIDTH, position, &self.spans).calm
+        self.groups[axis / WIDTH].glance::<true>(axis % WIDTH, position, &self.spans).calm
+    }
+
+    /// How an axis moves that lacks nothing at that position but the way to rest of one that is calm; none where it lacks more.
+    pub(super) fn bounded(&self, axis: usize, position: f64) -> Option<AxisState> {
+        let glance = self.groups[axis / WIDTH].glance::<false>(axis % WIDTH, position, &self.spans);
+        let Glance { speed, pull, calm, .. } = glance;
+        calm.then_some(AxisState { position, velocity: speed, acceleration: pull })
     }
 
     /// Takes what is sent, calm or not.
@@ -253,7 +263,7 @@ impl AxisGroup {
     fn see(&self, position: &GroupRow, spans: &FrameSpans, seen: &mut GroupSeen) -> bool {
         let mut calm = true;
         for (axis, &position) in position.iter().enumerate() {
-            let glance = self.glance(axis, position, spans);
+            let glance = self.glance::<true>(axis, position, spans);
             seen.velocity[axis] = glance.velocity;
             seen.acceleration[axis] = glance.acceleration;
             seen.beyond[0][axis] = glance.beyond[0];
@@ -277,9 +287,10 @@ impl AxisGroup {
         }
     }
 
+    /// What one more frame makes of an axis; without `ROOM` it is calm wherever it comes to rest.
     #[inline(always)]
     #[expect(clippy::manual_range_contains, reason = "without a branch the loops around it become vectors")]
-    fn glance(&self, axis: usize, position: f64, spans: &FrameSpans) -> Glance {
+    fn glance<const ROOM: bool>(&self, axis: usize, position: f64, spans: &FrameSpans) -> Glance {
         let rows = &self.rows;
         let velocity = (position - self.position[axis]) * spans.per_frame;
         let change = velocity - self.velocity[axis];
@@ -308,9 +319,9 @@ impl AxisGroup {
             & (up.max(down) <= rows.velocity[axis])
             & (position >= 0.0)
             & (position <= 1.0)
-            & (position + rows.way(axis, up, rising) <= 1.0 + 1e-9)
-            & (position - rows.way(axis, down, falling) >= -1e-9);
-        Glance { velocity, acceleration, beyond, calm }
+            & (!ROOM | (position + rows.way(axis, up, rising) <= 1.0 + 1e-9))
+            & (!ROOM | (position - rows.way(axis, down, falling) >= -1e-9));
+        Glance { velocity, acceleration, beyond, speed, pull, calm }
     }
 }
 

@@ -226,12 +226,13 @@ impl Limiter {
 
     /// What one axis is sent, and whether what was asked broke a limit.
     fn judge_axis(&mut self, axis: usize, asked: f64, frame: &Frame, by: Provenance) -> (f64, bool) {
-        let state = &mut self.axes[axis];
+        let state = &self.axes[axis];
         // Near an end of the stroke one axis of many is not calm, in all lanes of a hall at once.
-        if state.mode == AxisMode::Following && self.fast_path.is_calm(axis, asked) {
-            state.take_up(AxisMode::Following);
+        if state.mode == AxisMode::Following && self.passes_by_sums(axis, asked, by) {
+            self.axes[axis].take_up(AxisMode::Following);
             return (asked, false);
         }
+        let state = &mut self.axes[axis];
         // As long as it follows, what is asked is what is sent, and that is measured below.
         // Apart from it it is looked at by itself, to know when it may be followed again.
         let broken = state.mode != AxisMode::Following && state.look(asked, frame.time_ms);
@@ -256,6 +257,15 @@ impl Limiter {
         let (limit, times) = exceeded(&self.axes[axis].limits, &next);
         self.counter.refused(Clamp { axis, asked, allowed, limit, times });
         (allowed, true)
+    }
+
+    /// True if an axis that follows is calm, or keeps the limits by the same sums and was proved to come to rest: of that as much is
+    /// asked as in [`Self::leads_on`], but of how it moves by its newest poses.
+    fn passes_by_sums(&self, axis: usize, asked: f64, by: Provenance) -> bool {
+        let AxisLimits { velocity, acceleration, jerk, .. } = self.axes[axis].limits;
+        let turns = |state| Halt::plainly_turns(state, Limits { velocity, acceleration, jerk });
+        self.fast_path.is_calm(axis, asked)
+            || (by == Provenance::Proved && self.fast_path.bounded(axis, asked).is_some_and(turns))
     }
 
     /// True if a way to rest goes on from this pose.

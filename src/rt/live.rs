@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::TickReport;
 use super::table::Row;
-use crate::belief::LaneEvidence;
+use crate::belief::{EvidenceTable, LaneEvidence};
 use crate::engine::Engine;
 use crate::published::SharedWord;
 use crate::state::{Machine, State};
@@ -83,7 +83,7 @@ pub struct Live {
     /// How often the limiter held each lane back.
     clamps: Box<[AtomicU64]>,
     /// What the ack thread has seen of each lane.
-    evidence: Box<[LaneEvidence]>,
+    evidence: EvidenceTable,
     /// Which controllers have said anything at all.
     heard: Box<[AtomicBool]>,
     /// Up to when it has told all that arrived.
@@ -102,7 +102,7 @@ impl Live {
     pub fn new(lanes: usize) -> Self {
         Self {
             clamps: (0..lanes).map(|_| AtomicU64::new(0)).collect(),
-            evidence: (0..lanes).map(|_| LaneEvidence::default()).collect(),
+            evidence: EvidenceTable::of(lanes),
             heard: (0..lanes).map(|_| AtomicBool::new(false)).collect(),
             ..Self::default()
         }
@@ -110,8 +110,8 @@ impl Live {
 
     /// What the ack thread has seen of a lane; none where there is no such lane.
     #[must_use]
-    pub fn evidence(&self, lane: usize) -> Option<&LaneEvidence> {
-        self.evidence.get(lane)
+    pub fn evidence(&self, lane: usize) -> Option<LaneEvidence<'_>> {
+        self.evidence.lane(lane)
     }
 
     /// True if a controller has said anything at all.

@@ -320,7 +320,7 @@ impl Mail {
     }
 
     /// What the ack thread has seen of a lane; none where nobody tells.
-    pub(super) fn evidence(&self, lane: usize) -> Option<&LaneEvidence> {
+    pub(super) fn evidence(&self, lane: usize) -> Option<LaneEvidence<'_>> {
         self.live.evidence(lane)
     }
 

@@ -87,8 +87,9 @@ impl Places {
         if moving && self.moved && now.since(since) > self.asleep && mail.live().has_reader() {
             self.lose_sight(engine, mail, now);
         }
+        let told = mail.told();
         for lane in 0..self.lanes.len() {
-            match self.take_evidence(lane, mail, now) {
+            match self.take_evidence(lane, mail, told, now) {
                 Found::Nothing => {}
                 // One that is led ahead brakes by itself where nothing reaches it; slow lines do not.
                 Found::Gap if self.lanes[lane].belief.is_led_ahead() => {
@@ -178,7 +179,7 @@ impl Places {
     /// A controller takes part again. Where its seat stands is known by what was read since the last frame went to it; else it
     /// is looked at once more.
     pub(super) fn find(&mut self, lane: usize, engine: &mut Engine, mail: &mut Mail, now: MonoTime) {
-        self.take_evidence(lane, mail, now);
+        self.take_evidence(lane, mail, mail.told(), now);
         if engine.is_led(lane) {
             return; // it is looked at again as soon as it is away
         }
@@ -198,9 +199,10 @@ impl Places {
         }
     }
 
-    fn take_evidence(&mut self, lane: usize, mail: &Mail, now: MonoTime) -> Found {
+    /// All that arrived before `told`, which was asked before, is in what is taken.
+    fn take_evidence(&mut self, lane: usize, mail: &Mail, told: MonoTime, now: MonoTime) -> Found {
         let Some(evidence) = mail.evidence(lane) else { return Found::Nothing };
-        self.lanes[lane].belief.look(evidence, mail.told(), now)
+        self.lanes[lane].belief.look(evidence, told, now)
     }
 
     /// Whether this tick's frame of a lane may leave, and what it says of time. Where it would be too fast from somewhere that
