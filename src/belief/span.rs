@@ -44,8 +44,9 @@ impl Reach {
         }
     }
 
-    /// Makes room for a pose as well. Poses are numbers: a comparison that asks for no more is half the work of `min` and `max`.
-    #[inline]
+    /// Makes room for a pose as well. Poses are numbers: a comparison that asks for no more is half the work of `min` and `max`. By itself
+    /// it becomes vectors; taken apart into what calls it, it did not.
+    #[inline(never)]
     pub(super) fn widen(&mut self, pose: &Pose) {
         for ((low, high), place) in self.low.iter_mut().zip(&mut self.high).zip(pose) {
             *low = if *place < *low { *place } else { *low };
