@@ -165,3 +165,13 @@ fn a_port_that_comes_back_as_the_line_of_another_seat_moves_nobody_there() {
         hall.moves_nobody_on_another_line(show, &other, places);
     });
 }
+
+/// Its units have the same numbers, and were homed with the same settings.
+#[test]
+fn a_seat_that_is_set_alike_at_the_end_of_a_line_that_was_exchanged_is_not_home() {
+    let other = homed_line(&read_of_another(HALL), 7 << 16);
+    hall_over(
+        |line| Box::new(changed(line, &other)),
+        |hall, _, _| hall.takes_no_other_seat(|bus| bus.units().iter().map(Unit::place).collect()),
+    );
+}

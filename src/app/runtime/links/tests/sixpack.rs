@@ -204,8 +204,17 @@ fn a_unit_that_is_restarted_in_a_play_stands_and_is_not_led_again_until_it_is_ho
 fn a_port_that_comes_back_as_the_line_of_another_seat_moves_nobody_there() {
     let other = homed_line(&read(HALL), 1_002);
     hall(|hall, show, _| {
-        let places =
-            |bus: &SixpackBus| bus.units()[0].motors[..3].iter().map(|motor| motor.shaft.place()).collect();
         hall.moves_nobody_on_another_line(show, &other, places);
     });
+}
+
+/// Its unit has the same number, and was homed with the same settings.
+#[test]
+fn a_seat_that_is_set_alike_at_the_end_of_a_line_that_was_exchanged_is_not_home() {
+    let other = homed_line(&read_of_another(HALL), 1_001);
+    hall_over(|line| Box::new(changed(line, &other)), |hall, _, _| hall.takes_no_other_seat(places));
+}
+
+fn places(bus: &SixpackBus) -> Vec<f64> {
+    bus.units()[0].motors[..3].iter().map(|motor| motor.shaft.place()).collect()
 }
