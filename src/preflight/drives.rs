@@ -275,11 +275,8 @@ fn rate(subject: &DriveSubject<'_>, notes: &mut Notes) {
         notes.add(Check::SlowReplies, found.clone(), "lower ADL of the units, or use a built-in serial port");
     }
     if alone.rate_hz() < hz {
-        notes.add(
-            Check::LinkTooSlow,
-            found,
-            format!("set rate_hz = {}, or {}", short(fits), measured.remedy(hz)),
-        );
+        let other = measured.carries(hz).map_or_else(String::new, |other| format!(", or {other}"));
+        notes.add(Check::LinkTooSlow, found, format!("set rate_hz = {}{other}", short(fits)));
     }
 }
 
@@ -299,8 +296,8 @@ fn home(subject: &DriveSubject<'_>, notes: &mut Notes) {
             format!("units {} were switched off since the seat was homed (register 40)", lost.join(", "))
         };
         notes.add(Check::Restarted, found, HOME);
-    } else if units_of(subject.controller)
-        .is_some_and(|seat| canaries.iter().any(|(_, canary)| !seat.is_own(*canary)))
+    } else if let Some(seat) = units_of(subject.controller)
+        && canaries.iter().any(|(_, canary)| !seat.is_own(*canary))
     {
         let found =
             "its units were homed with other settings, or by another name, than it has now (register 40)"
