@@ -82,6 +82,7 @@ impl SixHall<'_, '_> {
     }
 }
 
+#[expect(clippy::print_stdout, reason = "the figure is for who asks to see it")]
 #[test]
 fn a_cue_is_executed_within_a_fifth_of_a_millimetre_its_lead_after_the_ticks() {
     hall(|hall, show, cue| {
@@ -112,6 +113,7 @@ fn a_cue_is_executed_within_a_fifth_of_a_millimetre_its_lead_after_the_ticks() {
             }
         });
         assert_eq!(hall.state(), State::Parked);
+        println!("SIXpack 2, 56,818 baud, 3 axes, level {LEVEL}: at most {worst:.3} mm off the bench ride");
         assert!(rode && worst < 0.2, "{worst} mm");
         hall.assert_gentle();
         assert!(hall.mm().iter().all(|place| place.abs() < 0.05), "{:?}", hall.mm());
