@@ -493,6 +493,27 @@ fn the_bench_ride_fits_the_seats_of_all_examples() {
 }
 
 #[test]
+fn ports_that_may_change_places_and_seats_that_are_then_taken_for_each_other_are_worth_a_note() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let drives = std::fs::read_to_string(DRIVES).expect("it is there");
+    let (silver, _) = drives.rsplit_once("[[controller]]").expect("two seats");
+    let (before, seat) = silver.split_once("[[controller]]").expect("one seat");
+    let ports = before.replace("ttyS0", "ttyUSB1").replace("wiring = \"rs485\"", "");
+    let twin = seat.replace("\"D1\"", "\"D3\"").replace("link:stalls", "link:circle");
+    let checked = |name: &str, twin: &str| {
+        let hall = format!("{ports}[[controller]]{seat}[[controller]]{twin}");
+        kinocue(&["check", &write(folder.path(), name, &hall)])
+    };
+    let run = checked("alike.toml", &twin);
+    let said = "D1, D3 have units of the same numbers: if their adapters or plugs change places while the units are off";
+    assert!(run.code == Some(0) && run.stdout.contains(said), "{}{}", run.stdout, run.stderr);
+    let port = "link stalls: /dev/ttyUSB1 may be the adapter of another line after the next start; use its link in /dev/serial/by-id";
+    assert!(run.stdout.contains(port) && !run.stdout.contains("link circle: "), "{}", run.stdout);
+    let run = checked("apart.toml", &twin.replace("[16, 17, 18]", "[19, 20, 21]"));
+    assert!(run.code == Some(0) && !run.stdout.contains("same numbers"), "{}{}", run.stdout, run.stderr);
+}
+
+#[test]
 fn a_film_that_leads_no_cue_is_worth_a_note() {
     let folder = tempfile::tempdir().expect("a folder");
     let hall = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/systemd/simulated.toml"))

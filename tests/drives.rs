@@ -457,3 +457,37 @@ fn a_port_that_another_program_has_is_named_with_what_to_do_before_registers_are
     sim.signal(Signal::TERM);
     sim.finish();
 }
+
+/// Two seats that are set alike, and whose units have the same numbers.
+#[test]
+fn where_two_adapters_have_changed_places_no_seat_is_led_or_homed_as_the_other() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [one, other] = ["one", "other"].map(|name| folder.path().join(name));
+    let sims = [units(&one, "silvermax"), units(&other, "silvermax")];
+    let text = |first: &Path, second: &Path| {
+        let seats = [seat_of("A1", first, "silvermax", 20), seat_of("A2", second, "silvermax", 20)];
+        format!("[show]\nbind = \"127.0.0.1:0\"\n{}", seats.concat())
+    };
+    let hall = write(folder.path(), &text(&one, &other));
+    assert_eq!(home(&hall).2, Some(0));
+    let (told, fails, exit) = preflight(&hall);
+    assert_eq!((fails, exit), (vec![], Some(0)), "{told}");
+    let hall = write(folder.path(), &text(&other, &one));
+    let (told, fails, exit) = preflight(&hall);
+    assert_eq!((fails, exit), (vec!["not-home".to_owned()], Some(1)), "{told}");
+    let (code, _, said) = play(&cue(folder.path()), &hall);
+    assert!(code == Some(75) && said.contains("A1, A2: does not report that it is home"), "{said}");
+    let (_, said, exit) = home(&hall);
+    assert!(
+        exit != Some(0) && said.contains("A1: its drives were homed as A2: adapters or plugs have changed"),
+        "{said}"
+    );
+    // Put back, each is as it was.
+    let hall = write(folder.path(), &text(&one, &other));
+    let (told, fails, exit) = preflight(&hall);
+    assert_eq!((fails, exit), (vec![], Some(0)), "{told}");
+    for sim in sims {
+        sim.signal(Signal::TERM);
+        sim.finish();
+    }
+}

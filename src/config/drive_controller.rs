@@ -9,7 +9,7 @@ use toml::de::DeTable;
 use crate::channel::{self, SWITCHES};
 use crate::motion::{MAX_AXES, SeatType};
 
-pub(super) use together::{refuse_parted_groups, settle};
+pub(super) use together::{find_twins, refuse_parted_groups, settle};
 
 use super::accept::acceptances;
 use super::drive::homing::HomeWay;
@@ -35,6 +35,8 @@ pub struct Drives {
     pub(crate) link: String,
     /// The drives, axis by axis.
     pub(crate) motors: Motors,
+    /// The names of seats on other links whose drives have the same numbers: theirs answer if two lines change places.
+    pub(crate) twins: Vec<String>,
 }
 
 /// Which drives move the axes of a seat.
@@ -117,7 +119,8 @@ pub(super) fn drive_controller<'t>(
         refuse_switch(Entry::new("estop_inputs", value), drive, estop_inputs, faults);
     }
     let ((motors, motors_at), name, link) = (motors?, name?, link?);
-    let drives = Drives { drive: Arc::new(drive?), link: link.clone(), motors: motors.clone() };
+    let drives =
+        Drives { drive: Arc::new(drive?), link: link.clone(), motors: motors.clone(), twins: Vec::new() };
     let controller = Controller {
         group: group.unwrap_or_else(|| name.clone()),
         name,

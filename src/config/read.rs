@@ -14,7 +14,9 @@ use super::accept::acceptances;
 use super::api::api;
 use super::buttons::buttons;
 use super::drive::{DriveEntry, seat_drives};
-use super::drive_controller::{Placed, drive_controller, is_on_link, refuse_parted_groups, settle};
+use super::drive_controller::{
+    Placed, drive_controller, find_twins, is_on_link, refuse_parted_groups, settle,
+};
 use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::film::film;
@@ -150,7 +152,8 @@ impl Stated<'_> {
         let links = self.link.map_or_else(Vec::new, |entry| links(entry, faults));
         let drives = self.seat.map_or_else(Vec::new, |entry| seat_drives(entry, site.seats, faults));
         let controllers = |entry| controllers(entry, site, (&links, &drives), faults);
-        let peers = self.controller.map_or_else(Peers::default, controllers);
+        let mut peers = self.controller.map_or_else(Peers::default, controllers);
+        find_twins(&mut peers.placed);
         refuse_sparse_acks(self.show, &peers, faults);
         refuse_parted_groups(&peers.placed, &peers.by_udp(), faults);
         let links = settle(links, &peers.placed, faults);

@@ -167,17 +167,21 @@ impl LinkLoad {
     /// What to do for so many times a second, each with the number that fits.
     #[must_use]
     pub(crate) fn remedy(&self, wanted_hz: f64) -> String {
+        let none = || format!("no link carries so much; at the most {} Hz fit here", short(self.rate_hz()));
+        self.carries(wanted_hz).unwrap_or_else(none)
+    }
+
+    /// What carries so many, if anything does.
+    pub(crate) fn carries(&self, wanted_hz: f64) -> Option<String> {
         let fits = |load: &Self| load.rate_hz() >= wanted_hz;
         let baud = self.bauds().iter().copied().filter(|baud| *baud > self.baud);
         let baud = baud.into_iter().find(|baud| fits(&Self { baud: *baud, ..*self }));
         let links = (2..=self.seats).find(|links| fits(&self.shared_by(*links)));
         match (baud, links) {
-            (Some(baud), Some(links)) => format!("use baud = {baud}, or {links} links"),
-            (Some(baud), None) => format!("use baud = {baud}"),
-            (None, Some(links)) => format!("use {links} links"),
-            (None, None) => {
-                format!("no link carries so much; at the most {} Hz fit here", short(self.rate_hz()))
-            }
+            (Some(baud), Some(links)) => Some(format!("use baud = {baud}, or {links} links")),
+            (Some(baud), None) => Some(format!("use baud = {baud}")),
+            (None, Some(links)) => Some(format!("use {links} links")),
+            (None, None) => None,
         }
     }
 }

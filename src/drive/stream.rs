@@ -105,16 +105,20 @@ const NO_DRIVES: &str = "it has no drives of that link";
 
 /// The units that move a seat; none where others do.
 pub(crate) fn units_of(controller: &Controller) -> Option<silvermax::SeatUnits<'_>> {
-    let Drives { drive, motors: Motors::SilverMax(units), .. } = controller.drives()? else { return None };
+    let Drives { drive, motors: Motors::SilverMax(units), twins, .. } = controller.drives()? else {
+        return None;
+    };
     let silvermax = drive.silvermax.as_ref()?;
-    Some(silvermax::SeatUnits { seat: &controller.seat, drive, silvermax, units })
+    let (name, seat) = (&controller.name, &controller.seat);
+    Some(silvermax::SeatUnits { name, twins, seat, drive, silvermax, units })
 }
 
 /// The motors that move a seat, which are told something new in each period; none where others do.
 pub(crate) fn motors_of(controller: &Controller, period: Duration) -> Option<sixpack2::SeatMotors<'_>> {
-    let Drives { drive, motors: Motors::Sixpack2 { unit, motors }, .. } = controller.drives()? else {
+    let Drives { drive, motors: Motors::Sixpack2 { unit, motors }, twins, .. } = controller.drives()? else {
         return None;
     };
     let sixpack2 = drive.sixpack2.as_ref()?;
-    Some(sixpack2::SeatMotors { seat: &controller.seat, drive, sixpack2, unit: *unit, motors, period })
+    let (name, seat) = (&controller.name, &controller.seat);
+    Some(sixpack2::SeatMotors { name, twins, seat, drive, sixpack2, unit: *unit, motors, period })
 }

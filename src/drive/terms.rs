@@ -11,6 +11,7 @@ use crate::config::drive::sixpack2::Sixpack2Drive;
 use crate::config::link::LinkWiring;
 use crate::config::{Config, Controller, Link};
 use crate::motion::{AxisGeometry, MAX_LEAD, SeatType};
+use crate::plain;
 use crate::time::Rate;
 use crate::wire::sixpack2::{WAKING_DIVISOR, baud_of};
 
@@ -57,8 +58,10 @@ impl Lead {
 #[must_use]
 pub(crate) fn in_words(config: &Config) -> (Vec<String>, Vec<String>) {
     let (mut told, mut faults) = (Vec::new(), Vec::new());
+    told.extend(alike(config));
     for link in &config.links {
         told.extend(other_baud(link));
+        told.extend(changing_name(link));
         let Some(load) = LinkLoad::of(link, config) else {
             told.push(format!("link {} has no controller", link.name));
             continue;
@@ -73,6 +76,30 @@ pub(crate) fn in_words(config: &Config) -> (Vec<String>, Vec<String>) {
         }
     }
     (told, faults)
+}
+
+/// Seats of several links whose drives have the same numbers.
+fn alike(config: &Config) -> Option<String> {
+    let has_twin = |one: &&Controller| one.drives().is_some_and(|drives| !drives.twins.is_empty());
+    let names: Vec<_> = config.named().filter(has_twin).map(|one| one.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} have units of the same numbers: if their adapters or plugs change places while the units are off, homing takes one seat for \
+             another; give each unit of the hall a number of its own",
+            names.join(", ")
+        )
+    })
+}
+
+/// A port whose name is given out anew at each start.
+fn changing_name(Link { name, port, .. }: &Link) -> Option<String> {
+    let file = port.file_name()?.to_str()?;
+    ["ttyUSB", "ttyACM"].iter().any(|mark| file.starts_with(mark)).then(|| {
+        format!(
+            "link {name}: {} may be the adapter of another line after the next start; use its link in /dev/serial/by-id",
+            plain::path(port)
+        )
+    })
 }
 
 /// What became of the baud rate that the file asks for, where that is another.

@@ -51,8 +51,8 @@ impl Why {
                 Some("find out what moved it; then park, or start a show: it joins slowly from where it is")
             }
             Self::Outside { .. } => Some(
-                "correct its word order or PA02, or home it with nobody on the seat (`kinocue home --config`, with the service \
-                 stopped); it rejoins by itself once it is inside",
+                "correct its word order or PA02, turn a turntable back by hand that was turned too far, or home it with nobody on the \
+                 seat (`kinocue home --config`, with the service stopped); it rejoins by itself once it is inside",
             ),
             Self::Pushed { .. } => Some(
                 "free it, or find out why its motor does not hold it; it rejoins by itself once it stands where it is held",
@@ -234,5 +234,7 @@ mod tests {
             let next = why.next().expect("it is no matter of the network");
             assert!(next.contains("kinocue home --config") && !next.contains("network"), "{next}");
         }
+        // Homed where it stands, a turntable that was turned too far would turn as far again.
+        assert!(outside.next().is_some_and(|next| next.contains("turn a turntable back by hand")));
     }
 }

@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use super::{Check, Notes};
 use crate::config::drive_controller::Motors;
-use crate::config::{Controller, Drives, Link};
-use crate::drive::link::{AT_PARK, LinkPort, LinkTalk as _, STANDS_MM, TalkCounts};
+use crate::config::{Controller, Link};
+use crate::drive::link::{AT_PARK, HomedAs, LinkPort, LinkTalk as _, STANDS_MM, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
-use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts, UnitSettings, kill_names};
+use crate::drive::silvermax::{TalkFault, UnitFacts, UnitSettings, kill_names};
 use crate::drive::{motors_of, silvermax, sixpack2, units_of};
 use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Poll, StatusWord as _};
@@ -119,11 +119,7 @@ impl DriveSubject<'_> {
 
     /// What homing leaves in its units; none where no unit can be set so, which homing tells.
     fn settings(&self) -> Vec<UnitSettings> {
-        let Some(Drives { drive, motors: Motors::SilverMax(units), .. }) = self.controller.drives() else {
-            return Vec::new();
-        };
-        let of = |silvermax| SeatUnits { seat: &self.controller.seat, drive, silvermax, units }.settings();
-        drive.silvermax.as_ref().and_then(|silvermax| of(silvermax).ok()).unwrap_or_default()
+        units_of(self.controller).and_then(|seat| seat.settings().ok()).unwrap_or_default()
     }
 }
 
@@ -192,7 +188,7 @@ fn sixpack(subject: &DriveSubject<'_>, unit: u8, notes: &mut Notes) {
             "motors {} of unit {unit} count no position of this seat as it is configured",
             lost.join(", ")
         );
-        notes.add(Check::NotHome, found, HOME);
+        homed_otherwise(found, seat.and_then(|seat| seat.homed_as(facts)), notes);
     }
     if let Some(seat) = seat.filter(|_| is_home(notes)) {
         for (axis, motor) in seat.motors.iter().enumerate() {
@@ -279,11 +275,8 @@ fn rate(subject: &DriveSubject<'_>, notes: &mut Notes) {
         notes.add(Check::SlowReplies, found.clone(), "lower ADL of the units, or use a built-in serial port");
     }
     if alone.rate_hz() < hz {
-        notes.add(
-            Check::LinkTooSlow,
-            found,
-            format!("set rate_hz = {}, or {}", short(fits), measured.remedy(hz)),
-        );
+        let other = measured.carries(hz).map_or_else(String::new, |other| format!(", or {other}"));
+        notes.add(Check::LinkTooSlow, found, format!("set rate_hz = {}{other}", short(fits)));
     }
 }
 
@@ -303,11 +296,22 @@ fn home(subject: &DriveSubject<'_>, notes: &mut Notes) {
             format!("units {} were switched off since the seat was homed (register 40)", lost.join(", "))
         };
         notes.add(Check::Restarted, found, HOME);
-    } else if units_of(subject.controller)
-        .is_some_and(|seat| canaries.iter().any(|(_, canary)| !seat.is_own(*canary)))
+    } else if let Some(seat) = units_of(subject.controller)
+        && canaries.iter().any(|(_, canary)| !seat.is_own(*canary))
     {
-        let found = "its units were homed with other settings than it has now (register 40)".to_owned();
-        notes.add(Check::NotHome, found, HOME);
+        let found =
+            "its units were homed with other settings, or by another name, than it has now (register 40)"
+                .to_owned();
+        let canaries: Vec<i32> = canaries.iter().map(|(_, canary)| *canary).collect();
+        homed_otherwise(found, seat.homed_as(&canaries), notes);
+    }
+}
+
+/// A seat that is not home as it is now; perhaps its line leads to another.
+fn homed_otherwise(found: String, homed_as: Option<&str>, notes: &mut Notes) {
+    match homed_as {
+        Some(name) => told(Check::NotHome, &HomedAs(name.to_owned()).to_string(), notes),
+        None => notes.add(Check::NotHome, found, HOME),
     }
 }
 

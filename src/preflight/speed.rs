@@ -63,7 +63,10 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         notes.add(Check::SpeedTooLow, slowest.told(subject), remedy);
     }
     if let Some(fastest) = limits.last().filter(|limit| limit.share(subject) > MARGIN) {
-        let remedy = format!("set PA07 or PA80 to PA85 to {:.0}", needed(fastest));
+        let alone = fastest.axis < OWN_LIMITS && !turn_alike(subject);
+        let registers =
+            if alone { format!("PA8{}", fastest.axis) } else { "PA07 or PA80 to PA85".to_owned() };
+        let remedy = format!("set {registers} to {:.0}", needed(fastest));
         notes.add(Check::SpeedTooHigh, fastest.told(subject), remedy);
     }
 }
@@ -76,7 +79,19 @@ fn judge_axes_of_their_own(subject: &Subject<'_>, notes: &mut Notes) {
     }
     let registers: Vec<_> = open.iter().map(|axis| format!("PA8{axis}")).collect();
     let found = format!("{} = 0: no limit on the speed of these axes", registers.join(", "));
-    notes.add(Check::AxisSpeedUnlimited, found, format!("set them to {:.0}", needed_rpm(subject).ceil()));
+    let needed = |axis: &usize| geometry(subject, *axis).needed_rpm().ceil();
+    let remedy = if turn_alike(subject) {
+        format!("set them to {:.0}", needed_rpm(subject).ceil())
+    } else {
+        let each: Vec<_> = open.iter().map(|axis| format!("PA8{axis} to {:.0}", needed(axis))).collect();
+        format!("set {}", each.join(", "))
+    };
+    notes.add(Check::AxisSpeedUnlimited, found, remedy);
+}
+
+/// True if all axes need as many turns a minute: a limit for a turntable would stop a cylinder.
+fn turn_alike(subject: &Subject<'_>) -> bool {
+    subject.controller.seat.own().windows(2).all(|pair| pair[0].needed_rpm() == pair[1].needed_rpm())
 }
 
 /// Turns a minute that the greatest speed of the seat's fastest axis takes.

@@ -419,6 +419,25 @@ fn the_axis_that_takes_its_place_for_zero_is_the_one_that_turns() {
 }
 
 #[test]
+fn limits_on_the_speed_of_an_axis_that_turns_are_told_for_it_alone() {
+    let mut turns = chair(Dialect::Smc, 3);
+    let mut seat = (*turns.controller.seat).clone();
+    (seat.each[2].lead, seat.each[2].max_velocity) = (360.0, 400.0);
+    turns.controller.seat = std::sync::Arc::new(seat);
+    let remedy = |case: &Case, check: Check| {
+        let told = case.told();
+        told.into_iter().find(|finding| finding.check == check).map(|finding| finding.remedy)
+    };
+    let turns = turns.with(&[(0x07, 2_880), (0x80, 2_880), (0x81, 2_880), (0x82, 2_880)]);
+    assert_eq!(remedy(&turns, Check::SpeedTooHigh).as_deref(), Some("set PA82 to 67"));
+    let turns = turns.with(&[(0x80, 0), (0x82, 0)]);
+    assert_eq!(remedy(&turns, Check::AxisSpeedUnlimited).as_deref(), Some("set PA80 to 2880, PA82 to 67"));
+    let seat = Case::smc().with(&[(0x07, 3_500), (0x80, 0), (0x81, 3_500), (0x82, 3_500)]);
+    assert_eq!(remedy(&seat, Check::AxisSpeedUnlimited).as_deref(), Some("set them to 2880"));
+    assert_eq!(remedy(&seat, Check::SpeedTooHigh).as_deref(), Some("set PA07 or PA80 to PA85 to 2880"));
+}
+
+#[test]
 fn an_imax_controller_does_not_filter_positions_that_go_below_0() {
     let checks = |depth: u16| {
         let told = chair(Dialect::Mbox, 3).with(&[(0x51, depth)]).told();

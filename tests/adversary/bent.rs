@@ -1,6 +1,6 @@
 //! What happens in halls beside what always may.
 
-use super::cues::{FEWER, KINDS, Kind, MBOXES, RELOADED};
+use super::cues::{FEWER, KINDS, Kind, MBOXES, RELOADED, TURNTABLES};
 use super::dice::Dice;
 use super::ether::Weather;
 use super::hall::Hall;
@@ -32,6 +32,8 @@ pub(crate) enum Bent {
     Lie,
     /// Registers say for a while where a seat was.
     Stale,
+    /// Chairs have a turntable, and somebody turns it while their power is off.
+    Table,
     /// In a show as well seats are jogged at their keys, or home by themselves: they ack frames and do not execute them.
     Deaf,
 }
@@ -45,6 +47,7 @@ impl Bent {
             Self::Reload => &RELOADED[dice.range(0, RELOADED.len() as u64) as usize],
             Self::Fewer => &FEWER[dice.range(0, FEWER.len() as u64) as usize],
             Self::Mbox => &MBOXES,
+            Self::Table => &TURNTABLES,
             Self::Lie => dice.pick(&[&KINDS[..], &MBOXES]),
         }
     }
@@ -64,6 +67,7 @@ impl Bent {
             Self::Master | Self::Stale => 5,
             Self::Exchange | Self::Lie => 12,
             Self::Reload | Self::Fewer | Self::Deaf => 8,
+            Self::Table => 20,
             Self::Mbox => 25,
         }
     }
@@ -96,6 +100,15 @@ impl Bent {
                 let dark = dice.pick(&[1_000, 1_500]);
                 hall.note(|| format!("seat {}: its power goes for {dark} ms", seat + 1));
                 hall.ether.world().lines[seat].seat.reboot(now, dark * MS);
+            }
+            Self::Table => {
+                let (dark, mm) = (dice.pick(&[1_000, 1_500]), dice.range(0, 180) as f64 - 90.0);
+                hall.note(|| {
+                    format!("seat {}: its power goes for {dark} ms, its table is turned by {mm}", seat + 1)
+                });
+                let chair = &mut hall.ether.world().lines[seat].seat;
+                chair.reboot(now, dark * MS);
+                chair.turn(mm);
             }
             Self::Deaf => {
                 let mm = dice.range(0, 120) as f64 - 60.0;

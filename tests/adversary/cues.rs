@@ -5,8 +5,9 @@ use std::sync::{Arc, OnceLock};
 
 use kinocue::cue::{self, Source};
 use kinocue::harness::app::staged::headroom;
-use kinocue::harness::config::{Config, LossPolicy, from_to_args};
+use kinocue::harness::config::{Config, LossPolicy, from_to_args, load};
 use kinocue::harness::engine::Headroom;
+use kinocue::harness::motion::AxisGeometry;
 use kinocue::harness::time::Rate;
 use kinocue::harness::timeline::Timeline;
 use kinocue::wire::{Dialect, Timing};
@@ -25,6 +26,8 @@ pub(crate) struct Kind {
     park: f64,
     /// How far the cues go, of what they do otherwise.
     far: f64,
+    /// The last axis of each seat is a turntable.
+    pub(crate) turns: bool,
     ack_every: u32,
 }
 
@@ -37,6 +40,7 @@ const PLAIN: Kind = Kind {
     drives: 12,
     park: 0.0,
     far: 1.0,
+    turns: false,
     ack_every: 1,
 };
 const MBOX: Kind = Kind { dialect: Dialect::Mbox, ..PLAIN };
@@ -113,6 +117,15 @@ pub(crate) const FEWER: [[Kind; 2]; 4] = [
     [Kind { axes: &[8], hz: 50.0, ..PLAIN }, Kind { axes: &[8], drives: 7, ..HIGH }],
 ];
 
+/// Halls of chairs with a turntable, whose park is the middle of its range or elsewhere.
+pub(crate) const TURNTABLES: [Kind; 5] = [
+    Kind { axes: &[4], turns: true, park: 0.5, far: 0.6, ..PLAIN },
+    Kind { axes: &[4, 4], turns: true, park: 0.5, far: 0.6, hz: 50.0, ..PLAIN },
+    Kind { axes: &[4], turns: true, park: 0.2, far: 0.5, timing: Timing::Absolute, ..PLAIN },
+    Kind { axes: &[4], turns: true, ..PLAIN },
+    Kind { axes: &[4], turns: true, park: 0.5, hz: 200.0, policy: LossPolicy::Park, ..MBOX },
+];
+
 /// A cue that is ready to be staged.
 pub(crate) type Ready = (Arc<Timeline>, Headroom);
 
@@ -143,6 +156,9 @@ impl Kind {
         for controller in &mut config.controllers {
             let seat = Arc::make_mut(&mut controller.seat);
             let own = seat.axes;
+            if self.turns {
+                seat.each[own - 1] = turntable();
+            }
             seat.each[..own].iter_mut().for_each(|axis| (axis.park, axis.neutral) = (self.park, self.park));
             // Its replies tell nothing of an emergency stop.
             controller.estop_inputs = u16::from(self.dialect == Dialect::Mbox);
@@ -157,12 +173,13 @@ impl Kind {
 
     /// What there is for halls of this kind; made once.
     pub(crate) fn book(&self) -> &'static Book {
-        const ALL: usize = KINDS.len() + MBOXES.len() + 24 + OTHERS.len();
+        const ALL: usize = KINDS.len() + MBOXES.len() + 24 + OTHERS.len() + TURNTABLES.len();
         static BOOKS: [OnceLock<Book>; ALL] = [const { OnceLock::new() }; ALL];
         let mut all = KINDS
             .iter()
             .chain(&OTHERS)
             .chain(&MBOXES)
+            .chain(&TURNTABLES)
             .chain(RELOADED.iter().flatten())
             .chain(FEWER.iter().flatten());
         let index = all.position(|kind| kind == self).expect("it is one of them");
@@ -189,6 +206,17 @@ impl Kind {
             Book { config: Arc::new(config), cues }
         })
     }
+}
+
+/// One that turns as far and as fast in degrees as the cylinders go in millimetres, by as many pulses, to both sides of its zero.
+fn turntable() -> AxisGeometry {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("hall.toml");
+    let text = "[seat.table]\naxes = 1\n[seat.table.axis1]\nunit = \"deg\"\nrange = [-75, 75]\npulses_per_rev = 720000\n\
+        max_velocity_deg_s = 240\nmax_acceleration_deg_s2 = 3000\nmax_jerk_deg_s3 = 60000\n\
+        [[controller]]\nname = \"T1\"\nseat = \"table\"\naddress = \"127.0.1.1:7408\"\n";
+    std::fs::write(&path, text).expect("it is ours");
+    load(&path).expect("it is sound").controllers[0].seat.each[0]
 }
 
 /// Six seconds in which all axes swing, each a little after the one before.

@@ -145,6 +145,7 @@ pub(crate) fn open<T>(
 pub(crate) fn seats(kind: &Kind) -> Vec<Settings> {
     let seat = |(index, axes): (usize, &usize)| Settings {
         axes: *axes,
+        turntable: kind.turns.then(|| axes - 1),
         mm_s: 240.0,
         mbox: kind.dialect == Dialect::Mbox,
         lies: false,

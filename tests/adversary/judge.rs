@@ -15,6 +15,8 @@ const READ_BEFORE_MS: f64 = 100.0;
 const ROUNDING: f64 = 2.0;
 /// Pulses of the axes that are judged: 5 mm a turn of 10,000 pulses.
 pub(crate) const PULSES_PER_MM: f64 = 2_000.0;
+/// So far outside of its stroke a seat may be found, and led back from, mm.
+pub(crate) const OUTSIDE_MM: f64 = 11.0;
 /// What a seat may move by though nobody asked, mm.
 const STILL_MM: f64 = 0.2;
 
@@ -34,6 +36,8 @@ pub(crate) struct Breach {
 pub(crate) enum How {
     Fast,
     Unasked,
+    /// Led to a place that its stroke has not.
+    Beyond,
 }
 
 impl Breach {

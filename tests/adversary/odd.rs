@@ -65,3 +65,8 @@ fn no_more_than_are_open_do_whose_controllers_answer_with_where_they_were_up_to_
 fn none_does_whose_seats_are_jogged_or_home_by_themselves_in_a_show_and_ack_what_they_do_not_execute() {
     assert_no_more(Bent::Deaf, 0, 0.002);
 }
+
+#[test]
+fn nor_does_a_chair_with_a_turntable_that_is_turned_by_hand_while_its_power_is_off() {
+    assert_no_more(Bent::Table, 0, 0.0);
+}

@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use super::judge::{Breach, Executed, PULSES_PER_MM, admitted_ms, read_before_ns};
+use super::judge::{Breach, Executed, How, OUTSIDE_MM, PULSES_PER_MM, admitted_ms, read_before_ns};
 use super::words::{self, Frame, Heard};
 
 pub(crate) const MS: u64 = 1_000_000;
@@ -42,6 +42,8 @@ const POSITIONS: [u16; REGISTERS] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Settings {
     pub(crate) axes: usize,
+    /// The axis that has no end, and looks for no zero: where it is when it homes is its zero (PA03).
+    pub(crate) turntable: Option<usize>,
     /// What its type allows, mm/s; its own cap is off, so that it hides nothing.
     pub(crate) mm_s: f64,
     /// Whether it is an IMAX or MBOX.
@@ -227,7 +229,31 @@ impl Seat {
 
     /// Puts an axis somewhere, as it was before anybody looked.
     pub(crate) fn put(&mut self, axis: usize, mm: f64) {
-        self.rest[axis] = mm * PULSES_PER_MM;
+        self.rest[axis] = mm * PULSES_PER_MM - self.low(axis).abs();
+    }
+
+    /// The lower end of its stroke, pulses: that of a turntable is as far below its zero as the other is above.
+    fn low(&self, axis: usize) -> f64 {
+        if self.settings.turntable == Some(axis) { -75.0 * PULSES_PER_MM } else { 0.0 }
+    }
+
+    fn within_stroke(&self, axis: usize, place: f64) -> f64 {
+        let low = self.low(axis);
+        place.clamp(low, low + 150.0 * PULSES_PER_MM)
+    }
+
+    /// Where it is at zero once it has homed from where it is now.
+    fn home_zero(&self, now: u64) -> [f64; 12] {
+        let place = self.place(now);
+        std::array::from_fn(|axis| if self.settings.turntable == Some(axis) { place[axis] } else { 0.0 })
+    }
+
+    /// Somebody turns its table while its power is off, or its motor lets go: its controller notices where it has a zero.
+    pub(crate) fn turn(&mut self, mm: f64) {
+        if let (Some(axis), None) = (self.settings.turntable, self.moving) {
+            self.rest[axis] += mm * PULSES_PER_MM;
+            self.zero[axis] += if self.rebooting { mm * PULSES_PER_MM } else { 0.0 };
+        }
     }
 
     fn hold(&mut self, now: u64) {
@@ -252,7 +278,7 @@ impl Seat {
             return false;
         }
         let mut to = self.rest;
-        to[axis] = (to[axis] + mm * PULSES_PER_MM).clamp(0.0, 150.0 * PULSES_PER_MM);
+        to[axis] = self.within_stroke(axis, to[axis] + mm * PULSES_PER_MM);
         self.go(to, JOG_MM_S, now, Why::Led);
         if let Some(Move { from, to, begin, end, .. }) = self.moving {
             let speed = std::array::from_fn(|axis| (to[axis] - from[axis]).abs() / (end - begin) as f64);
@@ -272,10 +298,11 @@ impl Seat {
         let mut to = self.place(now);
         let why = match jogged {
             Some((axis, mm)) => {
-                to[axis] = (to[axis] + mm * PULSES_PER_MM).clamp(0.0, 150.0 * PULSES_PER_MM);
+                to[axis] = self.within_stroke(axis, to[axis] + mm * PULSES_PER_MM);
                 Why::Keys
             }
             None => {
+                self.zero = self.home_zero(now);
                 (to, self.homed) = (self.zero, false);
                 Why::Homes
             }
@@ -359,6 +386,7 @@ impl Seat {
         if command.foreign {
             return;
         }
+        self.judge_place(&command, now);
         let executed = Executed {
             far: std::array::from_fn(|axis| to[axis] - self.rest[axis]),
             ms: takes as f64 / MS as f64,
@@ -419,6 +447,25 @@ impl Seat {
         admitted_ms(period_ms, jitter_ms, is_untold)
     }
 
+    /// Whether the stroke has the place to which it is led.
+    fn judge_place(&mut self, command: &Command, at_ns: u64) {
+        for axis in 0..command.axes.min(self.settings.axes) {
+            let mm = (command.to[axis] - self.within_stroke(axis, command.to[axis])).abs() / PULSES_PER_MM;
+            if mm > OUTSIDE_MM {
+                let (ms, how) = (command.time_ns as f64 / MS as f64, How::Beyond);
+                self.breaches.push(Breach {
+                    at_ns,
+                    seat: self.index,
+                    axis,
+                    mm,
+                    ms,
+                    how,
+                    frame: command.number,
+                });
+            }
+        }
+    }
+
     fn judge(&mut self, executed: &Executed, frame: u32, at_ns: u64) {
         let far = executed.far.iter().fold(0.0_f64, |far, one| far.max(one.abs()));
         self.fastest = self.fastest.max(far / PULSES_PER_MM / executed.ms * 1_000.0);
@@ -462,7 +509,7 @@ impl Seat {
                     self.outputs = value;
                 }
                 if (channel, start, value) == (2, 0, 0) {
-                    let zero = [0.0; 12];
+                    let zero = self.home_zero(arrival.at);
                     self.homings += 1;
                     (self.zero, self.homed, self.stopped) = (zero, false, self.button.0);
                     (self.last_absolute, self.executed) = (None, None);

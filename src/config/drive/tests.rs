@@ -57,7 +57,7 @@ fn a_seat_of_silvermax_units_reads_as_it_is_written_with_defaults_for_the_rest()
     assert_eq!((link.wiring, link.baud, link.stop_bits), (LinkWiring::Rs232, 57_600, 2));
     assert_eq!((link.has_echo, link.rate_hz, link.family), (false, None, Some(DriveFamily::SilverMax)));
     let [one] = &hall.controllers[..] else { panic!("one seat") };
-    let Drives { drive, link, motors } = one.drives().unwrap();
+    let Drives { drive, link, motors, .. } = one.drives().unwrap();
     assert_eq!((one.name.as_str(), link.as_str(), one.group.as_str()), ("A1", "stalls", "A1"));
     assert_eq!((one.window(), one.estop_inputs, one.address().as_str()), (3..6, 0b10, "link:stalls"));
     assert_eq!(*motors, Motors::SilverMax(vec![16, 17, 18]));

@@ -1,10 +1,10 @@
 //! What controllers on one link cannot be together.
 
 use super::{Drives, Motors, Placed};
-use crate::config::Controller;
 use crate::config::drive::DriveFamily;
 use crate::config::fault::Faults;
 use crate::config::link::{Link, LinkEntry, LinkWiring};
+use crate::config::{Connection, Controller};
 
 /// Settles the links for the drives that are on them, and notes what these cannot be together.
 pub(in crate::config) fn settle(
@@ -103,6 +103,21 @@ fn refuse_units_of_rs232(link: &Link, on_it: &[&Placed], faults: &mut Faults<'_>
             link.name
         );
         faults.note(other.unit_at, message);
+    }
+}
+
+/// Tells each seat which others it may be taken for.
+pub(in crate::config) fn find_twins(placed: &mut [Placed]) {
+    let all: Vec<_> = placed
+        .iter()
+        .map(|one| (one.controller.name.clone(), one.link.clone(), one.motors.clone()))
+        .collect();
+    for one in placed {
+        let is_twin = |(_, link, motors): &&(_, String, Motors)| *link != one.link && *motors == one.motors;
+        let twins = all.iter().filter(is_twin).map(|(name, ..)| name.clone()).collect();
+        if let Connection::Link(drives) = &mut one.controller.connection {
+            drives.twins = twins;
+        }
     }
 }
 

@@ -22,6 +22,14 @@ pub(crate) enum Step {
     Set(usize),
 }
 
+/// A seat whose line leads to another one that was homed before, and has drives of the same numbers.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "its drives were homed as {0}: adapters or plugs have changed places; put them back; where the seats \
+     themselves have got other names, switch its drives off and on, then home it"
+)]
+pub(crate) struct HomedAs(pub(crate) String);
+
 /// A number that is another once what a seat is set to, in words, is: nothing else can be read back of much of it.
 pub(crate) fn sum_of(settings: &str) -> u64 {
     Sha256::digest(settings).iter().take(8).fold(0, |sum, octet| sum << 8 | u64::from(*octet))

@@ -20,7 +20,7 @@ mod virtual_port;
 
 pub(crate) use delays::Delays;
 pub(crate) use exchange::{LinkTalk, MOST_STRAY, Moment, TalkCounts, TalkState, TalkTerms};
-pub(crate) use homing::{Step, canary, sum_of};
+pub(crate) use homing::{HomedAs, Step, canary, sum_of};
 pub(crate) use led_lane::{LedLane, LinkAxis, STANDS_MM};
 pub(crate) use line::LinkLine;
 pub(crate) use peer::{AT_PARK, LaneWants, LinkPeer};

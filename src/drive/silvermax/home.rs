@@ -6,10 +6,11 @@
 
 use std::time::Duration;
 
+use super::look::look;
 use super::set_up::{HomeError, SeatUnits, UnitAxis, write, write_once};
 use super::talk::Talk;
 use crate::config::drive::homing::{HomeWay, Side};
-use crate::drive::link::{LinkPort, LinkTalk as _, Step};
+use crate::drive::link::{HomedAs, LinkPort, LinkTalk as _, Step};
 use crate::time::MonoTime;
 use crate::wire::silvermax::register::{ACCUMULATOR, CANARY, INPUT_POSITION, POSITION};
 use crate::wire::silvermax::{Internal, Io, Poll, Request, StatusWord, StopOn};
@@ -51,6 +52,7 @@ pub(crate) fn home<P: LinkPort>(
         return Err(HomeError::Canary);
     }
     let (axes, canary) = (seat.axes()?, seat.canary(around.canary)?);
+    is_its_own(talk, seat)?;
     let done = run(talk, &axes, canary, &mut around);
     if done.is_err() {
         // What is wrong already is told; that the line is gone, too, is no news.
@@ -62,6 +64,16 @@ pub(crate) fn home<P: LinkPort>(
         }
     }
     done.map(|()| canary)
+}
+
+/// That its units were not homed as another seat, which would move in its place from then on.
+fn is_its_own<P: LinkPort>(talk: &mut Talk<P>, seat: SeatUnits<'_>) -> Result<(), HomeError> {
+    if seat.twins.is_empty() {
+        return Ok(());
+    }
+    let canary = |unit: &u8| Ok(look(talk, *unit)?.canary);
+    let canaries = seat.units.iter().map(canary).collect::<Result<Vec<_>, HomeError>>()?;
+    seat.homed_as(&canaries).map_or(Ok(()), |name| Err(HomedAs(name.to_owned()).into()))
 }
 
 fn run<P: LinkPort>(

@@ -5,7 +5,7 @@ use super::scale::DriveScale;
 use super::talk::{Answer, Talk, TalkFault};
 use crate::config::drive::{SeatDrive, SilverMaxDrive};
 use crate::drive::TICK_NS;
-use crate::drive::link::{LinkPort, sum_of};
+use crate::drive::link::{HomedAs, LinkPort, sum_of};
 use crate::motion::{AxisGeometry, SeatType};
 use crate::wire::silvermax::register::{
     self, CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, MARK, QUEUE_SOURCE, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW,
@@ -19,6 +19,10 @@ pub(super) const HALF: i32 = 0xffff;
 /// A seat, and the units that move it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SeatUnits<'a> {
+    /// The name of its controller.
+    pub(crate) name: &'a str,
+    /// Those of seats that it may be taken for.
+    pub(crate) twins: &'a [String],
     /// What it is.
     pub(crate) seat: &'a SeatType,
     /// How drives move it.
@@ -178,6 +182,9 @@ pub(crate) enum HomeError {
         /// Who.
         unit: u8,
     },
+    /// Its line leads elsewhere.
+    #[error(transparent)]
+    Another(#[from] HomedAs),
     /// A person stopped it.
     #[error("homing was stopped; the seat is not home")]
     Aborted,
@@ -204,12 +211,13 @@ impl<'a> SeatUnits<'a> {
         Ok(self.axes()?.iter().map(UnitAxis::settings).collect())
     }
 
-    /// What a canary has in its lower half: another number once anything is that homing writes, or that places are measured by.
+    /// What a canary has in its lower half: another number once anything is that homing writes, or that places are measured by, and in
+    /// each seat: where two lines change places, seats that are set alike are not taken for each other.
     pub(super) fn sum(&self) -> Result<i32, HomeError> {
         let homing = &self.drive.homing;
         let set: Vec<_> = self.axes()?.iter().map(|axis| (axis.scale, axis.settings())).collect();
         let [low, high, ..] =
-            sum_of(&format!("{set:?} {} {:?}", homing.zero_mm, homing.toward)).to_le_bytes();
+            sum_of(&format!("{} {set:?} {} {:?}", self.name, homing.zero_mm, homing.toward)).to_le_bytes();
         Ok(u16::from_le_bytes([low, high]).into())
     }
 
@@ -230,6 +238,12 @@ impl<'a> SeatUnits<'a> {
     #[cfg(test)]
     pub(crate) fn own_canary(&self) -> i32 {
         self.canary(77 << 16).unwrap()
+    }
+
+    /// The seat that was homed as its units hold it, where that is one that this may be taken for.
+    pub(crate) fn homed_as(&self, canaries: &[i32]) -> Option<&'a str> {
+        let is_whose = |name| canaries.iter().any(|canary| Self { name, ..*self }.is_own(*canary));
+        self.twins.iter().map(String::as_str).find(|name| !is_whose(self.name) && is_whose(name))
     }
 
     /// True if a canary is one that homing with these settings leaves.

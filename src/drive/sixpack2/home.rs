@@ -11,10 +11,11 @@ use std::time::Duration;
 
 use super::ask::{WHO, position, searches};
 use super::find::find;
+use super::look::look;
 use super::set_up::{HomeError, MotorAxis, Purpose, SeatMotors};
 use super::talk::Talk;
 use crate::config::drive::homing::HomeWay;
-use crate::drive::link::{LinkPort, LinkTalk as _, Step};
+use crate::drive::link::{HomedAs, LinkPort, LinkTalk as _, Step};
 use crate::wire::sixpack2::{
     AbortSearch, ClockDivider, JointStart, JointTarget, PacketTimeout, PositionPreset, PositionTold,
     ReferenceSearch, SixpackOrder, SixpackReply, action,
@@ -57,6 +58,10 @@ pub(crate) fn home<P: LinkPort>(
     find(talk, &[unit])?;
     if talk.has_twins(|talk| talk.insist(unit, WHO).map(drop))? {
         return Err(HomeError::Twins { unit });
+    }
+    let homed_as = if seat.twins.is_empty() { None } else { seat.homed_as(&look(talk, unit, seat.motors)?) };
+    if let Some(name) = homed_as {
+        return Err(HomedAs(name.to_owned()).into());
     }
     let done = run(talk, seat, &axes, &mut around);
     if done.is_err() {

@@ -86,7 +86,7 @@ pub(crate) fn look_for<P: LinkPort>(
     if told.is_some() { Ok(None) } else { looked }
 }
 
-impl SeatMotors<'_> {
+impl<'a> SeatMotors<'a> {
     /// Its motors that count no place of the seat: they were never homed, or were restarted.
     pub(crate) fn strangers(&self, facts: &UnitFacts) -> Vec<u8> {
         // Where no axis can be set, homing tells why.
@@ -97,6 +97,12 @@ impl SeatMotors<'_> {
             !told(axis.motor).is_some_and(|told| (low..=high).contains(&f64::from(told.position)))
         };
         axes.iter().filter(is_stranger).map(|axis| axis.motor).collect()
+    }
+
+    /// The seat that was homed as its motors count, where that is one that this may be taken for.
+    pub(crate) fn homed_as(&self, facts: &UnitFacts) -> Option<&'a str> {
+        let is_whose = |name| Self { name, ..*self }.strangers(facts).is_empty();
+        self.twins.iter().map(String::as_str).find(|name| !is_whose(self.name) && is_whose(name))
     }
 
     /// Where the axis of a motor is by its counter, a part of its stroke; none of a motor that is not of the seat.

@@ -8,6 +8,8 @@ use crate::wire::sixpack2::{MOST_SPEED, steps_of_a_unit};
 const LEAST_BASE: u64 = 1_000_000;
 /// From there on it reads what the settings come to: with a stroke of 900,000 at the most it stays below 2^23.
 const BASES: u64 = 6_000_000;
+/// So far beside its stroke a counter may still be taken for a place of the seat, mm.
+pub(super) const BESIDE_MM: f64 = 10.0;
 
 /// How a motor counts one axis. Where it is reversed its counter goes down as the axis goes up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,14 +29,17 @@ impl MotorScale {
         let size = axis.pulses_per_rev / axis.lead;
         let per_mm = if is_reversed { -size } else { size };
         let scale = Self { per_mm, base: 0.0, low_mm: axis.low, stroke_mm: axis.stroke(), clock_divider };
-        scale.counting_by(0)
+        scale.counting_by(0, 0)
     }
 
     /// The same, counting from what a sum of its settings says: nothing else can be read of a motor but its counter, so that is to be no
-    /// place of the stroke once the settings are others than those that the seat was homed with.
-    pub(crate) fn counting_by(self, sum: u64) -> Self {
+    /// place of the stroke once the settings are others than those that the seat was homed with, or its line leads to another seat. Of
+    /// two seats that are set alike no place is one of both, or each is: neither is ever led by a count that is beside its own.
+    pub(crate) fn counting_by(self, sum: u64, whose: u64) -> Self {
+        let stroke = u64::from(self.way(self.stroke_mm + 2.0 * BESIDE_MM)) + 1;
+        let shifted = sum % BASES + stroke * (whose % (BASES / stroke).max(1));
         #[expect(clippy::cast_precision_loss, reason = "millions")]
-        let base = (LEAST_BASE + sum % BASES) as f64;
+        let base = (LEAST_BASE + shifted % BASES) as f64;
         Self { base: base.copysign(self.per_mm), ..self }
     }
 
@@ -136,9 +141,25 @@ mod tests {
             (reversed.at(0.5) + 1_048_000.0).abs() < 1e-6
                 && (reversed.fraction(-1_048_000.0) - 0.5).abs() < 1e-12
         );
-        let [low, high] = [5_999_999, 6_000_000].map(|sum| plain.counting_by(sum).whole(10.0));
+        let [low, high] = [5_999_999, 6_000_000].map(|sum| plain.counting_by(sum, 0).whole(10.0));
         assert_eq!((low, high), (6_999_999, 1_000_000));
         assert_eq!((plain.way(165.0), reversed.way(165.0)), (105_600, 105_600));
+    }
+
+    #[test]
+    fn seats_that_are_set_alike_share_all_places_or_none() {
+        let axis = AxisGeometry { pulses_per_rev: 3_200.0, ..AxisGeometry::BENCH };
+        let scale = MotorScale::of(&axis, false, 3);
+        let mut apart = 0;
+        for (sum, (one, other)) in
+            (0..400).flat_map(|n| [(n * 15_011, (n, n + 1)), (5_999_999 - n, (n, 7 * n))])
+        {
+            let [one, other] = [one, other].map(|whose| scale.counting_by(sum, whose).reach(BESIDE_MM));
+            assert!(one.0 > 900_000.0 && one.1 < 7_200_000.0, "{one:?}");
+            assert!(one == other || one.1 < other.0 || other.1 < one.0, "{one:?} {other:?}");
+            apart += u32::from(one != other);
+        }
+        assert!(apart > 700, "{apart} of 800");
     }
 
     #[test]

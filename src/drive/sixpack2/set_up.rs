@@ -10,7 +10,7 @@ use crate::config::drive::homing::{HomeWay, Side};
 use crate::config::drive::sixpack2::{MotorCurrent, PropDiv, SHARES, Sixpack2Drive};
 use crate::config::drive::{SeatDrive, homing::DriveHoming};
 use crate::drive::Lag;
-use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, sum_of};
+use crate::drive::link::{HomedAs, LinkFault, LinkPort, LinkTalk as _, sum_of};
 use crate::motion::{AxisGeometry, SeatType};
 use crate::wire::sixpack2::{
     CurrentSettings, MotorSettings, PeakCurrent, PiSettings, PositionTold, RampSettings, ReferenceSettings,
@@ -35,6 +35,10 @@ const OVERRUN_MM: f64 = 0.5;
 /// A seat, and the motors that move it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SeatMotors<'a> {
+    /// The name of its controller.
+    pub(crate) name: &'a str,
+    /// Those of seats that it may be taken for.
+    pub(crate) twins: &'a [String],
     /// What it is.
     pub(crate) seat: &'a SeatType,
     /// How drives move it.
@@ -182,6 +186,9 @@ pub(crate) enum HomeError {
         /// The unit.
         unit: u8,
     },
+    /// Its line leads elsewhere.
+    #[error(transparent)]
+    Another(#[from] HomedAs),
     /// A person stopped it.
     #[error("homing was stopped; the seat is not home")]
     Aborted,
@@ -228,8 +235,10 @@ impl<'a> SeatMotors<'a> {
         };
         let pairs = self.seat.own().iter().zip(self.motors).enumerate();
         let axes = pairs.map(axis).collect::<Result<Vec<_>, HomeError>>()?;
-        let counting =
-            |axis: &MotorAxis<'a>| MotorAxis { scale: axis.scale.counting_by(axis.sum(&axes)), ..*axis };
+        let counting = |axis: &MotorAxis<'a>| {
+            let whose = sum_of(&format!("{} {}", axis.motor, self.name));
+            MotorAxis { scale: axis.scale.counting_by(axis.sum(&axes), whose), ..*axis }
+        };
         Ok(axes.iter().map(counting).collect())
     }
 

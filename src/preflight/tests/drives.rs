@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::super::{Check, DriveSubject, LinkSurvey, judge_driven};
-use crate::config::drive_controller::Motors;
-use crate::config::{self, Acceptance, Config, Link};
+use crate::config::{self, Acceptance, Config, Connection, Link};
 use crate::drive::link::TalkCounts;
-use crate::drive::motors_of;
 use crate::drive::rates::LinkLoad;
-use crate::drive::silvermax::{SeatUnits, TalkFault, UnitFacts};
+use crate::drive::silvermax::{TalkFault, UnitFacts};
 use crate::drive::sixpack2::{self, MotorFacts};
+use crate::drive::{motors_of, units_of};
 use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::{Internal, Io, Poll, StatusWord as _};
 use crate::wire::sixpack2::action;
@@ -36,10 +35,7 @@ impl Case {
     fn new() -> Self {
         let hall = config::load(Path::new("tests/data/config/drives.toml")).unwrap();
         let controller = &hall.controllers[0];
-        let drives = controller.drives().unwrap();
-        let Motors::SilverMax(units) = &drives.motors else { panic!("the first is one") };
-        let silvermax = drives.drive.silvermax.as_ref().unwrap();
-        let of = SeatUnits { seat: &controller.seat, drive: &drives.drive, silvermax, units };
+        let of = units_of(controller).expect("the first is one");
         let facts = of.settings().unwrap().into_iter().map(|set| UnitFacts {
             unit: set.unit,
             revision: None,
@@ -91,7 +87,7 @@ impl Case {
         let found = judge_driven(&[subject], &self.hall.show.accept_findings).remove(0);
         found
             .into_iter()
-            .inspect(|one| assert!(!one.remedy.is_empty(), "{one:?}"))
+            .inspect(|one| assert!(!one.remedy.is_empty() && !one.remedy.contains(", or no "), "{one:?}"))
             .map(|one| (one.check, one.found))
             .collect()
     }
@@ -132,6 +128,19 @@ fn a_seat_that_is_not_home_and_one_of_whose_units_one_was_off_are_told_apart_and
     off.hall.show.accept_findings = vec![Acceptance { check: Check::NotHome, why: "so".to_owned() }];
     assert_eq!(off.found().len(), 1);
     assert!(!Check::NotHome.can_be_accepted() && Check::SoftLimits.can_be_accepted());
+}
+
+#[test]
+fn a_line_that_leads_to_a_seat_with_the_same_numbers_is_told_with_its_name() {
+    let mut case = Case::new();
+    let mut other = case.hall.controllers[0].clone();
+    other.name = "B1".to_owned();
+    let canary = units_of(&other).unwrap().own_canary();
+    case = case.all(|facts| facts.canary = canary);
+    case.assert_found(Check::NotHome, "homed with other settings, or by another name, than it has now");
+    let Connection::Link(drives) = &mut case.hall.controllers[0].connection else { panic!("it is on one") };
+    drives.twins = vec!["C1".to_owned(), "B1".to_owned()];
+    case.assert_found(Check::NotHome, "its drives were homed as B1: adapters or plugs have changed places");
 }
 
 #[test]

@@ -212,6 +212,15 @@ impl<B: Bus> Hall<'_, '_, B> {
         assert_eq!(places(self.line.lock().line.bus()), before, "{}", row.why);
     }
 
+    /// That the seat at the far end of its line is not taken for its own, however often it is looked at, and nothing leads it.
+    fn takes_no_other_seat(&mut self, places: impl Fn(&B) -> Vec<f64>) {
+        let before = places(self.line.lock().line.bus());
+        self.run(10.0, |hall| hall.runtime.live.want(NOW.get()));
+        let row = self.runtime.live.table().swap_remove(0);
+        assert!(!self.is_led() && self.reading().is_none(), "{row:?}");
+        assert_eq!(places(self.line.lock().line.bus()), before, "{}", row.why);
+    }
+
     /// That a seat which is held up for a second is read before it is led again, and not led while it is said to be lost.
     fn comes_back_after_a_second(&mut self, show: StagedShow, later: Duration) {
         self.go(show);
@@ -284,6 +293,17 @@ fn read(text: &str) -> Config {
     let file = folder.path().join("hall.toml");
     std::fs::write(&file, text).expect("it is written");
     crate::config::load(&file).expect("it is right")
+}
+
+/// The same hall with a seat of another name.
+fn read_of_another(text: &str) -> Config {
+    read(&text.replace("\"A1\"", "\"B1\""))
+}
+
+/// A line that leads to what another one led to: their adapters have changed places.
+fn changed<B: Bus>(line: SharedLine<B>, other: &SharedLine<B>) -> SharedLine<B> {
+    std::mem::swap(&mut line.lock().line, &mut other.lock().line);
+    line
 }
 
 /// Opens a hall whose seat was homed, with a cue on it.

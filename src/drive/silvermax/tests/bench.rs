@@ -76,7 +76,7 @@ pub(super) fn home_as(
     let mut steps = Vec::new();
     let seat = SeatType { axes: units.len(), ..seat() };
     let silvermax = drive.silvermax.clone().unwrap();
-    let of = SeatUnits { seat: &seat, drive, silvermax: &silvermax, units };
+    let of = SeatUnits { name: "A1", twins: &[], seat: &seat, drive, silvermax: &silvermax, units };
     let mut told = |step| steps.push(step);
     let around = Homing { canary: CANARY, goes_on: &|| true, told: &mut told };
     (home(talk, of, around).map(drop), steps)
@@ -111,7 +111,14 @@ impl Play {
         talk.port().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
         talk.port().damage = damage;
         let (seat, silvermax) = (seat(), drive.silvermax.clone().unwrap());
-        let seat = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16, 17, 18] };
+        let seat = SeatUnits {
+            name: "A1",
+            twins: &[],
+            seat: &seat,
+            drive: &drive,
+            silvermax: &silvermax,
+            units: &[16, 17, 18],
+        };
         let mut play = Self::over(talk, PERIOD, &[seat], Self::judge).unwrap();
         play.wait(1.0);
         assert!(play.all_ready());

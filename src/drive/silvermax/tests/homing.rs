@@ -6,12 +6,12 @@ use std::time::Duration;
 use super::bench::*;
 use crate::config::drive::SeatDrive;
 use crate::config::drive::homing::{HomeWay, Side};
-use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Step, TalkTerms};
+use crate::drive::link::{HomedAs, LinkFault, LinkPort, LinkTalk as _, Step, TalkTerms};
 use crate::drive::silvermax::*;
 use crate::drive::sixpack2;
 use crate::motion::SeatType;
 use crate::sim::serial::{LineFaults, SerialLine};
-use crate::sim::silvermax::{Action, SilverBus, UnitSetup};
+use crate::sim::silvermax::{Action, SilverBus, Unit, UnitSetup};
 use crate::time::MonoTime;
 
 fn three() -> Vec<UnitSetup> {
@@ -53,7 +53,8 @@ fn a_seat_whose_settings_were_edited_after_it_was_homed_is_not_home() {
     let (homed, silvermax) = (drive(SWITCH), drive(SWITCH).silvermax.unwrap());
     let of = |drive: &SeatDrive, seat: &SeatType| {
         let silvermax = drive.silvermax.clone().unwrap_or(silvermax.clone());
-        SeatUnits { seat, drive, silvermax: &silvermax, units: &[16, 17, 18] }.own_canary()
+        SeatUnits { name: "A1", twins: &[], seat, drive, silvermax: &silvermax, units: &[16, 17, 18] }
+            .own_canary()
     };
     let edits: [fn(&mut SeatDrive); 6] = [
         |drive| drive.reverse[1] = true,
@@ -78,7 +79,14 @@ fn a_seat_whose_settings_were_edited_after_it_was_homed_is_not_home() {
     let mut edited = drive(SWITCH);
     edited.homing.zero_mm = -12.0;
     let (seat, silvermax) = (seat(), edited.silvermax.clone().unwrap());
-    let seat = SeatUnits { seat: &seat, drive: &edited, silvermax: &silvermax, units: &[16, 17, 18] };
+    let seat = SeatUnits {
+        name: "A1",
+        twins: &[],
+        seat: &seat,
+        drive: &edited,
+        silvermax: &silvermax,
+        units: &[16, 17, 18],
+    };
     let facts = look(&mut play.stream.talk, 16).unwrap();
     assert!(facts.canary != 0 && !seat.is_own(facts.canary));
 }
@@ -169,12 +177,36 @@ fn the_index_is_looked_for_behind_the_edge() {
 }
 
 #[test]
+fn a_seat_is_not_homed_over_a_line_that_leads_to_another_one_until_its_units_were_off() {
+    let mut talk = talk_to(&three());
+    let (seat, drive, twins) = (seat(), drive(SWITCH), ["A1".to_owned(), "B1".to_owned()]);
+    let silvermax = drive.silvermax.clone().unwrap();
+    let (units, seat, drive, silvermax) = (&[16, 17, 18][..], &seat, &drive, &silvermax);
+    let home_as = |talk: &mut Talk<VirtualPort>, name| {
+        let around = Homing { canary: CANARY, goes_on: &|| true, told: &mut |_| {} };
+        home(talk, SeatUnits { name, twins: &twins, seat, drive, silvermax, units }, around)
+    };
+    let canary = home_as(&mut talk, "B1").unwrap();
+    talk.port().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
+    let refused = home_as(&mut talk, "A1").unwrap_err();
+    assert_eq!(refused, HomeError::Another(HomedAs("B1".to_owned())));
+    assert_eq!(look(&mut talk, 17).unwrap().canary, canary, "it is home as it was");
+    assert_eq!(unit(&mut talk, 1).executed().velocity, 0.0);
+    assert_eq!(home_as(&mut talk, "B1"), Ok(canary), "itself it is homed again");
+    act(&mut talk, Action::Reset);
+    let up = talk.now() + Duration::from_secs(1);
+    talk.port().sleep_until(up);
+    assert_ne!(home_as(&mut talk, "A1").unwrap(), canary);
+}
+
+#[test]
 fn a_homing_is_stopped_between_two_looks() {
     use std::sync::atomic::{AtomicBool, Ordering};
     let mut talk = talk_to(&[UnitSetup::new(16)]);
     let (seat, drive) = (SeatType { axes: 1, ..seat() }, drive(SWITCH));
     let silvermax = drive.silvermax.clone().unwrap();
-    let of = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16] };
+    let of =
+        SeatUnits { name: "A1", twins: &[], seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16] };
     let abort = AtomicBool::new(false);
     let mut told = |step| abort.store(matches!(step, Step::Searching(_)), Ordering::Relaxed);
     let homed = home(
@@ -290,7 +322,14 @@ fn a_sixpack_where_a_silvermax_was_is_told_and_moves_by_nothing_that_is_said_the
     let mut talk = Talk::new(crate::drive::link::VirtualPort::new(line, now), terms);
     let (drive, seat) = (drive(SWITCH), seat());
     let silvermax = drive.silvermax.clone().unwrap();
-    let of = SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units: &[16, 17, 18] };
+    let of = SeatUnits {
+        name: "A1",
+        twins: &[],
+        seat: &seat,
+        drive: &drive,
+        silvermax: &silvermax,
+        units: &[16, 17, 18],
+    };
     let homed = home(&mut talk, of, Homing { canary: CANARY, goes_on: &|| true, told: &mut |_| {} });
     assert!(homed.unwrap_err().to_string().starts_with("unit 16 does not answer"));
     assert!(look(&mut talk, 16).is_err());

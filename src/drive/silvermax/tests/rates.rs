@@ -48,8 +48,14 @@ fn reached(baud: u32, turn: (u64, u16, f64), axes: u8) -> [f64; 2] {
         assert_eq!(home_as(&mut talk, &drive, units).0, Ok(()));
     }
     let period = load(baud, turn, axes.into()).period();
-    let seats =
-        units.chunks(3).map(|units| SeatUnits { seat: &seat, drive: &drive, silvermax: &silvermax, units });
+    let seats = units.chunks(3).map(|units| SeatUnits {
+        name: "A1",
+        twins: &[],
+        seat: &seat,
+        drive: &drive,
+        silvermax: &silvermax,
+        units,
+    });
     let mut play = Play::over(talk, period, &seats.collect::<Vec<_>>(), |_, _| {}).unwrap();
     play.wait(2.0);
     assert!(play.all_ready(), "{:?}", play.rare());

@@ -8,6 +8,7 @@ use super::{PROBES, Sixpack2, TARGETS, Track, number};
 use crate::drive::link::{LinkFault, LinkPort, LinkTalk as _, Stage, Stream, StreamEvent, axis_number};
 use crate::drive::sixpack2::ask::{WHO, at_waking_rate, searches, where_is, who_now};
 use crate::drive::sixpack2::look::OUTSIDE_MM;
+use crate::drive::sixpack2::scale::BESIDE_MM;
 use crate::drive::sixpack2::talk::{ANSWER, TalkFault};
 use crate::time::MonoTime;
 use crate::wire::sixpack2::{ActionsTold, PositionTold, SixpackOrder, SixpackReply, UnitTold, action};
@@ -22,8 +23,6 @@ const STRAYS: u32 = 3;
 const SETTLES: u32 = 20;
 /// So often where their unit does not answer at all.
 const SILENT: u32 = 5;
-/// What is so far outside the stroke is no place of the seat at all, mm.
-const LOST_ZERO_MM: f64 = 10.0;
 
 /// What motors do that were told to stop.
 #[derive(Debug, Clone, Copy)]
@@ -145,7 +144,7 @@ impl<P: LinkPort> Stream<Sixpack2, P> {
         axis.strayed += 1;
         // What was damaged may be the answer: it is believed twice. A target that was brings it off its course for a while.
         let axis = &self.lanes[index].axes[a];
-        let (low, high) = axis.scale.reach(LOST_ZERO_MM);
+        let (low, high) = axis.scale.reach(BESIDE_MM);
         let is_lost = !(low..=high).contains(&f64::from(told.position));
         let is_for_good = is_wrong || is_lost || sent.since(axis.strays_since) > axis.heals_in();
         if axis.strayed > 1 && is_for_good {

@@ -70,7 +70,16 @@ pub(super) fn on_motors<'a>(
     motors: &'a [u8],
     period: Duration,
 ) -> SeatMotors<'a> {
-    SeatMotors { seat, drive, sixpack2: drive.sixpack2.as_ref().unwrap(), unit: 1, motors, period }
+    SeatMotors {
+        name: "A1",
+        twins: &[],
+        seat,
+        drive,
+        sixpack2: drive.sixpack2.as_ref().unwrap(),
+        unit: 1,
+        motors,
+        period,
+    }
 }
 
 /// What the counters of its motors read at the lower end of the stroke.

@@ -8,7 +8,7 @@ use super::play::Play;
 use crate::config::drive::SeatDrive;
 use crate::config::drive::homing::{HomeWay, Side};
 use crate::config::drive::sixpack2::PropDiv;
-use crate::drive::link::{LinkTalk as _, Step};
+use crate::drive::link::{HomedAs, LinkTalk as _, Step};
 use crate::drive::sixpack2::*;
 use crate::motion::SeatType;
 use crate::sim::serial::LineFaults;
@@ -129,8 +129,16 @@ fn a_search_is_made_with_less_current_and_a_show_with_all_of_it() {
     let mut talk = talk_to(&[unit_with(1, shaft())]);
     let (seat, drive) = (SeatType { axes: 1, ..seat() }, drive(SWITCH));
     let sixpack2 = drive.sixpack2.clone().unwrap();
-    let of =
-        SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors: &[0], period: PERIOD };
+    let of = SeatMotors {
+        name: "A1",
+        twins: &[],
+        seat: &seat,
+        drive: &drive,
+        sixpack2: &sixpack2,
+        unit: 1,
+        motors: &[0],
+        period: PERIOD,
+    };
     // It searches by then.
     let at = talk.now() + Duration::from_secs(2);
     talk.port().script = Some((at, |line, _| {
@@ -147,8 +155,16 @@ fn a_search_that_is_ended_stops_where_it_is() {
     let mut talk = talk_to(&[unit_with(1, shaft())]);
     let (seat, drive) = (SeatType { axes: 1, ..seat() }, drive(SWITCH));
     let sixpack2 = drive.sixpack2.clone().unwrap();
-    let of =
-        SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors: &[0], period: PERIOD };
+    let of = SeatMotors {
+        name: "A1",
+        twins: &[],
+        seat: &seat,
+        drive: &drive,
+        sixpack2: &sixpack2,
+        unit: 1,
+        motors: &[0],
+        period: PERIOD,
+    };
     let abort = AtomicBool::new(false);
     let mut told = |step| abort.store(matches!(step, Step::Searching(_)), Ordering::Relaxed);
     let homed = home(&mut talk, of, Homing { goes_on: &|| !abort.load(Ordering::Relaxed), told: &mut told });
@@ -303,6 +319,26 @@ fn over_a_bad_line_a_homing_ends_at_the_edge_or_says_what_is_wrong() {
         }
     }
     assert!(homes >= 8, "{homes}");
+}
+
+#[test]
+fn a_seat_is_not_homed_over_a_line_that_leads_to_another_one_until_its_unit_was_off() {
+    let mut talk = talk_to(&[unit_with(1, shaft())]);
+    let (seat, drive, twins) = (seat(), drive(SWITCH), ["A1".to_owned(), "B1".to_owned()]);
+    let of = |name| SeatMotors { name, twins: &twins, ..on_motors(&seat, &drive, &[0, 1, 2], PERIOD) };
+    let home_as = |talk: &mut Talk<VirtualPort>, name| {
+        home(talk, of(name), Homing { goes_on: &|| true, told: &mut |_| {} })
+    };
+    assert_eq!(home_as(&mut talk, "B1"), Ok(()));
+    talk.port().line.bus_mut().forget();
+    assert_eq!(home_as(&mut talk, "A1"), Err(HomeError::Another(HomedAs("B1".to_owned()))));
+    let facts = look_for(&mut talk, 1, &[0, 1, 2]).unwrap().unwrap();
+    assert_eq!(of("B1").strangers(&facts), [0; 0], "it is home as it was");
+    assert_eq!(of("A1").strangers(&facts), [0, 1, 2]);
+    assert_eq!(motor(&mut talk, 1).shaft.executed().velocity, 0.0);
+    assert_eq!(home_as(&mut talk, "B1"), Ok(()), "itself it is homed again");
+    suffer(&mut talk, SixpackFault::Reset);
+    assert_eq!(home_as(&mut talk, "A1"), Ok(()));
 }
 
 #[test]

@@ -69,6 +69,8 @@ fn motors_of_a_seat_that_takes_no_part_go_no_farther_by_an_order_that_was_damage
     let (seat, drive) = (seat(), drive(SWITCH));
     let sixpack2 = drive.sixpack2.clone().unwrap();
     let of = |motors| SeatMotors {
+        name: "A1",
+        twins: &[],
         seat: &seat,
         drive: &drive,
         sixpack2: &sixpack2,
@@ -118,7 +120,16 @@ fn lost_in_a_ride(mm_s2: f64, seconds: f64) -> Play {
     let drive = drive(SWITCH);
     let sixpack2 = drive.sixpack2.clone().unwrap();
     let motors = &[0, 1, 2];
-    let of = SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors, period: PERIOD };
+    let of = SeatMotors {
+        name: "A1",
+        twins: &[],
+        seat: &seat,
+        drive: &drive,
+        sixpack2: &sixpack2,
+        unit: 1,
+        motors,
+        period: PERIOD,
+    };
     assert_eq!(home(&mut talk, of, Homing { goes_on: &|| true, told: &mut |_| {} }), Ok(()));
     let mut play = Play::over(talk, PERIOD, &[of], |_, _| {}).unwrap();
     play.wait(1.0);

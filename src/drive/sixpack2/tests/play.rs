@@ -22,6 +22,8 @@ impl Play {
         let (seat, drive) = (seat(), drive(SWITCH));
         let sixpack2 = drive.sixpack2.clone().unwrap();
         let of = |unit| SeatMotors {
+            name: "A1",
+            twins: &[],
             seat: &seat,
             drive: &drive,
             sixpack2: &sixpack2,

@@ -36,6 +36,8 @@ fn reached(baud: u32, delay_ms: u64, axes: u32) -> [f64; 2] {
     let motors = &motors[..axes as usize / 3];
     let period = load(baud, Duration::from_micros(1_000 * delay_ms + 300), axes).period();
     let lane = |motors: &&'static [u8]| SeatMotors {
+        name: "A1",
+        twins: &[],
         seat: &seat,
         drive: &drive,
         sixpack2: &sixpack2,

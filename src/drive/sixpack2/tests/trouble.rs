@@ -268,7 +268,16 @@ fn home_until(play: &mut Play, ends: Option<Step>) -> Result<(), HomeError> {
     let (seat, drive) = (seat(), drive(SWITCH));
     let sixpack2 = drive.sixpack2.clone().unwrap();
     let motors = &[0, 1, 2];
-    let of = SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors, period: PERIOD };
+    let of = SeatMotors {
+        name: "A1",
+        twins: &[],
+        seat: &seat,
+        drive: &drive,
+        sixpack2: &sixpack2,
+        unit: 1,
+        motors,
+        period: PERIOD,
+    };
     let is_over = Cell::new(false);
     let goes_on = || !is_over.get();
     let mut told = |step: Step| is_over.set(is_over.get() || Some(step) == ends);
@@ -322,7 +331,16 @@ fn a_seat_of_one_axis_is_looked_for_though_its_slices_take_longer_than_their_per
     let sixpack2 = drive.sixpack2.clone().unwrap();
     // Two orders behind a break take 3.52 ms.
     let period = Duration::from_micros(3_160);
-    let of = SeatMotors { seat: &seat, drive: &drive, sixpack2: &sixpack2, unit: 1, motors: &[0], period };
+    let of = SeatMotors {
+        name: "A1",
+        twins: &[],
+        seat: &seat,
+        drive: &drive,
+        sixpack2: &sixpack2,
+        unit: 1,
+        motors: &[0],
+        period,
+    };
     assert_eq!(home(&mut talk, of, Homing { goes_on: &|| true, told: &mut |_| {} }), Ok(()));
     let mut play = Play::over(talk, period, &[of], |_, _| {}).unwrap();
     play.wait(1.0);

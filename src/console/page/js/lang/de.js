@@ -482,7 +482,7 @@ export default {
   "remedy.no-seat": "Sitze zuschalten (`kinocue enable`), oder bei jedem nachsehen, warum er nicht mitfährt",
   "remedy.other-axes": "PA02 auf die Achsen des Sitzes setzen, oder dem Sitz einen Typ mit ebenso vielen geben; dann, wenn die Sitze geparkt oder gestoppt sind, quittieren",
   "remedy.other-master": "den anderen Rechner anhalten; dann quittieren, und Referenzfahrt, wenn niemand auf dem Sitz ist",
-  "remedy.outside": "seine Wortfolge oder PA02 richtigstellen, oder Referenzfahrt, wenn niemand auf dem Sitz ist (`kinocue home --config`, bei angehaltenem Dienst); er fährt von selbst wieder ein, sobald er im Hub ist",
+  "remedy.outside": "seine Wortfolge oder PA02 richtigstellen, einen zu weit gedrehten Drehtisch von Hand zurückdrehen, oder Referenzfahrt, wenn niemand auf dem Sitz ist (`kinocue home --config`, bei angehaltenem Dienst); er fährt von selbst wieder ein, sobald er im Hub ist",
   "remedy.preflight": "Systemprüfung starten",
   "remedy.pushed": "es befreien, oder klären, warum der Motor ihn nicht hält; er fährt von selbst wieder ein, sobald er steht, wo er gehalten wird",
   "remedy.refuses": "den Fehler am Controller beheben, oder seinen Dialekt richtigstellen (smc, mbox): Frames des anderen weist er zurück; dann, wenn die Sitze geparkt oder gestoppt sind, den Saal quittieren",

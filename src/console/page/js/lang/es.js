@@ -482,7 +482,7 @@ export default {
   "remedy.no-seat": "active butacas (`kinocue enable`), o vea en cada una por qué está fuera",
   "remedy.other-axes": "ponga PA02 en los ejes de la butaca, o dele un tipo con esos ejes; con las butacas en reposo o detenidas, restablezca",
   "remedy.other-master": "detenga la otra máquina; luego restablezca, y búsqueda de origen sin nadie en la butaca",
-  "remedy.outside": "corrija su orden de palabra o PA02, o busque su origen sin nadie en la butaca (`kinocue home --config`, con el servicio detenido); se reincorpora solo cuando esté dentro",
+  "remedy.outside": "corrija su orden de palabra o PA02, gire hacia atrás a mano una plataforma giratoria que haya girado de más, o busque su origen sin nadie en la butaca (`kinocue home --config`, con el servicio detenido); se reincorpora solo cuando esté dentro",
   "remedy.preflight": "ejecute la comprobación previa",
   "remedy.pushed": "libérelo, o averigüe por qué su motor no lo sujeta; se reincorpora solo cuando esté donde se lo sujeta",
   "remedy.refuses": "resuelva el error en el controlador, o corrija su dialecto (smc, mbox): rechaza las tramas del otro; después, con las butacas en reposo o detenidas, restablezca la sala",

@@ -482,7 +482,7 @@ export default {
   "remedy.no-seat": "activer des sièges (`kinocue enable`), ou voir pour chacun pourquoi il est hors jeu",
   "remedy.other-axes": "régler PA02 sur les axes du siège, ou donner au siège un type qui en a autant ; sièges au repos ou arrêtés, acquitter",
   "remedy.other-master": "arrêter l’autre machine ; puis acquitter, et prise d’origine sans personne sur le siège",
-  "remedy.outside": "corriger son ordre des mots ou PA02, ou faire sa prise d’origine sans personne sur le siège (`kinocue home --config`, service arrêté) ; il rejoint de lui-même dès qu’il est dans sa course",
+  "remedy.outside": "corriger son ordre des mots ou PA02, ramener à la main un plateau tournant qui a trop tourné, ou faire sa prise d’origine sans personne sur le siège (`kinocue home --config`, service arrêté) ; il rejoint de lui-même dès qu’il est dans sa course",
   "remedy.preflight": "lancer le contrôle préalable",
   "remedy.pushed": "le dégager, ou chercher pourquoi son moteur ne le tient pas ; il rejoint de lui-même dès qu’il est là où il est tenu",
   "remedy.refuses": "lever l’erreur au contrôleur, ou corriger son dialecte (smc, mbox) : il refuse les trames de l’autre ; puis, sièges au repos ou arrêtés, acquitter la salle",

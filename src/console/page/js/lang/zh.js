@@ -482,7 +482,7 @@ export default {
   "remedy.no-seat": "启用座椅（`kinocue enable`），或逐个查看退出原因",
   "remedy.other-axes": "将 PA02 设为座椅的轴数，或为座椅选用轴数相同的类型；座椅归位或停止时复位",
   "remedy.other-master": "停止另一台机器；然后复位，并在座椅无人时回零",
-  "remedy.outside": "更正其字序或 PA02，或在座椅无人时回零（`kinocue home --config`，服务停止时）；回到行程内后自行并入",
+  "remedy.outside": "更正其字序或 PA02，或将转过头的转台用手转回，或在座椅无人时回零（`kinocue home --config`，服务停止时）；回到行程内后自行并入",
   "remedy.preflight": "运行开演前检查",
   "remedy.pushed": "清除障碍，或查明电机为何保持不住；回到保持位置后自行并入",
   "remedy.refuses": "排除控制器上的错误，或更正其方言（smc、mbox）：它会拒绝另一种方言的帧；然后在座椅归位或停止时复位该厅",
