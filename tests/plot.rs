@@ -127,7 +127,7 @@ fn a_page_of_a_recording_shows_each_pass_of_the_film_beside_the_last_and_fits_it
         }
     }
     // The clock begins anew with each pass, also in a part that is shown larger.
-    let clocks = "return [...document.querySelectorAll('.times .tick span')].map((one) => one.textContent)";
+    let clocks = "return [...document.querySelector('.times').querySelectorAll('.tick span')].map((one) => one.textContent)";
     let begins = |clocks: &serde_json::Value| {
         let all: Vec<String> = serde_json::from_value(clocks.clone()).expect("texts");
         all.windows(2).filter(|pair| pair[1] < pair[0]).count()
@@ -143,6 +143,48 @@ fn a_page_of_a_recording_shows_each_pass_of_the_film_beside_the_last_and_fits_it
     assert!(kinocue(&[text(&file), "-o", text(&svg)]).status.success());
     browser.open(&format!("file://{}", svg.display()));
     browser.shot("plot-recording-svg");
+}
+
+#[test]
+fn on_paper_each_of_twelve_axes_has_dashes_of_its_own_beside_its_name_and_names_stay_beside_their_panel() {
+    let Some(browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = folder.path().join("voyage.html");
+    for (theme, keys) in [("print", 12), ("light", 0)] {
+        assert!(
+            kinocue(&["cues/voyage.csv", "-o", text(&page), "--theme", theme, "--force"]).status.success()
+        );
+        browser.open(&format!("file://{}", page.display()));
+        let dashes = "const keys = [...document.querySelectorAll('section:first-of-type .name path')].filter((one) => one.getClientRects().length); \
+             return new Set(keys.map((one) => getComputedStyle(one).strokeDasharray)).size";
+        assert_eq!(browser.eval(dashes), json!(keys), "{theme}");
+        let inside = "return [...document.querySelectorAll('.box')].every((box) => [...box.querySelectorAll('.name')].every((name) => \
+             name.getBoundingClientRect().bottom <= box.getBoundingClientRect().bottom + 10 && name.getBoundingClientRect().right <= innerWidth))";
+        assert_eq!(browser.eval(inside), json!(true), "{theme}");
+        // Panels and effects may be on sheets of their own: times are below either.
+        assert_eq!(browser.eval("return document.querySelectorAll('.box.times').length"), json!(2));
+        browser.shot(&format!("plot-voyage-{theme}"));
+    }
+}
+
+/// What is asked of a cue alone is refused of a recording, and what a film leaves of the limits is in the picture as in the check.
+#[test]
+fn options_of_a_cue_do_what_they_say_or_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("show.mcap");
+    recorded(&file, "A1");
+    for option in [&["--chase"][..], &["--rate", "50"], &["--config", "examples/hall.toml"]] {
+        let run = kinocue(&[&[text(&file)], option].concat());
+        let told = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.code() == Some(64) && told.contains("are for cues"), "{run:?}");
+    }
+    let sentence = |options: &[&str]| {
+        let run = kinocue(&[&["cues/coaster.csv"], options].concat());
+        String::from_utf8(run.stdout).expect("text").lines().nth(1).expect("a sentence").to_owned()
+    };
+    assert!(sentence(&[]).contains("of 240 mm/s"), "{}", sentence(&[]));
+    let left = sentence(&["--chase"]);
+    assert!(left.contains("of 237 mm/s") && left == sentence(&["--chase", "--seat", "bench3"]), "{left}");
 }
 
 #[test]

@@ -70,7 +70,7 @@ struct RecordedOutcome {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PictureQuery {
-    /// The seat; where it is left out one that fell out, else the one that was held back farthest.
+    /// The seat; where it is left out one that a mark names, else that fell out, else the one that was held back farthest.
     seat: Option<String>,
 }
 

@@ -31,7 +31,7 @@ use crate::control::{Handle, Status, handle};
 use crate::health::Why;
 use crate::journal::{Journal, Limits};
 use crate::library::{self, Library, LibraryError};
-use crate::log::Log;
+use crate::log::{Line, Log, Priority};
 use crate::sd::{self, WatchdogThread};
 use crate::settings::SettingsFile;
 use crate::sys::clock::Monotonic;
@@ -236,7 +236,9 @@ fn serve_halls(
         let recorder = HallRecorder::start(&mut runtime, &record_places);
         ports.recorder = recorder.link();
         let left = keep(runtime, ports, library.clone(), journal, &mut feeder)?;
-        recorder.end();
+        if let Err(waits) = recorder.end() {
+            log.say(Line::new(Priority::Warning, "record-show", waits.to_string()));
+        }
         (ports, journal) = (left.ports, left.journal);
         let Some(next) = left.reload else {
             break Served { config, closed: left.closed, ended: left.ended };

@@ -101,6 +101,11 @@ impl SeatArgs {
         Ok(Judge { hall, seat, rate_hz, chases: self.chase })
     }
 
+    /// True if it says for which hall or rate, or for which film.
+    pub(super) const fn is_of_hall(&self) -> bool {
+        self.config.is_some() || self.rate.is_some() || self.chase
+    }
+
     /// What is to be given to `fit` so that a cue passes here.
     pub(super) const fn remedy(&self) -> &'static str {
         if self.chase { "kinocue fit CUE -o OUT --chase" } else { "kinocue fit CUE -o OUT" }
@@ -151,9 +156,12 @@ fn all_seats(
 
 impl Judge {
     /// What each axis of a cue is on: the seat asked for, else that of the first controller that takes the axis,
-    /// else the bench seat.
+    /// else the bench seat; with what a film leaves of its limits, where one leads.
     pub(super) fn seats(&self, axes: usize) -> Vec<SeatAxis> {
-        seats(self.hall.as_ref(), self.seat.as_ref(), axes)
+        let hall = self.hall.as_ref().map(|hall| self.led(hall));
+        let bench = || hall.is_none().then(|| Arc::new(SeatType::bench3(axes)));
+        let seat = self.seat.clone().or_else(bench).map(|seat| self.left_of(&seat));
+        seats(hall.as_deref(), seat.as_ref(), axes)
     }
 
     /// The same, and behind each the axes of the other controllers that take it.

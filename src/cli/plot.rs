@@ -30,7 +30,7 @@ const WIDEST: u16 = 240;
 ///
 /// Of a cue where it goes and what that asks of a seat; of a recording what a seat was asked and sent, and what went wrong. Draws in braille on a terminal; with -o writes a self-contained HTML page or SVG. Speed, acceleration and jerk are those of
 /// `kinocue info` and `kinocue check`, as fractions of their limits. For a recording, --seat is the name of a seat; without it, one
-/// that fell out is drawn, else the one that the limiter held back farthest.
+/// that a mark names is drawn, else one that fell out, else the one that the limiter held back farthest.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue plot cues/coaster.csv",
@@ -92,6 +92,12 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         exit::refuse_to_replace(path, args.force)?;
     }
     if let Some(recording) = plot_recording::meant(&args.cue)? {
+        if args.seat.is_of_hall() {
+            let error = anyhow!(
+                "--config, --rate and --chase are for cues; a recording has seats and a rate of its own"
+            );
+            return Err(error).or_exit(Exit::Usage);
+        }
         let (from, until) = args.stretch();
         let asked = plot_recording::Asked {
             file: &recording,

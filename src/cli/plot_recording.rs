@@ -1,7 +1,9 @@
 //! `kinocue plot` of a recording.
 
+use std::cmp::Reverse;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::anyhow;
 
@@ -17,7 +19,7 @@ pub(super) struct Asked<'a> {
     pub(super) file: &'a Path,
     /// Another, whose sent positions are laid over it.
     pub(super) other: Option<&'a Path>,
-    /// The seat; by itself the one whose asked and sent positions are farthest apart.
+    /// The seat; by itself one that a mark names, that fell out, or that was held back farthest.
     pub(super) seat: Option<&'a str>,
     /// The stretch of show time.
     pub(super) from: Option<ShowTime>,
@@ -87,10 +89,16 @@ fn lane(asked: &Asked<'_>, contents: &Contents, summary: &Summary) -> Result<usi
     if let Some(name) = asked.seat {
         return seat_in(contents, name);
     }
-    // One that fell out before one that was held back.
+    // One that a mark names, else that fell out nearest to what the file is of, else that was held back farthest.
+    let caused_at = contents.caused_at().unwrap_or_default();
     let gravest = summary.seats.iter().enumerate().max_by(|(one_lane, one), (other_lane, other)| {
-        let fell = (one.falls.count > 0).cmp(&(other.falls.count > 0));
-        fell.then(one.apart.total_cmp(&other.apart)).then(other_lane.cmp(one_lane))
+        let named = (summary.marked == Some(*one_lane)).cmp(&(summary.marked == Some(*other_lane)));
+        let [one_near, other_near] =
+            [one, other].map(|seat| Reverse(seat.falls.distance(caused_at).unwrap_or(Duration::MAX)));
+        named
+            .then(one_near.cmp(&other_near))
+            .then(one.apart.total_cmp(&other.apart))
+            .then(other_lane.cmp(one_lane))
     });
     gravest
         .map(|(lane, _)| lane)

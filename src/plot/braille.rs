@@ -1,5 +1,7 @@
 //! A picture as lines of braille, for a terminal: two columns and four rows of dots a character.
 
+use std::iter;
+
 use super::text::{clock, number};
 use super::{Lane, Panel, Picture, Scale};
 use crate::plain;
@@ -78,11 +80,19 @@ fn measured(panel: &Panel, cells: usize) -> Vec<String> {
         }
     }
     let name = if panel.name.len() > BEFORE { &panel.name[..5] } else { &panel.name };
-    let mut lines = dots.lines().into_iter();
-    let top = lines.next().unwrap_or_default();
-    let mut all = vec![format!("{name:<BEFORE$}{top} {}", panel.note)];
-    all.extend(lines.map(|line| format!("{:BEFORE$}{line} {}", "", panel.place)));
-    all
+    // What does not fit beside the dots goes on below.
+    let place = match panel.place.split_once(", ") {
+        Some((at, line)) if panel.place.chars().count() >= BEHIND => vec![at, line],
+        _ => vec![panel.place.as_str()],
+    };
+    let behind = iter::once(panel.note.as_str()).chain(place);
+    let dots = dots.lines().into_iter().chain(iter::repeat(" ".repeat(cells)));
+    let names = iter::once(name).chain(iter::repeat(""));
+    names
+        .zip(dots)
+        .zip(behind)
+        .map(|((name, dots), words)| format!("{name:<BEFORE$}{dots} {words}"))
+        .collect()
 }
 
 /// A line, and one more for a name that has no place before it.

@@ -46,7 +46,7 @@ function ticks() {
 function draw() {
   const [begin, end] = view;
   ticks();
-  for (const svg of document.querySelectorAll('svg')) svg.setAttribute('viewBox', `${begin * columns} 0 ${(end - begin) * columns} ${svg.dataset.high}`);
+  for (const svg of document.querySelectorAll('.clip svg')) svg.setAttribute('viewBox', `${begin * columns} 0 ${(end - begin) * columns} ${svg.dataset.high}`);
   for (const one of document.querySelectorAll('[data-at]')) {
     const at = (Number(one.dataset.at) - begin) / (end - begin);
     one.hidden = at < -1e-9 || at > 1 + 1e-9;

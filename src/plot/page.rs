@@ -6,7 +6,7 @@ use base64::engine::general_purpose::STANDARD;
 use sha2::{Digest as _, Sha256};
 
 use super::path::{self, HEIGHT};
-use super::svg::names;
+use super::svg::{APART, flag_rows, high, names};
 use super::text::{clock, number, safe};
 use super::theme::{Theme, classes};
 use super::time_axis::TimeTick;
@@ -26,7 +26,7 @@ pub(crate) fn page(picture: &Picture, theme: Theme) -> String {
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{}'\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>{}\n{STYLE}</style></head>\n\
          <body><main data-from=\"{}\" data-until=\"{}\" data-columns=\"{}\"{}>\n<h1>{title}</h1>\n<p class=\"sentence\">{}</p>\n{TOOLS}\n\
-         {}{}{}{}\n{}{}<footer>{facts}</footer></main>\n<script>{SCRIPT}</script></body></html>\n",
+         {}{}{}{}{}\n{}{}<footer>{facts}</footer></main>\n<script>{SCRIPT}</script></body></html>\n",
         STANDARD.encode(Sha256::digest(SCRIPT)),
         theme.css(),
         time.from_s,
@@ -36,6 +36,8 @@ pub(crate) fn page(picture: &Picture, theme: Theme) -> String {
         safe(&picture.sentence),
         flags(picture),
         picture.panels.iter().map(|panel| section(panel, time)).collect::<String>(),
+        // Also here: what is below may be on another sheet.
+        if picture.lanes.is_empty() { String::new() } else { times(time) },
         picture.lanes.iter().map(|one| lane(one, time)).collect::<String>(),
         times(time),
         picture.histograms.iter().map(histogram).collect::<String>(),
@@ -76,14 +78,14 @@ fn head(name: &str, note: &str) -> String {
 }
 
 fn section(panel: &Panel, time: &TimeAxis) -> String {
-    let (class, high) = if panel.scale == Scale::Range { ("high", 220.0) } else { ("low", 130.0) };
+    let high = high(panel, if panel.scale == Scale::Range { 220.0 } else { 130.0 });
     let note = if panel.place.is_empty() {
         panel.note.clone()
     } else {
         format!("{} · {}", panel.note, panel.place)
     };
     let mut out = format!(
-        "<section>{}<div class=\"box drag {class}\">",
+        "<section>{}<div class=\"box drag\" style=\"height:{high}px\">",
         head(&format!("{}, {}", panel.name, panel.unit), &note)
     );
     for tick in scale::of_values(panel.low, panel.high, 4.0) {
@@ -117,9 +119,15 @@ fn section(panel: &Panel, time: &TimeAxis) -> String {
             safe(&mark.words)
         );
     }
-    for (style, name, y) in names(panel, high, 14.0) {
-        out +=
-            &format!("<span class=\"name {}\" style=\"top:{y:.0}px\">{}</span>", classes(style), safe(name));
+    for (style, name, y) in names(panel, high, APART) {
+        let class = classes(style);
+        out += &format!(
+            "<span class=\"name {class}\" style=\"top:{y:.0}px\">{} {}</span>",
+            safe(name),
+            format_args!(
+                "<svg class=\"key\" width=\"22\" height=\"4\" aria-hidden=\"true\"><path class=\"curve {class}\" d=\"M0 2h22\"/></svg>"
+            )
+        );
     }
     out + "</div></section>\n"
 }
@@ -148,17 +156,20 @@ fn flags(picture: &Picture) -> String {
     if picture.flags.is_empty() {
         return String::new();
     }
-    let flag = |(row, flag): (usize, &super::Flag)| {
-        let late = if picture.time.part(flag.at_s).is_some_and(|part| part > 0.6) { " late" } else { "" };
+    // As on a screen of this width; each has its name as a title besides.
+    let rows = flag_rows(picture, 1_000.0, |x, _| x > 600.0);
+    let flag = |(flag, row): (&super::Flag, Option<(u8, bool)>)| {
+        let late = if row.is_some_and(|(_, is_before)| is_before) { " late" } else { "" };
+        let name = safe(&flag.name);
+        let shown = row.map(|(row, _)| format!("<span style=\"top:{}px\">{name}</span>", 20 * row));
         format!(
-            "<i class=\"flag{late}\" {}\" title=\"{name}, {time}\"><span style=\"top:{}px\">{name}</span></i>",
+            "<i class=\"flag{late}\" {}\" title=\"{name}, {}\">{}</i>",
             at(&picture.time, flag.at_s),
-            20 * (row % 3),
-            name = safe(&flag.name),
-            time = clock(picture.time.film_s(flag.at_s), 0.0)
+            clock(picture.time.film_s(flag.at_s), 0.0),
+            shown.unwrap_or_default()
         )
     };
-    let flags: String = picture.flags.iter().enumerate().map(flag).collect();
+    let flags: String = picture.flags.iter().zip(rows).map(flag).collect();
     format!("<section><h2>Markers</h2><div class=\"box flags\">{flags}</div></section>\n")
 }
 

@@ -4,7 +4,7 @@ use super::path::{self, HEIGHT};
 use super::text::{clock, number, safe};
 use super::theme::{Theme, classes};
 use super::time_axis::TimeTick;
-use super::{Histogram, Lane, Panel, Picture, Scale, TimeAxis, scale};
+use super::{Flag, Histogram, Lane, Panel, Picture, Scale, TimeAxis, scale};
 
 /// The whole, px.
 const WIDTH: f64 = 1200.0;
@@ -14,7 +14,7 @@ const LENGTH: f64 = 1084.0;
 /// Texts below each other, px.
 const LINE: f64 = 20.0;
 /// Names at the ends of lines are at least so far apart, px.
-const APART: f64 = 14.0;
+pub(super) const APART: f64 = 14.0;
 
 const TEXT: &str = "text{font:13px system-ui,'DejaVu Sans','Noto Sans',sans-serif;fill:var(--text)}.big{font-size:20px;font-weight:650}\
 .head{font-weight:650}.quiet{fill:var(--quiet)}.grid{stroke:var(--edge);stroke-width:1}.limit{stroke:var(--text);stroke-width:1.2}\
@@ -68,9 +68,14 @@ fn words(x: f64, y: f64, class: &str, safe: &str) -> String {
     format!("<text x=\"{x:.1}\" y=\"{y:.1}\" class=\"{class}\">{safe}</text>")
 }
 
+/// How high a panel is, px: at least so that the names of all its bands have room beside it.
+pub(super) fn high(panel: &Panel, least: f64) -> f64 {
+    panel.bands.iter().filter(|band| !band.name.is_empty()).fold(0.0, |high, _| high + APART).max(least)
+}
+
 /// A panel under its heading; `y` is moved behind it.
 fn drawn(panel: &Panel, time: &TimeAxis, y: &mut f64) -> String {
-    let high = if panel.scale == Scale::Range { 190.0 } else { 110.0 };
+    let high = high(panel, if panel.scale == Scale::Range { 190.0 } else { 110.0 });
     *y += 18.0;
     let note = [&*panel.note, &panel.place]
         .into_iter()
@@ -144,12 +149,13 @@ fn curves(panel: &Panel, time: &TimeAxis, top: f64, high: f64) -> String {
         );
     }
     for (style, name, y) in names(panel, high, APART) {
+        let (class, y) = (classes(style), top + y);
         out += &format!(
-            "<text class=\"name {}\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-            classes(style),
+            "<text class=\"name {class}\" x=\"{:.1}\" y=\"{:.1}\">{}</text><path class=\"key curve {class}\" d=\"M{:.1} {y:.1}h22\"/>",
             LEFT + LENGTH + 8.0,
-            top + y + 4.0,
-            safe(name)
+            y + 4.0,
+            safe(name),
+            WIDTH - 24.0
         );
     }
     out
@@ -229,26 +235,47 @@ fn histogram(histogram: &Histogram, y: &mut f64) -> String {
     format!("{out}</g>{words_}<path class=\"grid\" d=\"M{LEFT} {ground:.1}h{LENGTH}\"/>")
 }
 
-/// The names of flags in rows that do not run into each other, and how deep they are.
+/// The names of flags in rows, and how deep they are.
 fn flags(picture: &Picture, y: f64) -> (String, f64) {
-    const ROWS: usize = 4;
-    let mut ends = [f64::NEG_INFINITY; ROWS];
     let mut out = String::new();
     let mut depth = 0.0_f64;
-    for flag in &picture.flags {
+    let rows = flag_rows(picture, LENGTH, |x, width| LEFT + x + width > WIDTH);
+    for (flag, row) in picture.flags.iter().zip(rows) {
+        // One that no row has room for is told by its line alone.
+        let Some((row, is_before)) = row else { continue };
         let x = LEFT + LENGTH * picture.time.part(flag.at_s).unwrap_or_default();
-        let name: String = flag.name.chars().take(40).collect();
-        let width = 8.0 * f64::from(u16::try_from(name.chars().count()).unwrap_or(40)) + 10.0;
-        // One that no row has room for is told by its line alone, and by its title.
-        let begin = if x + width > WIDTH { x - width } else { x };
-        let Some(row) = ends.iter().position(|end| *end <= begin) else { continue };
-        ends[row] = begin + width;
-        let down = LINE * f64::from(u8::try_from(row).unwrap_or(0) + 1);
+        let down = LINE * f64::from(row + 1);
         depth = depth.max(down);
-        let (class, x) = if begin < x { ("late", x - 4.0) } else { ("", x + 4.0) };
-        out += &words(x, y + down - 6.0, class, &safe(&name));
+        let (class, x) = if is_before { ("late", x - 4.0) } else { ("", x + 4.0) };
+        out += &words(x, y + down - 6.0, class, &safe(&flag_name(&flag.name)));
     }
     (out, depth)
+}
+
+/// As much of a flag's name as there is room for.
+fn flag_name(name: &str) -> String {
+    name.chars().take(40).collect()
+}
+
+/// Rows in which the names of flags do not run into each other, over an axis so many px long, and whether each stands before its flag,
+/// as `is_before` has it of where that is and how wide the name is; `None` for one that no row has room for.
+pub(super) fn flag_rows(
+    picture: &Picture,
+    length: f64,
+    is_before: impl Fn(f64, f64) -> bool,
+) -> Vec<Option<(u8, bool)>> {
+    let mut ends = [f64::NEG_INFINITY; 4];
+    let row = |flag: &Flag| {
+        let x = length * picture.time.part(flag.at_s).unwrap_or_default();
+        let chars = flag_name(&flag.name).chars().count();
+        let width = 8.0 * f64::from(u8::try_from(chars).unwrap_or(u8::MAX)) + 10.0;
+        let is_before = is_before(x, width);
+        let begin = if is_before { x - width } else { x };
+        let (row, end) = (0_u8..).zip(&mut ends).find(|(_, end)| **end <= begin)?;
+        *end = begin + width;
+        Some((row, is_before))
+    };
+    picture.flags.iter().map(row).collect()
 }
 
 fn flag_lines(picture: &Picture, top: f64, bottom: f64) -> String {

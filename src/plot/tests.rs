@@ -141,10 +141,61 @@ fn the_seventh_axis_has_the_colour_of_the_first_and_dashes() {
 
 #[test]
 fn names_at_the_ends_of_lines_stand_apart_and_inside() {
-    let picture = drawn(&timeline(&rows(6, 5, "", |_, _| 0.0)), 0, 80, 40);
-    let names = super::svg::names(&picture.panels[0], 190.0, 14.0);
-    assert!(names.windows(2).all(|pair| pair[1].2 - pair[0].2 >= 14.0 - 1e-9), "{names:?}");
-    assert!(names.iter().all(|(_, _, y)| (0.0..=190.0).contains(y)));
+    for axes in [6, 12] {
+        let picture = drawn(&timeline(&rows(axes, 5, "", |_, _| 0.0)), 0, 80, 40);
+        for panel in &picture.panels {
+            let high = super::svg::high(panel, 110.0);
+            let names = super::svg::names(panel, high, 14.0);
+            assert_eq!(names.len(), axes);
+            assert!(names.windows(2).all(|pair| pair[1].2 - pair[0].2 >= 14.0 - 1e-9), "{names:?}");
+            assert!(names.iter().all(|(_, _, y)| (0.0..=high).contains(y)));
+        }
+    }
+}
+
+#[test]
+fn names_of_flags_do_not_run_into_each_other_and_what_has_no_room_keeps_its_line() {
+    let picture = drawn(&timeline(&rows(1, 500, "", noise)), 0, 9_980, 600);
+    let flag = |at_s: f64| Flag { at_s, name: format!("what happened at {at_s:.2}") };
+    let picture = Picture { flags: (0..60).map(|n| flag(f64::from(n) / 7.0)).collect(), ..picture };
+    let text = page(&picture, Theme::Auto);
+    assert_eq!(text.matches("<i class=\"flag").count(), 60);
+    let shown: Vec<(f64, f64, &str)> = text
+        .split("<i class=\"flag")
+        .skip(1)
+        .filter_map(|flag| {
+            let number =
+                |before: &str| flag.split(before).nth(1)?.split(['%', 'p']).next()?.parse::<f64>().ok();
+            let (part, row) = (number("left:")?, number("<span style=\"top:")?);
+            let begin = if flag.starts_with(" late") { 10.0 * part - 178.0 } else { 10.0 * part };
+            Some((begin, row, flag))
+        })
+        .collect();
+    assert!((12..40).contains(&shown.len()), "{}", shown.len());
+    for (index, (begin, row, flag)) in shown.iter().enumerate() {
+        let before = shown[..index].iter().rev().find(|(_, other, _)| other == row);
+        assert!(before.is_none_or(|(other, ..)| begin - other >= 177.9), "{flag}");
+    }
+}
+
+#[test]
+fn lines_of_a_picture_for_eighty_columns_are_no_wider_whatever_stands_beside_the_curves() {
+    let mcap = |text: &str| {
+        let mut out = std::io::Cursor::new(Vec::new());
+        cue::write_mcap(timeline(text).cue(), &mut out).unwrap();
+        Timeline::new(cue::read(Path::new("t.mcap"), out.get_ref().as_slice(), &Source::Native).unwrap())
+    };
+    let text = rows(1, 1_500, "", |row, _| if row >= 1_200 { 0.6 } else { 0.5 });
+    for cue in [timeline(&text), mcap(&text)] {
+        let drawn = braille(&drawn(&cue, 0, 29_980, 2 * cells(80) - 1));
+        let curves =
+            drawn.lines().filter(|line| line.contains(|c: char| ('\u{2800}'..='\u{28ff}').contains(&c)));
+        assert!(
+            curves.clone().count() >= 8 && curves.into_iter().all(|line| line.chars().count() <= 80),
+            "{drawn}"
+        );
+        assert!(drawn.contains("line 12") || drawn.contains("message 12"), "{drawn}");
+    }
 }
 
 proptest! {

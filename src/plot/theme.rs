@@ -21,11 +21,13 @@ const LIGHT: &str = "--ground:#fff;--text:#15191e;--quiet:#55606b;--edge:#c4ccd4
 /// The console's colours.
 const DARK: &str = "--ground:#0a0d11;--text:#eef2f6;--quiet:#a3afbc;--edge:#3a4552;--over:#ff8a3c;\
 --s0:#56b4e9;--s1:#eedd88;--s2:#d58ab5;--s3:#2fbf91;--s4:#e69f00;--s5:#d9dfe6;";
-/// Dashes of lines one to six on paper.
-const DASHES: &str = ".s1{stroke-dasharray:9 3}.s2{stroke-dasharray:2 3}.s3{stroke-dasharray:9 3 2 3}\
+/// Dashes of lines on paper, and a piece of each beside its name.
+const DASHES: &str = ".plot .key{display:inline-block}.plot .box{margin-right:62px}\
+.dashed.s0{stroke-dasharray:16 3 3 3}.dashed.s1{stroke-dasharray:1 4}.dashed.s2{stroke-dasharray:9 3 2 3 2 3}\
+.dashed.s3{stroke-dasharray:20 6}.dashed.s4{stroke-dasharray:4 2 1 2}.dashed.s5{stroke-dasharray:12 3 4 3}.s1{stroke-dasharray:9 3}.s2{stroke-dasharray:2 3}.s3{stroke-dasharray:9 3 2 3}\
 .s4{stroke-dasharray:5 4}.s5{stroke-dasharray:14 4}";
 /// What is drawn alike everywhere.
-const SHAPES: &str = ".curve{fill:none;stroke-width:1.4;stroke-linejoin:round;vector-effect:non-scaling-stroke}\
+const SHAPES: &str = ".key{display:none}.curve{fill:none;stroke-width:1.4;stroke-linejoin:round;vector-effect:non-scaling-stroke}\
 .range{fill-opacity:.22}.dashed{stroke-dasharray:6 4}\
 .s0{--line:var(--s0)}.s1{--line:var(--s1)}.s2{--line:var(--s2)}.s3{--line:var(--s3)}.s4{--line:var(--s4)}.s5{--line:var(--s5)}\
 .curve{stroke:var(--line)}.range{fill:var(--line)}.name{fill:var(--line);color:var(--line);font-weight:600}\

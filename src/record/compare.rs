@@ -217,7 +217,9 @@ fn apart(ours: &BTreeMap<String, Track>, theirs: &BTreeMap<String, Track>, lag_s
     (count > 0).then(|| sum / f64::from(count))
 }
 
+/// At the instants of the one that has fewer, so that nothing is made up between samples where the other has every tick.
 fn differences(seat: &str, track: &Track, against: &Track) -> Vec<Difference> {
+    let (track, against) = if against.len() < track.len() { (against, track) } else { (track, against) };
     let axes = track.first().map_or(0, |(_, places)| places.len());
     let difference =
         |axis| Difference { seat: seat.to_owned(), axis, greatest: 0.0, film_s: 0.0, rms: 0.0, compared: 0 };
@@ -276,6 +278,16 @@ mod tests {
         }
         let still = BTreeMap::from([("F4".to_owned(), vec![(0.0, vec![1.0]), (0.1, vec![1.0])])]);
         assert_eq!(lag_ms(&still, &still), None);
+    }
+
+    #[test]
+    fn samples_are_held_against_every_tick_at_their_own_instants() {
+        let every = seat(0.0).remove("F4").expect("it is there");
+        let samples: Track = every.iter().step_by(9).cloned().collect();
+        for [one, other] in [[&every, &samples], [&samples, &every]] {
+            let axes = differences("F4", one, other);
+            assert!(axes.iter().all(|axis| axis.greatest == 0.0 && axis.compared > 50), "{axes:?}");
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The flight recorder's file: of fixed size, written round and round. Each block of entries has a number and a checksum, so that what
 //! was whole when the program was killed is found again, in its order.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::os::unix::fs::{FileExt as _, OpenOptionsExt as _};
 use std::path::Path;
@@ -47,8 +47,13 @@ impl Flight {
     /// # Errors
     /// Where there is no room for it, or no folder.
     pub(crate) fn create(path: &Path, opening: &[u8], room: u64) -> io::Result<Self> {
-        let file =
-            OpenOptions::new().read(true).write(true).create(true).truncate(true).mode(0o640).open(path)?;
+        // Not that file itself: whoever waits for a disk yet may go on to write to it.
+        if let Err(error) = fs::remove_file(path)
+            && error.kind() != io::ErrorKind::NotFound
+        {
+            return Err(error);
+        }
+        let file = OpenOptions::new().read(true).write(true).create_new(true).mode(0o640).open(path)?;
         let ring_at = (HEAD_LEN as u64 + opening.len() as u64).next_multiple_of(STEP);
         let room = room.next_multiple_of(STEP);
         // So that no other program can take the room later.
@@ -209,6 +214,20 @@ mod tests {
         let after = flight.read().unwrap();
         assert_eq!(after.last(), before.last());
         assert!(after.len() + 2 >= before.len(), "{} of {}", after.len(), before.len());
+    }
+
+    #[test]
+    fn whoever_still_writes_to_one_that_was_there_before_writes_nothing_into_the_new_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("flight.ring");
+        let mut before = Flight::create(&path, b"before", 8 << 10).unwrap();
+        let mut flight = Flight::create(&path, b"now", 8 << 10).unwrap();
+        flight.put(&numbered(1, 90));
+        flight.write().unwrap();
+        before.put(&numbered(2, 90));
+        before.write().unwrap();
+        assert_eq!(flight.read().unwrap(), [numbered(1, 90)]);
+        assert_eq!(read(&File::open(&path).unwrap()).unwrap().unwrap().0, b"now");
     }
 
     #[test]

@@ -59,7 +59,9 @@ pub(crate) use intake::{Counts, Intake, Taps};
 pub(crate) use judging::{JudgedController, Judging};
 pub(crate) use margins::{Margin, Margins, Quantity};
 pub(crate) use marks::{MarkBudget, MarkRefusal};
-pub(crate) use notes::{ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote};
+pub(crate) use notes::{
+    ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote, note_in_words,
+};
 pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning, read};
 pub(crate) use recorder::Recorder;
 pub(crate) use recording::{ACKS, About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ};

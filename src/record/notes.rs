@@ -130,6 +130,21 @@ impl Note {
     }
 }
 
+/// A note as a person reads it, of its JSON; `None` where that is something else.
+pub(crate) fn note_in_words(topic: &str, json: &str) -> Option<String> {
+    let note: Value = serde_json::from_str(json).ok()?;
+    let text = |key: &str| note[key].as_str().unwrap_or_default();
+    let or = |text: &str, other: &str| if text.is_empty() { other.to_owned() } else { text.to_owned() };
+    match topic {
+        "/event" if text("kind") == "incident" => Some(format!("incident: {}", text("text"))),
+        "/event" => Some(format!("{} {}", text("seat"), text("text")).trim_start().to_owned()),
+        "/action" => Some(format!("{}: {}, {}", text("what"), text("result"), text("who"))),
+        "/mark" => Some(format!("{}, {}", or(text("text"), "marked"), text("who"))),
+        "/log" => Some(text("message").to_owned()),
+        _ => None,
+    }
+}
+
 /// The topics of all notes, and their schemas.
 pub(super) fn topics() -> [(&'static str, Value); 6] {
     let [text, number, count] = ["string", "number", "integer"].map(|kind| json!({"type": kind}));

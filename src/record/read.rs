@@ -106,6 +106,11 @@ impl Contents {
         self.entry("rate_hz").parse().unwrap_or(100.0)
     }
 
+    /// When that happened of which it is an incident; `None` where it is of something else.
+    pub(crate) fn caused_at(&self) -> Option<MonoTime> {
+        self.entry("caused_ns").parse().ok().map(MonoTime::from_nanos)
+    }
+
     /// The most that each axis was sent to do, as the recorder measured it.
     pub(crate) fn most(&self) -> Vec<Margin> {
         self.end.get("most").and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()

@@ -101,8 +101,9 @@ struct SeatWindow {
     clamps: u64,
     /// Lost frames until the window before.
     lost: u64,
-    /// What lasts: how its group stands, and where its axes were measured to be.
+    /// What lasts: how its group stands, what of that was told last, and where its axes were measured to be.
     standing: Option<u8>,
+    told: Option<u8>,
     measured_mm: Vec<f64>,
 }
 
@@ -168,7 +169,9 @@ impl Sampled {
         for (lane, window) in self.windows.iter_mut().enumerate() {
             let mut sample = std::mem::take(&mut window.sample);
             let worst = window.worst.take();
-            let is_heard = sample.acked > 0 || sample.refused > 0 || sample.lost > 0;
+            // Of a seat that falls out there may be nothing more than that.
+            let is_news = window.standing != window.told;
+            let is_heard = sample.acked > 0 || sample.refused > 0 || sample.lost > 0 || is_news;
             match &worst {
                 Some((_, _, [asked, sent])) => {
                     (sample.asked_mm, sample.sent_mm) = (round(asked), round(sent));
@@ -177,6 +180,7 @@ impl Sampled {
             }
             if let Some(at) = worst.map(|(at, ..)| at).or_else(|| is_heard.then_some(closed_at)) {
                 (sample.standing, sample.measured_mm) = (window.standing, window.measured_mm.clone());
+                window.told = window.standing;
                 tell(at, Message::Seat(lane, sample));
             }
         }

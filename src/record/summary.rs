@@ -3,6 +3,7 @@
 use std::io::Read;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::read::{Contents, ReadError, Told, Wanted, read};
 use super::{Chunk, Falls, Margin, Margins, TickSample};
@@ -116,6 +117,9 @@ pub(crate) struct Summary {
     pub(crate) happenings: Vec<Happening>,
     /// How much more did.
     pub(crate) more: u64,
+    /// The seat that the last mark names which names one, by its place.
+    #[serde(skip)]
+    pub(crate) marked: Option<usize>,
     /// The most that each axis was sent to do: measured again where every tick is in the file, else as the recorder did.
     pub(crate) most: Vec<Margin>,
 }
@@ -171,7 +175,7 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
         match told {
             Told::Seat(lane, sample) => {
                 let seat = &mut summary.seats[lane];
-                seat.falls.take(&sample);
+                seat.falls.take(at, &sample);
                 seat.sent += u64::from(sample.sent);
                 seat.unsent += u64::from(sample.unsent);
                 seat.clamps = seat.clamps.saturating_add(sample.clamps);
@@ -188,8 +192,12 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
                 let margins = margins.get_or_insert_with(|| Margins::new(&contents.seats, rate));
                 each_chunk(&chunks, |chunk| margins.take(chunk, &contents.seats, &mut |_, _, _| ()));
             }
-            Told::Drains(_) => {}
+            // Positions of the film come all the time.
+            Told::Drains(_) | Told::Other("/timecode", _) => {}
             Told::Other(topic, data) => {
+                if topic == "/mark" {
+                    summary.marked = seat_named(contents, data).or(summary.marked);
+                }
                 let film_s = last.1.unwrap_or(0.0);
                 summary.happened(contents, at, topic, &String::from_utf8_lossy(data), film_s);
             }
@@ -197,6 +205,14 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
     })?;
     summary.most = margins.map_or_else(|| contents.most(), |margins| margins.most(&contents.seats));
     Ok((contents, summary))
+}
+
+/// The seat that the text of a mark names, as a word of its own.
+fn seat_named(contents: &Contents, mark: &[u8]) -> Option<usize> {
+    let mark: Value = serde_json::from_slice(mark).ok()?;
+    let text = mark["text"].as_str()?;
+    let mut words = text.split(|c: char| !c.is_alphanumeric() && !matches!(c, '-' | '_'));
+    words.find_map(|word| contents.seats.iter().position(|seat| seat.name.eq_ignore_ascii_case(word)))
 }
 
 /// Hands over chunks that stand one behind the other.

@@ -168,6 +168,39 @@ fn what_is_heard_of_a_seat_without_frames_is_told_of_the_show_time_then() {
 }
 
 #[test]
+fn a_seat_that_falls_out_is_told_in_that_window_though_nothing_more_is_heard_of_it() {
+    let (Taps { ticks: mut tap, mut acks }, mut intake) =
+        Intake::new(vec![seat()], Rate::from_hz(100.0), SAMPLE_HZ);
+    let mut told = Vec::new();
+    for tick in 0..60 {
+        let mut buf = [0; MAX_LEN];
+        match tick {
+            0 => acks.take(&AckRecord::Standing(0, HealthState::Ok)),
+            20 => acks.take(&AckRecord::Standing(0, HealthState::Lost)),
+            _ => {}
+        }
+        if tick < 18 {
+            tap.asked(asked(0.5));
+            tap.frame(0, frame(0.5, &mut buf), MonoTime::from_nanos(10 * tick * MS), Delivery::Sent);
+        }
+        tap.tick(&head(10 * tick));
+        acks.drained(MonoTime::from_nanos((10 * tick + 5) * MS));
+        intake.take(&mut |at, message| {
+            if let Message::Seat(_, sample) = message {
+                told.push((at, sample));
+            }
+        });
+    }
+    let mut falls = Falls::default();
+    told.iter().for_each(|(at, sample)| falls.take(*at, sample));
+    let (film_s, standing) = falls.first.expect("it fell out");
+    assert!(standing == HealthState::Lost && (0.2..0.25).contains(&film_s), "{film_s}");
+    let [at, late] = [20 * 10, 500].map(|ms| MonoTime::from_nanos(ms * MS));
+    assert!(falls.distance(at) < falls.distance(late), "it is nearer to when it did");
+    assert_eq!(told.iter().filter(|(_, sample)| sample.sent == 0).count(), 1, "and once");
+}
+
+#[test]
 fn a_sample_is_the_worst_of_its_window_and_its_counts_are_of_all() {
     // For one tick of the second window the seat was asked for 15 mm more than it was sent.
     let file = recorded((0..10).map(|tick| (if tick == 7 { 0.6 } else { 0.5 }, 0.5)));

@@ -434,8 +434,22 @@ fn a_moment_is_marked_by_a_key_and_its_recording_is_looked_at_seat_by_seat() {
     let margin = text(&browser, "#history tbody tr td:nth-child(4)");
     assert!(margin.contains("% left, axis ") && margin.contains(" a"), "{margin}");
     assert!(text(&browser, "#history tbody tr td:nth-child(2)").to_lowercase().contains("swell"));
+    // On a tablet the button of each is in view, however much else its table has.
+    browser.resize(1024, 768);
+    for table in ["history", "recordings"] {
+        let is_seen = "const [button, panel] = [row.querySelector('button'), row.closest('.panel')].map((one) => one.getBoundingClientRect()); \
+             return button.left > panel.left && button.right <= panel.right";
+        let is_seen = format!("const row = document.querySelector('#{table} tbody tr'); {is_seen}");
+        assert_eq!(browser.eval(&is_seen), true, "{table}");
+    }
+    browser.shot("33-recordings-on-a-tablet");
     browser.press("#history tbody tr button");
     browser.wait("document.getElementById('picture').naturalWidth > 500");
+    let width = "return document.getElementById('picture').getBoundingClientRect().width";
+    assert!(browser.eval(width).as_f64() < Some(700.0), "it fits its column");
+    browser.press("#picture-large");
+    assert_eq!(browser.eval(width).as_f64(), Some(1_200.0));
+    browser.press("#picture-large");
     assert!(text(&browser, "#picture-title").contains("show"));
     browser.shot("32-history-of-shows");
     // The incident is the newer of the two.

@@ -1,10 +1,11 @@
 //! Disks that fail as disks do: recordings on a file system of their own, in a mount namespace of the service, that errors set
-//! read-only or that answers everything with an error.
+//! read-only, that answers everything with an error, or that answers no write at all.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::hall::Hall;
@@ -30,8 +31,7 @@ impl Disk {
         let mut hall = Hall::closed(&[], |config| format!("{config}[record]\nmin_free_gib = 0.0\n"));
         let (image, folder) = (hall.path("disk.img"), hall.path("state/recordings"));
         std::fs::create_dir_all(&folder).expect("a folder");
-        let probe =
-            "mkfs.ext4 -q -F \"$1\" 64M && command -v nsenter python3 && mount -t ext4 -o loop \"$1\" \"$2\"";
+        let probe = "mkfs.ext4 -q -F \"$1\" 64M && command -v nsenter python3 fsfreeze && mount -t ext4 -o loop \"$1\" \"$2\"";
         let tried = own_namespace(probe, &image, &folder).output();
         if !tried.as_ref().is_ok_and(|one| one.status.success()) {
             // Straight to the standard error: the test harness keeps what a passed test prints.
@@ -95,6 +95,22 @@ impl Disk {
     }
 }
 
+/// A disk that answers no write until this is dropped.
+struct StandsStill<'d>(&'d Disk);
+
+impl<'d> StandsStill<'d> {
+    fn begin(disk: &'d Disk) -> Self {
+        disk.inside(&["fsfreeze", "--freeze"]);
+        Self(disk)
+    }
+}
+
+impl Drop for StandsStill<'_> {
+    fn drop(&mut self) {
+        self.0.inside(&["fsfreeze", "--unfreeze"]);
+    }
+}
+
 fn own_namespace(script: &str, image: &Path, folder: &Path) -> Command {
     let mut command = Command::new("unshare");
     command.args(["--mount", "sh", "-c", script, "sh"]).args([image, folder]);
@@ -111,4 +127,38 @@ fn a_disk_that_errors_set_read_only_in_mid_show_is_told_in_five_seconds_and_the_
 fn a_disk_that_answers_with_errors_in_mid_show_is_told_in_five_seconds_and_the_show_goes_on() {
     let Some(disk) = Disk::open() else { return };
     disk.breaks(|disk| disk.inside(&["python3", "-c", SHUT_DOWN]), "Input/output error");
+}
+
+#[test]
+fn a_disk_that_stands_still_in_mid_show_is_told_in_five_seconds_and_holds_up_neither_the_show_nor_a_reload() {
+    let Some(disk) = Disk::open() else { return };
+    let hall = &disk.hall;
+    hall.play("night");
+    hall.wait(|status| status["record"]["recording"].is_string());
+    hall.rises(0);
+    let still = StandsStill::begin(&disk);
+    let began = hall.status();
+    let told = hall.wait(|status| status["record"]["troubles"]["show"].is_string());
+    let ticks = |status: &Value| status["ticks"].as_u64().expect("a count");
+    assert!(ticks(&told) - ticks(&began) <= 500, "{} ticks of 10 ms later", ticks(&told) - ticks(&began));
+    let trouble = told["record"]["troubles"]["show"].as_str().expect("text");
+    assert!(trouble.contains("state/recordings: the disk answers no write"), "{trouble}");
+    let warnings = told["warnings"].as_array().expect("a list");
+    assert!(warnings.iter().any(|one| one["id"] == "record-show"), "{warnings:?}");
+    hall.done(&["park"]);
+    assert_eq!(hall.comes_to("parked")["missed_ticks"], 0);
+    // The hall is opened anew, with a recorder of its own; the one before still waits.
+    hall.serving().signal(Signal::HUP);
+    hall.wait(|status| status["ticks"].as_u64() < Some(ticks(&told)) && status["state"] == "parked");
+    drop(still);
+    let names = || {
+        let all = std::fs::read_dir(format!("/proc/{}/root{}", disk.pid, disk.folder().display()));
+        let name = |entry: std::fs::DirEntry| entry.file_name().into_string().expect("text");
+        all.expect("it is there")
+            .flatten()
+            .map(name)
+            .filter(|name| name.contains("-show-"))
+            .collect::<Vec<_>>()
+    };
+    hall.wait(|_| matches!(&names()[..], [one] if one.ends_with("-show-night.mcap")));
 }

@@ -144,11 +144,11 @@ fn a_marked_moment_is_kept_with_what_was_before_it_at_full_rate() {
     let hall = Hall::open();
     hall.play("night");
     hall.rises(0);
-    let marked = hall.done(&["mark", "A1 jerked"]);
+    let marked = hall.done(&["mark", "a2 jerked!"]);
     assert!(marked.stderr.contains("marked at "), "{marked:?}");
     let recorded = Recorded::read(&closed(&hall, "-incident-mark"));
     let (_, at, mark) = recorded.of("/mark").next().expect("it is marked");
-    assert_eq!(mark["text"], "A1 jerked");
+    assert_eq!(mark["text"], "a2 jerked!");
     assert!(mark["film_s"].as_f64().unwrap() > 0.0, "{mark}");
     let first = recorded.messages.first().expect("there are some").1;
     let last = recorded.messages.last().expect("there are some").1;
@@ -156,6 +156,66 @@ fn a_marked_moment_is_kept_with_what_was_before_it_at_full_rate() {
     assert!(recorded.full > 10, "{} blocks", recorded.full);
     assert!(hall.status()["state"] == "playing", "it plays on");
     assert_eq!(hall.status()["record"]["incidents"]["mark"], 1);
+    // Its picture is of the seat that the words name, with one flag for the mark.
+    let path = closed(&hall, "-incident-mark");
+    let at = format!("/api/v1/recordings/{}/picture", path.file_name().unwrap().to_str().unwrap());
+    let picture = hall.socket().get(&at).value();
+    assert_eq!(picture["seat"], "A2");
+    assert_eq!(picture["svg"].as_str().unwrap().matches(">a2 jerked!<").count(), 1);
+    assert_eq!(picture["svg"].as_str().unwrap().matches(">mark").count(), 0);
+}
+
+#[test]
+fn the_picture_of_an_incident_is_of_the_seat_that_fell_out_and_says_so_in_one_sentence() {
+    let hall = Hall::open();
+    hall.play("night");
+    hall.rises(0);
+    hall.relay(1).pull();
+    hall.wait(|status| status["record"]["incidents"]["lost-seat"] == 1);
+    hall.relay(1).put_back();
+    let path = closed(&hall, "-incident-lost-seat");
+    let at = format!("/api/v1/recordings/{}/picture", path.file_name().unwrap().to_str().unwrap());
+    let picture = hall.socket().get(&at).value();
+    let sentence = picture["sentence"].as_str().unwrap();
+    assert_eq!(picture["seat"], "A2");
+    assert!(sentence.starts_with("A2 at 00:") && sentence.contains(": fell out (lost), "), "{sentence}");
+    assert_eq!(sentence.matches("A2").count(), 1, "one sentence: {sentence}");
+}
+
+#[test]
+fn what_the_flight_recorder_holds_is_dumped_as_a_file_that_is_read_like_any_other() {
+    let hall = Hall::open();
+    hall.play("ride");
+    hall.comes_to("parked");
+    let dumped = hall.done(&["record", "dump", "--json"]);
+    let status: Value = serde_json::from_str(&dumped.stdout).expect("JSON");
+    assert_eq!(status["state"], "parked");
+    let path = closed(&hall, "-incident-dump");
+    let recorded = Recorded::read(&path);
+    assert!(recorded.of("/mark").next().is_none() && recorded.full > 0, "nobody marked anything");
+    let metadata = recorded.metadata();
+    assert_eq!((&*metadata["kinocue"]["of"], &*metadata["kinocue"]["cause"]), ("incident", "dump"));
+    // It has all of the show that was before, and what is said of it is what the show's own file says.
+    let show = Recorded::read(&closed_show(&hall));
+    for key in ["sent", "acked", "lost", "clamps"] {
+        assert_eq!(recorded.sum("/seat/A2", key), show.sum("/seat/A2", key), "{key}");
+    }
+    let of = |args: &[&str]| {
+        let run = hall.run(&[args, &[path.to_str().unwrap()]].concat());
+        assert_eq!(run.code, Some(0), "{run:?}");
+        run.stdout
+    };
+    let info = of(&["record", "info"]);
+    assert!(info.contains("full recording of dump, 100 Hz") && info.contains("A1 ok: "), "{info}");
+    assert!(info.contains("/action go: done, "), "{info}");
+    assert!(of(&["replay"]).contains("no difference"));
+    let refused = hall.run(&["convert", path.to_str().unwrap(), hall.path("a.csv").to_str().unwrap()]);
+    assert!(refused.code == Some(65) && refused.stderr.contains("--take sent` makes a cue"), "{refused:?}");
+}
+
+fn closed_show(hall: &Hall) -> PathBuf {
+    let name = files(hall).into_iter().find(|name| name.ends_with("-show-ride.mcap")).expect("it is closed");
+    hall.path("state/recordings").join(name)
 }
 
 #[test]

@@ -130,6 +130,20 @@ fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
     let most: Value = serde_json::from_str(info["end"]["most"].as_str().expect("JSON in it")).expect("JSON");
     assert_eq!(most, info["most"], "measured again, the same comes nearest");
     assert!(of(&["record", "list", text(path.parent().expect("a folder"))]).contains("nod.mcap"));
+    // Each curve of the layout for viewers has figures in the file.
+    let layout: Value = serde_json::from_str(&of(&["record", "layout", "--seat", "F4"])).expect("JSON");
+    let file = std::fs::read(&path).expect("it is there");
+    let panels = layout["configById"].as_object().expect("panels").values();
+    let paths: Vec<&str> = panels
+        .flat_map(|one| one["paths"].as_array().expect("paths"))
+        .filter_map(|one| one["value"].as_str())
+        .collect();
+    assert_eq!(paths.len(), 6 + 2 + 4 + 2, "{paths:?}");
+    for path in paths {
+        let (topic, field) = path.split_once('.').expect("a field");
+        let field = field.split('[').next().expect("a name");
+        assert!(messages(&file, topic).iter().any(|one| !one[field].is_null()), "{path}");
+    }
     let said = of(&["plot", text(&path), "--seat", "F4"]);
     let sentence = said.lines().nth(1).expect("a sentence");
     assert!(sentence.starts_with("F4: sent as it was asked for; "), "{sentence}");

@@ -120,6 +120,10 @@ fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
         return Err(io::ErrorKind::AlreadyExists.into());
     }
     let result = copy(path, &fresh, may).and_then(|()| {
+        // It was closed after all: by a recorder whose disk stood still.
+        if whole.try_exists()? {
+            return Err(io::ErrorKind::AlreadyExists.into());
+        }
         fs::rename(&fresh, &whole)?;
         fs::remove_file(path)
     });

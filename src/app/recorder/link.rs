@@ -1,8 +1,10 @@
 //! The way to a recorder: what it is told, bounded and never waited for; and how it stands.
 
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::Duration;
 
 use crate::control::RecordStatus;
 use crate::record::{IncidentCause, MarkBudget, MarkNote, MarkRefusal, Note};
@@ -11,6 +13,9 @@ use crate::time::{Clock as _, MonoTime};
 
 /// What waits at the most; more is lost, and counted.
 const WAITING: usize = 1_024;
+/// A recorder that has not looked at its taps for so long waits for a disk, or for a turn, and cannot say so itself; the taps hold two
+/// seconds.
+const STILL: Duration = Duration::from_secs(3);
 
 /// A show, or what else is recorded as one.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -83,6 +88,10 @@ struct SharedFigures {
     /// Octets that a second of a show takes, and for which there is room, what may go for them included; 0 where nothing is known.
     octets_a_s: AtomicU64,
     room: AtomicU64,
+    /// When the recorder looked at its taps last, ns; 0 where none does.
+    looked_at: AtomicU64,
+    /// The folder of recordings.
+    dir: OnceLock<PathBuf>,
     status: Mutex<RecordStatus>,
     marks: Mutex<MarkBudget>,
 }
@@ -126,11 +135,50 @@ impl RecordLink {
         self.shared.marks.lock().unwrap_or_else(PoisonError::into_inner).take_more()
     }
 
-    /// How it stands.
-    pub(crate) fn status(&self) -> RecordStatus {
+    /// How it stands, by its own words.
+    pub(super) fn status(&self) -> RecordStatus {
         let mut status = self.shared.status.lock().unwrap_or_else(PoisonError::into_inner).clone();
         status.dropped_notes = self.shared.dropped.load(Ordering::Relaxed);
         status
+    }
+
+    /// How it stands now: also that it waits for a disk, which it cannot say itself.
+    pub(crate) fn status_at(&self, now: MonoTime) -> RecordStatus {
+        let mut status = self.status();
+        let looked_at = self.shared.looked_at.load(Ordering::Relaxed);
+        if looked_at > 0 && now.since(MonoTime::from_nanos(looked_at)) >= STILL {
+            let dir = self.dir().display().to_string();
+            let trouble = format!(
+                "nothing is recorded: {dir}: the disk answers no write, or other programs take all processors; look at that disk, or set \
+                 [record] dir to a folder on another; the show goes on, and so does the recording once it can"
+            );
+            status.troubles.insert(RecordPart::Show.word().to_owned(), trouble);
+        }
+        status
+    }
+
+    /// The folder of recordings.
+    pub(super) fn dir(&self) -> PathBuf {
+        self.shared.dir.get().cloned().unwrap_or_default()
+    }
+
+    /// The recorder writes there, and begins to look.
+    pub(super) fn begins(&self, dir: &Path, now: MonoTime) {
+        let _ = self.shared.dir.set(dir.to_owned());
+        self.looks(now);
+    }
+
+    /// It looks at its taps; that the last time was long ago counts as an error.
+    pub(super) fn looks(&self, now: MonoTime) {
+        let before = self.shared.looked_at.swap(now.as_nanos(), Ordering::Relaxed);
+        if before > 0 && now.since(MonoTime::from_nanos(before)) >= STILL {
+            self.tell(|status| status.errors += 1);
+        }
+    }
+
+    /// It looks no more.
+    pub(super) fn ends(&self) {
+        self.shared.looked_at.store(0, Ordering::Relaxed);
     }
 
     /// A second of a show takes so much.

@@ -11,6 +11,7 @@ mod worker;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{self, Builder, JoinHandle};
 use std::time::Duration;
 
@@ -36,6 +37,8 @@ const FLIGHT_FILE: &str = "flight.ring";
 /// Octets that it may have at the most.
 const MOST_FLIGHT: u64 = 128 << 20;
 const LEAST_FLIGHT: u64 = 1 << 20;
+/// How long a recorder has to write what it has once its hall has closed; all that it waits for is a disk.
+const RECORDER_ENDS: Duration = Duration::from_secs(10);
 
 /// Where a recorder has its files.
 #[derive(Debug, Clone)]
@@ -52,7 +55,8 @@ pub(crate) struct RecordPlaces {
 #[derive(Debug)]
 pub(crate) struct HallRecorder {
     link: RecordLink,
-    thread: Option<JoinHandle<()>>,
+    /// Its thread, and what ends as it does.
+    thread: Option<(JoinHandle<()>, Receiver<()>)>,
     flight: PathBuf,
 }
 
@@ -91,15 +95,19 @@ impl HallRecorder {
         let worker = Worker::new(intake, asks, link.clone(), opening, maker, disk, config.record.clone());
         let safe = safe_configuration(&text);
         let told = link.clone();
+        link.begins(&places.recordings, clocks.0);
+        let (ends, ended) = channel();
         let (live, ring) = (runtime.control().live, flight.clone());
         let thread = Builder::new().name("recorder".to_owned()).spawn(move || {
             realtime::stand_back();
+            let _ends: Sender<()> = ends;
             let _told = TellsOfPanic(told);
             let worker = worker.attaching(safe).flying(&ring, flight_len);
             worker.clear_up(leftover, move || !live.is_moving());
             worker.run(&Monotonic);
         });
         if let Err(error) = &thread {
+            link.ends();
             link.trouble(
                 RecordPart::Show,
                 Some(format!("nothing is recorded: no thread could be started: {error}")),
@@ -107,7 +115,7 @@ impl HallRecorder {
         } else {
             runtime.record(taps);
         }
-        Self { link, thread: thread.ok(), flight }
+        Self { link, thread: thread.ok().map(|thread| (thread, ended)), flight }
     }
 
     /// The way to it.
@@ -115,17 +123,31 @@ impl HallRecorder {
         self.link.clone()
     }
 
-    /// Waits until what came through its taps is written; these are gone by now.
-    pub(crate) fn end(self) {
+    /// Waits until what came through its taps is written; these are gone by now. Not for a disk that stands still: what is left is
+    /// recovered at the next start, like that of a thread that panicked.
+    ///
+    /// # Errors
+    /// Where it is left.
+    pub(crate) fn end(self) -> Result<(), RecorderWaits> {
         self.link.put(RecordAsk::Close);
-        let Some(thread) = self.thread else { return };
-        // One that panicked has said so, and its files are recovered at the next start.
+        let Some((thread, ended)) = self.thread else { return Ok(()) };
+        if ended.recv_timeout(RECORDER_ENDS) == Err(RecvTimeoutError::Timeout) {
+            return Err(RecorderWaits(self.link.dir()));
+        }
         if thread.join().is_ok() {
             // An end in order leaves nothing to be recovered.
             let _ = fs::remove_file(&self.flight);
         }
+        Ok(())
     }
 }
+
+/// A recorder whose disk answers no write.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{}: the disk answers no write, and the last recording is not closed; look at that disk; the next start repairs the file", .0.display()
+)]
+pub(crate) struct RecorderWaits(PathBuf);
 
 /// Says so where the thread that has it panics: the hall goes on.
 struct TellsOfPanic(RecordLink);
@@ -133,6 +155,7 @@ struct TellsOfPanic(RecordLink);
 impl Drop for TellsOfPanic {
     fn drop(&mut self) {
         if thread::panicking() {
+            self.0.ends();
             self.0.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
             let text = "recording has stopped: the recorder failed; restart the service between two shows";
             self.0.trouble(RecordPart::Show, Some(text.to_owned()));

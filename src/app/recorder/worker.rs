@@ -142,6 +142,7 @@ impl Worker {
 
     /// Takes what is there, and minds what is due.
     fn look(&mut self, now: MonoTime) {
+        self.link.looks(now);
         self.take_asks(now);
         self.take_taps();
         self.mind_ends(now);
@@ -405,6 +406,7 @@ impl Worker {
         self.close_show(now);
         self.close_incident(now);
         self.link.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
+        self.link.ends();
     }
 }
 

@@ -394,7 +394,12 @@ impl Supervisor {
     /// How all of it stands.
     fn status(&self) -> Status {
         let Self { hall, features, .. } = self;
-        let parts = StatusParts { hall, features, record: &hall.recorder.status(), began: self.ports.began };
+        let parts = StatusParts {
+            hall,
+            features,
+            record: &hall.recorder.status_at(hall.now),
+            began: self.ports.began,
+        };
         let table = hall.live.table();
         let warnings = parts.warnings(&table, &self.notes, self.ports.settings_file.trouble());
         parts.status(&table, warnings)

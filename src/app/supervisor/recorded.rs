@@ -215,7 +215,7 @@ pub(super) fn dump(hall: &HallContext) -> Result<Vec<Act>, Problem> {
 }
 
 fn records(hall: &HallContext) -> Result<(), Problem> {
-    let status = hall.recorder.status();
+    let status = hall.recorder.status_at(hall.now);
     if status.flight_s > 0.0 || status.recording.is_some() {
         return Ok(());
     }
@@ -227,7 +227,7 @@ fn records(hall: &HallContext) -> Result<(), Problem> {
 pub(super) fn lacks_room(hall: &HallContext) -> Option<String> {
     let length_s = hall.cued.as_ref()?.timeline.duration().as_secs_f64();
     let (needs, room) = hall.recorder.lacks(length_s)?;
-    if hall.recorder.status().recording.is_some() {
+    if hall.recorder.status_at(hall.now).recording.is_some() {
         return None;
     }
     #[expect(clippy::cast_precision_loss, reason = "to a tenth")]
@@ -281,7 +281,7 @@ mod tests {
         assert_eq!((told.iter().filter(is_mark).count(), told.len()), (1, 1 + 3), "{told:?}");
         let RecordAsk::Keep(Note::Action(last)) = &told[3] else { panic!("{told:?}") };
         assert!(last.result.ends_with(", 998 times"), "{last:?}");
-        assert_eq!(hall.recorder.status().more_marks, 999);
+        assert_eq!(hall.recorder.status_at(hall.now).more_marks, 999);
     }
 
     #[test]

@@ -14,7 +14,7 @@ const PRINTED: usize = 20;
 /// Compares two recordings by show time: how far the sent positions differ, for each axis of each seat, how much later the second was, and
 /// what happened in one alone.
 ///
-/// Exits with 1 if an axis differs by more than the tolerance.
+/// Exits with 1 if an axis differs by more than the tolerance, a seat is in one alone, or nothing could be compared.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue record compare before.mcap ride.mcap --tolerance 0.1mm")]
 pub(in super::super) struct Args {

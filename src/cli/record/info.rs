@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::super::{Exit, Failure, print};
 use super::{flaws, open, shown, unread, wall};
-use crate::record::{Contents, Margin, Quantity, Summary, summarize};
+use crate::record::{Contents, Margin, Quantity, Summary, note_in_words, summarize};
 use crate::time::ShowTime;
 
 /// Above this part of a limit what was sent is a fault of ours.
@@ -73,8 +73,8 @@ fn seats(summary: &Summary) -> String {
     for seat in &summary.seats {
         let part = |quantity| {
             let of_seat = summary.most.iter().filter(|one| one.seat == seat.name && one.quantity == quantity);
-            let most = of_seat.map(Margin::part).fold(0.0, f64::max);
-            format!("{:.0} %", 100.0 * most)
+            let most = of_seat.map(Margin::part).reduce(f64::max);
+            most.map_or_else(|| "–".to_owned(), |most| format!("{:.0} %", 100.0 * most))
         };
         let [speed, acceleration, jerk] = Quantity::ALL.map(part);
         let apart = format!("{:.2}", seat.apart);
@@ -92,11 +92,15 @@ fn seats(summary: &Summary) -> String {
 fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
     let mut out = String::new();
     let mut line = |text: std::fmt::Arguments<'_>| put(&mut out, text);
-    let entry = |key| shown(contents.entry(key));
+    let entry = |key| match contents.entry(key) {
+        "" => "–".to_owned(),
+        text => shown(text),
+    };
+    let of = ["cue", "cause", "of"].into_iter().find(|key| !contents.entry(key).is_empty()).unwrap_or("cue");
     line(format_args!(
         "{name}: {} recording of {}, {} Hz, by {}",
         entry("mode"),
-        entry("cue"),
+        entry(of),
         entry("rate_hz"),
         entry("program")
     ));
@@ -133,7 +137,8 @@ fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
         line(format_args!("  attached  {}, {size} bytes", shown(name)));
     }
     for one in summary.happenings.iter().take(PRINTED) {
-        line(format_args!("  {} film {} {} {}", wall(one.wall_ns), film(one.film_s), one.topic, one.text));
+        let text = note_in_words(&one.topic, &one.text).map_or_else(|| one.text.clone(), |text| shown(&text));
+        line(format_args!("  {} film {} {} {text}", wall(one.wall_ns), film(one.film_s), one.topic));
     }
     let more = summary.more + summary.happenings.len().saturating_sub(PRINTED) as u64;
     if more > 0 {

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::super::{Exit, Failure, print};
 
-/// Prints a Foxglove and Lichtblick layout for one seat: asked and sent positions, lateness, states.
+/// Prints a Foxglove and Lichtblick layout for one seat: asked and sent positions, lateness and acks, what went wrong, states.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue record layout --seat c1 > c1.json")]
 pub(in super::super) struct Args {
@@ -23,12 +23,16 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         .flat_map(|axis| ["asked", "sent"].map(|what| format!("/seat/{seat}.{what}_mm[{axis}]")));
     let plot =
         |title: String, paths: Vec<_>| json!({"title": title, "paths": paths, "xAxisVal": "timestamp"});
-    let late = ["/tick.late_max_us".to_owned(), format!("/seat/{seat}.clamps")];
-    let states = [json!({"value": "/hall.state", "timestampMethod": "receiveTime"})];
+    let of_seat = |what: &str| format!("/seat/{seat}.{what}");
+    let late = ["/tick.late_max_us".to_owned(), of_seat("ack_max_us")];
+    let wrong = ["clamps", "lost", "refused", "unsent"].map(of_seat);
+    let states = ["/hall.state".to_owned(), of_seat("standing")]
+        .map(|value| json!({"value": value, "timestampMethod": "receiveTime"}));
     print::json(&json!({
         "configById": {
             "Plot!p": plot(format!("{seat}, mm"), places.map(path).collect()),
-            "Plot!t": plot("late, µs; clamps".to_owned(), late.map(path).to_vec()),
+            "Plot!t": plot("late, acks, µs".to_owned(), late.map(path).to_vec()),
+            "Plot!w": plot("held back, lost, refused, not taken".to_owned(), wrong.map(path).to_vec()),
             "StateTransitions!s": {"paths": states},
         },
         "globalVariables": {},
@@ -37,7 +41,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         "layout": {
             "direction": "column",
             "first": "Plot!p",
-            "second": {"direction": "column", "first": "Plot!t", "second": "StateTransitions!s"},
+            "second": {
+                "direction": "column",
+                "first": "Plot!t",
+                "second": {"direction": "column", "first": "Plot!w", "second": "StateTransitions!s"},
+            },
         },
     }))?;
     Ok(Exit::Done)

@@ -15,6 +15,9 @@ const METADATA: &str = "kinocue";
 /// The version of the layout of topics and messages.
 const VERSION: &str = "1";
 
+/// What a recording is told of by whoever takes it for a cue.
+const RECORDING: &str = "it is a recording; `kinocue convert FILE OUT --seat NAME --take sent` makes a cue of what a seat was sent";
+
 /// The topics of a cue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Topic {

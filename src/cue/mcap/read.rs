@@ -17,7 +17,7 @@ use super::super::limits::{
 use super::super::problem::Problem;
 use super::super::unit::DeclaredUnits;
 use super::super::{Cue, Effects, Marker, Origin, Steps, title_of, value};
-use super::{METADATA, Topic, VERSION, message};
+use super::{METADATA, RECORDING, Topic, VERSION, message};
 use crate::channel::{ChannelId, Sample};
 use crate::container::{self, ChannelRecord, Trouble};
 use crate::motion::MAX_AXES;
@@ -136,6 +136,9 @@ impl McapReading {
             op::METADATA => {
                 let (name, entries) = container::metadata(body).ok_or_else(|| broken("metadata"))?;
                 if name == METADATA {
+                    if entries.get("kind") == Some(&"recording") {
+                        return Err(Problem::Foreign(RECORDING.to_owned()));
+                    }
                     self.declare(&entries);
                 }
             }

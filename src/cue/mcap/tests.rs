@@ -206,6 +206,9 @@ fn foreign_files_are_refused() {
          interpolation: \"sine\" is not known; interpolations are spline, monotone, linear or hold"
     );
     assert!(
+        faults(&file(&[("kind", "recording"), ("version", "2")], &[])).contains("--take sent` makes a cue")
+    );
+    assert!(
         faults(&file(FRACTION, &[("/cue/axes", 1, r#"{"a":[0]}"#)]))
             .ends_with("the first time is 1 ns and must be 0")
     );

@@ -115,12 +115,39 @@ pub(super) struct SeatCounts {
     pub(super) late_us: f64,
     pub(super) late_at: Moment,
     pub(super) ack_us: f64,
+    pub(super) level: LevelRamps,
     /// The greatest distance of asked and sent, and when.
     pub(super) apart: f64,
     pub(super) apart_at: Moment,
     /// How long they were apart in one piece, about the greatest; and the piece that is not over, with its own greatest.
     pub(super) held: f64,
     pub(super) piece: Option<(MonoTime, f64)>,
+}
+
+/// Changes of a seat's level, each from where it turns to where it turns or rests again.
+#[derive(Debug, Default)]
+pub(super) struct LevelRamps {
+    last: Option<f64>,
+    /// The one that goes on: from where, and since when.
+    now: Option<(f64, Moment)>,
+    /// The greatest, of several the last: from where, to where, and when it began.
+    pub(super) most: Option<(f64, f64, Moment)>,
+}
+
+impl LevelRamps {
+    pub(super) fn take(&mut self, level: f64, moment: Moment) {
+        let Some(last) = self.last.replace(level) else { return };
+        let step = level - last;
+        if step == 0.0 {
+            self.now = None;
+            return;
+        }
+        let goes_on = self.now.filter(|(from, _)| (last - from) * step >= 0.0);
+        let (from, at) = *self.now.insert(goes_on.unwrap_or((last, moment)));
+        if self.most.is_none_or(|(begin, end, _)| (level - from).abs() >= (end - begin).abs()) {
+            self.most = Some((from, level, at));
+        }
+    }
 }
 
 impl Gathered {
@@ -184,7 +211,7 @@ impl Gathered {
     fn seat(&mut self, at: MonoTime, sample: &SeatSample) {
         let Some((column, moment)) = self.place(at, sample.film_s) else { return };
         let falls = self.falls.count;
-        self.falls.take(sample);
+        self.falls.take(at, sample);
         self.on(OUT, column, self.falls.count - falls);
         self.measured.take(column, sample.measured_mm.iter().copied());
         let counts = &mut self.counts;
@@ -202,6 +229,9 @@ impl Gathered {
         }
         if !self.is_whole {
             self.frame(at, moment, column, [&sample.asked_mm, &sample.sent_mm]);
+            if !sample.asked_mm.is_empty() {
+                self.counts.level.take(sample.level, moment);
+            }
             self.counts.sent += u64::from(sample.sent);
             self.counts.unsent += u64::from(sample.unsent);
             self.counts.clamps += sample.clamps;
@@ -277,6 +307,7 @@ impl Gathered {
                 let (asked, sent) = (seat.asked(&frame.asked), seat.sent(&frame));
                 self.frame(at, moment, column, [&asked, &sent]);
                 if !asked.is_empty() {
+                    self.counts.level.take(frame.asked.level, moment);
                     let more = frame
                         .asked
                         .clamps
@@ -343,6 +374,9 @@ fn flag_name(topic: &str, data: &[u8], seat: &str) -> Option<String> {
     let text = |key: &str| note[key].as_str().unwrap_or_default();
     let of = text("seat");
     match topic {
+        // A mark has a flag of its own, whoever else tells of it.
+        "/event" if (text("kind"), text("text")) == ("incident", "mark") => None,
+        "/action" if text("what").split(' ').next() == Some("mark") => None,
         "/event" if of == seat || of.is_empty() => Some(text("text").to_owned()),
         "/event" => None,
         "/action" if text("result") == "done" => Some(text("what").to_owned()),

@@ -136,7 +136,7 @@ mod tests {
             let gone = drawn_of(mode, &recorded_falling(mode, ticks(), stays), 300);
             assert!(gone.sentence.starts_with("A1 at 00:01.5"), "{}", gone.sentence);
             assert!(
-                gone.sentence.contains(": fell out (lost), not back in what is shown. "),
+                gone.sentence.contains(": fell out (lost), not back in what is shown; "),
                 "{}",
                 gone.sentence
             );
@@ -146,6 +146,19 @@ mod tests {
             let back = drawn_of(mode, &recorded_falling(mode, ticks(), comes_back), 300);
             assert!(back.sentence.contains("fell out (lost), back in play at 00:02.0"), "{}", back.sentence);
         }
+    }
+
+    #[test]
+    fn the_greatest_change_of_a_level_is_told_from_where_it_turned() {
+        let axis = FilmAxis::of_film(0.0, 10.0, 100);
+        let mut ramps = super::gather::LevelRamps::default();
+        // Down to a half, up again before it rests, and a little down.
+        for (tick, level) in (0_u32..).zip([1.0, 0.8, 0.6, 0.5, 0.7, 0.9, 0.9, 0.85]) {
+            let moment = axis.moment(crate::time::MonoTime::default(), f64::from(tick)).unwrap();
+            ramps.take(level, moment);
+        }
+        let (from, to, at) = ramps.most.unwrap();
+        assert_eq!((from, to, at.film_s), (1.0, 0.5, 1.0));
     }
 
     /// The film ran from 0 to 2 s, from 1 to 2.5 s and from 0.5 to 1.5 s, with the seat at another place each time; after that it stood

@@ -8,6 +8,10 @@ use crate::time::ShowTime;
 
 /// A tick is late from here on, µs.
 const LATE_US: f64 = 1_000.0;
+/// An ack is late from here on, µs: without one for so long a seat falls out.
+const ACK_US: f64 = 50_000.0;
+/// A level has changed from here on.
+const LEVEL: f64 = 0.05;
 
 /// To two places where that is little.
 pub(super) fn places(value: f64) -> String {
@@ -32,17 +36,26 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
         return format!("{name}: nothing was sent in what is shown.");
     }
     let held = counts.apart > APART || counts.clamps > 0;
-    let mut words = fallen(name, &gathered.falls);
+    let fell = fallen(&gathered.falls);
+    let mut words = match &fell {
+        Some((at, how)) => format!("{name} at {at}: {how}; "),
+        None if held => format!("{name} at {}: ", counts.apart_at),
+        None => format!("{name}: "),
+    };
     words += &if held {
-        let at = counts.apart_at;
         // From tick to tick it is one period longer than from the first instant to the last.
         let ms = 1_000.0 * (counts.held + if gathered.is_whole { 1.0 / rate_hz } else { 0.05 });
         let about = if gathered.is_whole { "" } else { "about " };
-        let how_far = places(counts.apart);
-        format!("{name} at {at}: held back by the limiter for {about}{ms:.0} ms, by up to {how_far} mm")
+        let at = if fell.is_some() { format!(" at {}", counts.apart_at) } else { String::new() };
+        format!("held back by the limiter for {about}{ms:.0} ms{at}, by up to {} mm", places(counts.apart))
+    } else if fell.is_some() {
+        "otherwise sent as it was asked for".to_owned()
     } else {
-        format!("{name}: sent as it was asked for")
+        "sent as it was asked for".to_owned()
     };
+    if let Some((from, to, at)) = counts.level.most.filter(|(from, to, _)| (to - from).abs() >= LEVEL) {
+        words += &format!("; its level went from {:.0} % to {:.0} % at {at}", 100.0 * from, 100.0 * to);
+    }
     let late = if counts.missed > 0 {
         format!("{} ticks missed", counts.missed)
     } else if counts.late_us > LATE_US {
@@ -57,6 +70,9 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
         (lost, refused, _) => format!("{lost} lost, {refused} refused"),
     };
     words += &format!("; {late}, {acks}");
+    if counts.ack_us > ACK_US {
+        words += &format!(", the slowest ack after {:.0} ms", counts.ack_us / 1e3);
+    }
     if counts.unsent > 0 {
         words += &format!(", {} not taken by the kernel", counts.unsent);
     }
@@ -66,9 +82,9 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
     words + "."
 }
 
-/// That a seat fell out, which is graver than all else; empty where it did not.
-fn fallen(name: &str, falls: &Falls) -> String {
-    let Some((at, standing)) = falls.first else { return String::new() };
+/// When a seat fell out, and that it did, which is graver than all else; `None` where it did not.
+fn fallen(falls: &Falls) -> Option<(ShowTime, String)> {
+    let (at, standing) = falls.first?;
     let time = ShowTime::from_secs_f64;
     let back = match falls.back_s {
         Some(back) => format!("back in play at {}", time(back)),
@@ -76,13 +92,17 @@ fn fallen(name: &str, falls: &Falls) -> String {
     };
     let times =
         if falls.count > 1 { format!(" for the first of {} times", falls.count) } else { String::new() };
-    format!("{name} at {}: fell out{times} ({standing}), {back}. ", time(at))
+    Some((time(at), format!("fell out{times} ({standing}), {back}")))
 }
 
 pub(super) fn facts(contents: &Contents, summary: &Summary, gathered: &Gathered) -> Vec<String> {
     let entry = |key| contents.entry(key);
     let nearest =
         summary.nearest().map(|margin| format!("Nearest to its limit in all of it: {}.", margin.in_words()));
+    let digest = match entry("cue_sha256") {
+        "" => String::new(),
+        digest => format!("digest {digest}, "),
+    };
     let mut facts = vec![
         format!(
             "{} recording of {}, hall {}, {} Hz",
@@ -91,12 +111,7 @@ pub(super) fn facts(contents: &Contents, summary: &Summary, gathered: &Gathered)
             entry("hall"),
             entry("rate_hz")
         ),
-        format!(
-            "digest {}, recorded by {}, drawn by kinocue {}",
-            entry("cue_sha256"),
-            entry("program"),
-            env!("CARGO_PKG_VERSION")
-        ),
+        format!("{digest}recorded by {}, drawn by kinocue {}", entry("program"), env!("CARGO_PKG_VERSION")),
     ];
     facts.extend(nearest);
     let mut fell =

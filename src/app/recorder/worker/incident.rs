@@ -60,6 +60,7 @@ impl Worker {
         let (disk, out) = self.disk.create_incident(cause)?;
         let disk = disk.until_begun();
         let opening = self.opening.clone().with("of", "incident").with("cause", cause.word());
+        let opening = opening.with("caused_ns", at.as_nanos().to_string());
         let oldest = self.maker.wall(at).saturating_sub(1_000_000_000 * u64::from(self.record.flight_s));
         let held = flight.read()?;
         let entries = self.hall.iter().chain(held.iter().filter(|entry| entry.log_time >= oldest));

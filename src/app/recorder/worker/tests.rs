@@ -219,9 +219,15 @@ fn a_disk_that_stands_still_for_a_second_and_a_half_loses_nothing_and_for_ten_wh
     bench.worker.record.part_mib = 1_000;
     bench.begin();
     bench.ticks(1_000);
+    let says = |bench: &Bench| bench.worker.link.status_at(at(bench.tick)).troubles.remove("show");
     // What was dropped is told by the next tick that found room.
     let still = |bench: &mut Bench, ticks: u64| {
-        (0..ticks).for_each(|_| bench.tick());
+        for tick in 0..ticks {
+            bench.tick();
+            let trouble = says(bench);
+            assert!(trouble.is_some() || tick < 4_000, "nothing is said after {tick} ms");
+            assert!(trouble.is_none_or(|text| tick > 2_000 && text.contains("answers no write")), "{tick}");
+        }
         bench.worker.look(at(bench.tick));
         bench.ticks(1_000);
         bench.worker.intake.counts().dropped
@@ -244,7 +250,8 @@ fn a_disk_that_stands_still_for_a_second_and_a_half_loses_nothing_and_for_ten_wh
     let contents = read(file.as_slice(), Wanted::ALL, &mut take).expect("a recording");
     assert_eq!((gaps, ticks + gaps), (dropped, bench.tick));
     assert_eq!(contents.end["dropped"], dropped.to_string());
-    assert!(bench.worker.link.status().troubles.is_empty(), "the next look found the disk as it was");
+    assert_eq!(says(&bench), None, "the next look found the disk as it was");
+    assert_eq!(bench.worker.link.status().errors, 1);
 }
 
 /// A file that takes no more than it has, whoever writes.

@@ -10,10 +10,14 @@ let url = null;
 /** Makes the choice of the seat and the button work. */
 export function startPicture() {
   byId('picture-seat').addEventListener('change', ({ target }) => draw(shown.name, target.value));
+  byId('picture-large').addEventListener('click', ({ currentTarget: button }) => {
+    const large = byId('picture').classList.toggle('large');
+    button.setAttribute('aria-pressed', large);
+  });
   byId('picture-close').addEventListener('click', close);
 }
 
-/** Shows the recording of that file; of its seats one that fell out, else the one that was held back farthest. */
+/** Shows the recording of that file; of its seats one that a mark names, else that fell out, else the one that was held back farthest. */
 export function showPicture(name, title) {
   setText(byId('picture-title'), title);
   setProperty(byId('picture-panel'), 'hidden', false);
