@@ -46,7 +46,7 @@ fn files(pattern: &str) -> Vec<PathBuf> {
     let paths = entries.map(|entry| entry.expect("the folder can be read").path());
     let fits = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        path.is_file() && name.starts_with(front) && name.ends_with(back)
+        name.starts_with(front) && name.ends_with(back)
     };
     paths.filter(fits).collect()
 }
