@@ -63,6 +63,8 @@ fn every_file_that_the_package_names_exists() {
     }
     assert!(root().join(deb["license-file"][0].as_str().unwrap()).is_file());
     assert_eq!(files("systemd/debian/p*").len(), 3, "the maintainer scripts");
+    let of_version = format!("kinocue ({}-1) ", env!("CARGO_PKG_VERSION"));
+    assert!(text(deb["changelog"].as_str().unwrap()).starts_with(&of_version), "{of_version}");
 }
 
 #[test]
