@@ -29,7 +29,7 @@ def place(root, pattern, target, mode):
     for source in sources:
         path = root / (target + os.path.basename(source) if target.endswith("/") else target)
         path.parent.mkdir(parents=True, exist_ok=True)
-        if target.startswith("usr/share/man/"):
+        if target.startswith("usr/share/man/") or path.name.startswith("changelog"):
             path = path.with_name(path.name + ".gz")
             path.write_bytes(gzip.compress(pathlib.Path(source).read_bytes(), mtime=0))
         else:
@@ -71,7 +71,9 @@ def main():
         root.chmod(0o755)
         for asset in deb["assets"]:
             place(root, *asset)
-        place(root, deb["license-file"][0], f"usr/share/doc/{package['name']}/copyright", "644")
+        docs = f"usr/share/doc/{package['name']}"
+        place(root, deb["license-file"][0], f"{docs}/copyright", "644")
+        place(root, deb["changelog"], f"{docs}/changelog.Debian", "644")
         text, checksums = control(package, deb, root), sums(root)
         (root / "DEBIAN").mkdir()
         (root / "DEBIAN/control").write_text(text)

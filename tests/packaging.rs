@@ -46,7 +46,7 @@ fn files(pattern: &str) -> Vec<PathBuf> {
     let paths = entries.map(|entry| entry.expect("the folder can be read").path());
     let fits = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        path.is_file() && name.starts_with(front) && name.ends_with(back)
+        name.starts_with(front) && name.ends_with(back)
     };
     paths.filter(fits).collect()
 }
@@ -63,6 +63,8 @@ fn every_file_that_the_package_names_exists() {
     }
     assert!(root().join(deb["license-file"][0].as_str().unwrap()).is_file());
     assert_eq!(files("systemd/debian/p*").len(), 3, "the maintainer scripts");
+    let of_version = format!("kinocue ({}-1) ", env!("CARGO_PKG_VERSION"));
+    assert!(text(deb["changelog"].as_str().unwrap()).starts_with(&of_version), "{of_version}");
 }
 
 #[test]
