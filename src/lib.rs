@@ -70,6 +70,7 @@ mod preflight;
 mod replay;
 
 mod control;
+mod fleet;
 mod journal;
 mod library;
 mod playlist;

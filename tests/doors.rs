@@ -70,6 +70,10 @@ fn beginnings(door: &str) -> Vec<Vec<u8>> {
             b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\0\x10/kinocue/stop\0\0\0".to_vec(),
         ],
         "text" => text(&["go", "level 60%", "seek 01:02:03", "stop"]),
+        "letter" => {
+            let body = r#"{\"id\":\"1\",\"to\":\"a.b\",\"word\":\"levels\",\"args\":{\"motion\":0.5},\"sent_ms\":1}"#;
+            vec![format!("{{\"key\":\"U\",\"sig\":\"AA==\",\"body\":\"{body}\"}}").into_bytes()]
+        }
         "buttons" => vec![[[0; 16], [1, 0, 2, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0]].concat(), vec![0; 48]],
         "ltc" => vec![[[0_u8, 0x20].repeat(20), [0, 0xe0].repeat(20)].concat().repeat(40)],
         "mtc" => vec![(0..8).flat_map(|piece| [0xf1, piece << 4]).collect(), octets("f07f7f0101610203 04f7")],

@@ -119,6 +119,7 @@ fn the_units_are_as_closed_as_they_were_measured_to_be() {
         ("systemd/kinocue.service", "12"),
         ("systemd/kinocue-sync.service", "6"),
         ("systemd/kinocue-buttons.service", "6"),
+        ("systemd/kinocue-link.service", "12"),
     ] {
         let most = format!("--threshold={most}");
         if let Some(output) = tool("systemd-analyze", &["security", "--offline=true", &most, unit]) {
@@ -133,6 +134,7 @@ fn the_units_let_nothing_run_with_rights() {
         ("kinocue", "User=kinocue"),
         ("kinocue-sync", "User=kinocue-sync"),
         ("kinocue-buttons", "User=kinocue-buttons"),
+        ("kinocue-link", "User=kinocue-link"),
     ] {
         let unit = text(&format!("systemd/{name}.service"));
         for line in [user, "CapabilityBoundingSet=", "AmbientCapabilities=", "NoNewPrivileges=yes"] {

@@ -67,7 +67,8 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
         return render(caught(next.run(request)).await, None);
     };
     // Who has shown a token, or may open the control socket, keeps a place before those who have not.
-    let known = who.surface == Surface::Socket || request.headers().contains_key(AUTHORIZATION);
+    let known = matches!(who.surface, Surface::Socket | Surface::Fleet)
+        || request.headers().contains_key(AUTHORIZATION);
     if let Some(place) = request.extensions().get::<Arc<Place>>().filter(|_| known) {
         place.show(&who.name);
     }
@@ -103,6 +104,7 @@ fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
     }
     Ok(match peer {
         Peer::Socket(name) => Some(peer::local(name)),
+        Peer::Fleet(name) => Some(peer::link(name)),
         Peer::Tcp(_) if in_the_open => None,
         Peer::Tcp(address) => Some(shared.access.who(headers, *address, &shared.tries, Monotonic.now())?),
     })

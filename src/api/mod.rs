@@ -10,7 +10,7 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::thread::Builder;
 use std::time::Duration;
@@ -28,6 +28,7 @@ mod access;
 mod asker;
 mod controllers;
 mod cues;
+mod fleet;
 mod gate;
 mod guarded;
 mod history;
@@ -53,10 +54,15 @@ mod stop;
 mod streams;
 mod tries;
 
+#[cfg(feature = "harness")]
+pub(crate) use fleet::try_letter;
 pub(crate) use serving::ServingThread;
+pub(crate) use stop::fleet_stop_socket;
 pub use stop::{StopSocket, stop_socket};
 
 use access::{Access, AccessTokens};
+use fleet::FleetAccess;
+use peer::Peer;
 use shared::{Pulse, Shared};
 use socket::SocketFile;
 use streams::Streams;
@@ -145,6 +151,7 @@ pub enum ApiError {
 pub struct Running {
     addresses: Vec<SocketAddr>,
     tokens: AccessTokens,
+    fleet: FleetAccess,
     streams: Streams,
     _thread: ServingThread,
 }
@@ -162,6 +169,11 @@ impl Running {
             self.streams.part_with_tcp();
         }
     }
+
+    /// Has the keys of that fleet from now on; a socket of its own is there only from the start on.
+    pub(crate) fn set_fleet(&self, fleet: Option<&config::Fleet>) {
+        self.fleet.set(fleet);
+    }
 }
 
 /// Serves the API on a thread of its own. When this returns, all sockets take connections.
@@ -169,60 +181,89 @@ impl Running {
 /// # Errors
 /// [`ApiError`] where a socket or a port cannot be had; nothing is served then.
 pub fn start(setup: Setup) -> Result<Running, ApiError> {
-    let Setup { config, socket, handle, library, playlists, journal, recordings, pages, log } = setup;
-    let (local, file) = socket::unix(&socket)?;
-    let (tcp, addresses) = ports(&config.listen)?;
+    start_with(setup, None)
+}
+
+/// The same for a hall that belongs to a fleet, with the socket of whoever carries its letters.
+///
+/// # Errors
+/// As [`start`].
+pub(crate) fn start_with(setup: Setup, fleet: Option<(&config::Fleet, &Path)>) -> Result<Running, ApiError> {
+    let (local, file) = socket::unix(&setup.socket)?;
+    let of_fleet = fleet.map(|(_, socket)| socket::unix(socket)).transpose()?;
+    let (tcp, addresses) = ports(&setup.config.listen)?;
     let (closing, closed) = watch::channel(false);
     let (router, document) = routes::routes();
-    let (access, streams) = (Access::new(&config, &addresses), Streams::default());
-    let tokens = access.tokens();
-    let shared = Shared {
-        handle,
-        access,
-        tries: Default::default(),
-        once: Default::default(),
-        streams: streams.clone(),
-        errands: shared::errands(),
-        reports: shared::one_at_a_time(),
-        curves: shared::one_at_a_time(),
-        pictures: shared::one_at_a_time(),
-        closing: closed.clone(),
-        document: document.to_json().expect("a description is text").into(),
-        library,
-        shelf: playlists,
-        journal,
-        recordings,
-        pages,
-        log: log.clone(),
-        pulse: Pulse::default(),
-        written: Mutex::new(None),
-    };
-    let shared = Arc::new(shared);
+    let access = Access::new(&setup.config, &addresses);
+    let (tokens, log) = (access.tokens(), setup.log.clone());
+    let fleet = FleetAccess::of(fleet.map(|(fleet, _)| fleet));
+    let document = document.to_json().expect("a description is text").into();
+    let shared = Arc::new(shared(setup, access, fleet.clone(), closed, document));
+    let streams = shared.streams.clone();
     let router = routes::guarded(router, Arc::clone(&shared));
+    let fleet_router = routes::guarded(routes::of_fleet(), Arc::clone(&shared));
     let runtime = runtime::Builder::new_current_thread()
         .enable_all()
         .thread_name(THREAD)
         .max_blocking_threads(BLOCKING)
         .build()
         .map_err(ApiError::System)?;
-    let sockets = ApiSockets { local, _file: file, tcp, log };
-    let thread = Builder::new().name(THREAD.to_owned()).spawn(move || run(runtime, sockets, shared, router));
+    let sockets = ApiSockets { local: (local, file), fleet: of_fleet, tcp, log };
+    let thread = Builder::new()
+        .name(THREAD.to_owned())
+        .spawn(move || run(runtime, sockets, shared, [router, fleet_router]));
     let thread = ServingThread::new(closing, thread.map_err(ApiError::System)?);
-    Ok(Running { addresses, tokens, streams, _thread: thread })
+    Ok(Running { addresses, tokens, fleet, streams, _thread: thread })
 }
+
+/// What all handlers share.
+fn shared(
+    setup: Setup,
+    access: Access,
+    fleet: FleetAccess,
+    closing: watch::Receiver<bool>,
+    document: hyper::body::Bytes,
+) -> Shared {
+    let Setup { handle, library, playlists, journal, recordings, pages, log, .. } = setup;
+    Shared {
+        handle,
+        access,
+        fleet,
+        tries: Default::default(),
+        once: Default::default(),
+        streams: Streams::default(),
+        errands: shared::errands(),
+        reports: shared::one_at_a_time(),
+        curves: shared::one_at_a_time(),
+        pictures: shared::one_at_a_time(),
+        closing,
+        document,
+        library,
+        shelf: playlists,
+        journal,
+        recordings,
+        pages,
+        log,
+        pulse: Pulse::default(),
+        written: Mutex::new(None),
+    }
+}
+
+/// A socket in the file system, whose file goes when the server ends.
+type FileListener = (std::os::unix::net::UnixListener, SocketFile);
 
 /// What is listened on.
 struct ApiSockets {
-    local: std::os::unix::net::UnixListener,
-    /// Goes when the server ends.
-    _file: SocketFile,
+    local: FileListener,
+    fleet: Option<FileListener>,
     tcp: Vec<TcpListener>,
     log: Log,
 }
 
 /// Serves until the server ends.
-fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, router: axum::Router) {
-    let ApiSockets { local, _file, tcp, log } = sockets;
+fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, [router, of_fleet]: [axum::Router; 2]) {
+    let ApiSockets { local: (local, _file), fleet, tcp, log } = sockets;
+    let (fleet, _fleet_file) = fleet.unzip();
     let mut closing = shared.closing.clone();
     let (alive, mut all_gone) = mpsc::channel(1);
     let hall = serve::ServedHall { router, closing: closing.clone(), alive, log };
@@ -234,8 +275,13 @@ fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, router: axum:
             let listener = listener.expect("the runtime has just been made, and takes sockets");
             tokio::spawn(serve::tcp(listener, places.clone(), hall.clone()));
         }
-        let local = tokio::net::UnixListener::from_std(local);
-        tokio::spawn(serve::local(local.expect("the runtime takes sockets"), hall));
+        let taken =
+            |listener| tokio::net::UnixListener::from_std(listener).expect("the runtime takes sockets");
+        if let Some(fleet) = fleet {
+            let hall = serve::ServedHall { router: of_fleet, ..hall.clone() };
+            tokio::spawn(serve::local(taken(fleet), Peer::of_link, "the fleet socket", hall));
+        }
+        tokio::spawn(serve::local(taken(local), Peer::of_user, "the control socket", hall));
         let _ = closing.wait_for(|&closing| closing).await; // whoever would say so has gone: an end as well
         let _ = tokio::time::timeout(LAST_WORDS, all_gone.recv()).await;
     });

@@ -16,6 +16,8 @@ const MAX_USERS_LEN: u64 = 1 << 20;
 pub(super) enum Peer {
     /// A process of this machine that may open the control socket, by the name of its user.
     Socket(Arc<str>),
+    /// A process of this machine that may open the fleet socket, likewise. It is nobody by itself.
+    Fleet(Arc<str>),
     /// Another machine, or this one by its loopback address.
     Tcp(IpAddr),
 }
@@ -25,12 +27,17 @@ impl Peer {
     pub(super) fn of_user(uid: u32) -> Self {
         Self::Socket(user(uid).into())
     }
+
+    /// The same at the fleet socket.
+    pub(super) fn of_link(uid: u32) -> Self {
+        Self::Fleet(user(uid).into())
+    }
 }
 
 impl fmt::Display for Peer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Socket(name) => f.write_str(name),
+            Self::Socket(name) | Self::Fleet(name) => f.write_str(name),
             Self::Tcp(address) => address.fmt(f),
         }
     }
@@ -39,6 +46,11 @@ impl fmt::Display for Peer {
 /// Whoever may open a socket in the file system is engineer.
 pub(super) fn local(name: &str) -> Who {
     Who { role: Role::Engineer, surface: Surface::Socket, name: name.to_owned() }
+}
+
+/// Whoever may open the fleet's sockets may look and stop, and carry what others have signed.
+pub(super) fn link(name: &str) -> Who {
+    Who { role: Role::View, surface: Surface::Fleet, name: name.to_owned() }
 }
 
 /// The name of a user of this machine; `uid N` where the table of users has none.

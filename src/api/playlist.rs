@@ -23,6 +23,13 @@ pub(super) struct Choice {
     id: Option<String>,
 }
 
+impl Choice {
+    pub(super) fn command(self) -> Result<Command, Problem> {
+        let id = self.id.map(|text| id(&text)).transpose()?.map(|id| id.to_string());
+        Ok(Command::Playlist { id })
+    }
+}
+
 /// Which entry.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -45,8 +52,7 @@ pub(super) async fn all(State(shared): State<Arc<Shared>>) -> Result<JsonReply<V
     put, path = "/api/v1/playlist", tag = "playlist", request_body = Choice, responses((status = 200, body = Status))
 )]
 pub(super) async fn choose(asker: Asker, Json(choice): Json<Choice>) -> Result<StatusReply, Problem> {
-    let id = choice.id.map(|text| id(&text)).transpose()?.map(|id| id.to_string());
-    asker.ask(Command::Playlist { id }).await
+    asker.ask(choice.command()?).await
 }
 
 /// Selects the playlist entry to play next.

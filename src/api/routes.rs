@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use axum::middleware::from_fn_with_state;
+use axum::routing::{get, post};
 use utoipa::openapi::path::{Operation, Parameter, ParameterBuilder, ParameterIn, PathItem};
 use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{ObjectBuilder, Type};
@@ -15,7 +16,7 @@ use utoipa_axum::routes;
 use super::problem::{PROBLEM_JSON, ProblemBody};
 use super::shared::Shared;
 use super::{
-    controllers, cues, gate, history, playlist, recordings, reports, service, settings, show, status,
+    controllers, cues, fleet, gate, history, playlist, recordings, reports, service, settings, show, status,
 };
 use crate::control::Code;
 
@@ -81,6 +82,18 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(recordings::dump));
     let (router, document) = router.split_for_parts();
     (router.fallback(service::page).method_not_allowed_fallback(service::wrong_method), completed(document))
+}
+
+/// The routes of the fleet socket, which has these alone.
+pub(super) fn of_fleet() -> axum::Router<Arc<Shared>> {
+    axum::Router::new()
+        .route("/api/v1/fleet/status", get(fleet::status))
+        .route("/api/v1/fleet/order", post(fleet::order))
+        .route("/api/v1/fleet/journal", post(fleet::journal))
+        .route("/api/v1/status", get(status::status))
+        .route("/api/v1/cues", get(cues::all))
+        .fallback(service::nothing)
+        .method_not_allowed_fallback(service::wrong_method)
 }
 
 /// Adds what holds of every route.

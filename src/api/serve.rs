@@ -64,13 +64,18 @@ impl ServedHall {
     }
 }
 
-/// Serves the control socket until the server ends.
-pub(super) async fn local(listener: UnixListener, hall: ServedHall) {
+/// Serves a socket of this machine until the server ends; `peer` names who comes by it.
+pub(super) async fn local(
+    listener: UnixListener,
+    peer: fn(u32) -> Peer,
+    what: &'static str,
+    hall: ServedHall,
+) {
     let places = Places::new(LOCAL);
     let on = |(stream, _): (UnixStream, _)| {
         let Ok(user) = stream.peer_cred() else { return };
-        let place = hall.place(&places, None, "the control socket");
-        tokio::spawn(connection(stream, Peer::of_user(user.uid()), place, hall.clone()));
+        let place = hall.place(&places, None, what);
+        tokio::spawn(connection(stream, peer(user.uid()), place, hall.clone()));
     };
     accept_each(hall.closing.clone(), |context| listener.poll_accept(context), on).await;
 }

@@ -83,6 +83,12 @@ pub(super) async fn page(
     Ok(([(CONTENT_TYPE, HeaderValue::from_static(content_type))], bytes).into_response())
 }
 
+/// What no route of the fleet socket takes.
+pub(super) async fn nothing(uri: Uri) -> Problem {
+    let remedy = "the fleet socket has what docs/fleet.md says; all else is on the control socket";
+    Problem { remedy: remedy.to_owned(), ..nothing_there(uri.path()) }
+}
+
 /// A path that is there, asked by a method that it does not take.
 pub(super) async fn wrong_method(method: Method, uri: Uri) -> Problem {
     let detail = format!("{} does not take {method}", uri.path());

@@ -39,15 +39,22 @@ pub(super) struct Test {
     put, path = "/api/v1/trim", tag = "settings", request_body = Trim, responses((status = 200, body = Status))
 )]
 pub(super) async fn trim(asker: Asker, Json(trim): Json<Trim>) -> Reply {
-    let ask = match (trim.offset_s, trim.frames) {
-        (Some(offset_s), None) => Command::Trim(trim_ms(offset_s)?),
-        (None, Some(frames)) if (-TRIM_FRAMES..=TRIM_FRAMES).contains(&frames) => Command::Nudge(frames),
-        _ => {
-            let detail = "a trim is either offset_s, or frames by which it changes".to_owned();
-            return Err(bad_value(detail, "give one of them; frames are -12 to 12"));
+    asker.ask(trim.command()?).await
+}
+
+impl Trim {
+    pub(super) fn command(self) -> Result<Command, Problem> {
+        match (self.offset_s, self.frames) {
+            (Some(offset_s), None) => Ok(Command::Trim(trim_ms(offset_s)?)),
+            (None, Some(frames)) if (-TRIM_FRAMES..=TRIM_FRAMES).contains(&frames) => {
+                Ok(Command::Nudge(frames))
+            }
+            _ => {
+                let detail = "a trim is either offset_s, or frames by which it changes".to_owned();
+                Err(bad_value(detail, "give one of them; frames are -12 to 12"))
+            }
         }
-    };
-    asker.ask(ask).await
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "500 at the most")]
@@ -87,7 +94,7 @@ pub(super) async fn levels(asker: Asker, Json(change): Json<LevelsChange>) -> Re
     asker.ask(Command::Levels(change)).await
 }
 
-fn check_levels(change: &LevelsChange) -> Result<(), Problem> {
+pub(super) fn check_levels(change: &LevelsChange) -> Result<(), Problem> {
     let LevelsChange { motion, vibration, rows, .. } = change;
     let halls = [("motion", motion), ("vibration", vibration)];
     let halls = halls.into_iter().filter_map(|(name, level)| Some((name.to_owned(), (*level)?)));

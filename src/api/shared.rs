@@ -11,6 +11,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::Pages;
 use super::access::Access;
+use super::fleet::FleetAccess;
 use super::once::Once;
 use super::problem::panicked;
 use super::streams::Streams;
@@ -35,6 +36,8 @@ pub(super) struct Shared {
     pub(super) handle: Handle,
     /// Who may come in over TCP.
     pub(super) access: Access,
+    /// Who of the fleet may ask.
+    pub(super) fleet: FleetAccess,
     /// Wrong tokens.
     pub(super) tries: Tries,
     /// Requests that may come twice.

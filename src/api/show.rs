@@ -19,7 +19,7 @@ type Reply = Result<StatusReply, Problem>;
 #[serde(deny_unknown_fields)]
 pub(super) struct Load {
     /// Its id.
-    cue: String,
+    pub(super) cue: String,
 }
 
 /// Under which condition.

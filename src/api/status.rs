@@ -29,11 +29,15 @@ const KEEP_ALIVE: Duration = Duration::from_secs(5);
 /// The whole state of the hall; 503 where nothing new of it was heard for two seconds.
 #[utoipa::path(get, path = "/api/v1/status", tag = "hall", responses((status = 200, body = Status)))]
 pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<StatusReply, Problem> {
-    if let Some(still) = shared.pulse.stopped(Monotonic.now()) {
-        let detail = format!("no update of the hall for {} s", still.as_secs());
-        return Err(Problem::new(Code::Timeout, detail, "check the seats; a stop still works"));
-    }
+    check_pulse(&shared)?;
     Ok(StatusReply(shared.write(&shared.handle.status())))
+}
+
+/// True if the status is of now.
+pub(super) fn check_pulse(shared: &Shared) -> Result<(), Problem> {
+    let Some(still) = shared.pulse.stopped(Monotonic.now()) else { return Ok(()) };
+    let detail = format!("no update of the hall for {} s", still.as_secs());
+    Err(Problem::new(Code::Timeout, detail, "check the seats; a stop still works"))
 }
 
 /// Who asks, by their token, and what they may do.

@@ -14,7 +14,7 @@ use rustix::net::sockopt::socket_peercred;
 
 use super::socket::{self, SocketFile};
 use super::{ApiError, peer};
-use crate::control::Handle;
+use crate::control::{Handle, Who};
 use crate::sys::clock::Monotonic;
 use crate::sys::file::want_of_files;
 use crate::time::{Clock as _, MonoTime};
@@ -42,11 +42,31 @@ pub struct StopSocket {
 /// # Errors
 /// [`ApiError`] where the socket cannot be made, or another program serves it.
 pub fn stop_socket(path: &Path, handle: Handle) -> Result<StopSocket, ApiError> {
+    serve_stop(path, handle, peer::local)
+}
+
+/// The same for whoever carries the stops of a fleet, so that they need not be let in where whoever is let in leads the show.
+///
+/// # Errors
+/// As [`stop_socket`].
+pub(crate) fn fleet_stop_socket(path: &Path, handle: Handle) -> Result<StopSocket, ApiError> {
+    serve_stop(path, handle, peer::link)
+}
+
+fn serve_stop(path: &Path, handle: Handle, who: fn(&str) -> Who) -> Result<StopSocket, ApiError> {
     let (listener, file) = socket::unix(path)?;
     let (wake, sleeper) = UnixStream::pair().map_err(ApiError::System)?;
     let spare = sleeper.try_clone().ok();
-    let desk =
-        StopDesk { listener, _file: file, sleeper, spare, handle, peers: VecDeque::new(), pause_until: None };
+    let desk = StopDesk {
+        listener,
+        _file: file,
+        sleeper,
+        spare,
+        handle,
+        who,
+        peers: VecDeque::new(),
+        pause_until: None,
+    };
     let thread = Builder::new().name("stop".to_owned()).spawn(move || desk.run());
     Ok(StopSocket { wake: Some(wake), thread: Some(thread.map_err(ApiError::System)?) })
 }
@@ -68,6 +88,8 @@ struct StopDesk {
     /// A descriptor that is kept for a caller who finds none left.
     spare: Option<UnixStream>,
     handle: Handle,
+    /// Who somebody is that comes by it, by the name of their user.
+    who: fn(&str) -> Who,
     peers: VecDeque<Caller>,
     pause_until: Option<MonoTime>,
 }
@@ -116,8 +138,8 @@ impl StopDesk {
 
     /// Reads what the connections said, without waiting for any.
     fn hear(&mut self, now: MonoTime) {
-        let handle = &self.handle;
-        self.peers.retain_mut(|caller| caller.until > now && caller.listen(handle));
+        let (handle, who) = (&self.handle, self.who);
+        self.peers.retain_mut(|caller| caller.until > now && caller.listen(handle, who));
     }
 
     fn accept(&mut self, now: MonoTime) {
@@ -125,7 +147,7 @@ impl StopDesk {
             match self.listener.accept() {
                 Ok((stream, _)) if stream.set_nonblocking(true).is_ok() => {
                     let mut caller = Caller { stream, line: Vec::new(), until: now + SILENCE };
-                    if caller.listen(&self.handle) {
+                    if caller.listen(&self.handle, self.who) {
                         self.peers.push_back(caller);
                         self.peers.drain(..self.peers.len().saturating_sub(PEERS));
                     }
@@ -147,7 +169,7 @@ impl StopDesk {
 
 impl Caller {
     /// Takes in what is there; whether more is to come.
-    fn listen(&mut self, handle: &Handle) -> bool {
+    fn listen(&mut self, handle: &Handle, who: fn(&str) -> Who) -> bool {
         let mut bytes = [0; LINE];
         loop {
             match self.stream.read(&mut bytes) {
@@ -164,7 +186,7 @@ impl Caller {
         }
         let reply = if self.is_stop() {
             handle.stop(); // before anything that reads a file
-            handle.note_stop(peer::local(&self.user()));
+            handle.note_stop(who(&self.user()));
             "stopping\n"
         } else {
             "send the line: stop\n"

@@ -10,7 +10,7 @@ use tokio::runtime;
 use tokio::sync::watch;
 
 use super::buttons::{Buttons, PadTable};
-use crate::api::{self, ApiError, Pages, ServingThread, StopSocket, stop_socket};
+use crate::api::{self, ApiError, Pages, ServingThread, StopSocket, fleet_stop_socket, stop_socket};
 use crate::config::Config;
 use crate::control::Handle;
 use crate::library::Library;
@@ -26,7 +26,12 @@ pub(crate) struct Sockets {
     pub(crate) control: PathBuf,
     /// The one that takes a stop alone.
     pub(crate) stop: PathBuf,
+    /// That of whoever carries the letters of a fleet; served only in a hall that has one. The one for its stops is beside it.
+    pub(crate) fleet: PathBuf,
 }
+
+/// The name of the socket for stops of a fleet.
+const FLEET_STOP: &str = "fleet-stop.sock";
 
 /// Why a surface does not open.
 #[derive(Debug, thiserror::Error)]
@@ -57,6 +62,7 @@ pub(crate) struct Surfaces {
     osc: Option<Arc<Counts>>,
     buttons: Buttons,
     api: api::Running,
+    fleet_stop: Option<StopSocket>,
     stop: StopSocket,
 }
 
@@ -75,7 +81,12 @@ impl Surfaces {
         log: &Log,
     ) -> Result<Self, SurfaceError> {
         let stop = stop_socket(&sockets.stop, handle.clone())?;
-        let api = api::start(api::Setup {
+        let fleet_stop = config.fleet.as_ref().map(|_| {
+            let path = sockets.fleet.with_file_name(FLEET_STOP);
+            fleet_stop_socket(&path, handle.clone())
+        });
+        let fleet_stop = fleet_stop.transpose()?;
+        let setup = api::Setup {
             config: config.api.clone(),
             socket: sockets.control.clone(),
             handle: handle.clone(),
@@ -85,14 +96,15 @@ impl Surfaces {
             recordings,
             pages,
             log: log.clone(),
-        })?;
+        };
+        let api = api::start_with(setup, config.fleet.as_ref().map(|fleet| (fleet, &*sockets.fleet)))?;
         let osc = config.osc.as_ref().map(|osc| osc::open(osc, handle.clone())).transpose()?;
         let text = config.text.as_ref().map(|text| text_port::open(text, handle.clone())).transpose()?;
         let counts = osc.as_ref().map(Osc::counts);
         let ports =
             if osc.is_some() || text.is_some() { Some(show_control(osc, text, log.clone())?) } else { None };
         let buttons = Buttons::read(config, handle, log).map_err(SurfaceError::Buttons)?;
-        Ok(Self { ports, osc: counts, buttons, api, stop })
+        Ok(Self { ports, osc: counts, buttons, api, fleet_stop, stop })
     }
 
     /// Where the API listens over TCP.
@@ -101,9 +113,10 @@ impl Surfaces {
         self.api.addresses()
     }
 
-    /// Takes the tokens of a configuration that is in effect now.
+    /// Takes tokens and keys of a configuration that is in effect now.
     pub(crate) fn take_tokens(&self, config: &Config) {
         self.api.set_tokens(&config.api.tokens);
+        self.api.set_fleet(config.fleet.as_ref());
     }
 
     /// What has come to the port for OSC, if there is one.
@@ -118,10 +131,11 @@ impl Surfaces {
 
     /// Closes them in turn, those that stop last.
     pub(crate) fn close(self) {
-        let Self { ports, api, buttons, stop, .. } = self;
+        let Self { ports, api, buttons, fleet_stop, stop, .. } = self;
         drop(ports);
         drop(api);
         drop(buttons);
+        drop(fleet_stop);
         drop(stop);
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use clap::Command;
 
 /// What people do, and with which commands.
-const GROUPS: [(&str, &[&str]); 8] = [
+const GROUPS: [(&str, &[&str]); 9] = [
     ("Try it, without seats", &["demo", "sim"]),
     ("Make and check cues", &["check", "info", "plot", "fit", "edit", "convert"]),
     ("Play one cue, or follow a film", &["play", "sync"]),
@@ -22,6 +22,7 @@ const GROUPS: [(&str, &[&str]); 8] = [
         ],
     ),
     ("Set how much the seats do", &["level", "trim", "effects", "preset", "disable", "enable"]),
+    ("Lead many halls", &["fleet"]),
     ("Afterwards", &["report", "mark", "record", "replay", "decode"]),
 ];
 

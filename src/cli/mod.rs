@@ -26,6 +26,7 @@ mod exit;
 mod figures;
 mod film_player;
 mod fit;
+mod fleet;
 mod help;
 mod home;
 mod info;
@@ -107,6 +108,7 @@ enum ProgramCommand {
     Record(record::Args),
     Replay(replay::Args),
     Token(token::Args),
+    Fleet(fleet::Args),
     #[command(flatten)]
     Client(client::ClientCommand),
     Completions(completions::Args),
@@ -198,6 +200,7 @@ fn run(command: ProgramCommand) -> Result<Exit, Failure> {
         ProgramCommand::Record(args) => record::run(&args),
         ProgramCommand::Replay(args) => replay::run(&args),
         ProgramCommand::Token(args) => token::run(&args),
+        ProgramCommand::Fleet(args) => fleet::run(&args),
         ProgramCommand::Client(command) => client::run(&command),
         ProgramCommand::Completions(args) => completions::run(&args),
         ProgramCommand::Known(args) => client::known(&args),

@@ -58,13 +58,13 @@ pub(super) struct Args {
 
 /// A day as a person names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Day {
+pub(super) enum Day {
     Today,
     Yesterday,
     On(Date),
 }
 
-fn parse_day(text: &str) -> Result<Day, String> {
+pub(super) fn parse_day(text: &str) -> Result<Day, String> {
     match text {
         "today" => Ok(Day::Today),
         "yesterday" => Ok(Day::Yesterday),
@@ -76,13 +76,18 @@ fn parse_day(text: &str) -> Result<Day, String> {
 }
 
 impl Day {
-    fn date(self, today: Date) -> Date {
+    pub(super) fn date(self, today: Date) -> Date {
         match self {
             Self::Today => today,
             Self::Yesterday => today.yesterday().unwrap_or(today),
             Self::On(date) => date,
         }
     }
+}
+
+/// The shows of a report as a table.
+pub(super) fn shows_table(report: &JournalReport) -> String {
+    table::shows(report)
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {

@@ -51,6 +51,10 @@ pub(super) struct Args {
     /// The stop socket, which takes only a stop [default: stop.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     stop_socket: Option<PathBuf>,
+    /// The socket of `kinocue fleet link`, where the configuration has [fleet] [default: fleet.sock beside the control socket]; its
+    /// stops have fleet-stop.sock beside it.
+    #[arg(long, value_name = "PATH")]
+    fleet_socket: Option<PathBuf>,
     /// The folder for settings, library, playlists, journal and recordings [default: /var/lib/kinocue, with the journal in
     /// /var/log/kinocue; of an ordinary user ~/.local/state/kinocue].
     #[arg(long, value_name = "DIR")]
@@ -71,7 +75,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string()).or_system()?;
     }
     let beside = || control.with_file_name("stop.sock");
-    let sockets = Sockets { stop: args.stop_socket.clone().unwrap_or_else(beside), control };
+    let fleet = args.fleet_socket.clone().unwrap_or_else(|| control.with_file_name("fleet.sock"));
+    let sockets = Sockets { stop: args.stop_socket.clone().unwrap_or_else(beside), fleet, control };
     let places = Places { config: path, state, sockets };
     let log = Log::start(print::tell).or_system()?;
     for text in metres::of_hall(&config) {

@@ -20,6 +20,7 @@ mod effect_limits;
 mod fault;
 mod film;
 mod fit;
+mod fleet;
 mod gear;
 mod keys;
 mod level;
@@ -51,6 +52,7 @@ pub(crate) use effect_limits::EffectLimit;
 pub(crate) use fault::{ConfigFault, ConfigFaults, Faults};
 pub(crate) use film::{FilmPlayer, OnStop, stays_below};
 pub(crate) use fit::{HallStroke, Misfit};
+pub(crate) use fleet::{Fleet, FleetKey, FleetWord, is_fleet_id};
 pub(crate) use gear::GearWord;
 pub(crate) use keys::{key_name, lamp_name};
 pub(crate) use level::{level, no_level, parse_level, switches, trim};
@@ -106,6 +108,8 @@ pub struct Config {
     pub(crate) buttons: Vec<ButtonPad>,
     /// Who is told of alarms, if anybody.
     pub(crate) notify: Option<Notify>,
+    /// The fleet that the hall belongs to, if it does.
+    pub(crate) fleet: Option<Fleet>,
     /// HTTP over TCP.
     pub(crate) api: Api,
     /// The film that leads the shows, where one does.

@@ -20,6 +20,7 @@ use super::drive_controller::{
 use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::film::film;
+use super::fleet::fleet;
 use super::library::store;
 use super::link::{LinkEntry, links};
 use super::log::log;
@@ -83,8 +84,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let mut section = Section::new("the file", 0, table, faults);
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
-    let [api_at, link_at, record_at, buttons_at, notify_at] =
-        ["api", "link", "record", "buttons", "notify"].map(|key| section.get(key));
+    let [api_at, link_at, record_at, buttons_at, notify_at, fleet_at] =
+        ["api", "link", "record", "buttons", "notify", "fleet"].map(|key| section.get(key));
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; add at least one");
     }
@@ -107,6 +108,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let text = text_at.and_then(|entry| text(entry, faults));
     let buttons = buttons_at.map_or_else(Vec::new, |entry| buttons(entry, faults));
     let notify = notify_at.and_then(|entry| notify(entry, faults));
+    let fleet = fleet_at.and_then(|entry| fleet(entry, faults));
     let film = film_at.and_then(|entry| film(entry, faults));
     // The player tells where its film is, whoever else does.
     let of_player = film.is_some().then(FilmSync::default);
@@ -127,6 +129,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         text,
         buttons,
         notify,
+        fleet,
         api: api?,
         sync,
         film,

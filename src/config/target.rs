@@ -100,6 +100,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         text: None,
         buttons: Vec::new(),
         notify: None,
+        fleet: None,
         api: Api::default(),
         sync: None,
         film: None,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::Role;
-use crate::config::{GearWord, Preset};
+use crate::config::{FleetWord, GearWord, Preset};
 use crate::time::ShowTime;
 
 /// One thing asked of the hall. Each is answered with the state that it led to, or with a problem.
@@ -127,39 +127,43 @@ impl Command {
     /// What people alone may ask: no gear and no line of text, whose senders are known by address alone.
     pub(crate) const OF_PEOPLE: [&str; 5] = ["arm", "disarm", "home", "clear", "load"];
 
-    /// Its row of the table of commands: its word, the least role, whether it goes stale, and what gear has to be allowed.
-    const fn row(&self) -> (&'static str, Role, bool, Option<GearWord>) {
+    /// Its row of the table of commands: its word, the least role, whether it goes stale, and what gear and the fleet have to be
+    /// allowed.
+    const fn row(&self) -> (&'static str, Role, bool, Option<GearWord>, Option<FleetWord>) {
+        use FleetWord as Fleet;
         use Role::{Engineer, Operate, View};
         const STALE: bool = true;
         const LASTS: bool = false;
         match self {
-            Self::Home => ("home", Engineer, STALE, None),
-            Self::Load { .. } => ("load", Operate, LASTS, None),
-            Self::Playlist { .. } => ("playlist", Operate, LASTS, None),
-            Self::Select { .. } => ("select", Operate, LASTS, None),
-            Self::Arm { seats_empty: false } => ("arm", Operate, STALE, None),
-            Self::Arm { seats_empty: true } => ("arm", Engineer, STALE, None),
-            Self::Disarm => ("disarm", Operate, LASTS, None),
-            Self::Go => ("go", Operate, STALE, Some(GearWord::Go)),
-            Self::GoFrom(_) => ("go", Operate, STALE, None),
-            Self::Pause => ("pause", Operate, LASTS, Some(GearWord::Pause)),
-            Self::Resume => ("resume", Operate, STALE, Some(GearWord::Resume)),
-            Self::Seek(_) => ("seek", Operate, STALE, Some(GearWord::Seek)),
+            Self::Home => ("home", Engineer, STALE, None, None),
+            Self::Load { .. } => ("load", Operate, LASTS, None, Some(Fleet::Load)),
+            Self::Playlist { .. } => ("playlist", Operate, LASTS, None, Some(Fleet::Playlist)),
+            Self::Select { .. } => ("select", Operate, LASTS, None, None),
+            Self::Arm { seats_empty: false } => ("arm", Operate, STALE, None, None),
+            Self::Arm { seats_empty: true } => ("arm", Engineer, STALE, None, None),
+            Self::Disarm => ("disarm", Operate, LASTS, None, Some(Fleet::Disarm)),
+            Self::Go => ("go", Operate, STALE, Some(GearWord::Go), None),
+            Self::GoFrom(_) => ("go", Operate, STALE, None, None),
+            Self::Pause => ("pause", Operate, LASTS, Some(GearWord::Pause), Some(Fleet::Pause)),
+            Self::Resume => ("resume", Operate, STALE, Some(GearWord::Resume), None),
+            Self::Seek(_) => ("seek", Operate, STALE, Some(GearWord::Seek), None),
             // Whoever may look may also stop: an attacker may at worst stop the show.
-            Self::Stop => ("stop", View, LASTS, None),
-            Self::Park => ("park", Operate, STALE, Some(GearWord::Park)),
-            Self::Clear => ("clear", Engineer, STALE, None),
-            Self::Trim(_) | Self::Nudge(_) => ("trim", Operate, LASTS, Some(GearWord::Trim)),
-            Self::Source(_) => ("source", Operate, LASTS, None),
-            Self::Levels(_) => ("levels", Operate, LASTS, Some(GearWord::Levels)),
-            Self::Preset(_) => ("preset", Operate, LASTS, None),
-            Self::Enable(_) => ("enable", Operate, STALE, Some(GearWord::Seats)),
-            Self::Disable { .. } => ("disable", Operate, LASTS, Some(GearWord::Seats)),
-            Self::Preflight => ("preflight", Operate, LASTS, None),
-            Self::Test { .. } => ("test", Engineer, STALE, None),
-            Self::Reload => ("reload", Engineer, LASTS, None),
-            Self::Mark { .. } => ("mark", Operate, LASTS, None),
-            Self::Dump => ("dump", Operate, LASTS, None),
+            Self::Stop => ("stop", View, LASTS, None, None),
+            Self::Park => ("park", Operate, STALE, Some(GearWord::Park), Some(Fleet::Park)),
+            Self::Clear => ("clear", Engineer, STALE, None, None),
+            Self::Trim(_) | Self::Nudge(_) => {
+                ("trim", Operate, LASTS, Some(GearWord::Trim), Some(Fleet::Trim))
+            }
+            Self::Source(_) => ("source", Operate, LASTS, None, None),
+            Self::Levels(_) => ("levels", Operate, LASTS, Some(GearWord::Levels), Some(Fleet::Levels)),
+            Self::Preset(_) => ("preset", Operate, LASTS, None, None),
+            Self::Enable(_) => ("enable", Operate, STALE, Some(GearWord::Seats), None),
+            Self::Disable { .. } => ("disable", Operate, LASTS, Some(GearWord::Seats), None),
+            Self::Preflight => ("preflight", Operate, LASTS, None, None),
+            Self::Test { .. } => ("test", Engineer, STALE, None, None),
+            Self::Reload => ("reload", Engineer, LASTS, None, None),
+            Self::Mark { .. } => ("mark", Operate, LASTS, None, None),
+            Self::Dump => ("dump", Operate, LASTS, None, None),
         }
     }
 
@@ -186,6 +190,12 @@ impl Command {
     #[must_use]
     pub(crate) const fn gear_word(&self) -> Option<GearWord> {
         self.row().3
+    }
+
+    /// What the fleet has to be allowed for it; none for a stop, which needs no leave, and for what is never its to ask.
+    #[must_use]
+    pub(crate) const fn fleet_word(&self) -> Option<FleetWord> {
+        self.row().4
     }
 }
 

@@ -22,6 +22,8 @@ pub enum Surface {
     Text,
     /// A button of this machine: nobody sees who presses it.
     Buttons,
+    /// A key of the fleet, over the fleet socket.
+    Fleet,
     /// The schedule of the playlist, armed by a person.
     Schedule,
     /// A signal to the process.
@@ -49,6 +51,12 @@ impl Surface {
     pub(crate) const fn is_gear(self) -> bool {
         matches!(self, Self::Osc | Self::Text)
     }
+
+    /// True if nobody who asks by it sees the seats: its levels stay below what people here have set.
+    #[must_use]
+    pub(crate) const fn is_remote(self) -> bool {
+        self.is_gear() || matches!(self, Self::Fleet)
+    }
 }
 
 plain::displayed!(Surface {
@@ -57,6 +65,7 @@ plain::displayed!(Surface {
     Self::Osc => "osc",
     Self::Text => "text",
     Self::Buttons => "buttons",
+    Self::Fleet => "fleet",
     Self::Schedule => "schedule",
     Self::Signal => "signal",
     Self::Program => "program",

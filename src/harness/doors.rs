@@ -19,7 +19,9 @@ use crate::time::MonoTime;
 use crate::wire::silvermax::{Collected, LineCollector};
 use crate::wire::sixpack2::FrameCollector;
 use crate::wire::{FromController, Message, VibrationPort};
-use crate::{app, capture, config, cue, device, latency, osc, playlist, record, replay, settings, text_port};
+use crate::{
+    api, app, capture, config, cue, device, latency, osc, playlist, record, replay, settings, text_port,
+};
 
 /// A door: its name, and what takes octets there.
 pub type Door = (&'static str, fn(&[u8]));
@@ -44,6 +46,7 @@ pub const DOORS: &[Door] = &[
     ("osc", osc::try_datagram),
     ("text", text_port::try_line),
     ("buttons", app::buttons::try_records),
+    ("letter", |octets| with_text(octets, api::try_letter)),
     ("ltc", ltc),
     ("mtc", mtc),
     ("artnet", artnet),

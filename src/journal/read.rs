@@ -7,7 +7,7 @@ use super::record::Line;
 use crate::sys::folder::Folder;
 
 /// The longest line that is taken for one, bytes.
-const MAX_LINE: u64 = 1 << 20;
+pub(super) const MAX_LINE: u64 = 1 << 20;
 
 /// Hands every line of a file to `take`, in its order; says of those that are none where they are.
 pub(super) fn each(

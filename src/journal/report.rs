@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use jiff::ToSpan as _;
 use jiff::civil::Date;
 use serde::Serialize;
+use serde_json::Value;
 use utoipa::ToSchema;
 
 use super::record::{Action, Line, ShowRecord, day_of};
@@ -136,6 +137,18 @@ pub(crate) fn report(
     };
     let runs = gather().map_err(|source| JournalError { path: dir.to_owned(), source })?;
     Ok(days.report(runs))
+}
+
+/// The same of lines that a journal told elsewhere, in their order; what is none is noted.
+pub(crate) fn report_of(lines: impl IntoIterator<Item = Value>, from: Date, to: Date) -> JournalReport {
+    let mut days = Days::new(from, to, ReportBounds::ALL);
+    for line in lines {
+        match serde_json::from_value(line) {
+            Ok(line) => days.take(line),
+            Err(error) => days.notes.push(format!("a record is of another version, skipped: {error}")),
+        }
+    }
+    days.report(true)
 }
 
 /// What has been read so far.

@@ -235,7 +235,12 @@ impl Hall {
 
     /// What the stop socket answers to a line.
     pub(crate) fn stop_socket(&self, line: &str) -> String {
-        let mut stream = UnixStream::connect(self.path("stop.sock")).expect("it listens");
+        self.line_of("stop.sock", line)
+    }
+
+    /// What a socket of lines answers to one.
+    pub(crate) fn line_of(&self, socket: &str, line: &str) -> String {
+        let mut stream = UnixStream::connect(self.path(socket)).expect("it listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("it is longer than nothing");
         stream.write_all(line.as_bytes()).expect("it listens");
         let mut answer = String::new();

@@ -59,7 +59,7 @@ impl Features {
             Command::Trim(ms) => trim(*ms, hall),
             Command::Nudge(frames) => trim(hall.settings.trim_ms + film::frames_ms(*frames, hall), hall),
             Command::Source(name) => film::choose(name.as_deref(), hall),
-            Command::Levels(change) if who.surface.is_gear() => gear::levels(change, hall),
+            Command::Levels(change) if who.surface.is_remote() => gear::levels(change, hall),
             Command::Levels(change) => set(hall, |settings| settings.change(change)),
             Command::Preset(name) => preset(name, hall),
             Command::Enable(name) => self.enable(name, hall),

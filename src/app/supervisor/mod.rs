@@ -11,6 +11,7 @@ mod commands;
 mod features;
 mod figures;
 mod film;
+mod fleet;
 mod gear;
 mod hall;
 mod hall_settings;
@@ -292,7 +293,9 @@ impl Supervisor {
 
     /// Has done what somebody asks.
     fn on_asked(&mut self, asked: Asked) {
-        let acts = self.features.gear.may_ask(&asked.desired, &self.hall).and_then(|()| {
+        let may = fleet::may_ask(&asked.desired, &self.hall)
+            .and_then(|()| self.features.gear.may_ask(&asked.desired, &self.hall));
+        let acts = may.and_then(|()| {
             self.happens(&SupervisorEvent::Asked(&asked.desired));
             self.features.acts_for(&asked, &self.hall)
         });

@@ -25,9 +25,9 @@ const LONGEST: usize = 64 << 20;
 
 /// A reply, whole.
 #[derive(Debug)]
-pub(super) struct HttpReply {
-    pub(super) status: u16,
-    pub(super) text: String,
+pub(in crate::cli) struct HttpReply {
+    pub(in crate::cli) status: u16,
+    pub(in crate::cli) text: String,
 }
 
 /// Does `work` on a runtime of its own.
@@ -38,7 +38,7 @@ pub(super) fn block_on<T>(work: impl Future<Output = Result<T, Failure>>) -> Res
 
 /// A request to `path` with that body. What changes something carries a key, so that it is done once however often it
 /// arrives, and when it was sent, so that it is not done late.
-pub(super) fn request<B>(
+pub(in crate::cli) fn request<B>(
     method: Method,
     path: &str,
     content_type: Option<&'static str>,
@@ -58,7 +58,7 @@ pub(super) fn request<B>(
 }
 
 /// Sends a request and reads its reply, which may take so long.
-pub(super) async fn exchange<B>(
+pub(in crate::cli) async fn exchange<B>(
     socket: &Path,
     request: Request<B>,
     patience: Duration,

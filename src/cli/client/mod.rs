@@ -3,7 +3,7 @@
 mod cues;
 mod events;
 mod film;
-mod http;
+pub(in crate::cli) mod http;
 mod known;
 mod levels;
 mod panel;

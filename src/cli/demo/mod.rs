@@ -145,6 +145,7 @@ fn furnish(
     let sockets = crate::app::surfaces::Sockets {
         control: folder.path("control.sock"),
         stop: folder.path("stop.sock"),
+        fleet: folder.path("fleet.sock"),
     };
     Ok(Places { config, state: folder.path("state"), sockets })
 }

@@ -1,0 +1,183 @@
+//! What may be asked of a hall by its fleet, from a place where nobody sees the seats: to hold, to end what people here have begun,
+//! and to get ready what they will begin. What is loaded in a hall that a person has armed stays; no seat is moved that nobody here has
+//! armed; no level goes above what a person here has set (`gear::levels`).
+
+use super::hall::HallContext;
+use crate::control::{Code, Command, Desired, Problem, Surface};
+use crate::state::State;
+
+/// True if it may be done for whom it is asked for.
+///
+/// # Errors
+/// Where it comes by the fleet, and the configuration does not allow it, or the state of the hall forbids it.
+pub(super) fn may_ask(desired: &Desired, hall: &HallContext) -> Result<(), Problem> {
+    let Desired { ask, who } = desired;
+    if who.surface != Surface::Fleet || *ask == Command::Stop {
+        return Ok(());
+    }
+    let refused = |why: String, remedy: &str| {
+        let detail = format!("the fleet may not {}: {why}", ask.word());
+        Err(Problem::new(Code::Role, detail, remedy))
+    };
+    let Some(word) = ask.fleet_word() else {
+        return refused("whoever asks it has to see the seats".to_owned(), "ask somebody in the hall");
+    };
+    if !hall.config.fleet.as_ref().is_some_and(|fleet| fleet.allow.contains(&word)) {
+        return refused(
+            "allow of [fleet] does not name it".to_owned(),
+            "ask somebody in the hall, or add it there and reload",
+        );
+    }
+    let state = hall.mirror.state;
+    match ask {
+        // Whoever armed it saw what was loaded.
+        Command::Load { .. } | Command::Playlist { .. } if state != State::Parked => {
+            refused(format!("the hall is {state}, not parked"), "try again when it is parked")
+        }
+        // Somebody may stand beside a seat that is off park.
+        Command::Park if !hall.is_on_cue() && !matches!(state, State::Armed | State::Parking) => refused(
+            format!("nobody has armed the seats that this may move while {state}"),
+            "ask somebody who sees the seats to park them",
+        ),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::app::supervisor::testing::{Rig, desired, hall};
+    use crate::config::{Fleet, FleetWord};
+    use crate::control::LevelsChange;
+    use crate::time::ShowTime;
+
+    /// One of each; the match has to name a new one.
+    fn all() -> Vec<Command> {
+        let name = || "A1".to_owned();
+        let all = vec![
+            Command::Home,
+            Command::Load { cue: name() },
+            Command::Playlist { id: None },
+            Command::Select { entry: 0 },
+            Command::Arm { seats_empty: false },
+            Command::Arm { seats_empty: true },
+            Command::Disarm,
+            Command::Go,
+            Command::GoFrom(ShowTime::ZERO),
+            Command::Pause,
+            Command::Resume,
+            Command::Seek(ShowTime::ZERO),
+            Command::Stop,
+            Command::Park,
+            Command::Clear,
+            Command::Trim(0),
+            Command::Nudge(1),
+            Command::Source(None),
+            Command::Levels(LevelsChange::default()),
+            Command::Preset(name()),
+            Command::Enable(name()),
+            Command::Disable { name: name(), why: None },
+            Command::Preflight,
+            Command::Test { rows: Vec::new() },
+            Command::Reload,
+            Command::Mark { text: None },
+            Command::Dump,
+        ];
+        for one in &all {
+            match one {
+                Command::Home | Command::Load { .. } | Command::Playlist { .. } | Command::Select { .. } => {}
+                Command::Arm { .. } | Command::Disarm | Command::Go | Command::GoFrom(_) => {}
+                Command::Pause | Command::Resume | Command::Seek(_) | Command::Stop | Command::Park => {}
+                Command::Clear | Command::Trim(_) | Command::Nudge(_) | Command::Source(_) => {}
+                Command::Levels(_) | Command::Preset(_) | Command::Enable(_) | Command::Disable { .. } => {}
+                Command::Preflight | Command::Test { .. } | Command::Reload => {}
+                Command::Mark { .. } | Command::Dump => {}
+            }
+        }
+        all
+    }
+
+    fn member(hall: &mut HallContext, allow: &[FleetWord]) {
+        let fleet = Fleet { name: "berlin.h3".to_owned(), allow: allow.to_vec(), keys: Vec::new() };
+        Arc::make_mut(&mut hall.config).fleet = Some(fleet);
+    }
+
+    /// The words that the fleet may say in a state, where all are allowed to it; written down apart from the code.
+    fn may_say(state: State) -> &'static [&'static str] {
+        match state {
+            State::Boot
+            | State::Recovering
+            | State::Homing
+            | State::Stopping
+            | State::Stopped
+            | State::Fault => &["disarm", "levels", "pause", "stop", "trim"],
+            State::Parked => &["disarm", "levels", "load", "pause", "playlist", "stop", "trim"],
+            State::Armed | State::Playing(_) | State::Paused | State::Parking => {
+                &["disarm", "levels", "park", "pause", "stop", "trim"]
+            }
+        }
+    }
+
+    #[test]
+    fn in_each_state_the_fleet_may_say_the_words_of_the_table_and_no_others() {
+        for state in State::ALL {
+            let mut hall = hall(state, "one");
+            member(&mut hall, &FleetWord::ALL.map(|(_, word)| word));
+            let may = |ask: &Command| may_ask(&desired(Surface::Fleet, ask.clone()), &hall);
+            let mut said: Vec<_> = all().iter().filter(|ask| may(ask).is_ok()).map(Command::word).collect();
+            said.sort_unstable();
+            said.dedup();
+            assert_eq!(said, may_say(state), "{state}");
+            for ask in all() {
+                if let Err(problem) = may(&ask) {
+                    assert_eq!(problem.code, Code::Role, "{problem}");
+                    assert!(problem.detail.starts_with(&format!("the fleet may not {}: ", ask.word())));
+                }
+                assert!(may_ask(&desired(Surface::Socket, ask), &hall).is_ok(), "people ask as ever");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_allowed_is_refused_in_every_state_but_a_stop_and_so_is_all_without_a_fleet() {
+        for state in State::ALL {
+            let mut hall = hall(state, "one");
+            for ask in all() {
+                let asked = may_ask(&desired(Surface::Fleet, ask.clone()), &hall);
+                assert_eq!(asked.is_ok(), ask == Command::Stop, "{state}: {ask}");
+            }
+            for (name, word) in FleetWord::ALL {
+                member(&mut hall, &[word]);
+                for ask in all() {
+                    let asked = may_ask(&desired(Surface::Fleet, ask.clone()), &hall);
+                    assert!(asked.is_err() || ask == Command::Stop || ask.word() == name, "{state}: {ask}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_fleet_moves_no_seat_of_a_parked_hall_and_raises_no_level_above_what_a_person_set() {
+        let mut rig = Rig::parked();
+        member(&mut rig.supervisor.hall, &FleetWord::ALL.map(|(_, word)| word));
+        let motion =
+            |motion| Command::Levels(LevelsChange { motion: Some(motion), ..LevelsChange::default() });
+        rig.ask(motion(0.6)).unwrap();
+        assert!(rig.ask_as(Surface::Fleet, motion(0.9)).unwrap_err().detail.ends_with("motion is 60 %"));
+        assert_eq!(rig.supervisor.hall.settings.levels.motion, 0.6);
+        rig.ask_as(Surface::Fleet, motion(0.3)).unwrap();
+        assert!(rig.ask_as(Surface::Fleet, Command::Park).unwrap_err().detail.contains("nobody has armed"));
+        for ask in [Command::Go, Command::Arm { seats_empty: false }] {
+            assert_eq!(rig.ask_as(Surface::Fleet, ask).unwrap_err().code, Code::Role);
+        }
+        assert_eq!(rig.state(), State::Parked);
+        let mut rig = Rig::playing();
+        member(&mut rig.supervisor.hall, &FleetWord::ALL.map(|(_, word)| word));
+        rig.ask_as(Surface::Fleet, Command::Pause).unwrap();
+        assert_eq!(rig.ask_as(Surface::Fleet, Command::Resume).unwrap_err().code, Code::Role);
+        rig.ask_as(Surface::Fleet, Command::Park).unwrap();
+        assert_eq!(rig.state(), State::Parking);
+    }
+}

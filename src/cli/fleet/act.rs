@@ -1,0 +1,312 @@
+//! `kinocue fleet stop`, `pause`, `park`, `disarm`, `level` and `load`: asked of all chosen halls at once, a line for each.
+
+use std::time::Duration;
+
+use anyhow::anyhow;
+use async_nats::Client;
+use async_nats::client::{Request, RequestErrorKind};
+use futures_util::future::join_all;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::settings::DeskSettings;
+use super::{DeskArgs, engine, settings};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::config::parse_level;
+use crate::control::HallFacts;
+use crate::fleet::{self, Letter, Order};
+use crate::sys::clock::wall_now_ns;
+
+/// How long a hall may take to answer.
+const PATIENCE: Duration = Duration::from_secs(3);
+/// The same where it reads and proves a cue.
+const LONG: Duration = Duration::from_secs(70);
+
+/// Brings the seats of halls to rest at once.
+///
+/// All halls of the desk where none is named. Not a safety device: the emergency stop is hard-wired, and a network may be down. A stop
+/// latches until somebody in the hall clears it.
+#[derive(Debug, clap::Args)]
+pub(super) struct StopArgs {
+    #[command(flatten)]
+    desk: DeskArgs,
+    /// Halls: SITE.HALL, SITE.*, or all.
+    #[arg(value_name = "HALL", default_value = "all")]
+    halls: Vec<String>,
+    /// Print JSON: an array with an object for each hall.
+    #[arg(long)]
+    json: bool,
+}
+
+// The halls that are asked. No documentation: clap would show it as the help of commands.
+#[derive(Debug, clap::Args)]
+struct HallArgs {
+    #[command(flatten)]
+    desk: DeskArgs,
+    /// Halls: SITE.HALL, SITE.*, or all.
+    #[arg(value_name = "HALL", required = true)]
+    halls: Vec<String>,
+    /// Print JSON: an array with an object for each hall.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Holds the shows of halls that allow it (pause).
+///
+/// Somebody in the hall resumes.
+#[derive(Debug, clap::Args)]
+pub(super) struct PauseArgs {
+    #[command(flatten)]
+    of: HallArgs,
+}
+
+/// Ends the shows of halls that allow it (park).
+///
+/// The seats park. A hall whose seats nobody there has armed does not: somebody may stand beside one.
+#[derive(Debug, clap::Args)]
+pub(super) struct ParkArgs {
+    #[command(flatten)]
+    of: HallArgs,
+}
+
+/// Has halls that allow it (disarm) stand down.
+#[derive(Debug, clap::Args)]
+pub(super) struct DisarmArgs {
+    #[command(flatten)]
+    of: HallArgs,
+}
+
+/// Sets the level of the motion in halls that allow it (levels), no higher than a person there has set.
+#[derive(Debug, clap::Args)]
+pub(super) struct LevelArgs {
+    /// The level, as 60%, 0.6 or -6dB.
+    #[arg(value_parser = parse_level, allow_hyphen_values = true)]
+    level: f64,
+    #[command(flatten)]
+    of: HallArgs,
+}
+
+/// Loads a cue of their own libraries in halls that allow it (load) and are parked.
+#[derive(Debug, clap::Args)]
+pub(super) struct LoadArgs {
+    /// The id of the cue.
+    cue: String,
+    #[command(flatten)]
+    of: HallArgs,
+}
+
+/// What is asked of halls.
+struct Asked {
+    word: &'static str,
+    args: Value,
+    patience: Duration,
+}
+
+/// What a hall's link answers.
+#[derive(Debug, Deserialize)]
+struct LinkReply {
+    status: u16,
+    reply: Value,
+}
+
+/// Why a hall did not do it, as it writes it.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct HallProblem {
+    detail: String,
+    remedy: String,
+}
+
+/// What came of it in a hall.
+#[derive(Debug)]
+enum Answer {
+    Done(String),
+    Refused(String),
+    /// Nobody answered, in words.
+    Silent(String),
+}
+
+pub(super) fn stop(args: &StopArgs) -> Result<Exit, Failure> {
+    let settings = settings::desk(&args.desk.desk)?;
+    let asked = Asked { word: "stop", args: Value::Null, patience: PATIENCE };
+    ask_all(&settings, &args.halls, &asked, args.json)
+}
+
+pub(super) fn pause(args: &PauseArgs) -> Result<Exit, Failure> {
+    ask(&args.of, Asked { word: "pause", args: json!({}), patience: PATIENCE })
+}
+
+pub(super) fn park(args: &ParkArgs) -> Result<Exit, Failure> {
+    ask(&args.of, Asked { word: "park", args: json!({}), patience: PATIENCE })
+}
+
+pub(super) fn disarm(args: &DisarmArgs) -> Result<Exit, Failure> {
+    ask(&args.of, Asked { word: "disarm", args: json!({}), patience: PATIENCE })
+}
+
+pub(super) fn level(args: &LevelArgs) -> Result<Exit, Failure> {
+    ask(&args.of, Asked { word: "levels", args: json!({ "motion": args.level }), patience: PATIENCE })
+}
+
+pub(super) fn load(args: &LoadArgs) -> Result<Exit, Failure> {
+    ask(&args.of, Asked { word: "load", args: json!({ "cue": args.cue }), patience: LONG })
+}
+
+fn ask(of: &HallArgs, asked: Asked) -> Result<Exit, Failure> {
+    ask_all(&settings::desk(&of.desk.desk)?, &of.halls, &asked, of.json)
+}
+
+/// Asks all of them at once, and says what came of it in each.
+fn ask_all(settings: &DeskSettings, halls: &[String], asked: &Asked, json: bool) -> Result<Exit, Failure> {
+    let halls = chosen(&settings.halls, halls)?;
+    engine::block_on(async {
+        let client = engine::connect_desk(&settings.access, &settings.name).await?;
+        let answers = join_all(halls.iter().map(|hall| ask_one(settings, &client, hall, asked))).await;
+        let answers: Vec<_> = halls.into_iter().zip(answers).collect();
+        if json {
+            let all: Vec<_> = answers.iter().map(|(hall, answer)| answer.json(hall)).collect();
+            print::json(&all)?;
+        } else {
+            let lines: String =
+                answers.iter().map(|(hall, answer)| format!("{hall}: {}\n", answer.line())).collect();
+            print::out(&lines)?;
+        }
+        Ok(exit(answers.iter().map(|(_, answer)| answer)))
+    })
+}
+
+/// How it ends: what is most to worry about decides.
+fn exit<'a>(answers: impl Iterator<Item = &'a Answer> + Clone) -> Exit {
+    if answers.clone().any(|answer| matches!(answer, Answer::Silent(_))) {
+        Exit::TryAgain
+    } else if answers.clone().any(|answer| matches!(answer, Answer::Refused(_))) {
+        Exit::CheckFailed
+    } else {
+        Exit::Done
+    }
+}
+
+/// The halls of a desk that are meant.
+fn chosen(all: &[String], meant: &[String]) -> Result<Vec<String>, Failure> {
+    let mut halls: Vec<String> = Vec::new();
+    for one in meant {
+        let site = one.strip_suffix(".*");
+        let is_meant = |hall: &&String| match site {
+            _ if one == fleet::ALL => true,
+            Some(site) => hall.split_once('.').is_some_and(|(of, _)| of == site),
+            None => *hall == one,
+        };
+        let found: Vec<_> = all.iter().filter(is_meant).cloned().collect();
+        if found.is_empty() {
+            let error = anyhow!("{one:?} is no hall of this desk; it has {}", all.join(", "));
+            return Err(error).or_exit(Exit::NoInput);
+        }
+        halls.extend(found);
+    }
+    halls.sort_unstable();
+    halls.dedup();
+    Ok(halls)
+}
+
+async fn ask_one(settings: &DeskSettings, client: &Client, hall: &str, asked: &Asked) -> Answer {
+    let (subject, letter) = match asked.word {
+        "stop" => (fleet::stop_to(hall, &settings.name), String::new()),
+        word => match letter(settings, hall, asked) {
+            Some(letter) => (fleet::command_to(hall, &settings.name, word), letter),
+            None => return Answer::Refused("the key of this desk cannot sign".to_owned()),
+        },
+    };
+    let request = Request::new().payload(letter.into()).timeout(Some(asked.patience));
+    match client.send_request(subject, request).await {
+        Ok(message) => Answer::of(&message.payload, asked.word),
+        Err(error) if error.kind() == RequestErrorKind::NoResponders => {
+            Answer::Silent("nobody hears it there: its link or its network is down".to_owned())
+        }
+        Err(error) if error.kind() == RequestErrorKind::TimedOut => Answer::Silent(format!(
+            "no answer within {} s; it may still take effect",
+            asked.patience.as_secs()
+        )),
+        Err(error) => Answer::Silent(format!("not asked: {error}")),
+    }
+}
+
+/// What is asked, signed now for that hall.
+fn letter(settings: &DeskSettings, hall: &str, asked: &Asked) -> Option<String> {
+    let order = Order {
+        id: id(),
+        to: hall.to_owned(),
+        word: asked.word.to_owned(),
+        args: asked.args.clone(),
+        sent_ms: i64::try_from(wall_now_ns() / 1_000_000).unwrap_or(i64::MAX),
+    };
+    let letter = Letter::sign(&settings.access.pair, serde_json::to_string(&order).ok()?)?;
+    serde_json::to_string(&letter).ok()
+}
+
+/// Like no other: a key that nobody has.
+fn id() -> String {
+    nkeys::KeyPair::new_user().public_key()
+}
+
+impl Answer {
+    fn of(payload: &[u8], word: &str) -> Self {
+        let Ok(LinkReply { status, reply }) = serde_json::from_slice(payload) else {
+            return Self::Refused("what answers there is no link of ours".to_owned());
+        };
+        if status == 200 {
+            let facts: HallFacts = serde_json::from_value(reply).unwrap_or_default();
+            return Self::Done(if word == "stop" { "stopping".to_owned() } else { facts.line(None) });
+        }
+        let problem: HallProblem = serde_json::from_value(reply).unwrap_or_default();
+        let text = format!("{}; {}", problem.detail, problem.remedy);
+        // The link is there, and the hall behind it did not answer.
+        if status == 503 { Self::Silent(text) } else { Self::Refused(text) }
+    }
+
+    fn line(&self) -> String {
+        match self {
+            Self::Done(line) | Self::Silent(line) => line.clone(),
+            Self::Refused(why) => format!("refused: {why}"),
+        }
+    }
+
+    fn json(&self, hall: &str) -> Value {
+        let (answered, done) = (!matches!(self, Self::Silent(_)), matches!(self, Self::Done(_)));
+        json!({ "hall": hall, "answered": answered, "done": done, "text": self.line() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halls_are_named_one_by_one_by_their_site_or_all_and_each_is_asked_once() {
+        let all = ["berlin.h1", "berlin.h2", "bern.h1"].map(str::to_owned);
+        let of = |meant: &[&str]| {
+            let meant: Vec<_> = meant.iter().map(|&one| one.to_owned()).collect();
+            chosen(&all, &meant).map_err(|failure| failure.exit)
+        };
+        assert_eq!(of(&["all"]).unwrap(), all);
+        assert_eq!(of(&["berlin.*"]).unwrap(), all[..2]);
+        assert_eq!(of(&["bern.h1", "bern.*"]).unwrap(), all[2..]);
+        for nobody in ["ber.*", "berlin", "h1", "berlin.h3", "*"] {
+            assert_eq!(of(&[nobody]), Err(Exit::NoInput), "{nobody}");
+        }
+    }
+
+    #[test]
+    fn who_did_not_answer_decides_how_it_ends() {
+        let answer = |status: u16| {
+            let reply = json!({ "hall": "a.b", "status": status, "reply": { "detail": "x", "remedy": "y", "state": "parked" } });
+            Answer::of(reply.to_string().as_bytes(), "pause")
+        };
+        let of = |all: &[u16]| exit(all.iter().map(|&status| answer(status)).collect::<Vec<_>>().iter());
+        assert_eq!(of(&[200, 200]), Exit::Done);
+        assert_eq!(of(&[200, 403]), Exit::CheckFailed);
+        assert_eq!(of(&[403, 503, 200]), Exit::TryAgain);
+        assert_eq!(answer(403).line(), "refused: x; y");
+        assert_eq!(answer(200).line(), "parked");
+        assert!(matches!(Answer::of(b"hello", "pause"), Answer::Refused(_)));
+    }
+}

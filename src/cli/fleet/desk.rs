@@ -1,0 +1,311 @@
+//! `kinocue fleet status` and `watch`: all halls, the one that needs a person most first, each with the age of what is known of it.
+
+use std::collections::BTreeMap;
+use std::io::{IsTerminal as _, stdout};
+use std::time::Duration;
+
+use async_nats::{Client, Subscriber};
+use futures_util::StreamExt as _;
+use serde::Serialize;
+use tokio::time::{Instant, sleep_until, timeout_at};
+
+use super::settings::DeskSettings;
+use super::{DeskArgs, engine, settings};
+use crate::cli::{Exit, Failure, OrExit as _, print, table};
+use crate::control::model::Severity;
+use crate::fleet::{self, BriefStatus};
+use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::time::{Clock as _, MonoTime};
+
+/// How long halls are listened to: each tells its status twice a second.
+const LISTEN: Duration = Duration::from_millis(1_200);
+/// After so long without a status a hall is silent.
+const SILENT: Duration = Duration::from_millis(1_500);
+/// How often a watched table is drawn.
+const DRAW: Duration = Duration::from_millis(500);
+
+/// Shows all halls of a desk, worst first, with the age of what is known of each.
+///
+/// A hall is silent where it has not been heard for 1.5 s; what is shown of it then is what the engine has kept, and is old. The hall itself
+/// plays on.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Exit codes: 0 every hall was heard, 69 the engine does not answer, 75 a hall is silent"
+)]
+pub(super) struct StatusArgs {
+    #[command(flatten)]
+    desk: DeskArgs,
+    /// Print JSON: an array with an object for each hall.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Shows all halls of a desk until Ctrl-C.
+///
+/// On a terminal it is one table; elsewhere a line for each change.
+#[derive(Debug, clap::Args)]
+pub(super) struct WatchArgs {
+    #[command(flatten)]
+    desk: DeskArgs,
+    /// Print JSON: an object in a line for each status as it comes.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is known of a hall.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct HallSeen {
+    /// `SITE.HALL`.
+    name: String,
+    /// How old that is, s; null if nothing is known.
+    age_s: Option<f64>,
+    /// True if nothing was heard of it for 1.5 s.
+    silent: bool,
+    /// Its last status; null if nothing is known.
+    status: Option<BriefStatus>,
+}
+
+/// The halls of a desk, and when each was heard last.
+struct Halls {
+    seen: BTreeMap<String, (BriefStatus, MonoTime)>,
+    /// What the engine has kept, with how long ago that was so when it was asked.
+    kept: BTreeMap<String, (BriefStatus, Duration, MonoTime)>,
+    names: Vec<String>,
+}
+
+pub(super) fn status(args: &StatusArgs) -> Result<Exit, Failure> {
+    let settings = settings::desk(&args.desk.desk)?;
+    engine::block_on(async {
+        let client = engine::connect_desk(&settings.access, &settings.name).await?;
+        let mut halls = Halls::of(&settings);
+        let mut heard = client.subscribe(fleet::status_of("*.*")).await.or_exit(Exit::Unavailable)?;
+        let until = Instant::now() + LISTEN;
+        // What the engine keeps is for those who are silent; without it the others are shown as well.
+        let kept = halls.look_up_kept(&client).await;
+        halls.listen(&mut heard, until).await;
+        let table = halls.table(Monotonic.now());
+        if args.json {
+            print::json(&table)?;
+        } else {
+            print::out(&drawn(&table))?;
+        }
+        kept?;
+        Ok(if table.iter().any(|hall| hall.silent) { Exit::TryAgain } else { Exit::Done })
+    })
+}
+
+pub(super) fn watch(args: &WatchArgs) -> Result<Exit, Failure> {
+    let settings = settings::desk(&args.desk.desk)?;
+    engine::block_on(async {
+        let client = engine::connect_desk(&settings.access, &settings.name).await?;
+        let mut halls = Halls::of(&settings);
+        let mut heard = client.subscribe(fleet::status_of("*.*")).await.or_exit(Exit::Unavailable)?;
+        let _ = halls.look_up_kept(&client).await;
+        tokio::select! {
+            shown = show(&mut halls, &mut heard, args.json) => shown,
+            _ = tokio::signal::ctrl_c() => Ok(Exit::Done),
+        }
+    })
+}
+
+/// Shows halls as they tell of themselves.
+async fn show(halls: &mut Halls, heard: &mut Subscriber, json: bool) -> Result<Exit, Failure> {
+    let mut lines = BTreeMap::new();
+    loop {
+        if json {
+            let Some(message) = heard.next().await else { return Ok(Exit::Unavailable) };
+            if let Some(name) = halls.hear(&message.subject, &message.payload) {
+                print::json_text(&serde_json::to_string(&halls.one(&name, Monotonic.now())).expect("text"))?;
+            }
+            continue;
+        }
+        halls.listen(heard, Instant::now() + DRAW).await;
+        let table = halls.table(Monotonic.now());
+        if stdout().is_terminal() {
+            print::out(&format!("\x1b[H\x1b[2J{}", drawn(&table)))?;
+            continue;
+        }
+        for hall in &table {
+            let line = format!("{}: {}", hall.name, hall.line());
+            if lines.insert(hall.name.clone(), line.clone()).as_ref() != Some(&line) {
+                print::out(&format!("{line}\n"))?;
+            }
+        }
+    }
+}
+
+impl Halls {
+    fn of(settings: &DeskSettings) -> Self {
+        Self { seen: BTreeMap::new(), kept: BTreeMap::new(), names: settings.halls.clone() }
+    }
+
+    /// Takes in a status; says whose it is.
+    fn hear(&mut self, subject: &str, payload: &[u8]) -> Option<String> {
+        let name = subject.strip_prefix("kc.status.")?;
+        let status = serde_json::from_slice(payload).ok()?;
+        self.seen.insert(name.to_owned(), (status, Monotonic.now()));
+        Some(name.to_owned())
+    }
+
+    async fn listen(&mut self, heard: &mut Subscriber, until: Instant) {
+        while let Ok(message) = timeout_at(until, heard.next()).await {
+            match message {
+                Some(message) => drop(self.hear(&message.subject, &message.payload)),
+                None => sleep_until(until).await, // the engine is gone for good
+            }
+        }
+    }
+
+    /// Asks the engine for the last status of each hall of the desk.
+    async fn look_up_kept(&mut self, client: &Client) -> Result<(), Failure> {
+        let kept = engine::kept(client);
+        engine::prepare(&kept).await?;
+        let bucket =
+            kept.get_stream_no_info(format!("KV_{}", fleet::SEEN)).await.or_exit(Exit::Unavailable)?;
+        for name in &self.names {
+            let Ok(entry) = bucket.direct_get_last_for_subject(format!("$KV.{}.{name}", fleet::SEEN)).await
+            else {
+                continue;
+            };
+            if let Ok(status) = serde_json::from_slice(&entry.payload) {
+                let at = u64::try_from(entry.time.unix_timestamp_nanos()).unwrap_or(0);
+                let age = Duration::from_nanos(wall_now_ns().saturating_sub(at));
+                self.kept.insert(name.clone(), (status, age, Monotonic.now()));
+            }
+        }
+        Ok(())
+    }
+
+    /// What is known of one.
+    fn one(&self, name: &str, now: MonoTime) -> HallSeen {
+        let heard = self.seen.get(name).map(|(status, at)| (status, now.since(*at)));
+        let kept = || self.kept.get(name).map(|(status, age, at)| (status, *age + now.since(*at)));
+        let silent = heard.as_ref().is_none_or(|(_, age)| *age > SILENT);
+        let known = heard.or_else(kept);
+        HallSeen {
+            name: name.to_owned(),
+            age_s: known.as_ref().map(|(_, age)| age.as_secs_f64()),
+            silent,
+            status: known.map(|(status, _)| status.clone()),
+        }
+    }
+
+    /// All halls of the desk, and others that were heard, worst first.
+    fn table(&self, now: MonoTime) -> Vec<HallSeen> {
+        let others = self.seen.keys().filter(|name| !self.names.contains(name));
+        let mut table: Vec<_> = self.names.iter().chain(others).map(|name| self.one(name, now)).collect();
+        table.sort_by(|a, b| a.rank().cmp(&b.rank()).then_with(|| a.name.cmp(&b.name)));
+        table
+    }
+}
+
+impl HallSeen {
+    /// How much it needs a person: 0 most.
+    fn rank(&self) -> u8 {
+        let Some(status) = self.status.as_ref().filter(|_| !self.silent) else { return 0 };
+        let gravest = status.warnings.iter().map(|warning| warning.severity).max();
+        match status.state.to_string().as_str() {
+            "fault" => 1,
+            "stopped" | "stopping" => 2,
+            _ if status.seats.lost > 0 || gravest == Some(Severity::Error) => 3,
+            "boot" | "recovering" => 4,
+            _ if gravest == Some(Severity::Warning) => 5,
+            _ => 6,
+        }
+    }
+
+    /// How it is, in a line without times.
+    fn line(&self) -> String {
+        let Some(status) = &self.status else { return "never heard".to_owned() };
+        let silent = if self.silent { "silent; it was " } else { "" };
+        let show = status.show.as_ref().map_or_else(String::new, |show| format!(", {}", show.cue));
+        let lost =
+            if status.seats.lost > 0 { format!(", {} seats lost", status.seats.lost) } else { String::new() };
+        format!("{silent}{}: {}{show}{lost}", status.state, status.cause)
+    }
+}
+
+/// The table as people read it.
+fn drawn(halls: &[HallSeen]) -> String {
+    let header = ["hall", "state", "show", "level", "seats", "what to know", "age"];
+    table::table(header, halls.iter().map(row))
+}
+
+fn row(hall: &HallSeen) -> [String; 7] {
+    let age = hall.age_s.map_or_else(|| "-".to_owned(), age);
+    let Some(status) = &hall.status else {
+        return [&hall.name, "silent", "", "", "", "never heard; check its link and the engine", &age]
+            .map(str::to_owned);
+    };
+    let show = status.show.as_ref().map_or_else(String::new, |show| {
+        format!("{} {:.0} of {:.0} s", show.cue, show.position_s, show.length_s)
+    });
+    let seats = format!("{} of {}", status.seats.taking_part, status.seats.total);
+    let state = if hall.silent { format!("silent, was {}", status.state) } else { status.state.to_string() };
+    let know = match status.warnings.first() {
+        _ if hall.silent => "not heard now; it may play on. Check its link and the network".to_owned(),
+        Some(warning) if warning.severity > Severity::Info => {
+            let more = status.warnings_total.saturating_sub(1);
+            let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
+            format!("{}{more}", warning.said())
+        }
+        _ => format!("{}; next: {}", status.cause, status.next),
+    };
+    [hall.name.clone(), state, show, format!("{:.0} %", status.level * 100.0), seats, know, age]
+}
+
+/// An age as a person reads it.
+fn age(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.1} s"),
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.0} h", s / 3600.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::Warning;
+    use crate::state::State;
+
+    fn seen(name: &str, state: State, lost: usize, age_s: f64) -> HallSeen {
+        let mut status = BriefStatus { state: state.into(), ..BriefStatus::default() };
+        status.seats.lost = lost;
+        HallSeen { name: name.to_owned(), age_s: Some(age_s), silent: age_s > 1.5, status: Some(status) }
+    }
+
+    #[test]
+    fn the_hall_that_needs_a_person_most_is_first_and_a_silent_one_before_all() {
+        let halls = [
+            seen("a", State::Parked, 0, 0.2),
+            seen("b", State::Stopped, 0, 0.2),
+            seen("c", State::Parked, 2, 0.2),
+            seen("d", State::Fault, 0, 0.2),
+            seen("e", State::Parked, 0, 60.0),
+            seen("f", State::Recovering, 0, 0.2),
+            HallSeen { name: "g".to_owned(), silent: true, ..HallSeen::default() },
+        ];
+        let ranks = halls.each_ref().map(HallSeen::rank);
+        assert_eq!(ranks, [6, 2, 3, 1, 0, 4, 0]);
+        let text = drawn(&halls);
+        assert!(text.contains("silent, was parked") && text.contains("never heard"), "{text}");
+        assert!(halls[4].line().starts_with("silent; it was parked"));
+    }
+
+    #[test]
+    fn the_gravest_warning_is_told_and_how_many_there_are_beside_it() {
+        let mut hall = seen("a", State::Parked, 0, 0.2);
+        let warning = Warning { severity: Severity::Error, text: "no room".to_owned(), ..Warning::default() };
+        let status = hall.status.as_mut().unwrap();
+        (status.warnings, status.warnings_total) = (vec![warning], 4);
+        assert_eq!(hall.rank(), 3);
+        assert!(row(&hall)[5].ends_with("no room (and 3 more)"), "{:?}", row(&hall));
+    }
+
+    #[test]
+    fn an_age_is_as_coarse_as_it_is_old() {
+        assert_eq!([0.24, 59.6, 600.0, 86_400.0].map(age), ["0.2 s", "60 s", "10 min", "24 h"]);
+    }
+}

@@ -1,0 +1,127 @@
+//! The way to the engine, and what it keeps for a fleet.
+
+use std::time::Duration;
+
+use anyhow::Context as _;
+use async_nats::jetstream::context::{Context, ContextBuilder};
+use async_nats::jetstream::stream::{Config, DiscardPolicy, StorageType};
+use async_nats::{Client, ConnectOptions};
+
+use super::settings::Access;
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::fleet;
+
+/// How long a desk waits for the engine.
+const ENTRY: Duration = Duration::from_secs(3);
+/// How long an answer of the engine may take.
+const ANSWER: Duration = Duration::from_secs(3);
+/// How often the engine is asked whether it lives; after two of these without an answer it is looked for anew.
+const PING: Duration = Duration::from_secs(5);
+/// The longest wait between two tries to reach it.
+const RETRY: Duration = Duration::from_secs(1);
+/// How long proofs of play are kept, as the journal of a hall keeps them by default.
+const LOG_AGE: Duration = Duration::from_secs(400 * 86_400);
+
+/// Does `work` on a runtime of its own.
+pub(super) fn block_on<T>(work: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    runtime.context("no runtime could be started").or_system()?.block_on(work)
+}
+
+/// What the inboxes of a member begin with, so that none hears what another is answered: of a hall by both its names, of a desk by one.
+pub(super) fn inbox(name: &str) -> String {
+    let kind = if name.contains('.') { "hall" } else { "desk" };
+    format!("_INBOX_{kind}.{name}")
+}
+
+/// Connects a desk, or says why not.
+pub(super) async fn connect_desk(access: &Access, name: &str) -> Result<Client, Failure> {
+    let options = options(access, name)?.connection_timeout(ENTRY);
+    let connected = tokio::time::timeout(2 * ENTRY, options.connect(&access.engine[..])).await;
+    let told = || {
+        format!(
+            "no engine answers at {}; start it (nats-server -c nats-server.conf), and check address, certificate and key",
+            access.engine.join(", ")
+        )
+    };
+    connected
+        .map_err(anyhow::Error::from)
+        .and_then(|done| Ok(done?))
+        .with_context(told)
+        .or_exit(Exit::Unavailable)
+}
+
+/// Connects a link, at once or as soon as the engine is there, and again each time that it is lost.
+pub(super) async fn connect_link(access: &Access, name: &str) -> Result<Client, Failure> {
+    let options = options(access, name)?.retry_on_initial_connect();
+    let options = options.event_callback(|event| async move {
+        print::tell(&format!("engine: {event}"));
+    });
+    options.connect(&access.engine[..]).await.context("the engine cannot be looked for").or_system()
+}
+
+fn options(access: &Access, name: &str) -> Result<ConnectOptions, Failure> {
+    let seed = access.pair.seed().context("the key has no secret half").or_exit(Exit::Config)?;
+    let mut options = ConnectOptions::with_nkey(seed)
+        .name(name)
+        .custom_inbox_prefix(inbox(name))
+        .ping_interval(PING)
+        .require_tls(access.engine.iter().any(|one| one.starts_with("tls://")))
+        .reconnect_delay_callback(|tries| {
+            RETRY.min(Duration::from_millis(100 * u64::try_from(tries).unwrap_or(u64::MAX).min(100)))
+        });
+    if let Some(ca) = &access.ca {
+        options = options.add_root_certificates(ca.clone());
+    }
+    Ok(options)
+}
+
+/// What the engine keeps, by the way that also passes leaf nodes.
+pub(super) fn kept(client: &Client) -> Context {
+    ContextBuilder::new().domain(fleet::DOMAIN).timeout(ANSWER).build(client.clone())
+}
+
+/// Makes what the engine keeps for a fleet, where it is missing.
+pub(super) async fn prepare(kept: &Context) -> Result<(), Failure> {
+    for config in [log(), seen()] {
+        let name = config.name.clone();
+        let made = kept.get_or_create_stream(config).await;
+        let told = || {
+            format!(
+                "the engine keeps no {name}; it needs JetStream with the domain hub, as in nats-server.conf of `kinocue fleet init`"
+            )
+        };
+        made.with_context(told).or_exit(Exit::Unavailable)?;
+    }
+    Ok(())
+}
+
+/// Proofs of play: nobody takes one away before its time.
+fn log() -> Config {
+    Config {
+        name: fleet::LOG.to_owned(),
+        subjects: vec![fleet::log_of(">")],
+        max_age: LOG_AGE,
+        storage: StorageType::File,
+        discard: DiscardPolicy::Old,
+        allow_direct: true,
+        deny_delete: true,
+        deny_purge: true,
+        ..Config::default()
+    }
+}
+
+/// The last status of each hall: a bucket, as other clients of the engine know them.
+fn seen() -> Config {
+    Config {
+        name: format!("KV_{}", fleet::SEEN),
+        subjects: vec![format!("$KV.{}.>", fleet::SEEN)],
+        max_messages_per_subject: 1,
+        storage: StorageType::File,
+        discard: DiscardPolicy::New,
+        allow_direct: true,
+        allow_rollup: true,
+        deny_delete: true,
+        ..Config::default()
+    }
+}

@@ -1,0 +1,239 @@
+//! `kinocue fleet init`: keys, the configuration of the engine with what each member may, and the settings of links and desk.
+
+use std::fmt::Write as _;
+use std::fs::{self, OpenOptions};
+use std::io::Write as _;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, anyhow};
+use nkeys::KeyPair;
+
+use super::engine::inbox;
+use super::settings::is_loopback;
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::config::is_fleet_id;
+use crate::fleet::{self, DOMAIN, LOG, SEEN};
+
+/// Makes keys and configurations of a fleet in a new folder.
+///
+/// nats-server.conf is for the engine: it says what each member may, by its key. A folder for each hall has fleet.toml with its key, and what
+/// goes into its kinocue.toml; one for the desk has desk.toml. The halls allow nothing yet but a stop. Nothing is installed or started.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The site of the halls.
+    #[arg(long, value_name = "NAME", value_parser = name)]
+    site: String,
+    /// The halls.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', required = true, value_parser = name)]
+    halls: Vec<String>,
+    /// Who asks at the desk.
+    #[arg(long, value_name = "NAME", value_parser = name, default_value = "office")]
+    desk: String,
+    /// Where the engine listens, and where the others find it.
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:4222")]
+    engine: String,
+    /// The folder to be made.
+    #[arg(long, value_name = "DIR", default_value = "fleet")]
+    folder: PathBuf,
+}
+
+/// What is made, and for whom.
+pub(super) struct Plan<'a> {
+    pub(super) site: &'a str,
+    pub(super) halls: &'a [String],
+    pub(super) desk: &'a str,
+    /// `HOST:PORT`.
+    pub(super) engine: &'a str,
+    /// The folder in which the engine keeps its streams.
+    pub(super) store: &'a str,
+    /// What the halls allow.
+    pub(super) allow: &'a str,
+}
+
+fn name(text: &str) -> Result<String, String> {
+    match text {
+        fleet::ALL => Err("all means every hall".to_owned()),
+        text if is_fleet_id(text) => Ok(text.to_owned()),
+        _ => Err("a name is made of a to z, 0 to 9, - and _".to_owned()),
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let Args { site, halls, desk, engine, folder } = args;
+    let plan = Plan { site, halls, desk, engine, store: "/var/lib/nats/jetstream", allow: "[]" };
+    let is_alone = host(engine)?;
+    if folder.exists() {
+        let error = anyhow!("{} is there; keys are made once: give another --folder", folder.display());
+        return Err(error).or_exit(Exit::Usage);
+    }
+    make(&plan, folder)?;
+    print::out(&next_steps(&plan, folder, is_alone))?;
+    Ok(Exit::Done)
+}
+
+/// True if an engine there is reached from this machine alone.
+fn host(engine: &str) -> Result<bool, Failure> {
+    let parts =
+        engine.rsplit_once(':').filter(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());
+    let why = || anyhow!("{engine:?} is no HOST:PORT, such as engine.example:4222");
+    Ok(is_loopback(parts.ok_or_else(why).or_exit(Exit::Usage)?.0))
+}
+
+/// Makes all files.
+pub(super) fn make(plan: &Plan<'_>, folder: &Path) -> Result<(), Failure> {
+    let desk = KeyPair::new_user();
+    let halls: Vec<_> = plan.halls.iter().map(|hall| (hall, KeyPair::new_user())).collect();
+    let engine = engine_conf(plan, &desk, &halls)?;
+    put(&folder.join("nats-server.conf"), &engine, 0o644)?;
+    let scheme = if host(plan.engine)? { "nats" } else { "tls" };
+    let access = |seed: &str| {
+        let ca = if scheme == "tls" { "ca = \"fleet-ca.pem\"\n" } else { "" };
+        format!("engine = [\"{scheme}://{}\"]\nseed = \"{seed}\"\n{ca}", plan.engine)
+    };
+    for (hall, pair) in &halls {
+        let of_hall = folder.join(hall);
+        put(&of_hall.join("fleet.nk"), &seed(pair)?, 0o600)?;
+        let settings = format!("{}site = \"{}\"\nhall = \"{hall}\"\n", access("fleet.nk"), plan.site);
+        put(&of_hall.join("fleet.toml"), &settings, 0o644)?;
+        put(&of_hall.join("kinocue-fleet.toml"), &hall_table(plan, hall, &desk), 0o644)?;
+    }
+    let of_desk = folder.join(plan.desk);
+    let names: Vec<_> = halls.iter().map(|(hall, _)| format!("\"{}.{hall}\"", plan.site)).collect();
+    put(&of_desk.join("desk.nk"), &seed(&desk)?, 0o600)?;
+    let settings = format!("{}name = \"{}\"\nhalls = [{}]\n", access("desk.nk"), plan.desk, names.join(", "));
+    put(&of_desk.join("desk.toml"), &settings, 0o644)
+}
+
+/// The lines of a hall's own configuration.
+fn hall_table(plan: &Plan<'_>, hall: &str, desk: &KeyPair) -> String {
+    let (site, name, public) = (plan.site, plan.desk, desk.public_key());
+    format!(
+        "# Add this to kinocue.toml, and restart the service. A stop is always taken; name in allow what else the desk may ask:\n\
+         # pause, park, disarm, load, playlist, levels, trim.\n\
+         [fleet]\nname = \"{site}.{hall}\"\nallow = {}\n\n[[fleet.key]]\nname = \"{name}\"\nrole = \"operate\"\npublic = \"{public}\"\n",
+        plan.allow
+    )
+}
+
+/// The configuration of the engine. Everybody has a key, and may what is listed for it: nobody else is let in.
+fn engine_conf(plan: &Plan<'_>, desk: &KeyPair, halls: &[(&String, KeyPair)]) -> Result<String, Failure> {
+    let mut text =
+        String::from("# Made by `kinocue fleet init`: what each member of the fleet may, by its key.\n");
+    let listen = plan.engine.rsplit_once(':').map_or("4222", |(_, port)| port);
+    let is_alone = host(plan.engine)?;
+    let listen = if is_alone { plan.engine.to_owned() } else { format!("0.0.0.0:{listen}") };
+    let tls = "tls { cert_file: \"/etc/nats/fleet-engine.pem\", key_file: \"/etc/nats/fleet-engine.key\" }\n";
+    let _ = write!(
+        text,
+        "server_name: {}-engine\nlisten: \"{listen}\"\n{}ping_interval: \"5s\"\nping_max: 2\nmax_payload: 1048576\n\
+         jetstream {{ store_dir: \"{}\", domain: {DOMAIN} }}\n\nauthorization {{\n  users: [\n",
+        plan.site,
+        if is_alone { "" } else { tls },
+        plan.store
+    ); // a String takes it
+    user(&mut text, plan.desk, &desk.public_key(), &of_desk(plan.desk), false);
+    for (hall, pair) in halls {
+        let member = format!("{}.{hall}", plan.site);
+        user(&mut text, &member, &pair.public_key(), &of_hall(plan.site, &member), true);
+    }
+    text.push_str("  ]\n}\n");
+    Ok(text)
+}
+
+/// What somebody may publish and hear.
+struct Rights {
+    publish: Vec<String>,
+    subscribe: Vec<String>,
+}
+
+/// A desk asks under its own name, hears how halls are, and has the engine keep the log and the last status, which it reads.
+fn of_desk(desk: &str) -> Rights {
+    let api = |what: &str| format!("$JS.{DOMAIN}.API.{what}");
+    let seen = format!("KV_{SEEN}");
+    let mut publish = vec![fleet::command_to("*.*", desk, "*"), fleet::stop_to("*.*", desk)];
+    for stream in [LOG, &seen] {
+        publish.extend(["INFO", "CREATE"].map(|what| api(&format!("STREAM.{what}.{stream}"))));
+    }
+    publish.push(api(&format!("DIRECT.GET.{seen}.$KV.{SEEN}.>")));
+    publish.push(api(&format!("CONSUMER.CREATE.{LOG}")));
+    publish.push(api(&format!("CONSUMER.CREATE.{LOG}.>")));
+    publish.push(api(&format!("CONSUMER.MSG.NEXT.{LOG}.>")));
+    Rights { publish, subscribe: vec![fleet::status_of("*.*"), format!("{}.>", inbox(desk))] }
+}
+
+/// A hall tells of itself alone, hears what it alone is asked, and answers whoever asked.
+fn of_hall(site: &str, member: &str) -> Rights {
+    let api = |what: &str| format!("$JS.{DOMAIN}.API.{what}");
+    let publish = vec![
+        fleet::status_of(member),
+        fleet::log_of(member),
+        api(&format!("DIRECT.GET.{LOG}.{}", fleet::log_of(member))),
+        api(&format!("$KV.{SEEN}.{member}")),
+    ];
+    let all = fleet::stop_to(&format!("{site}.{}", fleet::ALL), "*");
+    let subscribe = vec![
+        fleet::command_to(member, "*", "*"),
+        fleet::stop_to(member, "*"),
+        all,
+        format!("{}.>", inbox(member)),
+    ];
+    Rights { publish, subscribe }
+}
+
+fn user(text: &mut String, name: &str, public: &str, rights: &Rights, answers: bool) {
+    let list = |subjects: &[String]| {
+        let all: Vec<_> = subjects.iter().map(|subject| format!("\"{subject}\"")).collect();
+        all.join(",\n        ")
+    };
+    let answers = if answers { "      allow_responses: { max: 1, expires: \"90s\" }\n" } else { "" };
+    let _ = write!(
+        text,
+        "    # {name}\n    {{ nkey: {public}, permissions: {{\n      publish: {{ allow: [\n        {}] }}\n      \
+         subscribe: {{ allow: [\n        {}] }}\n{answers}    }} }}\n",
+        list(&rights.publish),
+        list(&rights.subscribe)
+    );
+}
+
+fn seed(pair: &KeyPair) -> Result<String, Failure> {
+    Ok(pair.seed().context("the key has no secret half").or_exit(Exit::Internal)? + "\n")
+}
+
+/// Writes a new file, with its mode from the start on.
+fn put(path: &Path, text: &str, mode: u32) -> Result<(), Failure> {
+    let write = || {
+        fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+        let mut file = OpenOptions::new().write(true).create_new(true).mode(mode).open(path)?;
+        file.write_all(text.as_bytes())
+    };
+    write().with_context(|| format!("cannot write {}", path.display())).or_exit(Exit::Io)
+}
+
+/// What a person does with it.
+fn next_steps(plan: &Plan<'_>, folder: &Path, is_alone: bool) -> String {
+    let (folder, site) = (folder.display(), plan.site);
+    let hall = plan.halls.first().map_or("h1", String::as_str);
+    let mut text = format!(
+        "made {folder}: keys of {} halls of {site} and of the desk {}\n\n\
+         1. The engine: {folder}/nats-server.conf to its machine (Debian: nats-server), then nats-server -c nats-server.conf\n\
+         2. Each hall, as {hall}: {folder}/{hall}/kinocue-fleet.toml into its kinocue.toml; fleet.toml and fleet.nk to /etc/kinocue;\n   \
+         systemctl restart kinocue; systemctl enable --now kinocue-link\n\
+         3. The desk: {folder}/{}/desk.toml and desk.nk to /etc/kinocue; kinocue fleet status\n",
+        plan.halls.len(),
+        plan.desk,
+        plan.desk
+    );
+    if !is_alone {
+        let host = plan.engine.rsplit_once(':').map_or(plan.engine, |(host, _)| host);
+        let kind = if host.parse::<std::net::IpAddr>().is_ok() { "IP" } else { "DNS" };
+        let _ = write!(
+            text,
+            "\nThe engine needs a certificate, since it is reached over a network; fleet-ca.pem goes beside each fleet.toml and desk.toml:\n\
+             openssl req -x509 -newkey ed25519 -nodes -days 3650 -subj /CN=fleet-ca -keyout fleet-ca.key -out fleet-ca.pem\n\
+             openssl req -newkey ed25519 -nodes -subj /CN={host} -keyout fleet-engine.key | openssl x509 -req -days 825 -CA fleet-ca.pem \
+             -CAkey fleet-ca.key -CAcreateserial -extfile <(echo subjectAltName={kind}:{host}) -out fleet-engine.pem\n"
+        );
+    }
+    text
+}

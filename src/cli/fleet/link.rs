@@ -1,0 +1,327 @@
+//! `kinocue fleet link`: carries what a hall says of itself to the engine, and what it is asked to the hall. It decides nothing: letters
+//! are checked by the hall. While it is away, or the engine, the hall plays on as ever.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::{Context as _, anyhow};
+use async_nats::connection::State;
+use async_nats::{Client, Message};
+use futures_util::{StreamExt as _, stream};
+use http_body_util::Full;
+use hyper::Method;
+use hyper::body::Bytes;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::UnixStream;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::{Semaphore, watch};
+use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
+
+use super::log::LogTeller;
+use super::{engine, settings};
+use crate::cli::client::http::{self, HttpReply};
+use crate::cli::{Exit, Failure, OrExit as _, places, print};
+use crate::fleet::{self, BriefStatus};
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
+
+/// How often the hall is looked at, and so the most that is told of it.
+const LOOK: Duration = Duration::from_millis(100);
+/// How often it is told where nothing changes.
+const TELL: Duration = Duration::from_millis(500);
+/// How often the last status is kept where the state stays.
+const KEEP: Duration = Duration::from_secs(60);
+/// How long the next try waits after something failed.
+const AGAIN: Duration = Duration::from_secs(2);
+/// How long the hall may take to answer what is looked up, and what is asked.
+const LOOKED_UP: Duration = Duration::from_secs(2);
+const ASKED: Duration = Duration::from_secs(65);
+/// How long a stop may take.
+const STOPPED: Duration = Duration::from_secs(2);
+/// What is asked at a time.
+const AT_ONCE: usize = 32;
+/// The longest letter.
+const LONGEST: usize = 60 << 10;
+
+/// Carries what a hall says to the engine, and what it is asked to the hall.
+///
+/// Runs beside `kinocue serve`, best as the unit kinocue-link.service: as a user who may open the two fleet sockets of the hall and nothing
+/// else. It checks no signature; the hall does. Ends on SIGTERM and Ctrl-C.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// Its settings, as `kinocue fleet init` makes them.
+    #[arg(long, value_name = "FILE", env = "KINOCUE_FLEET", default_value = "/etc/kinocue/fleet.toml")]
+    config: PathBuf,
+    /// The fleet socket of the hall [default: fleet.sock beside the control socket].
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+}
+
+/// What a link has.
+pub(super) struct Link {
+    /// `SITE.HALL`.
+    pub(super) hall: String,
+    pub(super) client: Client,
+    socket: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let settings = settings::link(&args.config)?;
+    let socket = args.socket.clone().unwrap_or_else(|| places::control_socket().with_file_name("fleet.sock"));
+    engine::block_on(async {
+        let mut ends = signal(SignalKind::terminate()).context("signals cannot be handled").or_system()?;
+        let client = engine::connect_link(&settings.access, &settings.hall).await?;
+        let link = Arc::new(Link { hall: settings.hall, client, socket });
+        print::tell(&format!("carries {} by {}", link.hall, link.socket.display()));
+        let (tell, told) = watch::channel(None);
+        let work = async {
+            tokio::join!(
+                link.tell(&tell),
+                link.keep(told),
+                link.hear_stops(),
+                link.hear_orders(),
+                link.tell_log()
+            );
+        };
+        tokio::select! {
+            () = work => {}
+            _ = ends.recv() => {}
+            _ = tokio::signal::ctrl_c() => {}
+        }
+        Ok(Exit::Done)
+    })
+}
+
+impl Link {
+    /// True if what is told now goes out now: what is told meanwhile would come late, when it is no longer so.
+    pub(super) fn is_connected(&self) -> bool {
+        self.client.connection_state() == State::Connected
+    }
+
+    /// Tells how the hall is, twice a second and where it changes.
+    async fn tell(&self, last: &watch::Sender<Option<BriefStatus>>) {
+        let mut pace = interval(LOOK);
+        pace.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let (mut seq, mut told_at, mut trouble) = (0, None, Trouble::default());
+        loop {
+            pace.tick().await;
+            let mut status: BriefStatus = match self.look_up("/api/v1/fleet/status").await {
+                Ok(status) => status,
+                Err(why) => {
+                    trouble.tell("the hall", &why);
+                    continue;
+                }
+            };
+            trouble.over("the hall");
+            let now = Monotonic.now();
+            let is_due = told_at.is_none_or(|at| now.since(at) >= TELL);
+            let differs = last.borrow().as_ref().is_none_or(|before| status.differs(before));
+            if !self.is_connected() || !(is_due || differs) {
+                continue;
+            }
+            seq += 1;
+            (status.seq, told_at) = (seq, Some(now));
+            let text = serde_json::to_vec(&status).expect("a status is text and numbers");
+            // Where it does not go out, the next one does.
+            let _ = self.client.publish(fleet::status_of(&self.hall), text.into()).await;
+            last.send_replace(Some(status));
+        }
+    }
+
+    /// Has the engine keep the last status: at each change of state, and each minute.
+    async fn keep(&self, mut told: watch::Receiver<Option<BriefStatus>>) {
+        let kept = engine::kept(&self.client);
+        let subject = format!("$JS.{}.API.$KV.{}.{}", fleet::DOMAIN, fleet::SEEN, self.hall);
+        let mut trouble = Trouble::default();
+        loop {
+            let Ok(status) = told.wait_for(Option::is_some).await.map(|status| status.clone()) else {
+                return;
+            };
+            if !self.is_connected() {
+                sleep(AGAIN).await;
+                continue;
+            }
+            let text = serde_json::to_vec(&status).expect("a status is text and numbers");
+            let put = async { kept.publish(subject.clone(), text.into()).await?.await };
+            match put.await {
+                Ok(_) => trouble.over("keeping the last status"),
+                Err(error) => {
+                    trouble.tell("keeping the last status", &anyhow!(error));
+                    sleep(AGAIN).await;
+                    continue;
+                }
+            }
+            let state = status.map(|status| status.state);
+            let differs = told.wait_for(|now| now.as_ref().map(|now| &now.state) != state.as_ref());
+            if matches!(timeout(KEEP, differs).await, Ok(Err(_))) {
+                return;
+            }
+        }
+    }
+
+    /// Passes stops on, by a socket of their own that waits for nothing.
+    async fn hear_stops(self: &Arc<Self>) {
+        let site = self.hall.split_once('.').map_or("", |(site, _)| site);
+        let all = fleet::stop_to(&format!("{site}.{}", fleet::ALL), "*");
+        let mut both = self.subscribed([fleet::stop_to(&self.hall, "*"), all]).await;
+        while let Some(message) = both.next().await {
+            let link = Arc::clone(self);
+            tokio::spawn(async move {
+                let who = message.subject.rsplit('.').next().unwrap_or_default();
+                print::tell(&format!("{who} asks for a stop"));
+                let reply = match timeout(STOPPED, stop(&link.socket.with_file_name("fleet-stop.sock"))).await
+                {
+                    Ok(Ok(())) => (200, json!({ "stopping": true })),
+                    Ok(Err(error)) => away(&anyhow!(error)),
+                    Err(_) => away(&anyhow!("the hall did not answer within {} s", STOPPED.as_secs())),
+                };
+                link.answer(message, reply).await;
+            });
+        }
+    }
+
+    /// Passes orders on, and what the hall answers back.
+    async fn hear_orders(self: &Arc<Self>) {
+        let mut orders = self.subscribed([fleet::command_to(&self.hall, "*", "*")]).await;
+        let places = Arc::new(Semaphore::new(AT_ONCE));
+        while let Some(message) = orders.next().await {
+            let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
+                self.answer(
+                    message,
+                    (
+                        429,
+                        json!({ "code": "busy", "detail": "too many orders at once",
+                    "remedy": "try again in a second" }),
+                    ),
+                )
+                .await;
+                continue;
+            };
+            let link = Arc::clone(self);
+            tokio::spawn(async move {
+                let _place = place;
+                let reply = link.carry(&message).await.unwrap_or_else(|why| away(&why));
+                link.answer(message, reply).await;
+            });
+        }
+    }
+
+    /// Has the hall take a letter, or look up its status, which needs none.
+    async fn carry(&self, message: &Message) -> anyhow::Result<(u16, Value)> {
+        let word = message.subject.rsplit('.').next().unwrap_or_default();
+        let reply = if word == "status" {
+            self.get("/api/v1/status").await?
+        } else {
+            anyhow::ensure!(message.payload.len() <= LONGEST, "a letter is at most {LONGEST} bytes long");
+            self.post("/api/v1/fleet/order", message.payload.clone(), ASKED).await?
+        };
+        Ok((reply.status, serde_json::from_str(&reply.text).unwrap_or(Value::Null)))
+    }
+
+    async fn answer(&self, message: Message, (status, reply): (u16, Value)) {
+        let Some(to) = message.reply else { return };
+        let text = json!({ "hall": self.hall, "status": status, "reply": reply }).to_string();
+        let _ = self.client.publish(to, text.into()).await; // whoever asked is told nothing, and says so
+    }
+
+    /// Passes the journal on, for as long as there is more.
+    async fn tell_log(&self) {
+        let mut log = LogTeller::new(self);
+        let mut trouble = Trouble::default();
+        loop {
+            match log.tell().await {
+                Ok(true) => trouble.over("the log"),
+                Ok(false) => {
+                    trouble.over("the log");
+                    sleep(AGAIN).await;
+                }
+                Err(why) => {
+                    trouble.tell("the log", &why);
+                    sleep(AGAIN).await;
+                }
+            }
+        }
+    }
+
+    async fn subscribed<const N: usize>(
+        &self,
+        subjects: [String; N],
+    ) -> stream::SelectAll<async_nats::Subscriber> {
+        let mut all = stream::SelectAll::new();
+        for subject in subjects {
+            // It fails where the client was closed, which nobody does.
+            if let Ok(heard) = self.client.subscribe(subject).await {
+                all.push(heard);
+            }
+        }
+        all
+    }
+
+    /// Looks something up at the hall.
+    pub(super) async fn look_up<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
+        told(&self.get(path).await?)
+    }
+
+    /// The same with a body that says what.
+    pub(super) async fn look_up_by<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        body: &Value,
+    ) -> anyhow::Result<T> {
+        told(&self.post(path, body.to_string().into(), LOOKED_UP).await?)
+    }
+
+    async fn get(&self, path: &str) -> anyhow::Result<HttpReply> {
+        let request = http::request(Method::GET, path, None, Full::<Bytes>::default());
+        let reply = async { http::exchange(&self.socket, request?, LOOKED_UP).await };
+        reply.await.map_err(|failure| failure.error)
+    }
+
+    async fn post(&self, path: &str, body: Bytes, patience: Duration) -> anyhow::Result<HttpReply> {
+        let request = http::request(Method::POST, path, Some("application/json"), Full::new(body));
+        let reply = async { http::exchange(&self.socket, request?, patience).await };
+        reply.await.map_err(|failure| failure.error)
+    }
+}
+
+fn told<T: DeserializeOwned>(reply: &HttpReply) -> anyhow::Result<T> {
+    anyhow::ensure!(reply.status == 200, "the hall replied {}: {}", reply.status, reply.text);
+    serde_json::from_str(&reply.text).context("the hall is of another version")
+}
+
+/// That the hall cannot be asked.
+fn away(why: &anyhow::Error) -> (u16, Value) {
+    let remedy = "look at the hall: its service may be down";
+    (503, json!({ "code": "timeout", "detail": format!("{why:#}"), "remedy": remedy }))
+}
+
+async fn stop(socket: &Path) -> std::io::Result<()> {
+    let mut stream = UnixStream::connect(socket).await?;
+    stream.write_all(b"stop\n").await?;
+    let mut reply = [0; 9];
+    stream.read_exact(&mut reply).await?;
+    if &reply == b"stopping\n" { Ok(()) } else { Err(std::io::ErrorKind::InvalidData.into()) }
+}
+
+/// What goes wrong, told once until it is over.
+#[derive(Debug, Default)]
+struct Trouble(Option<String>);
+
+impl Trouble {
+    fn tell(&mut self, what: &str, why: &anyhow::Error) {
+        let why = format!("{what}: {why:#}");
+        if self.0.as_ref() != Some(&why) {
+            print::tell(&why);
+            self.0 = Some(why);
+        }
+    }
+
+    fn over(&mut self, what: &str) {
+        if self.0.take().is_some() {
+            print::tell(&format!("{what}: well again"));
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! `kinocue fleet`: many halls from one desk, over an engine of messages (NATS, JetStream) that others make. The engine's library runs in
+//! these commands alone; a hall knows nothing of it.
+
+use std::path::PathBuf;
+
+use super::{Exit, Failure};
+
+mod act;
+mod demo;
+mod desk;
+mod engine;
+mod init;
+mod link;
+mod log;
+mod report;
+mod settings;
+
+const EXAMPLES: &str = "\
+Examples:
+  kinocue fleet demo                                     three halls of simulated seats, to try it
+  kinocue fleet init --site berlin --halls h1,h2,h3      makes keys and configurations in the folder fleet
+  kinocue fleet link --config /etc/kinocue/fleet.toml    carries what a hall says and is asked, as its unit starts it
+  kinocue fleet status
+  kinocue fleet watch
+  kinocue fleet stop
+  kinocue fleet stop berlin.h2
+  kinocue fleet level 60% 'berlin.*'
+  kinocue fleet report --day yesterday
+
+Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 75 a hall did not answer, 78 bad settings";
+
+/// Shows and leads many halls from one desk.
+///
+/// Each hall plays alone, whatever becomes of the network and of the engine. Halls may be stopped from a desk; all else they have to
+/// allow, and nothing from a desk ever homes, arms, clears or starts one.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    command: FleetCommand,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum FleetCommand {
+    Demo(demo::Args),
+    Init(init::Args),
+    Link(link::Args),
+    Status(desk::StatusArgs),
+    Watch(desk::WatchArgs),
+    Stop(act::StopArgs),
+    Pause(act::PauseArgs),
+    Park(act::ParkArgs),
+    Disarm(act::DisarmArgs),
+    Level(act::LevelArgs),
+    Load(act::LoadArgs),
+    Report(report::Args),
+}
+
+// Who asks. No documentation: clap would show it as the help of commands.
+#[derive(Debug, Clone, clap::Args)]
+struct DeskArgs {
+    /// The settings of the desk, as `kinocue fleet init` makes them.
+    #[arg(long, value_name = "FILE", env = "KINOCUE_DESK", default_value = "/etc/kinocue/desk.toml")]
+    desk: PathBuf,
+}
+
+pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
+    match command {
+        FleetCommand::Demo(args) => demo::run(args),
+        FleetCommand::Init(args) => init::run(args),
+        FleetCommand::Link(args) => link::run(args),
+        FleetCommand::Status(args) => desk::status(args),
+        FleetCommand::Watch(args) => desk::watch(args),
+        FleetCommand::Stop(args) => act::stop(args),
+        FleetCommand::Pause(args) => act::pause(args),
+        FleetCommand::Park(args) => act::park(args),
+        FleetCommand::Disarm(args) => act::disarm(args),
+        FleetCommand::Level(args) => act::level(args),
+        FleetCommand::Load(args) => act::load(args),
+        FleetCommand::Report(args) => report::run(args),
+    }
+}

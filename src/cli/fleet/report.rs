@@ -1,0 +1,137 @@
+//! `kinocue fleet report`: what all halls played, as each of them told the engine.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use async_nats::Client;
+use async_nats::jetstream::consumer::pull::Config;
+use async_nats::jetstream::consumer::{AckPolicy, DeliverPolicy};
+use futures_util::StreamExt as _;
+use jiff::civil::Date;
+
+use super::{DeskArgs, engine, settings};
+use crate::cli::report::{Day, parse_day, shows_table};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::fleet::{self, LogRecord};
+use crate::journal::{JournalReport, report_of};
+use crate::sys::clock::local_now;
+
+/// Records that are asked for at a time.
+const BATCH: usize = 200;
+/// How long the engine may take for these.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Reports what all halls of a desk played on a day.
+///
+/// A hall tells each show once, also what it played while it was cut off. Where it is not heard now, later shows may be missing: `kinocue fleet
+/// status` says so, and `kinocue report` in the hall has all.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Exit codes: 0 shown, 1 records of a hall are missing, 69 the engine does not answer")]
+pub(super) struct Args {
+    #[command(flatten)]
+    desk: DeskArgs,
+    /// The day: today, yesterday, or a date as 2026-11-21.
+    #[arg(long, value_name = "DAY", value_parser = parse_day, default_value = "today")]
+    day: Day,
+    /// Print JSON: an object with the report of each hall.
+    #[arg(long)]
+    json: bool,
+    /// With --json: the records as the engine has them, for programs that keep their own books.
+    #[arg(long, requires = "json")]
+    records: bool,
+}
+
+/// What a hall told.
+#[derive(Default)]
+struct ToldByHall {
+    records: Vec<LogRecord>,
+    last: Option<u64>,
+    /// Records that are not there, in words.
+    missing: Vec<String>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let settings = settings::desk(&args.desk.desk)?;
+    let day = args.day.date(local_now().date());
+    let mut told = engine::block_on(async {
+        let client = engine::connect_desk(&settings.access, &settings.name).await?;
+        engine::prepare(&engine::kept(&client)).await?;
+        read(&client, day).await
+    })?;
+    for hall in settings.halls {
+        told.entry(hall).or_default();
+    }
+    let is_whole = told.values().all(|hall| hall.missing.is_empty());
+    if args.records {
+        let records: BTreeMap<_, _> = told.iter().map(|(hall, told)| (hall, &told.records)).collect();
+        print::json(&records)?;
+        return Ok(if is_whole { Exit::Done } else { Exit::CheckFailed });
+    }
+    let reports: BTreeMap<_, _> = told.into_iter().map(|(hall, told)| (hall, told.report(day))).collect();
+    if args.json {
+        print::json(&reports)?;
+    } else {
+        for (hall, report) in &reports {
+            print::out(&format!("{hall}\n{}\n", shows_table(report)))?;
+            report.notes.iter().for_each(|note| print::tell(&format!("{hall}: {note}")));
+        }
+    }
+    Ok(if is_whole { Exit::Done } else { Exit::CheckFailed })
+}
+
+/// What halls told from the day before on: a show is told after it was played, and clocks differ.
+async fn read(client: &Client, day: Date) -> Result<BTreeMap<String, ToldByHall>, Failure> {
+    let from = day.yesterday().unwrap_or(day).at(0, 0, 0, 0).in_tz("UTC").or_exit(Exit::Usage)?.timestamp();
+    let start_time = async_nats::datetime::parse_rfc3339(&from.to_string())
+        .map_err(anyhow::Error::from_boxed)
+        .or_exit(Exit::Internal)?;
+    let stream = engine::kept(client).get_stream_no_info(fleet::LOG).await.or_exit(Exit::Unavailable)?;
+    let config = Config {
+        deliver_policy: DeliverPolicy::ByStartTime { start_time },
+        ack_policy: AckPolicy::None,
+        filter_subject: fleet::log_of("*.*"),
+        ..Config::default()
+    };
+    let told = "the engine does not tell what it keeps of shows";
+    let consumer = stream.create_consumer(config).await.context(told).or_exit(Exit::Unavailable)?;
+    let mut all: BTreeMap<String, ToldByHall> = BTreeMap::new();
+    loop {
+        let batch = consumer.fetch().max_messages(BATCH).expires(PATIENCE).messages().await;
+        let mut batch = batch.context(told).or_exit(Exit::Unavailable)?;
+        let mut count = 0;
+        while let Some(message) = batch.next().await {
+            let message =
+                message.map_err(|error| anyhow::anyhow!(error)).context(told).or_exit(Exit::Unavailable)?;
+            count += 1;
+            if let Some(hall) = message.subject.strip_prefix("kc.log.") {
+                all.entry(hall.to_owned()).or_default().take(&message.payload);
+            }
+        }
+        if count < BATCH {
+            return Ok(all);
+        }
+    }
+}
+
+impl ToldByHall {
+    fn take(&mut self, payload: &[u8]) {
+        let Ok(record) = serde_json::from_slice::<LogRecord>(payload) else {
+            self.missing.push("a record is none of ours".to_owned());
+            return;
+        };
+        let n = record.n;
+        if let Some(last) = self.last.filter(|last| n != last + 1) {
+            self.missing.push(format!("record {n} follows record {last}: what is between is missing"));
+        }
+        self.last = Some(n);
+        self.records.push(record);
+    }
+
+    fn report(self, day: Date) -> JournalReport {
+        let lines = self.records.into_iter().map(|record| record.part.record);
+        let mut report = report_of(lines, day, day);
+        report.notes.extend(self.missing);
+        report
+    }
+}

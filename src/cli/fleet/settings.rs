@@ -1,0 +1,209 @@
+//! `fleet.toml` of a hall's link and `desk.toml` of a desk: where the engine is, who it is that comes, and by which key.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, anyhow};
+use nkeys::KeyPair;
+use toml::de::DeTable;
+
+use crate::cli::{Exit, Failure, OrExit as _};
+use crate::config::{Entry, Faults, Section, is_fleet_id};
+
+/// The longest file that is read.
+const LONGEST: u64 = 64 << 10;
+
+/// How a member of a fleet comes to the engine.
+#[derive(Debug, Clone)]
+pub(super) struct Access {
+    /// Where the engine listens, in the order in which it is tried.
+    pub(super) engine: Vec<String>,
+    /// The key.
+    pub(super) pair: KeyPair,
+    /// Who signed the engine's certificate, if not an authority that the system knows.
+    pub(super) ca: Option<PathBuf>,
+}
+
+/// Of a hall's link.
+#[derive(Debug)]
+pub(super) struct LinkSettings {
+    pub(super) access: Access,
+    /// `SITE.HALL`.
+    pub(super) hall: String,
+}
+
+/// Of a desk.
+#[derive(Debug)]
+pub(super) struct DeskSettings {
+    pub(super) access: Access,
+    /// Who asks.
+    pub(super) name: String,
+    /// The halls that there are, `SITE.HALL` each.
+    pub(super) halls: Vec<String>,
+}
+
+/// Reads the settings of a link.
+pub(super) fn link(path: &Path) -> Result<LinkSettings, Failure> {
+    read(path, |section| {
+        let access = access(section, path);
+        let site = section.get("site").and_then(|entry| id(entry, section.faults));
+        let hall = section.get("hall").and_then(|entry| id(entry, section.faults));
+        section.require(&["site", "hall"]);
+        Some(LinkSettings { hall: format!("{}.{}", site?, hall?), access: access? })
+    })
+}
+
+/// Reads the settings of a desk.
+pub(super) fn desk(path: &Path) -> Result<DeskSettings, Failure> {
+    read(path, |section| {
+        let access = access(section, path);
+        let name = section.get("name").and_then(|entry| id(entry, section.faults));
+        let halls = section.get("halls").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
+        let halls = halls.into_iter().filter_map(|entry| member(entry, section.faults)).collect();
+        section.require(&["name", "halls"]);
+        Some(DeskSettings { access: access?, name: name?, halls })
+    })
+}
+
+fn read<T>(path: &Path, take: impl FnOnce(&mut Section<'_, '_, '_>) -> Option<T>) -> Result<T, Failure> {
+    let name = path.display();
+    let about = fs::metadata(path).with_context(|| format!("cannot read {name}")).or_exit(Exit::NoInput)?;
+    if about.len() > LONGEST {
+        return Err(anyhow!("{name} is longer than {LONGEST} bytes")).or_exit(Exit::Config);
+    }
+    let text =
+        fs::read_to_string(path).with_context(|| format!("cannot read {name}")).or_exit(Exit::NoInput)?;
+    let mut faults = Faults::of(&text);
+    let (tree, errors) = DeTable::parse_recoverable(&text);
+    for error in errors {
+        faults.note_syntax(&error);
+    }
+    let mut section = Section::new("the file", 0, tree.get_ref(), &mut faults);
+    let taken = take(&mut section);
+    section.finish();
+    match taken {
+        Some(taken) if faults.is_empty() => Ok(taken),
+        _ => {
+            let faults: Vec<_> = faults.into_list(path).iter().map(ToString::to_string).collect();
+            Err(anyhow!(faults.join("\n"))).or_exit(Exit::Config)
+        }
+    }
+}
+
+fn access(section: &mut Section<'_, '_, '_>, path: &Path) -> Option<Access> {
+    section.require(&["engine", "seed"]);
+    let entries = section.get("engine").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
+    let engine: Vec<_> = entries.into_iter().filter_map(|entry| address(entry, section.faults)).collect();
+    let beside = |name: &str| path.parent().unwrap_or(Path::new(".")).join(name);
+    let pair = section.get("seed").and_then(|entry| {
+        let name = entry.text(section.faults)?;
+        seed(&beside(name)).map_err(|why| entry.fault(section.faults, &why)).ok()
+    });
+    let ca = section.text("ca").map(|name| beside(&name));
+    Some(Access { engine, pair: pair?, ca })
+}
+
+/// `tls://engine.example:4222`; without TLS nothing leaves this machine.
+fn address(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
+    let text = entry.text(faults)?;
+    let rest = text.strip_prefix("tls://").map(|rest| (true, rest));
+    let rest = rest.or_else(|| text.strip_prefix("nats://").map(|rest| (false, rest)));
+    let message = match rest.and_then(|(is_tls, rest)| Some((is_tls, rest.rsplit_once(':')?))) {
+        Some((is_tls, (host, port)))
+            if port.parse::<u16>().is_ok() && !host.is_empty() && !host.contains('@') =>
+        {
+            if is_tls || is_loopback(host) {
+                return Some(text.to_owned());
+            }
+            format!(
+                "{text:?} would send over the network as it is; use tls:// and a certificate for the engine"
+            )
+        }
+        _ => format!("{text:?} is not where an engine listens, such as tls://engine.example:4222"),
+    };
+    entry.fault(faults, &message);
+    None
+}
+
+/// True if what is sent there stays on this machine.
+pub(super) fn is_loopback(host: &str) -> bool {
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|address| address.is_loopback())
+}
+
+/// The key in a file that nobody else may read.
+fn seed(path: &Path) -> Result<KeyPair, String> {
+    let name = path.display();
+    let about = fs::metadata(path).map_err(|error| format!("cannot read {name}: {error}"))?;
+    if about.permissions().mode() & 0o077 != 0 {
+        return Err(format!("others may read {name}; `chmod 600` it, and make a new key if somebody did"));
+    }
+    let text = fs::read_to_string(path).map_err(|error| format!("cannot read {name}: {error}"))?;
+    KeyPair::from_seed(text.trim()).map_err(|_| format!("{name} has no key; `kinocue fleet init` makes keys"))
+}
+
+fn id(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
+    let text = entry.text(faults)?;
+    if !is_fleet_id(text) {
+        entry.fault(faults, &format!("{text:?} is not a name here: a to z, 0 to 9, - and _"));
+        return None;
+    }
+    Some(text.to_owned())
+}
+
+fn member(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
+    let text = entry.text(faults)?;
+    if !text.split_once('.').is_some_and(|(site, hall)| is_fleet_id(site) && is_fleet_id(hall)) {
+        entry.fault(faults, &format!("{text:?} is not SITE.HALL, such as berlin.h3"));
+        return None;
+    }
+    Some(text.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str, mode: u32) -> Result<LinkSettings, String> {
+        let dir = tempfile::tempdir().unwrap();
+        let (file, key) = (dir.path().join("fleet.toml"), dir.path().join("fleet.nk"));
+        fs::write(&key, KeyPair::new_user().seed().unwrap()).unwrap();
+        fs::set_permissions(&key, fs::Permissions::from_mode(mode)).unwrap();
+        fs::write(&file, text).unwrap();
+        link(&file).map_err(|failure| failure.to_string())
+    }
+
+    const SOUND: &str =
+        "engine = [\"tls://engine.example:4222\"]\nsite = \"berlin\"\nhall = \"h3\"\nseed = \"fleet.nk\"\n";
+
+    #[test]
+    fn a_link_has_its_hall_its_key_and_an_engine_that_it_reaches_in_secret() {
+        let settings = of(SOUND, 0o600).unwrap();
+        assert_eq!((settings.hall.as_str(), settings.access.engine.len()), ("berlin.h3", 1));
+        for local in ["nats://127.0.0.1:4222", "nats://localhost:4222", "nats://[::1]:4222"] {
+            assert!(of(&SOUND.replace("tls://engine.example:4222", local), 0o600).is_ok(), "{local}");
+        }
+    }
+
+    #[test]
+    fn what_would_give_a_key_or_a_hall_away_is_refused_with_its_place() {
+        for (text, mode, says) in [
+            (SOUND.to_owned(), 0o640, "others may read"),
+            (
+                SOUND.replace("tls", "nats"),
+                0o600,
+                "fleet.toml:1:11: engine: \"nats://engine.example:4222\" would send",
+            ),
+            (SOUND.replace("tls://engine.example:4222", "engine"), 0o600, "is not where an engine listens"),
+            (SOUND.replace("example:4222", "example:x"), 0o600, "is not where an engine listens"),
+            (SOUND.replace("\"h3\"", "\"h3.>\""), 0o600, "is not a name here"),
+            (SOUND.replace("fleet.nk", "gone.nk"), 0o600, "cannot read"),
+            (SOUND.replace("fleet.nk", "fleet.toml"), 0o600, "others may read"),
+            (SOUND.replace("seed", "sede"), 0o600, "did you mean seed?"),
+        ] {
+            let fault = of(&text, mode).unwrap_err();
+            assert!(fault.contains(says), "{fault}");
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! `[fleet]`: what other houses may ask of this hall by the fleet, and whose signatures are taken; without the table there is no fleet.
+
+use nkeys::{KeyPair, KeyPairType};
+
+use super::Role;
+use super::fault::Faults;
+use super::section::{Entry, Section, did_you_mean};
+use crate::plain;
+
+/// The longest part of a name in the fleet.
+const LONGEST_NAME: usize = 32;
+
+/// The hall as a member of a fleet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Fleet {
+    /// Its name there, `SITE.HALL`: what is not addressed to it is not taken.
+    pub(crate) name: String,
+    /// What may be asked beside a stop; nothing by default.
+    pub(crate) allow: Vec<FleetWord>,
+    /// Whose signatures are taken.
+    pub(crate) keys: Vec<FleetKey>,
+}
+
+/// Somebody whose signature is taken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct FleetKey {
+    /// Their name in the journal, unlike any other's.
+    pub(crate) name: String,
+    /// What they may do: operate at the most.
+    pub(crate) role: Role,
+    /// The public half of their key, as `kinocue fleet init` writes it.
+    pub(crate) public: String,
+}
+
+/// What the fleet may ask at the most; a stop is always taken. Nothing among it arms, homes, clears or moves a seat that nobody in the
+/// hall has armed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum FleetWord {
+    /// To hold.
+    Pause,
+    /// To end a show.
+    Park,
+    /// To stand down.
+    Disarm,
+    /// To load a cue, while parked.
+    Load,
+    /// To load a playlist, while parked.
+    Playlist,
+    /// Levels and effects, up to what a person has set.
+    Levels,
+    /// To move the motion against the film.
+    Trim,
+}
+
+impl FleetWord {
+    /// All of them, by the words of the configuration.
+    pub(crate) const ALL: [(&'static str, Self); 7] = [
+        ("pause", Self::Pause),
+        ("park", Self::Park),
+        ("disarm", Self::Disarm),
+        ("load", Self::Load),
+        ("playlist", Self::Playlist),
+        ("levels", Self::Levels),
+        ("trim", Self::Trim),
+    ];
+    /// What nobody who is elsewhere may ask, whatever the configuration says.
+    const NEVER: [&'static str; 12] = [
+        "arm", "home", "clear", "go", "resume", "seek", "enable", "disable", "seats", "test", "reload",
+        "preset",
+    ];
+}
+
+plain::displayed!(FleetWord {
+    Self::Pause => "pause",
+    Self::Park => "park",
+    Self::Disarm => "disarm",
+    Self::Load => "load",
+    Self::Playlist => "playlist",
+    Self::Levels => "levels",
+    Self::Trim => "trim",
+});
+
+/// Reads the table.
+pub(super) fn fleet(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Fleet> {
+    let mut section = Section::new("[fleet]", entry.at, entry.table(faults)?, faults);
+    section.require(&["name"]);
+    let name = section.get("name").and_then(|entry| name(entry, section.faults));
+    let words = section.get("allow").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
+    let allow = words.into_iter().filter_map(|entry| word(entry, section.faults)).collect();
+    for later in ["start", "start_bound_ms"] {
+        section.refuse(later, "this version has no starts by the fleet; remove it");
+    }
+    let keys = keys(&mut section);
+    section.finish();
+    Some(Fleet { name: name?, allow, keys })
+}
+
+/// `berlin.h3`.
+fn name(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
+    let text = entry.text(faults)?;
+    let parts = text.split_once('.').map(|(site, hall)| [site, hall]);
+    if !parts.is_some_and(|parts| parts.into_iter().all(is_fleet_id)) {
+        let message = format!(
+            "{text:?} is not SITE.HALL, such as berlin.h3: each of a to z, 0 to 9, - and _, at most \
+            {LONGEST_NAME} long"
+        );
+        entry.fault(faults, &message);
+        return None;
+    }
+    Some(text.to_owned())
+}
+
+/// True if it can be a site, a hall or a person in a fleet: it is a part of subjects and of keys there.
+#[must_use]
+pub(crate) fn is_fleet_id(text: &str) -> bool {
+    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
+    !text.is_empty() && text.len() <= LONGEST_NAME && text.chars().all(fits)
+}
+
+fn word(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FleetWord> {
+    let text = entry.text(faults)?;
+    let found = FleetWord::ALL.iter().find(|(word, _)| *word == text).map(|&(_, word)| word);
+    // Whoever lists what is allowed will list it too.
+    if found.is_none() && text != "stop" {
+        let message = if FleetWord::NEVER.contains(&text) {
+            format!("{text} is never allowed to the fleet: whoever asks it has to see the seats")
+        } else {
+            let words = FleetWord::ALL.map(|(word, _)| word);
+            let hint = did_you_mean(text, words.into_iter());
+            format!("{text:?} is not one of {}, stop{hint}", words.join(", "))
+        };
+        entry.fault(faults, &message);
+    }
+    found
+}
+
+fn keys(section: &mut Section<'_, '_, '_>) -> Vec<FleetKey> {
+    let entries = section.get("key").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
+    let mut keys: Vec<FleetKey> = Vec::new();
+    for entry in entries {
+        let Some(key) = key(entry, section.faults) else { continue };
+        if keys.iter().any(|before| before.name == key.name) {
+            entry.fault(section.faults, &format!("{} already has a key; use another name", key.name));
+        } else if keys.iter().any(|before| before.public == key.public) {
+            entry.fault(section.faults, &format!("{} has the same key as another name", key.name));
+        }
+        keys.push(key);
+    }
+    keys
+}
+
+fn key(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FleetKey> {
+    let roles = [("view", Role::View), ("operate", Role::Operate)];
+    let mut section = Section::new("[[fleet.key]]", entry.at, entry.table(faults)?, faults);
+    section.require(&["name", "role", "public"]);
+    let name = section.get("name").and_then(|entry| key_name(entry, section.faults));
+    let role = section.choice("role", &roles);
+    let public = section.get("public").and_then(|entry| public(entry, section.faults));
+    section.finish();
+    Some(FleetKey { name: name?, role: role?, public: public? })
+}
+
+fn key_name(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
+    let text = entry.text(faults)?;
+    if !is_fleet_id(text) {
+        let message =
+            format!("{text:?} is not a name here: a to z, 0 to 9, - and _, at most {LONGEST_NAME} long");
+        entry.fault(faults, &message);
+        return None;
+    }
+    Some(text.to_owned())
+}
+
+/// The public half of a key, which begins with U. The other half, which begins with S, has no place in a configuration.
+fn public(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
+    let text = entry.text(faults)?;
+    let is_seed = text.starts_with('S');
+    let is_user = |pair: KeyPair| pair.key_pair_type() == KeyPairType::User;
+    if is_seed || !KeyPair::from_public_key(text).is_ok_and(is_user) {
+        let what = if is_seed {
+            "is the secret half of a key: make a new key, and write the public half here, which begins with U"
+        } else {
+            "is not the public half of a key, which begins with U; `kinocue fleet init` makes keys"
+        };
+        entry.fault(faults, what);
+        return None;
+    }
+    Some(text.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::tests::{faults_of, hall_with};
+
+    #[test]
+    fn a_hall_is_in_a_fleet_only_where_its_configuration_says_so_and_allows_nothing_by_itself() {
+        assert_eq!(hall_with("").fleet, None);
+        let alone = hall_with("[fleet]\nname = \"berlin.h3\"\n").fleet.unwrap();
+        assert_eq!((alone.name.as_str(), alone.allow, alone.keys), ("berlin.h3", vec![], vec![]));
+        let public = KeyPair::new_user().public_key();
+        let fleet = hall_with(&format!(
+            "[fleet]\nname = \"berlin.h3\"\nallow = [\"pause\", \"stop\", \"levels\"]\n[[fleet.key]]\nname = \"office\"\n\
+             role = \"operate\"\npublic = \"{public}\"\n"
+        ));
+        let fleet = fleet.fleet.unwrap();
+        assert_eq!(fleet.allow, [FleetWord::Pause, FleetWord::Levels]);
+        assert_eq!(fleet.keys, [FleetKey { name: "office".to_owned(), role: Role::Operate, public }]);
+    }
+
+    #[test]
+    fn what_the_fleet_may_never_ask_and_what_is_no_key_is_refused_with_its_place() {
+        let (pair, account) = (KeyPair::new_user(), KeyPair::new_account());
+        let key = |name: &str, role: &str, public: &str| {
+            format!("[[fleet.key]]\nname = \"{name}\"\nrole = \"{role}\"\npublic = \"{public}\"\n")
+        };
+        let (public, seed) = (pair.public_key(), pair.seed().unwrap());
+        let named = |rest: &str| format!("name = \"berlin.h3\"\n{rest}");
+        let mut wrong = vec![
+            (String::new(), "[fleet] has no name"),
+            ("name = \"berlin\"".to_owned(), "\"berlin\" is not SITE.HALL"),
+            ("name = \"berlin.h3.x\"".to_owned(), "is not SITE.HALL"),
+            ("name = \"Berlin.*\"".to_owned(), "is not SITE.HALL"),
+            (named("allow = [\"pauze\"]"), "did you mean pause?"),
+            (named("start = true"), "this version has no starts by the fleet"),
+            (named("start_bound_ms = 2"), "this version has no starts by the fleet"),
+            (named("keys = []"), "unknown key in [fleet]; did you mean key?"),
+            (named(&key("office", "engineer", &public)), "\"engineer\" is not one of view, operate"),
+            (named(&key("of.fice", "view", &public)), "\"of.fice\" is not a name here"),
+            (named(&key("office", "view", &seed)), "is the secret half of a key"),
+            (named(&key("office", "view", &account.public_key())), "is not the public half"),
+            (named(&key("office", "view", &public[1..])), "is not the public half"),
+            (named(&(key("a", "view", &public) + &key("b", "view", &public))), "the same key as another"),
+        ];
+        wrong.extend(
+            FleetWord::NEVER.map(|word| (named(&format!("allow = [\"{word}\"]")), "is never allowed")),
+        );
+        for (text, says) in wrong {
+            let faults = faults_of(&format!("[fleet]\n{text}\n"));
+            assert!(faults.iter().any(|fault| fault.contains(says)), "{text}: {faults:?}");
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Proof of play on its way to the engine: the journal of the hall is the queue, and each record says where in it the next one is.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::journal::JournalPart;
+
+/// Files of which it is kept how much was told: a clock that is set back has the journal go on in an older one.
+const FILES: usize = 4;
+
+/// A record of `kc_log`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct LogRecord {
+    /// Which one of this hall it is, from 1, without a gap.
+    pub(crate) n: u64,
+    /// How much of the journal was told with it and before it.
+    pub(crate) told: BTreeMap<String, u64>,
+    /// What the journal says.
+    #[serde(flatten)]
+    pub(crate) part: JournalPart,
+}
+
+impl LogRecord {
+    /// The record after `before`, or the first one.
+    pub(crate) fn after(before: Option<&Self>, part: JournalPart) -> Self {
+        let mut told = before.map_or_else(BTreeMap::new, |before| before.told.clone());
+        told.insert(part.file.clone(), part.line);
+        while told.len() > FILES {
+            told.pop_first();
+        }
+        Self { n: before.map_or(0, |before| before.n) + 1, told, part }
+    }
+}

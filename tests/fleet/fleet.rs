@@ -1,0 +1,173 @@
+//! An engine of one's own, and halls that are linked to it.
+
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::net::{TcpListener, TcpStream};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::Clock as _;
+use rustix::process::Signal;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::hall::Hall;
+use crate::process::{Guarded, PATIENCE, Run};
+use crate::programs::is_installed;
+
+/// All words that a hall may allow.
+pub(crate) const ALL: &str = r#"["pause", "park", "disarm", "load", "playlist", "levels", "trim"]"#;
+
+/// An engine that runs, with the keys of all who know it.
+pub(crate) struct Engine {
+    dir: TempDir,
+    address: String,
+    process: Option<Guarded>,
+}
+
+/// A link that runs.
+pub(crate) struct Link {
+    process: Guarded,
+    said: Receiver<String>,
+}
+
+impl Engine {
+    /// None where there is no such program, and somebody asked for that.
+    pub(crate) fn start(halls: &str) -> Option<Self> {
+        if !is_installed("nats-server") {
+            return None;
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let address = format!("127.0.0.1:{port}");
+        let mut engine = Self { dir, address, process: None };
+        let folder = engine.path("fleet");
+        let folder = folder.to_str().unwrap();
+        let init = [
+            "fleet",
+            "init",
+            "--site",
+            "berlin",
+            "--halls",
+            halls,
+            "--engine",
+            &engine.address,
+            "--folder",
+            folder,
+        ];
+        assert_eq!(crate::process::kinocue(&init).code, Some(0));
+        let conf = engine.path("fleet/nats-server.conf");
+        let store = engine.path("jetstream");
+        let text = fs::read_to_string(&conf).unwrap();
+        let text = text.replace("/var/lib/nats/jetstream", store.to_str().unwrap());
+        fs::write(conf, text).unwrap();
+        engine.restart();
+        Some(engine)
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    pub(crate) fn url(&self) -> String {
+        format!("nats://{}", self.address)
+    }
+
+    /// Starts it, again.
+    pub(crate) fn restart(&mut self) {
+        let mut command = Command::new("nats-server");
+        command.arg("-c").arg(self.path("fleet/nats-server.conf"));
+        let mut process = Guarded::start_command(&mut command);
+        let stderr = process.stderr();
+        thread::spawn(move || stderr.lines().map_while(Result::ok).for_each(drop));
+        self.process = Some(process);
+        let until = Monotonic.now() + PATIENCE;
+        while TcpStream::connect(&self.address).is_err() {
+            assert!(Monotonic.now() < until, "the engine does not start");
+            thread::yield_now();
+        }
+    }
+
+    /// Kills it.
+    pub(crate) fn kill(&mut self) {
+        drop(self.process.take());
+    }
+
+    /// Has it end in order.
+    pub(crate) fn end(&mut self) {
+        let process = self.process.take().unwrap();
+        process.signal(Signal::TERM);
+        process.finish();
+    }
+
+    /// A hall that plays, as a member of the fleet.
+    pub(crate) fn hall(&self, name: &str, allow: &str) -> Hall {
+        let table = fs::read_to_string(self.path(&format!("fleet/{name}/kinocue-fleet.toml"))).unwrap();
+        Hall::open_with(|config| config + &table.replace("allow = []", &format!("allow = {allow}")))
+    }
+
+    /// The link of a hall.
+    pub(crate) fn link(&self, name: &str, hall: &Hall) -> Link {
+        let settings = self.path(&format!("fleet/{name}/fleet.toml"));
+        let (settings, socket) = (settings.to_str().unwrap().to_owned(), hall.path("fleet.sock"));
+        let mut process =
+            Guarded::start(&["fleet", "link", "--config", &settings, "--socket", socket.to_str().unwrap()]);
+        let stderr: BufReader<_> = process.stderr();
+        let (tell, said) = channel();
+        thread::spawn(move || stderr.lines().map_while(Result::ok).for_each(|line| drop(tell.send(line))));
+        Link { process, said }
+    }
+
+    /// A command of the desk.
+    pub(crate) fn desk(&self, args: &[&str]) -> Run {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+        command.arg("fleet").args(args).env("KINOCUE_DESK", self.path("fleet/office/desk.toml"));
+        command.stdin(Stdio::null()).output().unwrap().into()
+    }
+
+    /// What the desk says of all halls, once that is so.
+    pub(crate) fn wait(&self, mut wanted: impl FnMut(&Value) -> bool) -> Value {
+        let until = Monotonic.now() + PATIENCE;
+        loop {
+            let run = self.desk(&["status", "--json"]);
+            let table: Value = serde_json::from_str(&run.stdout).unwrap_or_default();
+            if wanted(&table) {
+                return table;
+            }
+            assert!(Monotonic.now() < until, "it did not come to that: {run:?}");
+        }
+    }
+
+    /// Waits until every hall of the desk is heard.
+    pub(crate) fn hears_all(&self) -> Value {
+        self.wait(|table| {
+            table.as_array().is_some_and(|halls| halls.iter().all(|hall| hall["silent"] == false))
+        })
+    }
+
+    /// The records of a hall that the engine has, in its order.
+    pub(crate) fn log(&self, hall: &str) -> Vec<Value> {
+        let run = self.desk(&["report", "--records", "--json"]);
+        assert!(matches!(run.code, Some(0 | 1)), "{run:?}");
+        run.report()[format!("berlin.{hall}")].as_array().cloned().unwrap_or_default()
+    }
+}
+
+impl Link {
+    /// Waits until it has said that.
+    pub(crate) fn heard(&self, text: &str) -> String {
+        loop {
+            let line = self.said.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("it never said {text:?}"));
+            if line.contains(text) {
+                return line;
+            }
+        }
+    }
+
+    pub(crate) fn signal(&self, signal: Signal) {
+        self.process.signal(signal);
+    }
+}
