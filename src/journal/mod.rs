@@ -27,8 +27,10 @@ mod writer;
 pub(crate) use fold::Folds;
 pub use record::{Action, FilmProof, Outcome, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
+pub(crate) use report::{
+    JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report, report_of,
+};
 pub(crate) use tail::{JournalPart, tail};
-pub(crate) use report::{JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report, report_of};
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
