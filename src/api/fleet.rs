@@ -173,7 +173,7 @@ fn args<T: DeserializeOwned>(order: &Order) -> Result<T, Problem> {
 pub(crate) fn try_letter(text: &str) {
     if let Ok(letter) = serde_json::from_str::<Letter>(text) {
         let order = Order::of(&letter);
-        std::hint::black_box((letter.is_signed(), order.map(|order| command(&order))));
+        drop(std::hint::black_box((letter.is_signed(), order.map(|order| command(&order)))));
     }
 }
 
