@@ -73,7 +73,14 @@ fn every_path_of_the_unit_is_one_that_the_package_installs() {
     let assets = manifest["package"]["metadata"]["deb"]["assets"].as_array().unwrap();
     let targets: Vec<_> = assets.iter().map(|asset| asset[1].as_str().unwrap()).collect();
     let unit = text("systemd/kinocue.service");
-    assert!(unit.contains("\nExecStart=/usr/bin/kinocue serve --config /etc/kinocue/kinocue.toml\n"));
+    let start = "serve --config /etc/kinocue/kinocue.toml --fleet-socket /run/kinocue-fleet/fleet.sock";
+    assert!(unit.contains(&format!("\nExecStart=/usr/bin/kinocue {start}\n")));
+    let link = text("systemd/kinocue-link.service");
+    let start = "fleet link --config /etc/kinocue/fleet.toml --socket /run/kinocue-fleet/fleet.sock";
+    assert!(
+        link.contains(&format!("\nExecStart=/usr/bin/kinocue {start}\n")),
+        "where the hall has its socket"
+    );
     assert!(targets.contains(&"usr/bin/") && targets.contains(&"usr/lib/systemd/system/"));
     assert!(!targets.iter().any(|target| target.starts_with("etc/")), "no configuration is installed");
 }

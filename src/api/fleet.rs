@@ -173,8 +173,7 @@ fn args<T: DeserializeOwned>(order: &Order) -> Result<T, Problem> {
 pub(crate) fn try_letter(text: &str) {
     if let Ok(letter) = serde_json::from_str::<Letter>(text) {
         let order = Order::of(&letter);
-        let asked = order.ok().and_then(|order| command(&order).ok());
-        std::hint::black_box((letter.is_signed(), asked));
+        drop(std::hint::black_box((letter.is_signed(), order.map(|order| command(&order)))));
     }
 }
 

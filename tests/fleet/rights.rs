@@ -1,7 +1,6 @@
 //! What the key of a hall, or of a desk, may at the engine, and what not.
 
 use std::fs;
-use std::time::Duration;
 
 use async_nats::{Client, ConnectOptions, Event};
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
@@ -41,15 +40,18 @@ impl Member {
         self.is_let().await
     }
 
-    /// The engine refuses in order: once it has answered a ping, it has told of what came before.
+    /// The engine refuses in order: once it has refused what nobody may, it has told of what came before.
     async fn is_let(&mut self) -> bool {
+        self.client.publish("kc.nobody", "x".into()).await.unwrap();
         self.client.flush().await.unwrap();
-        let _ = timeout(Duration::from_secs(3), self.client.request("kc.nobody", "".into())).await;
         let mut is_let = true;
-        while let Ok(why) = self.refused.try_recv() {
-            is_let &= why.contains("kc.nobody");
+        loop {
+            let why = timeout(PATIENCE, self.refused.recv()).await.unwrap().unwrap();
+            if why.contains("kc.nobody") {
+                return is_let;
+            }
+            is_let = false;
         }
-        is_let
     }
 }
 

@@ -147,37 +147,35 @@ struct Rights {
     subscribe: Vec<String>,
 }
 
-/// A desk asks under its own name, hears how halls are, and has the engine keep the log and the last status, which it reads.
+/// A subject of the engine's own in both its forms: as members name it, also across a leaf node, and as the engine itself checks it.
+fn api(what: &str) -> [String; 2] {
+    let own = if what.starts_with('$') { what.to_owned() } else { format!("$JS.API.{what}") };
+    [format!("$JS.{DOMAIN}.API.{what}"), own]
+}
+
+/// A desk asks under its own name, hears how halls are, and has the engine keep what a fleet needs, which it reads.
 fn of_desk(desk: &str) -> Rights {
-    let api = |what: &str| format!("$JS.{DOMAIN}.API.{what}");
     let seen = format!("KV_{SEEN}");
     let mut publish = vec![fleet::command_to("*.*", desk, "*"), fleet::stop_to("*.*", desk)];
     for stream in [LOG, &seen] {
-        publish.extend(["INFO", "CREATE"].map(|what| api(&format!("STREAM.{what}.{stream}"))));
+        publish
+            .extend(["INFO", "CREATE"].into_iter().flat_map(|what| api(&format!("STREAM.{what}.{stream}"))));
     }
-    publish.push(api(&format!("DIRECT.GET.{seen}.$KV.{SEEN}.>")));
-    publish.push(api(&format!("CONSUMER.CREATE.{LOG}")));
-    publish.push(api(&format!("CONSUMER.CREATE.{LOG}.>")));
-    publish.push(api(&format!("CONSUMER.MSG.NEXT.{LOG}.>")));
+    publish.extend(api(&format!("DIRECT.GET.{seen}.$KV.{SEEN}.>")));
+    for what in [format!("CREATE.{LOG}"), format!("CREATE.{LOG}.>"), format!("MSG.NEXT.{LOG}.>")] {
+        publish.extend(api(&format!("CONSUMER.{what}")));
+    }
     Rights { publish, subscribe: vec![fleet::status_of("*.*"), format!("{}.>", inbox(desk))] }
 }
 
 /// A hall tells of itself alone, hears what it alone is asked, and answers whoever asked.
 fn of_hall(site: &str, member: &str) -> Rights {
-    let api = |what: &str| format!("$JS.{DOMAIN}.API.{what}");
-    let publish = vec![
-        fleet::status_of(member),
-        fleet::log_of(member),
-        api(&format!("DIRECT.GET.{LOG}.{}", fleet::log_of(member))),
-        api(&format!("$KV.{SEEN}.{member}")),
-    ];
+    let mut publish = vec![fleet::status_of(member), fleet::log_of(member)];
+    publish.extend(api(&format!("DIRECT.GET.{LOG}.{}", fleet::log_of(member))));
+    publish.extend(api(&format!("$KV.{SEEN}.{member}")));
     let all = fleet::stop_to(&format!("{site}.{}", fleet::ALL), "*");
-    let subscribe = vec![
-        fleet::command_to(member, "*", "*"),
-        fleet::stop_to(member, "*"),
-        all,
-        format!("{}.>", inbox(member)),
-    ];
+    let inbox = format!("{}.>", inbox(member));
+    let subscribe = vec![fleet::command_to(member, "*", "*"), fleet::stop_to(member, "*"), all, inbox];
     Rights { publish, subscribe }
 }
 

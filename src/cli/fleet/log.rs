@@ -3,6 +3,7 @@
 //! late, are refused by the engine for ever.
 
 use std::collections::VecDeque;
+use std::sync::atomic::Ordering;
 
 use anyhow::Context as _;
 use async_nats::jetstream::context::Context;
@@ -23,6 +24,8 @@ pub(super) struct LogTeller<'l> {
     /// The last record that the engine has, with its number there; not known before it was asked, and after a failure.
     last: Option<(u64, Option<LogRecord>)>,
     waiting: VecDeque<JournalPart>,
+    /// How often the engine was reached: one that comes back may have less than it had.
+    connects: u64,
 }
 
 impl<'l> LogTeller<'l> {
@@ -33,6 +36,7 @@ impl<'l> LogTeller<'l> {
             subject: fleet::log_of(&link.hall),
             last: None,
             waiting: VecDeque::new(),
+            connects: 0,
         }
     }
 
@@ -44,12 +48,20 @@ impl<'l> LogTeller<'l> {
         if !self.link.is_connected() {
             return Ok(false);
         }
+        let connects = self.link.client.statistics().connects.load(Ordering::Relaxed);
+        if std::mem::replace(&mut self.connects, connects) != connects {
+            self.forget();
+        }
         let told = self.tell_next().await;
         if told.is_err() {
-            self.last = None;
-            self.waiting.clear();
+            self.forget();
         }
         told
+    }
+
+    fn forget(&mut self) {
+        self.last = None;
+        self.waiting.clear();
     }
 
     async fn tell_next(&mut self) -> anyhow::Result<bool> {
