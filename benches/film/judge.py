@@ -207,6 +207,13 @@ class Player:
 
         return place
 
+    def astray(self, since, until):
+        """How far each answer is from the straight line through them all, and how often the player's clock stepped by over 2 ms, s."""
+        those = self.prompt(since, until)
+        place, rate = straight(those)
+        steps = [(b[1] - a[1]) - rate * (b[0] - a[0]) for a, b in zip(those, those[1:])]
+        return [abs(media - place(at)) for at, media in those], [step for step in steps if abs(step) > 0.002]
+
     def prompt(self, since, until):
         """Answers between two instants that took no longer than most."""
         those = [answer for answer in self.answers if since <= answer[0] <= until]
@@ -349,4 +356,14 @@ def chords(folder, seconds):
     with wave.open(str(path), "wb") as file:
         file.setparams((1, 2, rate, 0, "NONE", None))
         file.writeframes(sound.tobytes())
+    return path
+
+
+def silence(folder, seconds):
+    """A film of nothing but silence, which takes a player next to no time."""
+    path = pathlib.Path(folder) / "silence.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, 8_000, 0, "NONE", None))
+        for _ in range(int(seconds)):
+            file.writeframes(bytes(16_000))
     return path

@@ -20,7 +20,7 @@ import subprocess
 import tempfile
 import time
 
-from judge import Between, Play, Player, Ramp, Seat, Sender, chords, film
+from judge import Between, Play, Player, Ramp, Seat, Sender, chords, film, silence
 
 SETTLED_S = 10.0  # after a join; of five in a minute the next waits for a person
 
@@ -86,31 +86,46 @@ def follow(args, folder, player=(), lost=0.0):
     errors, bent = [error for _, error in show.errors(frames, *span)], show.errors_of_bent(frames, *span)
     bias, gap = statistics.median(errors), max(b[0] - a[0] for a, b in zip(frames, frames[1:]))
     told = "; ".join(" ".join(line.split()) for line in show.play.lines if line.startswith(("ticks", "lateness")))
-    film = f"film {1e6 * (show.film_rate - 1):+.0f} ppm, its answers within {1e3 * show.film_left:.2f} ms of a line"
+    astray, steps = show.player.astray(*span)
+    film = f"film {1e6 * (show.film_rate - 1):+.0f} ppm, its own answers beside a straight line {spread(1e3 * one for one in astray)}"
+    film += f", {len(steps)} steps of over 2 ms, the greatest {1e3 * max(map(abs, steps), default=0.0):.1f} ms"
     film += f"; |error| by the player's own answers around each frame {spread(map(abs, bent))}"
     return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, longest gap between frames {1e3 * gap:.0f} ms; {told}; {film}"
 
 
 def two_hours(args, folder):
     """A player that is 300 ppm fast, each four minutes of it held to a straight line of their own: in two hours this machine's clock bends."""
-    turn_s, turns = 240.0, 30
-    player, film_of = ["--ao-null-speed=1.0003"], film(folder, turn_s * turns + 60)
-    with Show(args, folder, player, film=film_of, ramp=Ramp(turn_s, turns)) as show:
-        medians, errors = [], []
+    turn_s, turns_each, stretches = 120.0, 2, args.stretches
+    stretch_s = turn_s * turns_each
+    sound = silence(folder, stretch_s * (stretches + 1) + 60)
+    with Show(args, folder, ["--ao-null-speed=1.0003"], film=sound, ramp=Ramp(turn_s, turns_each * (stretches + 1))) as show:
+        medians, errors, bent = [], [], []
         time.sleep(SETTLED_S)
-        for _ in range(turns - 1):
+        for turn in range(stretches):
             since, said = time.monotonic(), len(show.play.lines)
-            time.sleep(turn_s)
-            place, _, _ = show.player.clock(since, since + turn_s)
-            ends = ((place(at + lasts), pulses) for at, lasts, pulses in show.seat.frames() if since <= at <= since + turn_s)
-            there = ((film_s, show.ramp.media(pulses, int(film_s // turn_s))) for film_s, pulses in ends)
-            those = [(film_s - media) * 1e3 for film_s, media in there if media is not None]
-            assert those, show.play.lines[said:]
-            medians.append(statistics.median(those))
-            errors += map(abs, those)
-            print(f"  {len(medians) * turn_s / 60:.0f} min: median {medians[-1]:+.3f} ms, {spread(map(abs, those))}, holds {show.holds()}", flush=True)
-            print(*(f"    {line}" for line in show.play.lines[said:]), sep="", end="", flush=True)
-    return f"|error| {spread(errors)}; medians of four minutes {min(medians):+.3f} to {max(medians):+.3f}, first {medians[0]:+.3f}, last {medians[-1]:+.3f} ms"
+            time.sleep(stretch_s)
+            frames = [frame for frame in show.seat.frames() if since <= frame[0] <= since + stretch_s]
+            line, rate, left = show.player.clock(since, since + stretch_s)
+            those, by_answers = (off(show.ramp, frames, place) for place in (line, show.player.bent(since, since + stretch_s)))
+            if those and by_answers:
+                medians.append(statistics.median(those))
+                errors += map(abs, those)
+                bent += map(abs, by_answers)
+                told = f"median {medians[-1]:+.3f} ms, {spread(map(abs, those))}; by its answers {spread(map(abs, by_answers))}"
+            else:
+                told = f"nothing to judge: {len(frames)} frames"
+            told += f"; film {1e6 * (rate - 1):+.1f} ppm, answers within {1e3 * left:.2f} ms; holds {show.holds()}, load {os.getloadavg()[0]:.1f}"
+            print(f"  {(turn + 1) * stretch_s / 60:.0f} min: {told}", *show.play.lines[said:], sep="\n    ", flush=True)
+    told = f"|error| {spread(errors)}; by its answers {spread(bent)}; "
+    told += f"medians of four minutes {min(medians):+.3f} to {max(medians):+.3f}, first {medians[0]:+.3f}, last {medians[-1]:+.3f} ms"
+    return told + "; " + "; ".join(" ".join(line.split()) for line in show.play.lines if line.startswith(("ticks", "lateness", "film")))
+
+
+def off(ramp, frames, place):
+    """How far a film of many turns is ahead of the seats where each frame ends, ms."""
+    ends = ((place(at + lasts), pulses) for at, lasts, pulses in frames)
+    there = ((film_s, ramp.media(pulses, int(film_s // ramp.seconds))) for film_s, pulses in ends if film_s is not None)
+    return [(film_s - media) * 1e3 for film_s, media in there if media is not None]
 
 
 def loaded(args, folder, measure=follow):
@@ -302,11 +317,12 @@ def main():
     parser.add_argument("--seconds", type=float, default=120.0)
     parser.add_argument("--times", type=int, default=12, help="pauses, and seeks")
     parser.add_argument("--rate", type=int, default=100)
+    parser.add_argument("--stretches", type=int, default=29, help="of \"two hours\", four minutes each")
     parser.add_argument("--only", choices=CASES, action="append")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
         folder = pathlib.Path(folder)
-        args.film = film(folder, max(args.seconds + 60, 220))
+        args.film = film(folder, max(args.seconds + 60, 220)) if args.only != ["two hours"] else None
         for name in args.only or (name for name in CASES if name != "two hours"):
             print(f"{name:11} {CASES[name](args, folder)}", flush=True)
 
