@@ -2,9 +2,8 @@
 //! a letter counts for whose key has signed it. That is checked here, where the keys are configured, and not by who carries it: it is
 //! what others reach over the network, and may be taken over without a seat more in danger.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
-use std::time::Duration;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use axum::Json as JsonReply;
 use axum::extract::State;
@@ -20,117 +19,15 @@ use super::settings::{Trim, check_levels};
 use super::shared::{Shared, turn};
 use super::show::Load;
 use super::status::check_pulse;
-use crate::config::{self, FleetKey};
-use crate::control::{Code, Command, FRESH, HallFacts, LevelsChange, Problem, Surface, Who};
+use crate::config;
+use crate::control::{Code, Command, HallFacts, LevelsChange, Problem};
 use crate::fleet::{BriefStatus, Letter, Order};
 use crate::journal::{self, JournalPart, stamp};
 use crate::sys::clock::{Monotonic, wall_now_ns};
-use crate::time::{Clock as _, MonoTime};
+use crate::time::Clock as _;
 
-/// How long the id of an order is remembered; far longer than one may be under way, for clocks may be set.
-const REMEMBERED: Duration = Duration::from_secs(600);
-/// Orders of one key within that time.
-const ORDERS: usize = 1024;
 /// Records of the journal in a reply.
 const RECORDS: usize = 100;
-
-/// Who of the fleet may ask, and what they asked of late.
-#[derive(Debug, Clone, Default)]
-pub(super) struct FleetAccess {
-    fleet: Arc<RwLock<Option<config::Fleet>>>,
-    asked: Arc<Mutex<VecDeque<AskedOrder>>>,
-}
-
-/// An order that came.
-#[derive(Debug)]
-struct AskedOrder {
-    key: String,
-    id: String,
-    at: MonoTime,
-}
-
-/// What a letter asks, for whom, and when it was asked.
-type Opened = (Who, Command, MonoTime);
-
-impl FleetAccess {
-    /// Of that fleet.
-    pub(super) fn of(fleet: Option<&config::Fleet>) -> Self {
-        let access = Self::default();
-        access.set(fleet);
-        access
-    }
-
-    /// Has these keys from now on.
-    pub(super) fn set(&self, fleet: Option<&config::Fleet>) {
-        *self.fleet.write().unwrap_or_else(PoisonError::into_inner) = fleet.cloned();
-    }
-
-    /// What a letter asks, where one of the keys has signed it, for this hall, just now, and for the first time.
-    fn open(&self, letter: &Letter, wall_ns: u64, now: MonoTime) -> Result<Opened, Problem> {
-        let (who, name) = self.sender(letter)?;
-        let order = Order::of(letter).map_err(|why| bad_value(format!("no order: {why}"), "send one"))?;
-        if order.to != name {
-            let detail = format!("{} was asked, and this hall is {name}", order.to);
-            return Err(Problem::new(Code::Origin, detail, "ask the hall that is meant"));
-        }
-        let asked_at = asked_at(&order, wall_ns, now)?;
-        let ask = command(&order)?;
-        self.first_time(letter, &order, now)?;
-        Ok((who, ask, asked_at))
-    }
-
-    /// Whose key has signed a letter, and what the hall is called in the fleet.
-    fn sender(&self, letter: &Letter) -> Result<(Who, String), Problem> {
-        let fleet = self.fleet.read().unwrap_or_else(PoisonError::into_inner);
-        let fleet = fleet.as_ref().ok_or_else(|| {
-            Problem::new(
-                Code::Off,
-                "this hall is in no fleet",
-                "configure [fleet], and start the service again",
-            )
-        })?;
-        let known: Option<&FleetKey> = fleet.keys.iter().find(|key| key.public == letter.key);
-        let key = known.filter(|_| letter.is_signed()).ok_or_else(|| {
-            let detail = "no key of [fleet] has signed this";
-            Problem::new(
-                Code::Token,
-                detail,
-                "sign it with a key that the hall has, or add the key there and reload",
-            )
-        })?;
-        Ok((Who { role: key.role, surface: Surface::Fleet, name: key.name.clone() }, fleet.name.clone()))
-    }
-
-    /// Remembers an order, which must not have come before.
-    fn first_time(&self, letter: &Letter, order: &Order, now: MonoTime) -> Result<(), Problem> {
-        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
-        while asked.pop_front_if(|oldest| now.since(oldest.at) >= REMEMBERED).is_some() {}
-        let of_key = || asked.iter().filter(|one| one.key == letter.key);
-        if of_key().any(|one| one.id == order.id) {
-            let detail = format!("the order {} came before", order.id);
-            return Err(Problem::new(Code::Late, detail, "check the status, then give a new order"));
-        }
-        if of_key().count() >= ORDERS {
-            let detail =
-                format!("{ORDERS} orders of this key came within {} minutes", REMEMBERED.as_secs() / 60);
-            return Err(Problem::new(Code::Busy, detail, "wait a minute, or ask somebody in the hall"));
-        }
-        asked.push_back(AskedOrder { key: letter.key.clone(), id: order.id.clone(), at: now });
-        Ok(())
-    }
-}
-
-/// When an order was given, by our own clock.
-fn asked_at(order: &Order, wall_ns: u64, now: MonoTime) -> Result<MonoTime, Problem> {
-    let age_ms = i128::from(wall_ns / 1_000_000) - i128::from(order.sent_ms);
-    let most = i128::from(u64::try_from(FRESH.as_millis()).unwrap_or(u64::MAX));
-    if (-most..=most).contains(&age_ms) {
-        return Ok(now.before(Duration::from_millis(u64::try_from(age_ms).unwrap_or(0))));
-    }
-    let when = if age_ms < 0 { "from now" } else { "ago" };
-    let detail = format!("{} was asked {} ms {when}, more than {most}", order.word, age_ms.abs());
-    Err(Problem::new(Code::Late, detail, "if this happens every time, the clocks of desk and hall differ"))
-}
 
 /// What an order asks. Of the words of the hall those that the fleet may ever ask are read; which of them it may, is asked where
 /// the state is known.
@@ -188,7 +85,7 @@ pub(super) async fn order(
     State(shared): State<Arc<Shared>>,
     Json(letter): Json<Letter>,
 ) -> Result<JsonReply<HallFacts>, Problem> {
-    let (who, ask, asked_at) = shared.fleet.open(&letter, wall_now_ns(), Monotonic.now())?;
+    let (who, ask, asked_at) = shared.fleet.open(&letter, command, wall_now_ns(), Monotonic.now())?;
     let status = shared.handle.post_asked(who, ask, asked_at)?.answer().await?;
     Ok(JsonReply(HallFacts::from(&*status)))
 }
@@ -219,68 +116,15 @@ pub(super) async fn journal(
 
 #[cfg(test)]
 mod tests {
-    use nkeys::KeyPair;
-
     use super::*;
-    use crate::config::{Fleet, Role};
-
-    const NOW_MS: i64 = 1_795_306_800_123;
-
-    fn access() -> (FleetAccess, KeyPair) {
-        let pair = KeyPair::new_user();
-        let key = FleetKey { name: "office".to_owned(), role: Role::Operate, public: pair.public_key() };
-        let fleet = Fleet { name: "berlin.h3".to_owned(), allow: Vec::new(), keys: vec![key] };
-        (FleetAccess::of(Some(&fleet)), pair)
-    }
-
-    fn open(access: &FleetAccess, letter: &Letter) -> Result<Opened, Code> {
-        let wall_ns = u64::try_from(NOW_MS).unwrap() * 1_000_000;
-        let now = MonoTime::from_nanos(0) + Duration::from_secs(1000);
-        access.open(letter, wall_ns, now).map_err(|problem| problem.code)
-    }
-
-    fn letter(pair: &KeyPair, id: &str, to: &str, word: &str, args: &str, sent_ms: i64) -> Letter {
-        let body = format!(
-            "{{\"id\":\"{id}\",\"to\":\"{to}\",\"word\":\"{word}\",\"args\":{args},\"sent_ms\":{sent_ms}}}"
-        );
-        Letter::sign(pair, body).unwrap()
-    }
-
-    #[test]
-    fn a_letter_counts_for_whose_key_has_signed_it_for_this_hall_and_once() {
-        let (access, pair) = access();
-        let pause = |id, to, sent_ms| letter(&pair, id, to, "pause", "{}", sent_ms);
-        let (who, ask, _) = open(&access, &pause("1", "berlin.h3", NOW_MS - 500)).unwrap();
-        assert_eq!((who.name.as_str(), who.role, who.surface), ("office", Role::Operate, Surface::Fleet));
-        assert_eq!(ask, Command::Pause);
-        assert_eq!(open(&access, &pause("1", "berlin.h3", NOW_MS)).err(), Some(Code::Late), "again");
-        assert!(open(&access, &pause("2", "berlin.h3", NOW_MS)).is_ok());
-        assert_eq!(open(&access, &pause("3", "berlin.h4", NOW_MS)).err(), Some(Code::Origin));
-        for age in [2001, 60_000, -2001] {
-            assert_eq!(
-                open(&access, &pause("4", "berlin.h3", NOW_MS - age)).err(),
-                Some(Code::Late),
-                "{age}"
-            );
-        }
-        let stranger = letter(&KeyPair::new_user(), "5", "berlin.h3", "pause", "{}", NOW_MS);
-        assert_eq!(open(&access, &stranger).err(), Some(Code::Token));
-        let forged = Letter { key: pair.public_key(), ..stranger };
-        assert_eq!(open(&access, &forged).err(), Some(Code::Token));
-        access.set(Some(&Fleet { name: "berlin.h3".to_owned(), allow: Vec::new(), keys: Vec::new() }));
-        assert_eq!(open(&access, &pause("6", "berlin.h3", NOW_MS)).err(), Some(Code::Token), "revoked");
-        access.set(None);
-        assert_eq!(open(&access, &pause("7", "berlin.h3", NOW_MS)).err(), Some(Code::Off));
-    }
 
     #[test]
     fn words_are_read_with_what_belongs_to_them_and_no_others_at_all() {
-        let (access, pair) = access();
-        let mut id = 0;
-        let mut ask = |word: &str, args: &str| {
-            id += 1;
-            open(&access, &letter(&pair, &id.to_string(), "berlin.h3", word, args, NOW_MS))
-                .map(|opened| opened.1)
+        let ask = |word: &str, args: &str| {
+            let (id, to) = ("1".to_owned(), "berlin.h3".to_owned());
+            let args = serde_json::from_str(args).unwrap();
+            command(&Order { id, to, word: word.to_owned(), args, sent_ms: 0 })
+                .map_err(|problem| problem.code)
         };
         assert_eq!(ask("load", "{\"cue\":\"storm\"}"), Ok(Command::Load { cue: "storm".to_owned() }));
         assert_eq!(ask("playlist", "{\"id\":null}"), Ok(Command::Playlist { id: None }));
@@ -305,23 +149,5 @@ mod tests {
         ] {
             assert_eq!(ask(word, "{}"), Err(Code::Role), "{word}");
         }
-    }
-
-    #[test]
-    fn one_key_fills_no_more_than_its_own_room_and_ids_are_kept_for_ten_minutes() {
-        let (access, pair) = access();
-        let letter = letter(&pair, "x", "berlin.h3", "pause", "{}", NOW_MS);
-        let at = |seconds| MonoTime::from_nanos(0) + Duration::from_secs(seconds);
-        let first = |key: &str, id: &str, now| {
-            let order = Order { id: id.to_owned(), ..Order::of(&letter).unwrap() };
-            access.first_time(&Letter { key: key.to_owned(), ..letter.clone() }, &order, now)
-        };
-        for n in 0..ORDERS {
-            first("one", &n.to_string(), at(0)).unwrap();
-        }
-        assert_eq!(first("one", "more", at(599)).unwrap_err().code, Code::Busy);
-        assert!(first("two", "0", at(599)).is_ok());
-        assert_eq!(first("one", "0", at(599)).unwrap_err().code, Code::Late);
-        assert!(first("one", "0", at(600)).is_ok());
     }
 }

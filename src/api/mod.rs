@@ -29,6 +29,7 @@ mod asker;
 mod controllers;
 mod cues;
 mod fleet;
+mod fleet_access;
 mod gate;
 mod guarded;
 mod history;
@@ -61,7 +62,7 @@ pub(crate) use stop::fleet_stop_socket;
 pub use stop::{StopSocket, stop_socket};
 
 use access::{Access, AccessTokens};
-use fleet::FleetAccess;
+use fleet_access::FleetAccess;
 use peer::Peer;
 use shared::{Pulse, Shared};
 use socket::SocketFile;

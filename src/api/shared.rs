@@ -11,7 +11,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::Pages;
 use super::access::Access;
-use super::fleet::FleetAccess;
+use super::fleet_access::FleetAccess;
 use super::once::Once;
 use super::problem::panicked;
 use super::streams::Streams;

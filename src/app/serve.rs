@@ -236,9 +236,7 @@ fn serve_halls(
         let recorder = HallRecorder::start(&mut runtime, &record_places);
         ports.recorder = recorder.link();
         let left = keep(runtime, ports, library.clone(), journal, &mut feeder)?;
-        if let Err(waits) = recorder.end() {
-            log.say(Line::new(Priority::Warning, "record-show", waits.to_string()));
-        }
+        end_recording(recorder, &log);
         (ports, journal) = (left.ports, left.journal);
         let Some(next) = left.reload else {
             break Served { config, closed: left.closed, ended: left.ended };
@@ -252,6 +250,13 @@ fn serve_halls(
     surfaces.close();
     log.close();
     Ok(served)
+}
+
+/// Ends what is recorded; says where that could not be waited for.
+fn end_recording(recorder: HallRecorder, log: &Log) {
+    if let Err(waits) = recorder.end() {
+        log.say(Line::new(Priority::Warning, "record-show", waits.to_string()));
+    }
 }
 
 /// Opens the hall, and reads what tells of its film.

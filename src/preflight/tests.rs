@@ -433,6 +433,7 @@ fn limits_on_the_speed_of_an_axis_that_turns_are_told_for_it_alone() {
     let turns = turns.with(&[(0x80, 0), (0x82, 0)]);
     assert_eq!(remedy(&turns, Check::AxisSpeedUnlimited).as_deref(), Some("set PA80 to 2880, PA82 to 67"));
     let seat = Case::smc().with(&[(0x07, 3_500), (0x80, 0), (0x81, 3_500), (0x82, 3_500)]);
+    let seat = seat.with(&[(0xb0, 3_500), (0xb1, 3_500), (0xb2, 3_500)]);
     assert_eq!(remedy(&seat, Check::AxisSpeedUnlimited).as_deref(), Some("set them to 2880"));
     assert_eq!(remedy(&seat, Check::SpeedTooHigh).as_deref(), Some("set PA07 or PA80 to PA85 to 2880"));
 }

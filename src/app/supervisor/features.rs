@@ -3,6 +3,7 @@
 
 use super::act::{Act, Feature, SupervisorEvent};
 use super::figures::Figures;
+use super::fleet;
 use super::gear::GearLimits;
 use super::hall::{HallContext, ShowChange};
 use super::homing::Homing;
@@ -14,7 +15,7 @@ use super::readiness::ReadinessCheck;
 use super::record::ShowRecords;
 use super::recorded::HallTeller;
 use super::seat_testing::SeatTesting;
-use crate::control::Problem;
+use crate::control::{Desired, Problem};
 use crate::time::ShowTime;
 
 /// All of them.
@@ -58,6 +59,15 @@ impl Features {
         let mut out = Vec::new();
         all.into_iter().for_each(|feature| feature.on(event, hall, &mut out));
         out
+    }
+
+    /// True if it may be done for whom it is asked for.
+    ///
+    /// # Errors
+    /// Where it comes by the fleet and is not for it, or the hall has no such thing.
+    pub(super) fn may_ask(&self, desired: &Desired, hall: &HallContext) -> Result<(), Problem> {
+        fleet::may_ask(desired, hall)?;
+        self.gear.may_ask(desired, hall)
     }
 
     /// Takes what a job has come to.

@@ -293,9 +293,7 @@ impl Supervisor {
 
     /// Has done what somebody asks.
     fn on_asked(&mut self, asked: Asked) {
-        let may = fleet::may_ask(&asked.desired, &self.hall)
-            .and_then(|()| self.features.gear.may_ask(&asked.desired, &self.hall));
-        let acts = may.and_then(|()| {
+        let acts = self.features.may_ask(&asked.desired, &self.hall).and_then(|()| {
             self.happens(&SupervisorEvent::Asked(&asked.desired));
             self.features.acts_for(&asked, &self.hall)
         });
@@ -397,12 +395,8 @@ impl Supervisor {
     /// How all of it stands.
     fn status(&self) -> Status {
         let Self { hall, features, .. } = self;
-        let parts = StatusParts {
-            hall,
-            features,
-            record: &hall.recorder.status_at(hall.now),
-            began: self.ports.began,
-        };
+        let (record, began) = (&hall.recorder.status_at(hall.now), self.ports.began);
+        let parts = StatusParts { hall, features, record, began };
         let table = hall.live.table();
         let warnings = parts.warnings(&table, &self.notes, self.ports.settings_file.trouble());
         parts.status(&table, warnings)

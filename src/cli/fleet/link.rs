@@ -6,13 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
-use async_nats::connection::State;
-use async_nats::{Client, Message};
+use async_nats::Message;
 use futures_util::{StreamExt as _, stream};
-use http_body_util::Full;
-use hyper::Method;
-use hyper::body::Bytes;
-use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::UnixStream;
@@ -20,9 +15,9 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
+use super::hall::Link;
 use super::log::LogTeller;
 use super::{engine, settings};
-use crate::cli::client::http::{self, HttpReply};
 use crate::cli::{Exit, Failure, OrExit as _, places, print};
 use crate::fleet::{self, BriefStatus};
 use crate::sys::clock::Monotonic;
@@ -36,8 +31,7 @@ const TELL: Duration = Duration::from_millis(500);
 const KEEP: Duration = Duration::from_secs(60);
 /// How long the next try waits after something failed.
 const AGAIN: Duration = Duration::from_secs(2);
-/// How long the hall may take to answer what is looked up, and what is asked.
-const LOOKED_UP: Duration = Duration::from_secs(2);
+/// How long the hall may take to answer what is asked.
 const ASKED: Duration = Duration::from_secs(65);
 /// How long a stop may take.
 const STOPPED: Duration = Duration::from_secs(2);
@@ -58,14 +52,6 @@ pub(super) struct Args {
     /// The fleet socket of the hall [default: fleet.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     socket: Option<PathBuf>,
-}
-
-/// What a link has.
-pub(super) struct Link {
-    /// `SITE.HALL`.
-    pub(super) hall: String,
-    pub(super) client: Client,
-    socket: PathBuf,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
@@ -96,11 +82,6 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 impl Link {
-    /// True if what is told now goes out now: what is told meanwhile would come late, when it is no longer so.
-    pub(super) fn is_connected(&self) -> bool {
-        self.client.connection_state() == State::Connected
-    }
-
     /// Tells how the hall is, twice a second and where it changes.
     async fn tell(&self, last: &watch::Sender<Option<BriefStatus>>) {
         let mut pace = interval(LOOK);
@@ -259,37 +240,6 @@ impl Link {
         }
         all
     }
-
-    /// Looks something up at the hall.
-    pub(super) async fn look_up<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
-        told(&self.get(path).await?)
-    }
-
-    /// The same with a body that says what.
-    pub(super) async fn look_up_by<T: DeserializeOwned>(
-        &self,
-        path: &str,
-        body: &Value,
-    ) -> anyhow::Result<T> {
-        told(&self.post(path, body.to_string().into(), LOOKED_UP).await?)
-    }
-
-    async fn get(&self, path: &str) -> anyhow::Result<HttpReply> {
-        let request = http::request(Method::GET, path, None, Full::<Bytes>::default());
-        let reply = async { http::exchange(&self.socket, request?, LOOKED_UP).await };
-        reply.await.map_err(|failure| failure.error)
-    }
-
-    async fn post(&self, path: &str, body: Bytes, patience: Duration) -> anyhow::Result<HttpReply> {
-        let request = http::request(Method::POST, path, Some("application/json"), Full::new(body));
-        let reply = async { http::exchange(&self.socket, request?, patience).await };
-        reply.await.map_err(|failure| failure.error)
-    }
-}
-
-fn told<T: DeserializeOwned>(reply: &HttpReply) -> anyhow::Result<T> {
-    anyhow::ensure!(reply.status == 200, "the hall replied {}: {}", reply.status, reply.text);
-    serde_json::from_str(&reply.text).context("the hall is of another version")
 }
 
 /// That the hall cannot be asked.

@@ -12,7 +12,7 @@ use async_nats::jetstream::stream::DirectGetErrorKind;
 use serde_json::json;
 
 use super::engine;
-use super::link::Link;
+use super::hall::Link;
 use crate::fleet::{self, LogRecord};
 use crate::journal::JournalPart;
 

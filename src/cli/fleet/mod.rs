@@ -9,6 +9,7 @@ mod act;
 mod demo;
 mod desk;
 mod engine;
+mod hall;
 mod init;
 mod link;
 mod log;

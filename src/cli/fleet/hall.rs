@@ -1,0 +1,69 @@
+//! A hall as its link reaches it, and the client by which it reaches the engine.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use async_nats::Client;
+use async_nats::connection::State;
+use http_body_util::Full;
+use hyper::Method;
+use hyper::body::Bytes;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::cli::client::http::{self, HttpReply};
+
+/// How long the hall may take to answer what is looked up.
+const LOOKED_UP: Duration = Duration::from_secs(2);
+
+/// What a link has.
+pub(super) struct Link {
+    /// `SITE.HALL`.
+    pub(super) hall: String,
+    pub(super) client: Client,
+    pub(super) socket: PathBuf,
+}
+
+impl Link {
+    /// True if what is told now goes out now: what is told meanwhile would come late, when it is no longer so.
+    pub(super) fn is_connected(&self) -> bool {
+        self.client.connection_state() == State::Connected
+    }
+
+    /// Looks something up at the hall.
+    pub(super) async fn look_up<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
+        told(&self.get(path).await?)
+    }
+
+    /// The same with a body that says what.
+    pub(super) async fn look_up_by<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        body: &Value,
+    ) -> anyhow::Result<T> {
+        told(&self.post(path, body.to_string().into(), LOOKED_UP).await?)
+    }
+
+    pub(super) async fn get(&self, path: &str) -> anyhow::Result<HttpReply> {
+        let request = http::request(Method::GET, path, None, Full::<Bytes>::default());
+        let reply = async { http::exchange(&self.socket, request?, LOOKED_UP).await };
+        reply.await.map_err(|failure| failure.error)
+    }
+
+    pub(super) async fn post(
+        &self,
+        path: &str,
+        body: Bytes,
+        patience: Duration,
+    ) -> anyhow::Result<HttpReply> {
+        let request = http::request(Method::POST, path, Some("application/json"), Full::new(body));
+        let reply = async { http::exchange(&self.socket, request?, patience).await };
+        reply.await.map_err(|failure| failure.error)
+    }
+}
+
+fn told<T: DeserializeOwned>(reply: &HttpReply) -> anyhow::Result<T> {
+    anyhow::ensure!(reply.status == 200, "the hall replied {}: {}", reply.status, reply.text);
+    serde_json::from_str(&reply.text).context("the hall is of another version")
+}
