@@ -190,6 +190,14 @@ fn what_is_asked_wrongly_is_a_usage_error() {
         let run = kinocue(args);
         assert_eq!(run.code, Some(64), "{args:?}: {}", run.stderr);
     }
+    // What else there is, beside what is missing, stands in the answer.
+    for (args, both) in
+        [(&["play", CUE][..], "<--to <ADDR>|--config <FILE>>"), (&["serve"], "<--config <FILE>|--rehearse>")]
+    {
+        let run = kinocue(args);
+        assert_eq!(run.code, Some(64), "{args:?}: {}", run.stderr);
+        assert!(run.stderr.contains(both), "{args:?}: {}", run.stderr);
+    }
     for args in
         [&["check", CUE, "--seat", "bench33"][..], &["info", CUE, "--config", HALL, "--seat", "bench33"]]
     {

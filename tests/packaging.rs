@@ -208,6 +208,28 @@ fn alerts_are_what_prometheus_takes_and_a_lost_film_raises_one_only_where_seats_
 }
 
 #[test]
+fn every_expression_of_the_dashboard_is_one_that_prometheus_takes() {
+    let board: serde_json::Value = serde_json::from_str(&text("systemd/grafana/kinocue.json")).unwrap();
+    let targets =
+        board["panels"].as_array().unwrap().iter().flat_map(|panel| panel["targets"].as_array().unwrap());
+    let expressions: Vec<String> =
+        targets.map(|target| target["expr"].as_str().unwrap().replace("$__rate_interval", "1m")).collect();
+    assert!(expressions.len() > 20);
+    // A text of JSON is one of YAML.
+    let rules = expressions
+        .iter()
+        .enumerate()
+        .map(|(at, expr)| serde_json::json!({"record": format!("of:{at}"), "expr": expr}));
+    let groups = serde_json::json!({"groups": [{"name": "dashboard", "rules": rules.collect::<Vec<_>>()}]});
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("dashboard.yml");
+    fs::write(&file, groups.to_string()).unwrap();
+    if let Some(output) = tool("promtool", &["check", "rules", file.to_str().unwrap()]) {
+        assert!(output.status.success(), "{}", said(&output));
+    }
+}
+
+#[test]
 fn every_library_in_the_program_may_be_passed_on_with_its_licence() {
     let folder = tempfile::tempdir().unwrap();
     let list = folder.path().join("third-party.txt");

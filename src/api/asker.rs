@@ -84,9 +84,7 @@ impl Asker {
         if self.who.role >= least {
             return Ok(());
         }
-        let Who { name, role, .. } = &self.who;
-        let detail = format!("{what} needs the role {least}, and {name} has {role}");
-        Err(Problem::new(Code::Role, detail, "ask somebody with that role"))
+        Err(Problem::role(what, least, &self.who))
     }
 
     /// When it was asked, by our own clock; now, where nobody said and it does not matter.

@@ -17,7 +17,8 @@ use crate::time::parse_trim;
 use crate::timeline::Timeline;
 
 /// The codes of bad files, the one that counts most first.
-const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::BadCue, Exit::CheckFailed];
+const WORST_FIRST: [Exit; 6] =
+    [Exit::NoInput, Exit::NotAllowed, Exit::Config, Exit::Io, Exit::BadCue, Exit::CheckFailed];
 
 /// Checks cue and configuration files: every fault, with its place.
 ///
@@ -209,6 +210,14 @@ impl CheckReport {
         if hall.film.is_none() && hall.sync.as_ref().is_some_and(|sync| !sync.leads) {
             let note = "[sync] has no start: a cue follows the film only where its entry of a playlist has film, else it starts at once";
             self.note(path, note);
+        }
+        for (at, one) in hall.effects.iter().enumerate() {
+            let other = hall.effects[..at].iter().find(|other| other.output == one.output);
+            other.iter().for_each(|other| {
+                let text =
+                    format!("{} and {} switch the same output, Y{:02}", other.name, one.name, one.output);
+                self.note(path, &text);
+            });
         }
         if self.exits.len() == before {
             self.passes(path, &hall_in_words(hall));

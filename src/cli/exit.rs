@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::{fmt, io, iter};
 
-use anyhow::anyhow;
+use anyhow::{Context as _, anyhow};
 
 use crate::app::film::FilmError;
 use crate::net::NetError;
@@ -126,7 +126,8 @@ pub(super) fn of_film(error: FilmError) -> Failure {
 
 /// An output that exists is replaced only where that was asked for.
 pub(super) fn refuse_to_replace(output: &Path, force: bool) -> Result<(), Failure> {
-    if !force && output.try_exists().or_exit(Exit::Io)? {
+    let path = || output.display().to_string();
+    if !force && output.try_exists().with_context(path).or_exit(Exit::Io)? {
         let error = anyhow!("{} exists; --force replaces it", output.display());
         return Err(error).or_exit(Exit::Usage);
     }

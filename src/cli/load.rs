@@ -1,6 +1,7 @@
 //! What several commands read: cues and configurations, with the exit codes of their faults.
 
 use std::borrow::Cow;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -269,6 +270,9 @@ pub(super) fn cue(path: &Path, source: &Source) -> Result<Cue, Failure> {
 /// How the program ends where a configuration has these faults.
 pub(super) fn config_exit(faults: &ConfigFaults) -> Exit {
     match faults {
+        ConfigFaults::Unreadable { source, .. } if source.kind() == io::ErrorKind::PermissionDenied => {
+            Exit::NotAllowed
+        }
         ConfigFaults::Unreadable { .. } => Exit::NoInput,
         ConfigFaults::Bad(_) => Exit::Config,
     }
@@ -278,6 +282,7 @@ pub(super) fn config_exit(faults: &ConfigFaults) -> Exit {
 pub(super) fn cue_exit(faults: &CueFaults) -> Exit {
     match faults.class() {
         FaultClass::NoInput => Exit::NoInput,
+        FaultClass::Denied => Exit::NotAllowed,
         FaultClass::Io => Exit::Io,
         FaultClass::BadCue => Exit::BadCue,
     }

@@ -30,6 +30,7 @@ mod tests {
             (failure.exit, failure.to_string().as_str()),
             (Exit::NoInput, "there is no controller B11; did you mean B1?; there are: A1, B1")
         );
+        assert!(unknown("seat", "a1", ["A1", "B1"].into_iter()).to_string().contains("did you mean A1?"));
         let many: Vec<String> = (0..64).map(|seat| format!("S{seat}")).collect();
         let told = unknown("seat", "x", many.iter().map(String::as_str)).to_string();
         assert!(told.ends_with("S10, S11, 52 more"), "{told}");

@@ -49,6 +49,7 @@ const EXAMPLES: [&str; 5] = [
 /// seats where they are. On a terminal, keys control the play; ? lists them. None of this is an emergency stop: that one is
 /// hard-wired.
 #[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("seats").required(true).args(["to", "config"])))]
 #[command(after_help = after_help(&EXAMPLES))]
 pub(super) struct Args {
     /// The cue: CSV or MCAP.
@@ -57,7 +58,7 @@ pub(super) struct Args {
     source: SourceArgs,
     /// A controller: HOST:PORT, then optionally, after commas, name=A1, axes=6, offset=0, fan_out=slice or shared, dialect=smc or
     /// mbox; repeatable.
-    #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
+    #[arg(long, value_name = "ADDR")]
     to: Vec<String>,
     /// The configuration, with controllers, seats and show settings.
     #[arg(long, value_name = "FILE")]

@@ -21,6 +21,7 @@ use crate::log::{Line, Log, Priority};
 /// Nothing moves without a command from a client, the web console or another surface. SIGTERM parks the seats and ends with 0;
 /// SIGHUP reloads the configuration if nothing is armed.
 #[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("hall").required(true).multiple(true).args(["config", "rehearse"])))]
 #[command(after_help = "\
 Examples:
   kinocue serve --rehearse                                 two rows of simulated seats, to rehearse on a laptop
@@ -39,7 +40,7 @@ Exit codes:
   78  the configuration is bad")]
 pub(super) struct Args {
     /// The configuration of the hall.
-    #[arg(long, value_name = "FILE", env = "KINOCUE_CONFIG", required_unless_present = "rehearse")]
+    #[arg(long, value_name = "FILE", env = "KINOCUE_CONFIG")]
     config: Option<PathBuf>,
     /// Simulate every controller in this program; nothing leaves the machine. Without --config: two rows of four seats, with two cues
     /// and a playlist.

@@ -53,7 +53,7 @@ Commands of --script, each with TIME: before it (seconds from the start), and of
   X1=1, X1=0     the switch at input X01 closes (active with PA04 = 1), or opens; X1 to X12
   err=12, err=0  an error occurs (1 to 7, 10 to 15, 17, 20, 21); all errors and their causes go away
   reboot         a power cycle
-  estop=1        an emergency stop without an input; estop=0 releases it
+  estop=1        an emergency stop without an input; estop=0 releases it, but with PA91 = 2, as --safe has it, it holds until a reboot
   mute=1         requests are carried out but not answered; mute=0: answered again
   pa95=3         a parameter is set at the controller's keys: register in hex, value decimal or 0x
   loss=0.1, duplicate=0.1, delay=50ms   network faults from now on

@@ -245,7 +245,8 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
 
 /// `; did you mean x?` for the word most like `word`, or nothing.
 pub(crate) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
-    let likeness = |candidate: &str| strsim::jaro_winkler(word, candidate);
+    let word = word.to_lowercase();
+    let likeness = |candidate: &str| strsim::jaro_winkler(&word, &candidate.to_lowercase());
     let best = known.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
     best.filter(|best| likeness(best) >= ALIKE)
         .map_or_else(String::new, |best| format!("; did you mean {best}?"))

@@ -179,9 +179,7 @@ impl Handle {
     /// [`Problem`] where it is not even queued: the role is too low, it is stale already, or too many wait.
     pub(crate) fn post_asked(&self, who: Who, ask: Command, asked_at: MonoTime) -> Result<Posted, Problem> {
         if who.role < ask.least_role() {
-            let (word, least) = (ask.word(), ask.least_role());
-            let detail = format!("{word} needs the role {least}, and {} has {}", who.name, who.role);
-            return Err(Problem::new(Code::Role, detail, "ask somebody with that role"));
+            return Err(Problem::role(ask.word(), ask.least_role(), &who));
         }
         if ask == Command::Stop {
             self.stop();

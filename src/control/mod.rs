@@ -21,6 +21,8 @@ pub(crate) use links::{LinkAxisStatus, LinkStatus};
 pub use model::Health;
 pub(crate) use model::{Coded, Histogram, Percentiles, Severity, Then, Times};
 pub(crate) use places::{Place, Places, network};
+#[cfg(test)]
+pub(crate) use problem::NEEDS_ENGINEER;
 pub use problem::{Code, Problem};
 pub(crate) use recordings::is_recording;
 pub(crate) use status::{

@@ -5,8 +5,9 @@ use std::fmt;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::Who;
 use super::model::words;
-use crate::config::there_is_no;
+use crate::config::{Role, there_is_no};
 use crate::state::Refusal;
 
 words! {
@@ -49,6 +50,9 @@ words! {
         Internal = "internal",
     }
 }
+
+/// What stands against what an engineer has to ask.
+pub(crate) const NEEDS_ENGINEER: &str = "needs-engineer";
 
 /// Why something was not done (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
@@ -113,6 +117,13 @@ impl Problem {
         remedy: impl Into<String>,
     ) -> Self {
         Self::new(Code::Unknown, there_is_no(what, name, known), remedy)
+    }
+
+    /// That who asked may not, for want of a role.
+    pub(crate) fn role(what: &str, least: Role, who: &Who) -> Self {
+        let detail = format!("{what} needs the role {least}, and {} has {}", who.name, who.role);
+        let why = (least == Role::Engineer).then_some(NEEDS_ENGINEER);
+        Self { why, ..Self::new(Code::Role, detail, "ask somebody with that role") }
     }
 
     /// That no film leads shows here.

@@ -76,6 +76,8 @@ impl fmt::Display for Fault {
 pub(crate) enum FaultClass {
     /// Missing, a folder, or not to be opened.
     NoInput,
+    /// The system does not allow it to be read.
+    Denied,
     /// Reading failed midway.
     Io,
     /// The content is wrong.
@@ -114,6 +116,7 @@ impl CueFaults {
     pub(crate) fn class(&self) -> FaultClass {
         match self.told.first().map(|fault| &fault.problem) {
             Some(Problem::Missing | Problem::Folder | Problem::Unopened(_)) => FaultClass::NoInput,
+            Some(Problem::Denied) => FaultClass::Denied,
             Some(Problem::Unread(_)) => FaultClass::Io,
             _ => FaultClass::BadCue,
         }

@@ -337,6 +337,7 @@ pub(crate) fn open(path: &Path) -> Result<File, CueFaults> {
         let problem = match error.kind() {
             io::ErrorKind::NotFound => Problem::Missing,
             io::ErrorKind::IsADirectory => Problem::Folder,
+            io::ErrorKind::PermissionDenied => Problem::Denied,
             _ => Problem::Unopened(error.to_string()),
         };
         CueFaults::one(path, problem)
@@ -372,14 +373,28 @@ pub(crate) fn is_mcap(front: &[u8]) -> bool {
     front.starts_with(MAGIC)
 }
 
+/// What a file is that begins so and is no text, with what to do; `None` where it may be text.
+fn other_kind(front: &[u8]) -> Option<&'static str> {
+    let is_text = |byte: &u8| !byte.is_ascii_control() || byte.is_ascii_whitespace();
+    match front {
+        [b'P', b'K', 3, 4, ..] => Some("a spreadsheet or an archive: save it as CSV"),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("text in UTF-16: save it as UTF-8"),
+        _ => (!front.iter().all(is_text)).then_some("no text, as a film or a picture is not"),
+    }
+}
+
 /// Reads a cue of our own: the content says whether it is MCAP, and a name in `.mcap` that it should be.
 fn read_native(path: &Path, mut input: impl Read) -> Result<Cue, CueFaults> {
     let mut front = Vec::new();
     if let Err(error) = input.by_ref().take(MAGIC.len() as u64).read_to_end(&mut front) {
         return Err(CueFaults::one(path, Problem::Unread(error.to_string())));
     }
-    let named_so = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
-    let begins_so = front == MAGIC;
+    let ends_in = |ending| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending));
+    let (named_so, begins_so) = (ends_in("mcap"), front == MAGIC);
+    let other = if ends_in("toml") { Some("a configuration: --config takes it") } else { other_kind(&front) };
+    if let Some(kind) = other.filter(|_| !named_so && !begins_so) {
+        return Err(CueFaults::one(path, Problem::OtherKind(kind)));
+    }
     let input = front.as_slice().chain(input);
     if named_so || begins_so { mcap::read(path, input) } else { csv::read(path, input) }
 }
@@ -388,6 +403,21 @@ fn read_native(path: &Path, mut input: impl Read) -> Result<Cue, CueFaults> {
 mod tests {
     use super::*;
     use crate::timeline::Timeline;
+
+    #[test]
+    fn a_file_of_another_kind_is_called_that_and_no_fault_of_it_is_told() {
+        let told = |name: &str, octets: &[u8]| {
+            read(Path::new(name), octets, &Source::Native).unwrap_err().to_string()
+        };
+        assert_eq!(
+            told("x.csv", b"PK\x03\x04rest\n"),
+            "x.csv: is a spreadsheet or an archive: save it as CSV; a cue is a CSV or MCAP file"
+        );
+        assert!(told("x.csv", b"\xff\xfet\0i\0").contains("UTF-16: save it as UTF-8"));
+        assert!(told("film.mkv", b"\x1a\x45\xdf\xa3\x01").contains("no text"));
+        assert!(told("hall.toml", b"[show]\n").contains("--config takes it"));
+        assert!(told("x.csv", b"\xef\xbb\xbftime_ms,a1\n0,2\n").contains("2:3: a1: 2 is outside"));
+    }
 
     #[test]
     fn a_missing_file_and_a_folder_are_told_from_bad_data() {

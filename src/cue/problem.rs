@@ -17,6 +17,12 @@ pub enum Problem {
     /// A folder stands where a file belongs.
     #[error("is a folder, not a cue file")]
     Folder,
+    /// Something else than a cue.
+    #[error("is {0}; a cue is a CSV or MCAP file")]
+    OtherKind(&'static str),
+    /// The file may not be read.
+    #[error("may not be read: change its owner or its mode")]
+    Denied,
     /// The system would not let the file be opened.
     #[error("cannot be opened: {0}")]
     Unopened(String),

@@ -1,6 +1,7 @@
 //! Names of cues and playlists: never paths.
 
 use std::fmt;
+use std::path::Path;
 use std::str::FromStr;
 
 /// The most characters of an id.
@@ -15,8 +16,16 @@ pub(crate) type CueId = Id;
 
 /// A text that is no id.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not an id; an id has 1 to {MAX_LEN} characters of a to z, 0 to 9, _ and -")]
+#[error(
+    "{0:?} is not an id; an id has 1 to {MAX_LEN} characters of a to z, 0 to 9, _ and -{hint}",
+    hint = of_file(.0).map_or_else(String::new, |id| format!("; did you mean {id}?"))
+)]
 pub struct IdError(String);
+
+/// The id that the file of that name has in the library.
+fn of_file(name: &str) -> Option<Id> {
+    Path::new(name).file_stem()?.to_str()?.to_ascii_lowercase().parse().ok()
+}
 
 impl Id {
     /// Its text.
@@ -60,6 +69,15 @@ mod tests {
         for bad in ["", ".", "..", "../x", "a/b", "A", "a.csv", "a b", "a\0", "ä", "a\n", &long] {
             assert!(bad.parse::<Id>().is_err(), "{bad:?}");
         }
+    }
+
+    #[test]
+    fn the_name_of_a_file_is_answered_with_its_id() {
+        let told = |text: &str| text.parse::<Id>().unwrap_err().to_string();
+        for name in ["ride.csv", "cues/ride.csv", "RIDE.csv", "./Ride"] {
+            assert!(told(name).ends_with("; did you mean ride?"), "{}", told(name));
+        }
+        assert!(!told("my ride.csv").contains("did you mean"));
     }
 
     #[test]

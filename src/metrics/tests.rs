@@ -381,7 +381,19 @@ fn alerts_and_dashboard_ask_for_figures_that_exist() {
     };
     let rules = include_str!("../../systemd/prometheus/kinocue.rules.yml");
     let dashboard = include_str!("../../systemd/grafana/kinocue.json");
-    serde_json::from_str::<serde_json::Value>(dashboard).unwrap();
+    let board: serde_json::Value = serde_json::from_str(dashboard).unwrap();
+    let panels = board["panels"].as_array().unwrap();
+    for target in panels.iter().flat_map(|panel| panel["targets"].as_array().unwrap()) {
+        let of = |key: &str| target[key].as_str().unwrap_or_default();
+        let labels = of("legendFormat").split("{{").skip(1).map(|rest| rest.split_once("}}").unwrap().0);
+        for label in labels.filter(|label| *label != "instance") {
+            let has = |series: &String| {
+                let (name, labels) = series.split_once('{').unwrap_or((series, ""));
+                names(of("expr")).contains(&name) && labels.contains(&format!("{label}=\""))
+            };
+            assert!(page.samples.keys().any(has), "no {label} in {}", of("expr"));
+        }
+    }
     for (file, text) in [("rules", rules), ("dashboard", dashboard)] {
         let asked = names(text);
         assert!(asked.len() > 10, "{file}");

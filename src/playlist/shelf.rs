@@ -98,7 +98,7 @@ impl Shelf {
             "playlist",
             &id.to_string(),
             ids.iter().map(String::as_str),
-            "GET /api/v1/playlists lists them",
+            "`kinocue playlist`, the page and GET /api/v1/playlists list them",
         )
     }
 

@@ -124,7 +124,7 @@ fn refuse_others(proof: &Proof) -> Result<(), FitError> {
                 | Breach::TooRoughToRest { .. }
                 | Breach::VibrationPastStroke { .. }
                 | Breach::Shaken { .. }
-        )
+        ) || matches!(breach, Breach::TooShort { length, least } if length >= least)
     };
     let others = proof.violations.iter().filter(|violation| !movable(&violation.breach));
     let others: Vec<_> = others.map(|violation| violation.message()).collect();

@@ -56,6 +56,9 @@ use stencil::Stencils;
 /// What may be over a limit: 0.1 % of it.
 pub(crate) const SLACK: f64 = 1.001;
 
+/// No ride is as short: a cue that is, and breaks a limit, may have its times in another unit than its header says.
+const SHORT: ShowTime = ShowTime::from_millis(1000);
+
 /// The greatest size of something that has a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Worst {
@@ -127,12 +130,27 @@ pub fn prove(timeline: &Timeline, terms: Terms) -> Proof {
     let subjects = subjects(timeline, &terms);
     let axes = on_threads(&subjects, &mut found, |subject, found| subject.prove(&terms, &stencils, found));
     effects::prove(timeline, &terms, &mut found);
+    let is_broken = !found.is_empty();
+    found.extend(too_short(timeline, &axes, &stencils, is_broken));
     // By time before any is left out: people mend a cue from its beginning.
     found.sort_by_key(|one| one.at);
     let more = found.len().saturating_sub(FAULTS_TOLD) as u64;
     found.truncate(FAULTS_TOLD);
     let violations = found.into_iter().map(|one| placed(timeline, one)).collect();
     Proof { terms, axes, links: Vec::new(), violations, more }
+}
+
+/// A cue that moves and is too short for differences to see how, or so short that its times may be meant in seconds.
+fn too_short(timeline: &Timeline, axes: &[AxisProof], stencils: &Stencils, is_broken: bool) -> Option<Found> {
+    let (length, least) = (timeline.duration(), ShowTime::from_nanos(stencils.reach()));
+    let is_unseen = length < least && axes.iter().any(|axis| axis.lowest.value < axis.highest.value);
+    let breach = Breach::TooShort { length, least };
+    (is_unseen || is_broken && length < SHORT).then_some(Found {
+        at: ShowTime::ZERO,
+        axis: None,
+        column: String::new(),
+        breach,
+    })
 }
 
 /// Proves each axis, on as many threads as there are processors.

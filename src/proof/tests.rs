@@ -475,3 +475,20 @@ fn seats_of_one_type_are_proved_once() {
     let terms = Terms::of_hall(&config, Digest::of(timeline.cue()), Rate::from_hz(100.0), 1.0);
     assert_eq!(prove(&timeline, terms).axes.len(), 2);
 }
+
+#[test]
+fn a_cue_that_is_too_short_to_be_judged_does_not_pass_and_one_whose_times_may_be_seconds_is_told_so() {
+    const SECONDS: &str = "; if its times are in seconds, name their column time_s";
+    let ride = |step_ms: u32| {
+        let rows = [0.0, 0.3, 0.5, 0.3, 0.0, 0.0].iter().zip(0_u32..);
+        let rows: String = rows.map(|(at, row)| format!("{},{at}\n", row * step_ms)).collect();
+        messages(&on_bench(&format!("# interpolation: monotone\ntime_ms,a1\n{rows}")))
+    };
+    // Up and down in less than a period: no two frames see it.
+    for step_ms in [1, 10] {
+        let told = ride(step_ms);
+        assert!(told[0].contains(SECONDS), "{told:?}");
+    }
+    assert!(ride(100).iter().any(|told| told.contains(SECONDS)) && ride(1_000).is_empty());
+    assert!(on_bench("time_ms,a1\n0,0.5\n10,0.5\n").passed(), "it does not move");
+}

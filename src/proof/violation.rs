@@ -132,6 +132,16 @@ pub(crate) enum Breach {
         /// When it is worst.
         at: ShowTime,
     },
+    /// The cue is too short to be judged, or to be meant.
+    #[error(
+        "the cue lasts only {length}; if its times are in seconds, name their column time_s; motion is judged over {least} and more"
+    )]
+    TooShort {
+        /// How long it lasts.
+        length: ShowTime,
+        /// The least that differences need.
+        least: ShowTime,
+    },
     /// The cue ends in motion, and the stroke has no room to come to rest.
     #[error(
         "the cue ends at {at} in motion, {velocity:.1} {0}/s at {position:.3} {0}, and needs {missing:.3} {0} more than \

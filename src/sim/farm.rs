@@ -29,7 +29,9 @@ pub enum FarmError {
         count: usize,
     },
     /// An address is taken, or none of this machine's.
-    #[error("cannot listen on {address}")]
+    #[error(
+        "cannot listen on {address}; another program may have it, such as a simulator or a rehearsal: end that, or listen elsewhere"
+    )]
     Listen {
         /// The address.
         address: SocketAddrV4,

@@ -363,6 +363,15 @@ fn the_library_and_the_playlist_are_listed() {
         "next_start": null});
     let run = Daemon::with(status).run(&["playlist"]);
     assert!(squeezed(&run.stdout).contains(">2 coaster"), "{run:?}");
+    let lists = json!([{"id": "saturday"}, {"id": "today"}]);
+    let daemon = Daemon::start(move |_, request| {
+        let of_lists = request.path.contains("/api/v1/playlists");
+        Answer::Reply(200, if of_lists { lists.clone() } else { hall("parked") })
+    });
+    told(
+        &daemon.run(&["playlist"]),
+        "no playlist is loaded; there are: saturday, today; next: kinocue playlist ID",
+    );
 }
 
 #[test]

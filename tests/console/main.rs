@@ -431,7 +431,7 @@ fn a_moment_is_marked_by_a_key_and_its_recording_is_looked_at_seat_by_seat() {
     browser.wait("[...document.querySelectorAll('#recordings td')].some((cell) => cell.textContent.startsWith('stopped'))");
     // The show is in the history, with what its recording says of it, and its picture.
     browser.wait("/^stopped, .*1 marked/.test(document.querySelector('#history tbody tr td:nth-child(3)')?.textContent)");
-    let margin = text(&browser, "#history tbody tr td:nth-child(4)");
+    let margin = text(&browser, "#history tbody tr td:nth-child(3) p");
     assert!(margin.contains("% left, axis ") && margin.contains(" a"), "{margin}");
     assert!(text(&browser, "#history tbody tr td:nth-child(2)").to_lowercase().contains("swell"));
     // On a tablet the button of each is in view, however much else its table has.

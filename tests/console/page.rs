@@ -122,6 +122,46 @@ fn what_is_next_is_a_button_arm_says_what_it_waits_for_and_what_is_over_goes() {
 }
 
 #[test]
+fn the_button_that_is_marked_is_the_one_that_the_words_name() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    // A seat whose emergency stop holds until a reset: it says that it knows its position, and is homed all the same.
+    for (code, button) in [("home", "home"), ("park-or-home", "park"), ("clear", "clear"), ("release", "")] {
+        let state = if ["clear", "release"].contains(&code) { "stopped" } else { "recovering" };
+        pretend(
+            &browser,
+            &format!(
+                "Object.assign(status, {{ state: '{state}', may_clear: '{state}' === 'stopped', next_coded: {{ code: '{code}' }} }});
+                 Object.assign(status.controllers[0], {{ emergency_stop: true, homed: true }});"
+            ),
+        );
+        let marked = "[...document.querySelectorAll('[data-next=true]:enabled')].map((one) => one.id).join()";
+        browser.wait(&format!(
+            "document.documentElement.dataset.state === '{state}' && {marked} === '{button}'"
+        ));
+    }
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn whoever_left_the_question_for_a_token_finds_the_way_back_to_it() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    browser.resize(390, 844);
+    browser.open(hall.url());
+    browser.wait("!document.getElementById('token').hidden");
+    browser.press("#token-leave");
+    browser.press("#log-in");
+    browser.wait("!document.getElementById('token').hidden");
+    browser.press("#token-text");
+    browser.type_text(crate::hall::TOKEN);
+    browser.press("#token [type=submit]");
+    browser.reads("state", "parked");
+    browser.wait("document.getElementById('lost').hidden");
+}
+
+#[test]
 fn the_map_is_one_tab_stop_and_the_arrow_keys_lead_from_seat_to_seat() {
     let Some(browser) = Browser::start() else { return };
     let hall = Hall::open();

@@ -59,8 +59,13 @@ fn a_locked_page_leaves_stop_pause_resume_park_and_go_until_the_lock_is_held() {
     browser.let_go();
     browser.press("#resume"); // it is there again, and the end of the long press has not locked the page anew
     browser.reads("state", "playing");
+    browser.wait("document.getElementById('next-locked').hidden");
+    browser.press("#lock");
     browser.touch("#stop");
     browser.reads("state", "stopped");
+    // CLEAR is next, which show mode leaves to whoever unlocks: that is what is next on this page.
+    browser.wait("document.querySelector('#lock[data-next=true]') !== null");
+    browser.wait("document.getElementById('next-locked').checkVisibility()");
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 

@@ -77,3 +77,27 @@ fn lanes_have_names_wheel_and_keys_show_less_of_the_film_and_only_seek_moves_the
     assert_eq!(shown(&browser), [0.0, 120.0]);
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
+
+#[test]
+fn no_name_of_an_effect_is_covered_by_the_next_one_and_one_without_room_is_left_out() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    // Two effects that take turns all through a cue, and one near its end that stands alone.
+    let drawn = browser.eval(
+        "const pen = CanvasRenderingContext2D.prototype, { fillText, fillRect } = pen, texts = [], blocks = [];
+         pen.fillText = function (text, x, y) { texts.push([text, x, x + this.measureText(text).width, y]); };
+         pen.fillRect = function (x, y, width, height) { blocks.push([x, x + width, y, y + height]); };
+         const on = (is) => Array.from({ length: 200 }, (_, at) => is(at));
+         const turns = (from) => on((at) => at < 160 && (at + from) % 12 < 3);
+         const effects = ['light', 'smoke', 'air', 'wind'].map((name, from) => ({ name, on: turns(3 * from) }));
+         return import('/js/timeline.js').then(({ setCue }) => {
+           setCue({ axes: [{ name: 'a1', colour: '#fff', min: on(() => 0), max: on(() => 0) }],
+             effects: [...effects, { name: 'alone', on: on((at) => at === 170) }], markers: [], length: 200 });
+           Object.assign(pen, { fillText, fillRect });
+           const covered = texts.slice(1).filter(([, from, to, y]) => blocks.some(([left, right, top, bottom]) => left > from && left < to && top < y && y < bottom));
+           return [texts.some(([text]) => text === 'alone'), covered.map(([text]) => text)];
+         });",
+    );
+    assert_eq!(drawn, json!([true, []]));
+}

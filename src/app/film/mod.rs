@@ -96,7 +96,7 @@ pub(crate) enum FilmError {
         source: IndexFault,
     },
     /// A command does not start.
-    #[error("`{command}` cannot be started; see that it is installed")]
+    #[error("`{command}` cannot be started; install it (`arecord` is in alsa-utils)")]
     Command {
         /// Which.
         command: String,

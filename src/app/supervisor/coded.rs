@@ -95,6 +95,8 @@ words! {
         Preflight = "preflight",
         /// Correct what it found.
         Correct = "correct-findings",
+        /// Say in the configuration or the playlist where the film is.
+        NoFilm = "no-film",
         /// Enable it once it is repaired.
         SeatOut = "seat-out",
         /// Change what should be different.
@@ -115,7 +117,7 @@ mod tests {
     use super::*;
     use crate::console;
     use crate::control::model::{Ending, Health};
-    use crate::control::{Code, MarginOf, Role};
+    use crate::control::{Code, MarginOf, NEEDS_ENGINEER, Role};
     use crate::film::chase::{HoldCause, ParkCause};
     use crate::film::point::FilmState;
     use crate::film::words::FilmLed;
@@ -222,6 +224,8 @@ mod tests {
             add("refusal", why.code(), 0);
             add("refusal-remedy", why.code(), 0);
         }
+        add("refusal", NEEDS_ENGINEER, 0);
+        add("refusal-remedy", NEEDS_ENGINEER, 0);
         for why in standings() {
             add("standing", why.code(), why.figures().len());
             why.next().iter().for_each(|_| add("remedy", why.code(), 0));

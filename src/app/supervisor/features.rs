@@ -102,7 +102,7 @@ impl Features {
         let mut acts = Vec::new();
         match list {
             Some(Ok(list)) => self.onward.list = Some(*list),
-            Some(Err(problem)) => acts.push(Act::Note(problem.to_string())),
+            Some(Err(problem)) => acts.push(Act::Note(problem.to_string().replace('\n', "; "))),
             None => {}
         }
         acts.push(match cued {

@@ -59,7 +59,11 @@ impl List {
         cue: &str,
     ) -> Result<Self, Problem> {
         let id = place.id.parse().map_err(|error: IdError| {
-            Problem::new(Code::Value, error.to_string(), "GET /api/v1/playlists lists them")
+            Problem::new(
+                Code::Value,
+                error.to_string(),
+                "`kinocue playlist`, the page and GET /api/v1/playlists list them",
+            )
         })?;
         let mut list = Self::read(shelf, library, config, &id)?;
         list.current = list.nearest(place.entry, cue);

@@ -57,7 +57,11 @@ impl Onward {
             return Ok(Vec::new());
         };
         let id = id.parse::<PlaylistId>().map_err(|error| {
-            Problem::new(Code::Value, error.to_string(), "GET /api/v1/playlists lists them")
+            Problem::new(
+                Code::Value,
+                error.to_string(),
+                "`kinocue playlist`, the page and GET /api/v1/playlists list them",
+            )
         })?;
         Ok(vec![Act::Start(Job::List(id))])
     }
@@ -69,11 +73,12 @@ impl Onward {
     pub(super) fn select(&mut self, entry: usize, hall: &HallContext) -> Result<Vec<Act>, Problem> {
         let count = self.list.as_ref().map_or(0, |list| list.playlist.entries.len());
         if entry >= count {
-            return Err(Problem::new(
-                Code::Unknown,
-                format!("there is no entry {} in a playlist of {count}", entry.saturating_add(1)),
-                "choose an existing one; the API counts them from 0",
-            ));
+            let detail = format!("there is no entry {} in a playlist of {count}", entry.saturating_add(1));
+            let remedy = match count {
+                0 => "load a playlist first".to_owned(),
+                _ => format!("select one of 1 to {count}; the API counts them from 0"),
+            };
+            return Err(Problem::new(Code::Unknown, detail, remedy));
         }
         hall.may("load")?;
         hall.is_free()?;

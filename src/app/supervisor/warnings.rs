@@ -180,11 +180,12 @@ impl StatusParts<'_> {
         {
             return None;
         }
-        let text = "the cue that is loaded follows no film, and starts at once when it is let go: [sync] has no start";
-        Some(in_two(
-            WarningCode::NoFilm.word(),
-            &format!("{text}; set start in [sync], or film in its entry of the playlist"),
-        ))
+        let code = WarningCode::NoFilm.word();
+        Some(Warning {
+            coded: Some(Coded::new(code, [])),
+            remedy_code: Some(RemedyCode::NoFilm.to_string()),
+            ..in_two(code, NO_FILM)
+        })
     }
 
     fn of_preflight(&self) -> Option<Warning> {
@@ -217,6 +218,10 @@ impl StatusParts<'_> {
         })
     }
 }
+
+/// Of a cue that nothing leads, in a hall whose film others show.
+const NO_FILM: &str = "the cue that is loaded follows no film, and starts at once when it is let go: [sync] has no start; \
+                       set start in [sync], or film in its entry of the playlist";
 
 /// A warning of a text that ends with what to do.
 fn in_two(id: &str, trouble: &str) -> Warning {

@@ -26,7 +26,7 @@ pub(in crate::cli) struct KnownArgs {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum KnownKind {
+pub(super) enum KnownKind {
     Cues,
     Playlists,
     Seats,
@@ -48,7 +48,7 @@ pub(in crate::cli) fn known(args: &KnownArgs) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn names(kind: KnownKind, server: &ServerArgs) -> Result<Vec<String>, Failure> {
+pub(super) fn names(kind: KnownKind, server: &ServerArgs) -> Result<Vec<String>, Failure> {
     let ids = |text: &str| -> Result<Vec<String>, Failure> {
         let all: Vec<WithId> = serde_json::from_str(text).or_exit(Exit::Internal)?;
         Ok(all.into_iter().map(|one| one.id).collect())

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use super::known::{KnownKind, names};
 use super::server::ServerArgs;
 use super::view::{percent, time};
 use crate::cli::table::table;
@@ -97,7 +98,11 @@ fn show(server: &ServerArgs) -> Result<Exit, Failure> {
     } else if let Some(playlist) = &status.playlist {
         print::out(&entries(playlist))?;
     } else {
-        print::tell("kinocue: no playlist is loaded; next: kinocue playlist ID");
+        let ids = names(KnownKind::Playlists, server)?;
+        let there_are = if ids.is_empty() { "none".to_owned() } else { ids.join(", ") };
+        print::tell(&format!(
+            "kinocue: no playlist is loaded; there are: {there_are}; next: kinocue playlist ID"
+        ));
     }
     Ok(Exit::Done)
 }

@@ -59,7 +59,7 @@ export function select(which) {
   showController(hall());
   const place = byId('controller');
   if (!place.hidden) {
-    place.scrollIntoView({ block: 'nearest' });
+    place.scrollIntoView();
     place.focus({ preventScroll: true });
   } else if (before !== null) {
     document.querySelector(`[data-controller="${CSS.escape(before)}"]`)?.focus();

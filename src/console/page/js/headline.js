@@ -3,8 +3,9 @@
 import { sentAt } from './clock.js';
 import { byId, setAttribute, setProperty, setText } from './dom.js';
 import { takesPart } from './marks.js';
-import { hasSpoken, refusal, silence } from './stream.js';
+import { hasSpoken, needsToken, refusal, silence } from './stream.js';
 import { linkState } from './state.js';
+import { askForToken } from './token.js';
 import { words } from './language.js';
 import { causeOf, nextOf, stateName } from './said.js';
 import { lasting, number, percent, sentence, signed, timeOfDay } from './words.js';
@@ -14,25 +15,27 @@ let spoken = '';
 
 /** Keeps the time of day and the seconds of silence true while nothing comes. */
 export function startHeadline() {
+  byId('log-in').addEventListener('click', () => askForToken({ pressed: true }));
   setInterval(() => {
     setText(byId('clock'), new Date(sentAt()).toLocaleTimeString('en-GB'));
-    if (linkState() === 'lost') showSilence();
+    if (linkState() === 'lost') showLink('lost');
   }, BLINK_MS);
 }
 
 /** Shows the state, or that it is not known. */
 export function showHeadline(status, link) {
   setAttribute(document.documentElement, 'data-link', link);
-  // Whoever is asked for a token has lost nothing yet.
-  const asked = !hasSpoken() && !byId('token').hidden;
-  setProperty(byId('lost'), 'hidden', link !== 'lost' || asked);
-  setText(byId('link'), words(asked ? 'link.log-in' : `link.${link}`));
+  showLink(link);
   for (const area of document.querySelectorAll('.live:not(.panel, .bar, #gravest)')) setProperty(area, 'inert', link === 'lost');
-  if (link === 'lost') showSilence();
   if (status) showStatus(status, link);
 }
 
-function showSilence() {
+function showLink(link) {
+  // Whoever is asked for a token has lost nothing yet.
+  const asked = !hasSpoken() && !byId('token').hidden;
+  setProperty(byId('lost'), 'hidden', link !== 'lost' || asked);
+  setProperty(byId('log-in'), 'hidden', !needsToken());
+  setText(byId('link'), words(asked ? 'link.log-in' : `link.${link}`));
   const why = refusal() ?? words('lost.trying');
   setText(byId('lost-since'), words(hasSpoken() ? 'lost.for' : 'lost.yet', { s: number(silence()), why }));
 }

@@ -31,7 +31,8 @@ function line({ start, cue, title, result, lost, missed_ticks: missed, recorded 
     clamps > 0 && words('history.clamps', { n: whole(clamps) }),
     marks > 0 && words('history.marks', { n: whole(marks) }),
   ].filter(Boolean);
-  const cells = [when, title ?? cue, [came(result), ...figures].join(', '), least(nearest), name === null ? '–' : picture(name, title ?? cue, when)];
+  const ended = make('span', {}, [came(result), ...figures].join(', '), ...least(nearest));
+  const cells = [when, title ?? cue, ended, name === null ? '–' : picture(name, title ?? cue, when)];
   return make('tr', { title: cue }, ...cells.map((cell) => make('td', {}, cell)));
 }
 
@@ -39,9 +40,10 @@ const came = (result) => (['interrupted', 'running'].includes(result) ? words(`h
 
 /** What came nearest to its limit. */
 function least(nearest) {
-  if (nearest === null) return '–';
+  if (nearest === null) return [];
   const { of, seat, axis, left, at_s: at } = nearest;
-  return words('margins.spoken', { what: said('margin', { code: of }, of), part: percent(left), axis: `${seat} a${axis}`, at: clock(at) });
+  const text = words('margins.spoken', { what: said('margin', { code: of }, of), part: percent(left), axis: `${seat} a${axis}`, at: clock(at) });
+  return [make('p', { className: 'quiet' }, words('pair', { of: words('history.margin'), text }))];
 }
 
 function picture(name, what, when) {

@@ -16,6 +16,9 @@ let isEnding = false;
 
 const isLocked = () => sessionStorage.getItem(KEY) !== null;
 
+/** Whether show mode keeps a button of the show from being pressed: the style hides it. */
+export const isShut = (button) => isLocked() && getComputedStyle(button).visibility === 'hidden';
+
 /** Makes the button work. */
 export function startLock() {
   const button = byId('lock');

@@ -1,7 +1,8 @@
 // What a person does next, as a button where the page can do it: one beside the words, or the marked one of the show's buttons.
 
-import { byId, make, onChange, setAttribute } from './dom.js';
+import { byId, make, onChange, setAttribute, setProperty } from './dom.js';
 import { disable } from './controller.js';
+import { isShut } from './lock.js';
 import { healthWord } from './marks.js';
 import { chosenCue, loadCue } from './playlist.js';
 import { onPress } from './press.js';
@@ -11,6 +12,11 @@ import { words } from './language.js';
 /** Seats that are offered to be disabled; of more the map and the warnings are the place. */
 const OFFERED = 2;
 const SILENT = ['lost', 'unknown', 'error'];
+/** The button of the show that does what the hall says is next. */
+const PRESSED = {
+  'park-or-home': 'park', 'park-or-start': 'park', home: 'home', arm: 'arm', 'arm-or-from': 'arm', 'arm-and-home': 'home-arm', go: 'go', 'go-or-from': 'go',
+  resume: 'resume', 'let-join': 'resume', clear: 'clear', restart: 'clear', 'check-cue': 'clear', 'look-at-seat': 'clear', 'stop-other-master': 'clear',
+};
 
 /** What arming still waits for; null where it waits for nothing. */
 export function armNeeds({ show, preflight }) {
@@ -22,8 +28,10 @@ export function armNeeds({ show, preflight }) {
 export function showNext(status, link) {
   const live = link === 'live';
   showActions(live ? actionsOf(status) : []);
-  const next = live ? pressedNext(status) : null;
-  for (const button of document.querySelectorAll('.transport button')) setAttribute(button, 'data-next', String(button.id === next));
+  const next = (live && PRESSED[status.next_coded?.code]) || null;
+  const shut = next !== null && isShut(byId(next));
+  setProperty(byId('next-locked'), 'hidden', !shut);
+  for (const button of document.querySelectorAll('.transport button, #lock')) setAttribute(button, 'data-next', String(button.id === (shut ? 'lock' : next)));
 }
 
 function actionsOf(status) {
@@ -54,11 +62,3 @@ function buttonOf({ what, of }) {
   return button;
 }
 
-/** The button among those of the show that is next. */
-function pressedNext(status) {
-  const { state, controllers, may_clear: mayClear, arm_homes: homes } = status;
-  if (mayClear) return controllers.some((one) => one.enabled && one.emergency_stop) ? null : 'clear';
-  if (state === 'recovering') return controllers.some((one) => one.enabled && one.homed === false) ? 'home' : 'park';
-  if (state === 'parked' && armNeeds(status) === null) return homes ? 'home-arm' : 'arm';
-  return { armed: 'go', paused: 'resume' }[state] ?? null;
-}

@@ -51,7 +51,7 @@ function showList(list) {
     const { when, kind, what } = parts(recording.name);
     const look = make('button', { type: 'button', 'aria-label': words('picture.of', { kind, what, when }) }, words('picture'));
     look.addEventListener('click', () => showPicture(recording.name, `${kind} ${what}, ${when}`));
-    const cells = [when, `${kind} ${what}`, outcome(recording), look].map((cell) => make('td', {}, cell));
+    const cells = [when, words('pair', { of: kind, text: what }), outcome(recording), look].map((cell) => make('td', {}, cell));
     return make('tr', { title: recording.name }, ...cells);
   });
   setProperty(byId('recordings'), 'hidden', lines.length === 0);
@@ -60,7 +60,7 @@ function showList(list) {
 }
 
 /** How a show ended, and how large its file is; of what is no show, or was not closed, nothing else is known. */
-function outcome({ result, lost, missed_ticks: missed, bytes }) {
+function outcome({ bytes, result, lost, missed_ticks: missed }) {
   if (result === undefined) return size(bytes);
   const faults = [lost > 0 && words('recordings.lost', { n: whole(lost) }), missed > 0 && words('recordings.missed', { n: whole(missed) })].filter(Boolean);
   return [endingName(result), ...(faults.length > 0 ? faults : [words('recordings.all')]), size(bytes)].join(', ');

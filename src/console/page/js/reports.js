@@ -43,10 +43,12 @@ const showFindings = onChange(({ findings, all }) => {
   const lines = alike(findings).map(({ severity, controllers, ...found }) => {
     const look = SEVERITIES[severity] ?? SEVERITIES.warning;
     const grave = make('span', { className: `grave look-${look.look}` }, mark(look.mark), words(look.word));
-    return row([grave, whose(controllers, all), sentence(textOf(found)), sentence(remedyOf(found))]);
+    return row([make('span', {}, grave, make('p', {}, whose(controllers, all))), make('span', {}, sentence(textOf(found)), remedy(sentence(remedyOf(found))))]);
   });
   byId('preflight').tBodies[0].replaceChildren(...lines);
 });
+
+const remedy = (text) => make('p', { className: 'remedy' }, make('span', { className: 'off-screen' }, words('warnings.remedy')), text);
 
 function whose(controllers, all) {
   if (controllers.length === 0) return words('hall');

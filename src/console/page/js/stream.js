@@ -27,6 +27,9 @@ export const hasSpoken = () => everHeard;
 /** Why the server does not speak, where it said so; null where nobody knows. */
 export const refusal = () => refused;
 
+/** Whether it says that it needs a token. */
+export const needsToken = () => refused === words('lost.token');
+
 /** Reads for as long as the page is open. */
 export async function startStream() {
   setInterval(watchSilence, WATCH_MS);

@@ -139,28 +139,27 @@ function blocksOf({ name, on }, stretch, xOf) {
   return blocks;
 }
 
-/** Lays blocks into few rows, with room for their names; where there is none they go without. */
+/** Lays blocks into few rows, with room for their names where there is any. */
 function inRows(blocks, pen) {
   const rows = [];
   for (const block of blocks) {
     const wide = pen.measureText(block.name).width + 6;
-    const end = Math.max(block.to, block.to - block.from >= wide ? 0 : block.to + wide);
     let row = rows.find((one) => one.end <= block.from);
     if (!row && rows.length < MOST_EFFECTS) rows.push(row = { end: 0, blocks: [] });
-    const isNamed = row !== undefined;
     row ??= rows.reduce((least, one) => (one.end < least.end ? one : least));
-    row.blocks.push({ ...block, wide: isNamed ? wide : 0 });
-    row.end = Math.max(row.end, isNamed ? end : block.to);
+    row.blocks.push({ ...block, wide });
+    row.end = Math.max(row.end, block.to - block.from >= wide ? block.to : block.to + wide);
   }
   return rows;
 }
 
 function drawRow(pen, { blocks }, top) {
-  for (const { name, from, to, wide } of blocks) {
+  for (const [index, { name, from, to, wide }] of blocks.entries()) {
     pen.fillStyle = EFFECT_COLOUR;
     pen.fillRect(from, top + 1, Math.max(to - from, 1), EFFECT - 2);
-    if (wide === 0) continue;
     const inside = to - from >= wide;
+    // A name that the next block would cover is not begun.
+    if (!inside && to + wide > (blocks[index + 1]?.from ?? Infinity)) continue;
     pen.fillStyle = inside ? DARK : EFFECT_COLOUR;
     pen.fillText(name, (inside ? Math.max(from, 0) : to) + 3, top + EFFECT / 2 + 0.5);
   }
