@@ -61,9 +61,29 @@ fn seats_are_where_the_film_is_by_every_source_and_the_limiter_has_nothing_to_do
         let error = p99(&errors_ms(&played, &truth), 8.0..25.0);
         println!("{name:<12} p99 {error:.3} ms");
         // A pulse is a tenth of a millisecond.
-        assert!(error <= if name == "Art-Net" { 1.5 } else { 0.6 }, "{name}: {error} ms");
+        assert!(error <= if name == "Art-Net" { 1.1 } else { 0.6 }, "{name}: {error} ms");
         assert_unclamped(&played, name);
     }
+}
+
+/// How far seats are from a film by Art-Net whose datagrams come up to 10 ms late, and one in a hundred 50 ms later: p99 and middle.
+fn by_late_datagrams(seed: u64) -> (f64, f64) {
+    let film = ShownFilm::told_by(4, TrueFilm::new(-3.0, 1.0002), seed);
+    let truth = film.truth.clone();
+    let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
+    let errors = errors_ms(&played, &truth);
+    let mut those: Vec<f64> =
+        errors.iter().filter(|(at, _)| (8.0..25.0).contains(at)).map(|error| error.1).collect();
+    those.sort_by(f64::total_cmp);
+    (p99(&errors, 8.0..25.0), those[those.len() / 2])
+}
+
+#[test]
+fn datagrams_that_are_up_to_10_ms_late_lead_seats_to_within_a_millisecond() {
+    let all: Vec<(f64, f64)> = (4..8).map(by_late_datagrams).collect();
+    println!("p99 and middle, ms: {all:.3?}");
+    // A pulse is a tenth of a millisecond.
+    assert!(all.iter().all(|(p99, middle)| *p99 <= 1.1 && middle.abs() <= 1.0), "{all:.3?}");
 }
 
 /// What is left of a step of `step_s` at 12 s after 3 s and after 4.5 s, and how far the seat goes past the film, ms.

@@ -276,6 +276,12 @@ impl MpvClient {
         }
     }
 
+    /// Says once more if it runs, for somebody who heard nothing of it before: of a film that stands nothing else comes.
+    pub(crate) fn say_again(&self, at: MonoTime, out: &mut impl FnMut(Observation)) {
+        let runs = self.runs.map(|runs| if runs { FilmWord::Play } else { FilmWord::Stop });
+        runs.into_iter().for_each(|word| out(Observation::new(at, word)));
+    }
+
     fn on_event(
         &mut self,
         event: &str,

@@ -33,11 +33,16 @@ impl FilmState {
 pub(crate) enum FilmLed {
     /// A show that follows it has not been started, or is paused.
     Nobody,
+    /// The same where the hall itself starts the film with its show.
+    Own,
     /// Seats wait to be on the cue, or are on their way.
     Joining,
     /// Seats that are on the cue.
     Following,
 }
+
+const START_SHOW: (&str, &str) =
+    ("start-show", "nothing; seats follow it once a person starts or resumes the show");
 
 impl FilmState {
     /// What a source says of the film, for somebody who looks at that source alone.
@@ -74,12 +79,11 @@ impl FilmState {
             Self::FreeRunning | Self::Locked => match led {
                 FilmLed::Following => ("followed", "nothing; the seats follow it"),
                 FilmLed::Joining => ("joined", "nothing; the seats join it as soon as it is in the cue"),
-                FilmLed::Nobody => {
-                    ("start-show", "nothing; seats follow it once a person starts or resumes the show")
-                }
+                FilmLed::Nobody | FilmLed::Own => START_SHOW,
             },
             Self::Freewheeling | Self::Acquiring | Self::Jumped => ("wait", "wait a moment"),
             Self::Absent | Self::Lost => ("start-film", "start the film; check that its source is connected"),
+            Self::Stopped if matches!(led, FilmLed::Own) => START_SHOW,
             Self::Stopped => ("run-on", "let the film run on"),
             Self::Ended => ("next-show", "nothing; start the next show"),
             Self::Reverse | Self::Shuttle => ("run-forward", "let the film run forward at its speed"),

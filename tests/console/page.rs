@@ -83,6 +83,8 @@ fn sixty_four_seats_the_film_the_buttons_and_the_gravest_warning_are_in_view_tog
     browser.reads("remaining", "−01:");
     browser.wait("/^\\d\\d:\\d\\d:\\d\\d$/.test(document.getElementById('clock').textContent)");
     browser.reads("gravest", "A1, A2");
+    pretend(&browser, &format!("{LARGE} status.film.error_ms = -0.04;"));
+    browser.reads("follow-badge", "film locked, artnet, 0 ms");
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 

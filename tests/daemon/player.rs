@@ -105,6 +105,7 @@ fn go_pause_resume_seek_and_stop_lead_film_and_seats_together() {
     arm(&hall, "night");
     let armed = hall.wait(stands);
     assert!(at(&armed, "film").abs() < 0.1, "it waits at its beginning: {}", armed["film"]);
+    assert_eq!(armed["film"]["next"], "nothing; seats follow it once a person starts or resumes the show");
     assert_eq!((hall.relay(0).count(), hall.relay(1).count()), (0, 0), "a film that is loaded moves nobody");
     hall.done(&["go"]);
     hall.wait(|status| together(status, 2.0));
@@ -120,7 +121,8 @@ fn go_pause_resume_seek_and_stop_lead_film_and_seats_together() {
     hall.wait(|status| together(status, 30.0));
     hall.done(&["stop"]);
     hall.wait(|status| status["state"] == "stopped" && stands(status));
-    hall.close();
+    let lines = hall.close();
+    assert!(!lines.iter().any(|line| line.contains("start mpv")), "the service does: {lines:?}");
     hall.end();
 }
 

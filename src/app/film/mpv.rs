@@ -34,27 +34,28 @@ impl MpvPlayer {
         let now = Monotonic.now();
         let mut client = MpvClient::new(now);
         let ended = UnixStream::connect(&self.socket).and_then(|stream| self.converse(stream, &mut client));
-        self.told.note(|notes| notes.trouble = ended.err().map(|error| self.trouble(&error)));
+        self.told.note(|notes| notes.trouble = ended.err().and_then(|error| self.trouble(&error)));
         let mut is_heard = true;
         client.hear_end(Monotonic.now(), &mut |what| is_heard &= self.tell(what));
         is_heard && self.told.waits()
     }
 
-    /// What is wrong, for a person.
-    fn trouble(&self, error: &io::Error) -> String {
+    /// What is wrong, for a person; nothing of the hall's own player, which says itself why it is not there.
+    fn trouble(&self, error: &io::Error) -> Option<String> {
         match error.kind() {
             io::ErrorKind::NotFound | io::ErrorKind::ConnectionRefused => {
                 let socket = self.socket.display();
-                format!("no player is there; start mpv with --input-ipc-server={socket}")
+                let is_own = self.told.gate.is_some();
+                (!is_own).then(|| format!("no player is there; start mpv with --input-ipc-server={socket}"))
             }
-            _ => error.to_string(),
+            _ => Some(error.to_string()),
         }
     }
 
     fn converse(&self, mut stream: UnixStream, client: &mut MpvClient) -> io::Result<()> {
         stream.set_write_timeout(Some(AGAIN))?;
         stream.write_all(MpvClient::greeting().as_bytes())?;
-        let mut octets = [0; 4_096];
+        let (mut octets, mut counted) = ([0; 4_096], false);
         // One that talks without a pause is left as well.
         while !self.told.is_over() {
             let now = Monotonic.now();
@@ -71,6 +72,11 @@ impl MpvPlayer {
                     // Line by line, so that what is told is of the film that was said to be open before.
                     for line in octets[..count].split_inclusive(|octet| *octet == b'\n') {
                         let counts = self.counts(client);
+                        if !std::mem::replace(&mut counted, counts) && counts {
+                            client.say_again(Monotonic.now(), &mut |what| {
+                                self.tell(what);
+                            });
+                        }
                         client.hear(line, Monotonic.now(), &mut |what| {
                             self.tell(if counts { what } else { Observation::new(what.at, FilmWord::Gone) });
                         });

@@ -238,15 +238,17 @@ impl FilmTable {
         row.filter(|row| row.state == FilmState::Locked && row.may_lead)?.media_s.map(ShowTime::from_secs_f64)
     }
 
-    /// Where in a cue of that length the film is, by whom, and what that source says of it; nothing where there is no source.
-    pub(crate) fn place(&self, length: ShowTime) -> Option<String> {
+    /// How the film is, if that is to be said, and where in a cue of that length, by which source; nothing where nothing is known.
+    pub(crate) fn place(&self, length: ShowTime, says_state: bool) -> Option<String> {
         let row = self.sources.get(self.leads.unwrap_or(0))?;
         let place = row.media_s.map(ShowTime::from_secs_f64).map(|at| match at {
-            at if at < ShowTime::ZERO => format!(", {} before the cue", ShowTime::ZERO.since(at)),
-            at if at > length => format!(", {} behind the end of the cue", at.since(length)),
-            at => format!(", at {at} of the cue"),
+            at if at < ShowTime::ZERO => format!("{} before the cue", ShowTime::ZERO.since(at)),
+            at if at > length => format!("{} behind the end of the cue", at.since(length)),
+            at => format!("at {at} of the cue"),
         });
-        Some(format!("{}{} by {}", row.state.word(), place.unwrap_or_default(), row.source))
+        let state = says_state.then(|| row.state.word().to_owned());
+        let known: Vec<String> = state.into_iter().chain(place).collect();
+        (!known.is_empty()).then(|| format!("{} by {}", known.join(", "), row.source))
     }
 
     /// Sources that have all ended without a position of a film.

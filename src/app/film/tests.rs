@@ -208,39 +208,50 @@ fn what_has_no_device_is_not_relayed() {
     }
 }
 
-/// A player at that socket that has a film open which began when the test did, and then another.
-fn player(socket: &Path, films: [&'static str; 2]) -> std::sync::mpsc::Sender<()> {
+/// A player at that socket that has a film open which began when the test did, or which stands, and then another.
+fn player(socket: &Path, films: [&'static str; 2], runs: bool) -> std::sync::mpsc::Sender<()> {
     let (listener, begun) =
         (std::os::unix::net::UnixListener::bind(socket).expect("it is free"), Monotonic.now());
     let (next, wanted) = std::sync::mpsc::channel();
+    let changed = |name: &str, data: serde_json::Value| serde_json::json!({ "event": "property-change", "name": name, "data": data });
     thread::spawn(move || {
         let (stream, _) = listener.accept().expect("it is looked for");
         let (mut out, mut open) = (stream.try_clone().expect("it can be cloned"), None);
+        writeln!(out, "{}", changed("pause", (!runs).into())).expect("somebody listens");
         for line in std::io::BufRead::lines(std::io::BufReader::new(stream)) {
             let asked: serde_json::Value = serde_json::from_str(&line.expect("text")).expect("JSON");
             let film = if wanted.try_recv().is_ok() { Some(films[1]) } else { open.or(Some(films[0])) };
             if film != open {
                 open = film;
-                let path = serde_json::json!({ "event": "property-change", "name": "path", "data": film });
-                writeln!(out, "{path}").expect("somebody listens");
+                let told = [changed("path", film.into()), changed("time-pos", 0.04.into())];
+                told.iter().for_each(|one| writeln!(out, "{one}").expect("somebody listens"));
             }
             let at = Monotonic.now().since(begun).as_secs_f64();
             let id = &asked["request_id"];
-            writeln!(out, "{}", serde_json::json!({ "data": at, "error": "success", "request_id": id }))
-                .expect("somebody listens");
+            let answer = if runs {
+                serde_json::json!({ "data": at, "error": "success", "request_id": id })
+            } else {
+                serde_json::json!({ "error": "property unavailable", "request_id": id })
+            };
+            writeln!(out, "{answer}").expect("somebody listens");
         }
     });
     next
+}
+
+/// Whoever asks the player at that socket, and follows one film of its two alone.
+fn follows_the_feature(socket: &Path) -> FilmReader {
+    let source = FilmSource::Mpv(socket.to_owned());
+    let args = FilmArgs { films: vec!["feature.mkv".to_owned()], ..FilmArgs::of(source) };
+    FilmReader::start(&[args], RULES).expect("it can be asked")
 }
 
 #[test]
 fn a_player_leads_nobody_with_a_film_that_is_none_of_its_own() {
     let folder = TempDir::new().expect("there is room");
     let socket = folder.path().join("mpv.sock");
-    let next = player(&socket, ["/srv/trailer.mkv", "/srv/feature.mkv"]);
-    let source = FilmSource::Mpv(socket);
-    let args = FilmArgs { films: vec!["feature.mkv".to_owned()], ..FilmArgs::of(source) };
-    let reader = FilmReader::start(&[args], RULES).expect("it can be asked");
+    let next = player(&socket, ["/srv/trailer.mkv", "/srv/feature.mkv"], true);
+    let reader = follows_the_feature(&socket);
     let row = until(&reader, "refused", |table| table.sources[0].notes.refused.is_some()).sources.remove(0);
     assert!(
         row.notes
@@ -251,6 +262,18 @@ fn a_player_leads_nobody_with_a_film_that_is_none_of_its_own() {
     assert_eq!((row.used, row.state), (0, FilmState::Absent));
     next.send(()).expect("it lives");
     assert_eq!(in_state(&reader, FilmState::Locked).notes.refused, None);
+}
+
+#[test]
+fn a_film_that_stands_where_it_is_opened_after_another_is_stopped_and_not_lost() {
+    let folder = TempDir::new().expect("there is room");
+    let socket = folder.path().join("mpv.sock");
+    let next = player(&socket, ["/srv/trailer.mkv", "/srv/feature.mkv"], false);
+    let reader = follows_the_feature(&socket);
+    until(&reader, "refused", |table| table.sources[0].notes.refused.is_some());
+    next.send(()).expect("it lives");
+    let row = in_state(&reader, FilmState::Stopped);
+    assert!(row.media_s.is_some_and(|at| at.abs() < 0.01), "it is known where: {row:?}");
 }
 
 #[test]
@@ -439,11 +462,11 @@ fn where_the_film_is_in_the_cue_is_said_with_who_says_so() {
     let place = |media_s| {
         let row = SourceRow { media_s, ..SourceRow::named("ltc:-", FilmState::Locked) };
         let table = FilmTable { sources: vec![row], ..FilmTable::default() };
-        table.place(ShowTime::from_millis(60_000)).expect("there is a source")
+        table.place(ShowTime::from_millis(60_000), true).expect("there is a source")
     };
     assert_eq!(place(None), "locked by ltc:-");
     assert_eq!(place(Some(-1.25)), "locked, 00:01.250 before the cue by ltc:-");
     assert_eq!(place(Some(7.5)), "locked, at 00:07.500 of the cue by ltc:-");
     assert_eq!(place(Some(61.0)), "locked, 00:01.000 behind the end of the cue by ltc:-");
-    assert_eq!(FilmTable::default().place(ShowTime::ZERO), None);
+    assert_eq!(FilmTable::default().place(ShowTime::ZERO, true), None);
 }

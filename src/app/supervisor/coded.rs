@@ -244,7 +244,7 @@ mod tests {
             add("warning", code.word(), values);
         }
         for state in FilmState::ALL {
-            for led in each!(FilmLed { Nobody, Joining, Following }) {
+            for led in each!(FilmLed { Nobody, Own, Joining, Following }) {
                 add("film-next", state.next(led).0, 0);
             }
         }

@@ -44,6 +44,7 @@ fn led(hall: &HallContext, error_ms: Option<f64>) -> FilmLed {
     match hall.mirror.state {
         _ if error_ms.is_some() => FilmLed::Following,
         State::Playing(_) => FilmLed::Joining,
+        _ if hall.player.is_some() => FilmLed::Own,
         _ => FilmLed::Nobody,
     }
 }

@@ -102,7 +102,7 @@ pub(super) fn warnings(hall: &HallContext) -> Vec<String> {
 fn apart(movie: &str, length_s: f64, cue: &str, until_s: f64) -> Option<String> {
     let over_s = length_s - until_s;
     let (of_film, of_cue) =
-        (format!("{movie} is {length_s:.1} s long"), format!("{cue} ends at {until_s:.1} s of it"));
+        (format!("the film {movie} is {length_s:.1} s long"), format!("{cue} ends at {until_s:.1} s of it"));
     if over_s > ALIKE_S {
         Some(format!(
             "{of_film}, and {of_cue}; the seats park there, and the next entry that starts cuts off the rest of the film"
@@ -182,11 +182,9 @@ mod tests {
     fn a_film_of_another_length_than_its_cue_is_named_with_both_lengths() {
         let said = |length_s| apart("a.mkv", length_s, "ride", 60.0);
         assert_eq!((said(60.9), said(59.1)), (None, None));
-        assert!(
-            said(72.5)
-                .unwrap()
-                .starts_with("a.mkv is 72.5 s long, and ride ends at 60.0 s of it; the seats park there")
-        );
+        assert!(said(72.5).unwrap().starts_with(
+            "the film a.mkv is 72.5 s long, and ride ends at 60.0 s of it; the seats park there"
+        ));
         assert!(said(48.0).unwrap().contains("is it the film of this cue?"));
     }
 }

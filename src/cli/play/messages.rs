@@ -8,6 +8,7 @@ use super::{CtrlC, keyboard};
 use crate::app::film::SharedTable;
 use crate::app::{Control, RollCall};
 use crate::engine::Unplanned;
+use crate::film::chase::HoldCause;
 use crate::rt::News;
 use crate::state::{Cause, State, Transition, Whose};
 use crate::time::ShowTime;
@@ -68,7 +69,9 @@ impl Messages {
         if let Some(name) = self.name(cause) {
             let _ = write!(text, " ({name})"); // a String takes it
         }
-        if let Some(film) = self.film_place().filter(|_| matches!(state, State::Playing(_))) {
+        // Why it waits is how the film was then, which may have changed by now.
+        let says_state = !matches!(cause, Cause::FilmAwaited(HoldCause::Film(_)));
+        if let Some(film) = self.film_place(says_state).filter(|_| matches!(state, State::Playing(_))) {
             let _ = write!(text, "; film {film}");
         }
         // Parked, the play is over.
@@ -79,9 +82,9 @@ impl Messages {
         Some(text)
     }
 
-    /// Where the film is in the cue, and by whom that is known.
-    pub(super) fn film_place(&self) -> Option<String> {
-        self.film.as_ref()?.read().place(self.length)
+    /// How the film is, if that is to be said, where in the cue, and by whom that is known.
+    pub(super) fn film_place(&self, says_state: bool) -> Option<String> {
+        self.film.as_ref()?.read().place(self.length, says_state)
     }
 
     fn unplanned(&self, what: Unplanned) -> String {
@@ -127,7 +130,9 @@ impl Messages {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::film::{FilmTable, SourceRow};
     use crate::engine::Mix;
+    use crate::film::point::FilmState;
     use crate::rt::{Desk, TickReport};
     use crate::state::{Next, PlayMode, Refusal, Trouble, Why};
     use crate::time::MonoTime;
@@ -182,6 +187,18 @@ mod tests {
             "parked: the seats that take part have parked",
             "the play is over"
         );
+    }
+
+    #[test]
+    fn why_it_waits_for_the_film_comes_with_its_place_and_with_no_state_that_is_another_by_now() {
+        let row = SourceRow { media_s: Some(4.0), ..SourceRow::named("ltc:-", FilmState::Locked) };
+        let film = FilmTable { sources: vec![row], ..FilmTable::default() };
+        let said = Messages { film: Some(SharedTable::of(film)), ..said() };
+        let lost = Cause::FilmAwaited(HoldCause::Film(FilmState::Lost));
+        let waits = said.news(&entered(State::Playing(PlayMode::Waiting), lost, Next::AwaitFilm)).unwrap();
+        assert!(waits.contains("any more; film at 00:04.000 of the cue by ltc:-; next: "), "{waits}");
+        let joins = entered(State::Playing(PlayMode::Joining), Cause::FilmLeads, Next::Watch);
+        assert!(said.news(&joins).unwrap().contains("; film locked, at 00:04.000 of the cue by ltc:-; "));
     }
 
     #[test]

@@ -190,7 +190,7 @@ impl Teller {
                 Some((state, next)) => (self.said.figures(state), self.said.next(next)),
                 None => (self.said.preparing(), self.said.next("wait")),
             };
-            let film = self.said.film_place().map(|film| format!("film {film}\n"));
+            let film = self.said.film_place(true).map(|film| format!("film {film}\n"));
             bar.set_prefix(film.unwrap_or_default() + &next);
             bar.set_message(figures);
             bar.set_position(ms(self.said.show()));

@@ -213,6 +213,25 @@ fn a_film_that_is_cut_off_is_silent_and_one_that_is_quiet_there_is_not_missed() 
 }
 
 #[test]
+fn where_another_dialogue_is_all_that_is_heard_nothing_is_told_and_the_clock_of_before_is_heard_again_within_a_second()
+ {
+    let ([effects, _], _, index) = the_film();
+    let (at, seconds) = (12 * RATE, 11);
+    let mut line = effects[at..at + seconds * RATE].to_vec();
+    line[4 * RATE..8 * RATE].fill(0.0);
+    add_notes(&mut line, &mut Dice(5), 0.08, 0.25);
+    let heard = listen(index, &line);
+    let (first_s, worst_ms) = judge(&heard, 12.0, 1.0);
+    assert!(first_s < 4.0 && worst_ms < 2.0, "{first_s} s, {worst_ms} ms");
+    let told = |from_s: f64, to_s: f64| {
+        heard.places.iter().filter(|place| (from_s..to_s).contains(&place.line_s)).count()
+    };
+    assert_eq!(told(4.7, 8.0), 0, "nobody knows whether it runs");
+    assert!(told(8.0, 9.0) > 0 && told(9.0, 11.0) > 15, "{:?}", heard.places);
+    assert!(heard.states.contains(&EarState::Unknown), "{:?}", heard.states);
+}
+
+#[test]
 fn a_film_that_is_wound_is_found_where_it_is_then() {
     let (_, whole, index) = the_film();
     let line = [&whole[5 * RATE..9 * RATE], &whole[30 * RATE..35 * RATE]].concat();

@@ -47,7 +47,7 @@ const showMark = onChange((name) => byId('follow-mark').replaceChildren(mark(nam
 function showBadge(film) {
   if (film === null) return badge('follow-badge', '', 'away');
   const { state, source, error_ms: error } = film;
-  const parts = [words('follow.badge', { state: filmName(state) }), source && source.split(':')[0], error !== null && signed(Number(error.toFixed(1)))];
+  const parts = [words('follow.badge', { state: filmName(state) }), source && source.split(':')[0], error !== null && signed(Number(error.toFixed(1)) || 0)];
   badge('follow-badge', parts.filter(Boolean).join(', '), filmLook(state).look, causeOf(film));
 }
 
