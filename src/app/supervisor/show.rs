@@ -160,7 +160,11 @@ impl ProvedShow {
 }
 
 pub(super) fn no_cue(id: &str, error: &IdError) -> Problem {
-    Problem::new(Code::Value, format!("{id:?}: {error}"), "`kinocue cues`, the page and GET /api/v1/cues list them")
+    Problem::new(
+        Code::Value,
+        format!("{id:?}: {error}"),
+        "`kinocue cues`, the page and GET /api/v1/cues list them",
+    )
 }
 
 /// Where in the cue the motion is at a time of the film, with that trim.
