@@ -12,6 +12,14 @@ use crate::library::{IdError, Library};
 use crate::playlist::{Entry, Playlist, PlaylistId, Schedule, Shelf, next_start};
 use crate::time::ShowTime;
 
+/// The id of a playlist as somebody asks for it.
+pub(super) fn list_id(text: &str) -> Result<PlaylistId, Problem> {
+    text.parse().map_err(|error: IdError| {
+        let remedy = "`kinocue playlist`, the page and GET /api/v1/playlists list them";
+        Problem::new(Code::Value, error.to_string(), remedy)
+    })
+}
+
 /// The playlist that is loaded.
 #[derive(Debug)]
 pub(super) struct List {
@@ -58,13 +66,7 @@ impl List {
         place: &PlaylistPlace,
         cue: &str,
     ) -> Result<Self, Problem> {
-        let id = place.id.parse().map_err(|error: IdError| {
-            Problem::new(
-                Code::Value,
-                error.to_string(),
-                "`kinocue playlist`, the page and GET /api/v1/playlists list them",
-            )
-        })?;
+        let id = list_id(&place.id)?;
         let mut list = Self::read(shelf, library, config, &id)?;
         list.current = list.nearest(place.entry, cue);
         Ok(list)

@@ -8,11 +8,11 @@ use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::{HallContext, ShowChange};
 use super::hall_settings::HallSettings;
 use super::job::{Job, JobResult};
-use super::list::List;
+use super::list::{List, list_id};
 use super::show::ProvedShow;
 use crate::control::{Code, Command, Problem, Surface};
 use crate::journal::PlaylistPlace;
-use crate::playlist::{PlaylistId, Then};
+use crate::playlist::Then;
 use crate::rt::Command as TickCommand;
 use crate::state::{State, Transition};
 
@@ -56,14 +56,7 @@ impl Onward {
             self.list = None;
             return Ok(Vec::new());
         };
-        let id = id.parse::<PlaylistId>().map_err(|error| {
-            Problem::new(
-                Code::Value,
-                error.to_string(),
-                "`kinocue playlist`, the page and GET /api/v1/playlists list them",
-            )
-        })?;
-        Ok(vec![Act::Start(Job::List(id))])
+        Ok(vec![Act::Start(Job::List(list_id(id)?))])
     }
 
     /// Makes an entry the next to be played.
