@@ -163,6 +163,8 @@ impl FastPath {
 
     /// How an axis moves that lacks nothing at that position but the way to rest of one that is calm; none where it lacks more.
     pub(super) fn bounded(&self, axis: usize, position: f64) -> Option<AxisState> {
+        // A parameter of the type, not of the call: for calm poses, which are nearly all, the loop stays one of vectors, and what is not
+        // asked there costs nothing.
         let glance = self.groups[axis / WIDTH].glance::<false>(axis % WIDTH, position, &self.spans);
         let Glance { speed, pull, calm, .. } = glance;
         calm.then_some(AxisState { position, velocity: speed, acceleration: pull })

@@ -262,7 +262,10 @@ impl Limiter {
     /// True if an axis that follows is calm, or keeps the limits by the same sums and was proved to come to rest: of that as much is
     /// asked as in [`Self::leads_on`], but of how it moves by its newest poses.
     fn passes_by_sums(&self, axis: usize, asked: f64, by: Provenance) -> bool {
+        // The sums bound all that the measure sees, so that the poses of 81 frames need not be fetched: in a hall they are no longer in
+        // the cache of the processor, and near an end of the stroke all lanes would ask for them in the same tick.
         let AxisLimits { velocity, acceleration, jerk, .. } = self.axes[axis].limits;
+        // That it comes to rest is proved. What was said to be proved and runs out of its stroke is refused while there is room left.
         let turns = |state| Halt::plainly_turns(state, Limits { velocity, acceleration, jerk });
         self.fast_path.is_calm(axis, asked)
             || (by == Provenance::Proved && self.fast_path.bounded(axis, asked).is_some_and(turns))
