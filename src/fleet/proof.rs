@@ -4,10 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::journal::JournalPart;
-
-/// Files of which it is kept how much was told: a clock that is set back has the journal go on in an older one.
-const FILES: usize = 4;
+use crate::journal::{JournalPart, TOLD_FILES};
 
 /// A record of `kc_log`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,7 +23,7 @@ impl LogRecord {
     pub(crate) fn after(before: Option<&Self>, part: JournalPart) -> Self {
         let mut told = before.map_or_else(BTreeMap::new, |before| before.told.clone());
         told.insert(part.file.clone(), part.line);
-        while told.len() > FILES {
+        while told.len() > TOLD_FILES {
             told.pop_first();
         }
         Self { n: before.map_or(0, |before| before.n) + 1, told, part }

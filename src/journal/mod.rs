@@ -30,7 +30,7 @@ pub(crate) use record::{PlaylistPlace, stamp};
 pub(crate) use report::{
     JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report, report_of,
 };
-pub(crate) use tail::{JournalPart, tail};
+pub(crate) use tail::{JournalPart, TOLD_FILES, tail};
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};

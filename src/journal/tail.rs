@@ -12,6 +12,9 @@ use super::read::MAX_LINE;
 use super::report::JournalError;
 use crate::sys::folder::Folder;
 
+/// Files of which it is remembered how much was told: a clock that is set back has the journal go on in an older one.
+pub(crate) const TOLD_FILES: usize = 4;
+
 /// A line about shows, or about starts of the program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct JournalPart {
@@ -23,8 +26,9 @@ pub(crate) struct JournalPart {
     pub(crate) record: Value,
 }
 
-/// The first `most` lines that are not among those that were `told`: so many of each file, by its name. What is older than all of these
-/// files was told. A line that has no end yet is left for the next time, and one that is no record is passed over.
+/// The first `most` lines that are not among those that were `told`: so many of each file, by its name. Where these are
+/// [`TOLD_FILES`], what is older than all of them was told; where they are fewer, a clock that ran ahead has been set back. A line that
+/// has no end yet is left for the next time, and one that is no record is passed over.
 ///
 /// # Errors
 /// [`JournalError`] where the folder or a file of it cannot be read. No records are no error.
@@ -36,9 +40,10 @@ pub(crate) fn tail(
     let gather = || -> io::Result<Vec<JournalPart>> {
         let folder = Folder::open(dir)?;
         let names = files::all(&folder)?.into_iter().filter(|file| file.kind == FileKind::Shows);
+        let oldest = told.first_key_value().filter(|_| told.len() >= TOLD_FILES).map(|(name, _)| name);
         let mut parts = Vec::new();
         for name in names.map(files::FileId::name) {
-            let is_told = told.first_key_value().is_some_and(|(first, _)| name < *first);
+            let is_told = oldest.is_some_and(|oldest| name < *oldest);
             if !is_told && parts.len() < most {
                 of_file(&folder, &name, told.get(&name).copied().unwrap_or(0), most, &mut parts)?;
             }
@@ -107,7 +112,15 @@ mod tests {
         );
         assert_eq!(of(&told(&[]), 2), all[..2]);
         assert_eq!(of(&told(&[(ONE, 1)]), 10), all[1..]);
-        assert_eq!(of(&told(&[(TWO, 0)]), 10), all[2..], "what is older was told");
+        let later: Vec<_> = (22..25).map(|day| format!("kinocue-2026-11-{day}-000.jsonl")).collect();
+        let four: Vec<_> =
+            [TWO].into_iter().chain(later.iter().map(String::as_str)).map(|name| (name, 0)).collect();
+        assert_eq!(of(&told(&four), 10), all[2..], "what is older was told");
+        assert_eq!(
+            of(&told(&four[1..]), 10),
+            all,
+            "a clock ran ahead, and was set back before any of these days"
+        );
         assert_eq!(of(&told(&[(ONE, 3), (TWO, 1)]), 10), []);
         write(TWO, "{\"kind\":\"show\"}\n{\"kind\":\"lost\"}\n");
         assert_eq!(of(&told(&[(ONE, 3), (TWO, 1)]), 10), [(TWO.to_owned(), 2, "\"lost\"".to_owned())]);

@@ -1,10 +1,11 @@
 //! What the key of a hall, or of a desk, may at the engine, and what not.
 
 use std::fs;
+use std::time::Duration;
 
 use async_nats::{Client, ConnectOptions, Event};
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 use crate::fleet::Engine;
 use crate::process::PATIENCE;
@@ -115,4 +116,79 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
         };
         timeout(PATIENCE, work).await.unwrap();
     });
+}
+
+#[test]
+fn a_key_of_a_hall_has_the_engine_neither_stop_another_nor_speak_for_it() {
+    let Some(engine) = Engine::start("h1,h2,h3") else { return };
+    let two = engine.hall("h2", "[]");
+    let link = engine.link("h2", &two);
+    engine
+        .wait(|table| table.as_array().is_some_and(|halls| halls.iter().any(|hall| hall["silent"] == false)));
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
+    let thief = runtime.block_on(Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1")).client;
+    // The engine answers each of these, to wherever it is asked to answer.
+    let answered = [
+        "kc.log.berlin.h1",
+        "$JS.hub.API.DIRECT.GET.kc_log.kc.log.berlin.h1",
+        "$JS.hub.API.$KV.kc_seen.berlin.h1",
+    ];
+    let status = r#"{"format":2,"state":"parked","cause":"all is well"}"#;
+    let speak = move |to: &'static str| {
+        let thief = thief.clone();
+        async move {
+            for subject in answered {
+                thief.publish_with_reply(subject, to, status.into()).await.unwrap();
+            }
+            thief.flush().await.unwrap();
+        }
+    };
+    runtime.block_on(speak("kc.stop.berlin.h2.office"));
+    runtime.block_on(speak("kc.stop.berlin.all.office"));
+    for _ in 0..2 * answered.len() {
+        link.heard("no stop");
+    }
+    assert_eq!(two.status()["state"], "parked");
+    let lies = runtime.spawn(async move {
+        loop {
+            speak("kc.status.berlin.h3").await;
+            sleep(Duration::from_millis(100)).await;
+        }
+    });
+    let run = engine.desk(&["status", "--json"]);
+    lies.abort();
+    let table: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    let three = table.as_array().unwrap().iter().find(|hall| hall["name"] == "berlin.h3").unwrap();
+    assert_eq!((&three["silent"], &three["status"]), (&true.into(), &serde_json::Value::Null), "{table}");
+    assert_eq!(engine.desk(&["stop", "berlin.h2"]).code, Some(0));
+    two.comes_to("stopped");
+}
+
+#[test]
+fn what_is_no_record_keeps_no_later_show_from_the_log_and_each_show_is_reported_once() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", "[]");
+    let link = engine.link("h1", &hall);
+    engine.hears_all();
+    let told = |shows: usize| {
+        engine.wait(|_| engine.desk(&["report"]).stdout.matches(" night ").count() == shows);
+    };
+    let play = || {
+        hall.play("night");
+        hall.done(&["park"]);
+        hall.comes_to("parked");
+    };
+    play();
+    told(1);
+    drop(link);
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let mut thief = runtime.block_on(Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1"));
+    assert!(runtime.block_on(thief.may_publish("kc.log.berlin.h1")));
+    play();
+    let link = engine.link("h1", &hall);
+    link.heard("no record of ours");
+    told(2);
+    let run = engine.desk(&["report"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(run.stderr.contains("a record is none of ours"), "{run:?}");
 }

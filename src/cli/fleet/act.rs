@@ -9,6 +9,7 @@ use futures_util::future::join_all;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::desk::said;
 use super::settings::DeskSettings;
 use super::{DeskArgs, engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print};
@@ -168,7 +169,7 @@ fn ask_all(settings: &DeskSettings, halls: &[String], asked: &Asked, json: bool)
             print::json(&all)?;
         } else {
             let lines: String =
-                answers.iter().map(|(hall, answer)| format!("{hall}: {}\n", answer.line())).collect();
+                answers.iter().map(|(hall, answer)| format!("{hall}: {}\n", said(&answer.line()))).collect();
             print::out(&lines)?;
         }
         Ok(exit(answers.iter().map(|(_, answer)| answer)))

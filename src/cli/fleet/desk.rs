@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::io::{IsTerminal as _, stdout};
+use std::pin::pin;
 use std::time::Duration;
 
-use async_nats::{Client, Subscriber};
+use async_nats::{Client, Message, Subscriber};
 use futures_util::StreamExt as _;
+use futures_util::future::join_all;
 use serde::Serialize;
 use tokio::time::{Instant, sleep_until, timeout_at};
 
@@ -14,6 +16,7 @@ use super::{DeskArgs, engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print, table};
 use crate::control::model::Severity;
 use crate::fleet::{self, BriefStatus};
+use crate::plain;
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock as _, MonoTime};
 
@@ -23,6 +26,8 @@ const LISTEN: Duration = Duration::from_millis(1_200);
 const SILENT: Duration = Duration::from_millis(1_500);
 /// How often a watched table is drawn.
 const DRAW: Duration = Duration::from_millis(500);
+/// The longest text in a cell or a line, bytes: a hall may say whatever it likes, and the others are to be seen beside it.
+const TEXT: usize = 480;
 
 /// Shows all halls of a desk, worst first, with the age of what is known of each.
 ///
@@ -68,10 +73,12 @@ pub(super) struct HallSeen {
 /// The halls of a desk, and when each was heard last.
 struct Halls {
     seen: BTreeMap<String, (BriefStatus, MonoTime)>,
-    /// What the engine has kept, with how long ago that was so when it was asked.
-    kept: BTreeMap<String, (BriefStatus, Duration, MonoTime)>,
+    kept: BTreeMap<String, Kept>,
     names: Vec<String>,
 }
+
+/// A status that the engine has kept, with how long ago that was so when it was asked.
+type Kept = (BriefStatus, Duration, MonoTime);
 
 pub(super) fn status(args: &StatusArgs) -> Result<Exit, Failure> {
     let settings = settings::desk(&args.desk.desk)?;
@@ -81,7 +88,7 @@ pub(super) fn status(args: &StatusArgs) -> Result<Exit, Failure> {
         let mut heard = client.subscribe(fleet::status_of("*.*")).await.or_exit(Exit::Unavailable)?;
         let until = Instant::now() + LISTEN;
         // What the engine keeps is for those who are silent; without it the others are shown as well.
-        let kept = halls.look_up_kept(&client).await;
+        let kept = halls.look_up_kept(&client, &mut heard).await;
         halls.listen(&mut heard, until).await;
         let table = halls.table(Monotonic.now());
         if args.json {
@@ -100,7 +107,7 @@ pub(super) fn watch(args: &WatchArgs) -> Result<Exit, Failure> {
         let client = engine::connect_desk(&settings.access, &settings.name).await?;
         let mut halls = Halls::of(&settings);
         let mut heard = client.subscribe(fleet::status_of("*.*")).await.or_exit(Exit::Unavailable)?;
-        let _ = halls.look_up_kept(&client).await;
+        let _ = halls.look_up_kept(&client, &mut heard).await;
         tokio::select! {
             shown = show(&mut halls, &mut heard, args.json) => shown,
             _ = tokio::signal::ctrl_c() => Ok(Exit::Done),
@@ -114,7 +121,7 @@ async fn show(halls: &mut Halls, heard: &mut Subscriber, json: bool) -> Result<E
     loop {
         if json {
             let Some(message) = heard.next().await else { return Ok(Exit::Unavailable) };
-            if let Some(name) = halls.hear(&message.subject, &message.payload) {
+            if let Some(name) = halls.hear(&message) {
                 print::json_text(&serde_json::to_string(&halls.one(&name, Monotonic.now())).expect("text"))?;
             }
             continue;
@@ -122,7 +129,8 @@ async fn show(halls: &mut Halls, heard: &mut Subscriber, json: bool) -> Result<E
         halls.listen(heard, Instant::now() + DRAW).await;
         let table = halls.table(Monotonic.now());
         if stdout().is_terminal() {
-            print::out(&format!("\x1b[H\x1b[2J{}", drawn(&table)))?;
+            print::data("\x1b[H\x1b[2J")?;
+            print::out(&drawn(&table))?;
             continue;
         }
         for hall in &table {
@@ -139,10 +147,14 @@ impl Halls {
         Self { seen: BTreeMap::new(), kept: BTreeMap::new(), names: settings.halls.clone() }
     }
 
-    /// Takes in a status; says whose it is.
-    fn hear(&mut self, subject: &str, payload: &[u8]) -> Option<String> {
-        let name = subject.strip_prefix("kc.status.")?;
-        let status = serde_json::from_slice(payload).ok()?;
+    /// Takes in a status; says whose it is. The engine answers to whatever subject it is asked to answer to, so that the key of one hall
+    /// could have it speak for another: such an answer has headers, or is no status.
+    fn hear(&mut self, message: &Message) -> Option<String> {
+        let name = message.subject.strip_prefix("kc.status.")?;
+        let status: BriefStatus = serde_json::from_slice(&message.payload).ok()?;
+        if message.headers.is_some() || status.format == 0 {
+            return None;
+        }
         self.seen.insert(name.to_owned(), (status, Monotonic.now()));
         Some(name.to_owned())
     }
@@ -150,29 +162,23 @@ impl Halls {
     async fn listen(&mut self, heard: &mut Subscriber, until: Instant) {
         while let Ok(message) = timeout_at(until, heard.next()).await {
             match message {
-                Some(message) => drop(self.hear(&message.subject, &message.payload)),
+                Some(message) => drop(self.hear(&message)),
                 None => sleep_until(until).await, // the engine is gone for good
             }
         }
     }
 
-    /// Asks the engine for the last status of each hall of the desk.
-    async fn look_up_kept(&mut self, client: &Client) -> Result<(), Failure> {
-        let kept = engine::kept(client);
-        engine::prepare(&kept).await?;
-        let bucket =
-            kept.get_stream_no_info(format!("KV_{}", fleet::SEEN)).await.or_exit(Exit::Unavailable)?;
-        for name in &self.names {
-            let Ok(entry) = bucket.direct_get_last_for_subject(format!("$KV.{}.{name}", fleet::SEEN)).await
-            else {
-                continue;
-            };
-            if let Ok(status) = serde_json::from_slice(&entry.payload) {
-                let at = u64::try_from(entry.time.unix_timestamp_nanos()).unwrap_or(0);
-                let age = Duration::from_nanos(wall_now_ns().saturating_sub(at));
-                self.kept.insert(name.clone(), (status, age, Monotonic.now()));
+    /// Asks the engine for the last status of each hall of the desk. Halls are heard meanwhile: an engine may take its time, and what
+    /// waited would look new.
+    async fn look_up_kept(&mut self, client: &Client, heard: &mut Subscriber) -> Result<(), Failure> {
+        let names = self.names.clone();
+        let mut kept = pin!(kept_of(client, &names));
+        self.kept = loop {
+            tokio::select! {
+                kept = &mut kept => break kept?,
+                () = self.listen(heard, Instant::now() + DRAW) => {}
             }
-        }
+        };
         Ok(())
     }
 
@@ -199,6 +205,25 @@ impl Halls {
     }
 }
 
+/// What the engine has kept of halls.
+async fn kept_of(client: &Client, names: &[String]) -> Result<BTreeMap<String, Kept>, Failure> {
+    let kept = engine::kept(client);
+    engine::prepare(&kept).await?;
+    let bucket = kept.get_stream_no_info(format!("KV_{}", fleet::SEEN)).await.or_exit(Exit::Unavailable)?;
+    let of_one = |name: &String| {
+        let (name, bucket) = (name.clone(), &bucket);
+        async move {
+            let subject = format!("$KV.{}.{name}", fleet::SEEN);
+            let entry = bucket.direct_get_last_for_subject(subject).await.ok()?;
+            let status = serde_json::from_slice(&entry.payload).ok()?;
+            let at = u64::try_from(entry.time.unix_timestamp_nanos()).unwrap_or(0);
+            let age = Duration::from_nanos(wall_now_ns().saturating_sub(at));
+            Some((name, (status, age, Monotonic.now())))
+        }
+    };
+    Ok(join_all(names.iter().map(of_one)).await.into_iter().flatten().collect())
+}
+
 impl HallSeen {
     /// How much it needs a person: 0 most.
     fn rank(&self) -> u8 {
@@ -221,7 +246,7 @@ impl HallSeen {
         let show = status.show.as_ref().map_or_else(String::new, |show| format!(", {}", show.cue));
         let lost =
             if status.seats.lost > 0 { format!(", {} seats lost", status.seats.lost) } else { String::new() };
-        format!("{silent}{}: {}{show}{lost}", status.state, status.cause)
+        said(&format!("{silent}{}: {}{show}{lost}", status.state, status.cause))
     }
 }
 
@@ -251,7 +276,13 @@ fn row(hall: &HallSeen) -> [String; 7] {
         }
         _ => format!("{}; next: {}", status.cause, status.next),
     };
-    [hall.name.clone(), state, show, format!("{:.0} %", status.level * 100.0), seats, know, age]
+    let level = format!("{:.0} %", status.level * 100.0);
+    [&hall.name, &state, &show, &level, &seats, &know, &age].map(|text| said(text))
+}
+
+/// What a hall says, in one line of bearable length, whatever it says.
+pub(super) fn said(text: &str) -> String {
+    plain::escaped(text, TEXT).into_owned()
 }
 
 /// An age as a person reads it.
@@ -302,6 +333,16 @@ mod tests {
         (status.warnings, status.warnings_total) = (vec![warning], 4);
         assert_eq!(hall.rank(), 3);
         assert!(row(&hall)[5].ends_with("no room (and 3 more)"), "{:?}", row(&hall));
+    }
+
+    #[test]
+    fn whatever_a_hall_says_is_one_short_line_and_speaks_for_no_other_hall() {
+        let mut hall = seen("a", State::Parked, 0, 0.2);
+        let long = "x".repeat(100_000);
+        hall.status.as_mut().unwrap().cause = format!("ok\nb: parked: ok\x1b[2J{long}");
+        assert_eq!(hall.line().lines().count(), 1);
+        let text = drawn(std::slice::from_ref(&hall));
+        assert!(text.lines().count() == 3 && text.len() < 10 * TEXT && !text.contains('\x1b'), "{text}");
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The way to the engine, and what it keeps for a fleet.
 
+use std::mem;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -54,8 +56,15 @@ pub(super) async fn connect_desk(access: &Access, name: &str) -> Result<Client, 
 /// Connects a link, at once or as soon as the engine is there, and again each time that it is lost.
 pub(super) async fn connect_link(access: &Access, name: &str) -> Result<Client, Failure> {
     let options = options(access, name)?.retry_on_initial_connect();
-    let options = options.event_callback(|event| async move {
-        print::tell(&format!("engine: {event}"));
+    let told = Mutex::new(None);
+    let options = options.event_callback(move |event| {
+        // What is like the last one is told once: an engine may be away for days, and a member may be refused as often as it likes.
+        let kind = Some(mem::discriminant(&event));
+        let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
+        if mem::replace(&mut *told, kind) != kind {
+            print::tell(&format!("engine: {event}"));
+        }
+        async {}
     });
     options.connect(&access.engine[..]).await.context("the engine cannot be looked for").or_system()
 }

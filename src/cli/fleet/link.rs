@@ -149,6 +149,10 @@ impl Link {
         let all = fleet::stop_to(&format!("{site}.{}", fleet::ALL), "*");
         let mut both = self.subscribed([fleet::stop_to(&self.hall, "*"), all]).await;
         while let Some(message) = both.next().await {
+            if is_of_engine(&message) {
+                print::tell("no stop: a member had the engine answer here");
+                continue;
+            }
             let link = Arc::clone(self);
             tokio::spawn(async move {
                 let who = message.subject.rsplit('.').next().unwrap_or_default();
@@ -240,6 +244,15 @@ impl Link {
         }
         all
     }
+}
+
+/// True of what the engine itself says. It answers to whatever subject it is asked to answer to, so also for a member that may not publish
+/// there. All else is somebody's stop, whatever is in it.
+fn is_of_engine(message: &Message) -> bool {
+    let is_kept = message.headers.as_ref().is_some_and(|headers| headers.get("Nats-Stream").is_some());
+    let is_ack =
+        [&b"{\"stream\":"[..], b"{\"error\":"].iter().any(|start| message.payload.starts_with(start));
+    message.status.is_some() || is_kept || is_ack
 }
 
 /// That the hall cannot be asked.

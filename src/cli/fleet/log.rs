@@ -13,6 +13,7 @@ use serde_json::json;
 
 use super::engine;
 use super::hall::Link;
+use crate::cli::print;
 use crate::fleet::{self, LogRecord};
 use crate::journal::JournalPart;
 
@@ -87,13 +88,19 @@ impl<'l> LogTeller<'l> {
         Ok(true)
     }
 
-    /// What the engine has last of this hall.
+    /// What the engine has last of this hall. Behind what is no record of ours the journal is told from its first line: nobody can take that
+    /// away again, and reports have each line once.
     async fn ask(&self) -> anyhow::Result<(u64, Option<LogRecord>)> {
         let stream = self.kept.get_stream_no_info(fleet::LOG).await?;
         match stream.direct_get_last_for_subject(self.subject.clone()).await {
             Ok(message) => {
-                let record = serde_json::from_slice(&message.payload);
-                Ok((message.sequence, Some(record.context("the last record of the engine is none of ours")?)))
+                let record = serde_json::from_slice(&message.payload).ok();
+                if record.is_none() {
+                    print::tell(
+                        "the log: what the engine has last is no record of ours; telling the journal again",
+                    );
+                }
+                Ok((message.sequence, record))
             }
             Err(error) if error.kind() == DirectGetErrorKind::NotFound => Ok((0, None)),
             Err(error) => {

@@ -1,6 +1,6 @@
 //! `kinocue fleet report`: what all halls played, as each of them told the engine.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -27,7 +27,9 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// A hall tells each show once, also what it played while it was cut off. Where it is not heard now, later shows may be missing: `kinocue fleet
 /// status` says so, and `kinocue report` in the hall has all.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Exit codes: 0 shown, 1 records of a hall are missing, 69 the engine does not answer")]
+#[command(
+    after_help = "Exit codes: 0 shown, 1 records of a hall are missing, 69 the engine does not answer, or not all of it comes"
+)]
 pub(super) struct Args {
     #[command(flatten)]
     desk: DeskArgs,
@@ -46,6 +48,8 @@ pub(super) struct Args {
 #[derive(Default)]
 struct ToldByHall {
     records: Vec<LogRecord>,
+    /// Lines of its journal that these are.
+    lines: BTreeSet<(String, u64)>,
     last: Option<u64>,
     /// Records that are not there, in words.
     missing: Vec<String>,
@@ -96,7 +100,8 @@ async fn read(client: &Client, day: Date) -> Result<BTreeMap<String, ToldByHall>
     let told = "the engine does not tell what it keeps of shows";
     let consumer = stream.create_consumer(config).await.context(told).or_exit(Exit::Unavailable)?;
     let mut all: BTreeMap<String, ToldByHall> = BTreeMap::new();
-    loop {
+    let mut left = consumer.cached_info().num_pending;
+    while left > 0 {
         let batch = consumer.fetch().max_messages(BATCH).expires(PATIENCE).messages().await;
         let mut batch = batch.context(told).or_exit(Exit::Unavailable)?;
         let mut count = 0;
@@ -104,20 +109,31 @@ async fn read(client: &Client, day: Date) -> Result<BTreeMap<String, ToldByHall>
             let message =
                 message.map_err(|error| anyhow::anyhow!(error)).context(told).or_exit(Exit::Unavailable)?;
             count += 1;
+            left = message
+                .info()
+                .map_err(anyhow::Error::from_boxed)
+                .context(told)
+                .or_exit(Exit::Unavailable)?
+                .pending;
             if let Some(hall) = message.subject.strip_prefix("kc.log.") {
                 all.entry(hall.to_owned()).or_default().take(&message.payload);
             }
         }
-        if count < BATCH {
-            return Ok(all);
+        if count == 0 {
+            let error =
+                anyhow::anyhow!("{left} more records of shows did not come; ask again over a better network");
+            return Err(error).or_exit(Exit::Unavailable);
         }
     }
+    Ok(all)
 }
 
 impl ToldByHall {
     fn take(&mut self, payload: &[u8]) {
         let Ok(record) = serde_json::from_slice::<LogRecord>(payload) else {
-            self.missing.push("a record is none of ours".to_owned());
+            self.missing
+                .push("a record is none of ours; the hall has told its journal again behind it".to_owned());
+            self.last = None;
             return;
         };
         let n = record.n;
@@ -125,7 +141,9 @@ impl ToldByHall {
             self.missing.push(format!("record {n} follows record {last}: what is between is missing"));
         }
         self.last = Some(n);
-        self.records.push(record);
+        if self.lines.insert((record.part.file.clone(), record.part.line)) {
+            self.records.push(record);
+        }
     }
 
     fn report(self, day: Date) -> JournalReport {
