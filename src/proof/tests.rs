@@ -298,7 +298,8 @@ fn a_cue_that_ends_with_more_acceleration_than_its_last_window_shows_is_refused(
     };
     let proof = on_bench(&text(58_000.0));
     assert!(proof.axes[0].acceleration.margin() > 0.1, "the windows end too soon: {:?}", proof.axes[0]);
-    let [message] = &messages(&proof)[..] else { panic!("{:?}", messages(&proof)) };
+    // The first says that half a second is short for a ride.
+    let [_, message] = &messages(&proof)[..] else { panic!("{:?}", messages(&proof)) };
     assert!(message.contains("the gentlest way to rest from there takes acceleration 3"), "{message}");
     assert!(on_bench(&text(40_000.0)).passed());
 }
