@@ -13,7 +13,6 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::input::{Json, id};
-use super::playlist::Choice;
 use super::problem::bad_value;
 use super::settings::{Trim, check_levels};
 use super::shared::{Shared, turn};
@@ -38,7 +37,6 @@ fn command(order: &Order) -> Result<Command, Problem> {
         "park" => none().map(|()| Command::Park)?,
         "disarm" => none().map(|()| Command::Disarm)?,
         "load" => Command::Load { cue: id(&args::<Load>(order)?.cue)?.to_string() },
-        "playlist" => args::<Choice>(order)?.command()?,
         "levels" => {
             let change: LevelsChange = args(order)?;
             check_levels(&change)?;
@@ -127,7 +125,6 @@ mod tests {
                 .map_err(|problem| problem.code)
         };
         assert_eq!(ask("load", "{\"cue\":\"storm\"}"), Ok(Command::Load { cue: "storm".to_owned() }));
-        assert_eq!(ask("playlist", "{\"id\":null}"), Ok(Command::Playlist { id: None }));
         assert_eq!(ask("trim", "{\"offset_s\":0.08}"), Ok(Command::Trim(80)));
         let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
         assert_eq!(ask("levels", "{\"motion\":0.5}"), Ok(Command::Levels(half)));
@@ -144,8 +141,8 @@ mod tests {
             assert_eq!(ask(word, args), Err(Code::Value), "{word} {args}");
         }
         for word in [
-            "arm", "home", "clear", "go", "resume", "seek", "enable", "disable", "test", "reload", "",
-            "Pause",
+            "arm", "home", "clear", "go", "resume", "seek", "enable", "disable", "test", "reload",
+            "playlist", "", "Pause",
         ] {
             assert_eq!(ask(word, "{}"), Err(Code::Role), "{word}");
         }

@@ -44,8 +44,6 @@ pub(crate) enum FleetWord {
     Disarm,
     /// To load a cue, while parked.
     Load,
-    /// To load a playlist, while parked.
-    Playlist,
     /// Levels and effects, up to what a person has set.
     Levels,
     /// To move the motion against the film.
@@ -54,19 +52,18 @@ pub(crate) enum FleetWord {
 
 impl FleetWord {
     /// All of them, by the words of the configuration.
-    pub(crate) const ALL: [(&'static str, Self); 7] = [
+    pub(crate) const ALL: [(&'static str, Self); 6] = [
         ("pause", Self::Pause),
         ("park", Self::Park),
         ("disarm", Self::Disarm),
         ("load", Self::Load),
-        ("playlist", Self::Playlist),
         ("levels", Self::Levels),
         ("trim", Self::Trim),
     ];
     /// What nobody who is elsewhere may ask, whatever the configuration says.
-    const NEVER: [&'static str; 12] = [
+    const NEVER: [&'static str; 13] = [
         "arm", "home", "clear", "go", "resume", "seek", "enable", "disable", "seats", "test", "reload",
-        "preset",
+        "preset", "playlist",
     ];
 }
 
@@ -75,7 +72,6 @@ plain::displayed!(FleetWord {
     Self::Park => "park",
     Self::Disarm => "disarm",
     Self::Load => "load",
-    Self::Playlist => "playlist",
     Self::Levels => "levels",
     Self::Trim => "trim",
 });

@@ -137,7 +137,7 @@ impl Command {
         match self {
             Self::Home => ("home", Engineer, STALE, None, None),
             Self::Load { .. } => ("load", Operate, LASTS, None, Some(Fleet::Load)),
-            Self::Playlist { .. } => ("playlist", Operate, LASTS, None, Some(Fleet::Playlist)),
+            Self::Playlist { .. } => ("playlist", Operate, LASTS, None, None),
             Self::Select { .. } => ("select", Operate, LASTS, None, None),
             Self::Arm { seats_empty: false } => ("arm", Operate, STALE, None, None),
             Self::Arm { seats_empty: true } => ("arm", Engineer, STALE, None, None),

@@ -31,7 +31,7 @@ pub(super) fn may_ask(desired: &Desired, hall: &HallContext) -> Result<(), Probl
     let state = hall.mirror.state;
     match ask {
         // Whoever armed it saw what was loaded.
-        Command::Load { .. } | Command::Playlist { .. } if state != State::Parked => {
+        Command::Load { .. } if state != State::Parked => {
             refused(format!("the hall is {state}, not parked"), "try again when it is parked")
         }
         // Somebody may stand beside a seat that is off park.
@@ -113,7 +113,7 @@ mod tests {
             | State::Stopping
             | State::Stopped
             | State::Fault => &["disarm", "levels", "pause", "stop", "trim"],
-            State::Parked => &["disarm", "levels", "load", "pause", "playlist", "stop", "trim"],
+            State::Parked => &["disarm", "levels", "load", "pause", "stop", "trim"],
             State::Armed | State::Playing(_) | State::Paused | State::Parking => {
                 &["disarm", "levels", "park", "pause", "stop", "trim"]
             }
