@@ -52,7 +52,7 @@ pub(super) struct Args {
     /// The stop socket, which takes only a stop [default: stop.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     stop_socket: Option<PathBuf>,
-    /// The socket of `kinocue fleet link`, where the configuration has [fleet] [default: fleet.sock beside the control socket]; its
+    /// The socket of `kinocue fleet link`, where the configuration has `[fleet]` [default: fleet.sock beside the control socket]; its
     /// stops have fleet-stop.sock beside it.
     #[arg(long, value_name = "PATH")]
     fleet_socket: Option<PathBuf>,

@@ -154,6 +154,7 @@ fn whoever_left_the_question_for_a_token_finds_the_way_back_to_it() {
     browser.open(hall.url());
     browser.wait("!document.getElementById('token').hidden");
     browser.press("#token-leave");
+    browser.wait("document.getElementById('log-in').getClientRects().length > 0");
     browser.press("#log-in");
     browser.wait("!document.getElementById('token').hidden");
     browser.press("#token-text");
