@@ -180,4 +180,6 @@ pub(crate) struct Flag {
     pub(crate) at_s: f64,
     /// Its name; from anywhere.
     pub(crate) name: String,
+    /// Whether a person has marked it.
+    pub(crate) is_mark: bool,
 }

@@ -72,8 +72,11 @@ pub(crate) fn of_cue(subject: Subject<'_>, columns: Columns) -> Picture {
     let view = View { timeline, strains: &strains, columns, stretches, time: time.clone() };
     let cue = timeline.cue();
     let title = cue.title().map_or_else(|| cue.path().display().to_string(), str::to_owned);
-    let flags =
-        cue.markers().iter().map(|marker| Flag { at_s: marker.at.as_secs_f64(), name: marker.name.clone() });
+    let flags = cue.markers().iter().map(|marker| Flag {
+        at_s: marker.at.as_secs_f64(),
+        name: marker.name.clone(),
+        is_mark: false,
+    });
     let flags = flags.filter(|flag| time.part(flag.at_s).is_some()).collect();
     Picture {
         title,

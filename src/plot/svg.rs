@@ -258,24 +258,32 @@ fn flag_name(name: &str) -> String {
 }
 
 /// Rows in which the names of flags do not run into each other, over an axis so many px long, and whether each stands before its flag,
-/// as `is_before` has it of where that is and how wide the name is; `None` for one that no row has room for.
+/// as `is_before` has it of where that is and how wide the name is; `None` for one that no row has room for. What a person has marked
+/// comes first: it is what the picture is looked at for, and a show begins with many flags.
 pub(super) fn flag_rows(
     picture: &Picture,
     length: f64,
     is_before: impl Fn(f64, f64) -> bool,
 ) -> Vec<Option<(u8, bool)>> {
-    let mut ends = [f64::NEG_INFINITY; 4];
-    let row = |flag: &Flag| {
+    let mut rows: [Vec<(f64, f64)>; 4] = Default::default();
+    let mut row = |flag: &Flag| {
         let x = length * picture.time.part(flag.at_s).unwrap_or_default();
         let chars = flag_name(&flag.name).chars().count();
         let width = 8.0 * f64::from(u8::try_from(chars).unwrap_or(u8::MAX)) + 10.0;
         let is_before = is_before(x, width);
         let begin = if is_before { x - width } else { x };
-        let (row, end) = (0_u8..).zip(&mut ends).find(|(_, end)| **end <= begin)?;
-        *end = begin + width;
-        Some((row, is_before))
+        let is_free =
+            |row: &[(f64, f64)]| row.iter().all(|(from, to)| *to <= begin || begin + width <= *from);
+        let (number, row) = (0_u8..).zip(&mut rows).find(|(_, row)| is_free(row))?;
+        row.push((begin, begin + width));
+        Some((number, is_before))
     };
-    picture.flags.iter().map(row).collect()
+    let mut placed = vec![None; picture.flags.len()];
+    for marked in [true, false] {
+        let flags = picture.flags.iter().zip(&mut placed).filter(|(flag, _)| flag.is_mark == marked);
+        flags.for_each(|(flag, place)| *place = row(flag));
+    }
+    placed
 }
 
 fn flag_lines(picture: &Picture, top: f64, bottom: f64) -> String {

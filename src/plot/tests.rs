@@ -108,7 +108,8 @@ fn each_worst_instant_is_marked_with_the_file_and_the_line_that_it_comes_from_or
 #[test]
 fn what_a_file_says_is_text_wherever_it_is_drawn_and_nothing_is_loaded() {
     let picture = drawn(&timeline(&rows(2, 5, &format!("# title: {}\n", &HOSTILE[..48]), noise)), 0, 80, 40);
-    let picture = Picture { flags: vec![Flag { at_s: 0.04, name: HOSTILE.to_owned() }], ..picture };
+    let picture =
+        Picture { flags: vec![Flag { at_s: 0.04, name: HOSTILE.to_owned(), is_mark: false }], ..picture };
     for text in [svg(&picture, Theme::Auto), page(&picture, Theme::Auto), braille(&picture)] {
         assert!(!text.contains('\u{1b}') && !text.contains('\u{202e}'));
     }
@@ -156,8 +157,11 @@ fn names_at_the_ends_of_lines_stand_apart_and_inside() {
 #[test]
 fn names_of_flags_do_not_run_into_each_other_and_what_has_no_room_keeps_its_line() {
     let picture = drawn(&timeline(&rows(1, 500, "", noise)), 0, 9_980, 600);
-    let flag = |at_s: f64| Flag { at_s, name: format!("what happened at {at_s:.2}") };
-    let picture = Picture { flags: (0..60).map(|n| flag(f64::from(n) / 7.0)).collect(), ..picture };
+    let flag = |at_s: f64| Flag { at_s, name: format!("what happened at {at_s:.2}"), is_mark: false };
+    let mut flags: Vec<Flag> = (0..60).map(|n| flag(f64::from(n) / 7.0)).collect();
+    flags[6].is_mark = true;
+    let marked = flags[6].name.clone();
+    let picture = Picture { flags, ..picture };
     let text = page(&picture, Theme::Auto);
     assert_eq!(text.matches("<i class=\"flag").count(), 60);
     let shown: Vec<(f64, f64, &str)> = text
@@ -172,6 +176,7 @@ fn names_of_flags_do_not_run_into_each_other_and_what_has_no_room_keeps_its_line
         })
         .collect();
     assert!((12..40).contains(&shown.len()), "{}", shown.len());
+    assert!(shown.iter().any(|(_, _, flag)| flag.contains(&marked)), "what a person has marked has a name");
     for (index, (begin, row, flag)) in shown.iter().enumerate() {
         let before = shown[..index].iter().rev().find(|(_, other, _)| other == row);
         assert!(before.is_none_or(|(other, ..)| begin - other >= 177.9), "{flag}");

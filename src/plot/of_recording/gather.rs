@@ -193,7 +193,7 @@ impl Gathered {
                 let at_s = self.look.axis.time.place(self.column);
                 let Some(name) = flag_name(topic, data, seat) else { return };
                 if self.flags.len() < FLAGS {
-                    self.flags.push(Flag { at_s, name });
+                    self.flags.push(Flag { at_s, name, is_mark: topic == "/mark" });
                 } else {
                     self.more_flags += 1;
                 }

@@ -60,7 +60,8 @@ fn flags_of_passes(time: &TimeAxis) -> impl Iterator<Item = Flag> {
     const MOST: usize = 12;
     let passes = time.passes();
     let each = passes.len().div_ceil(MOST).max(1);
-    let flag = |index: usize| Flag { at_s: passes[index].at_s, name: format!("pass {}", index + 1) };
+    let flag =
+        |index: usize| Flag { at_s: passes[index].at_s, name: format!("pass {}", index + 1), is_mark: false };
     (each..passes.len()).step_by(each).map(flag)
 }
 
