@@ -13,7 +13,7 @@ use hyper::body::Bytes;
 use super::access::one;
 use super::problem::{bad_value, panicked};
 use super::shared::Shared;
-use crate::control::{Code, Command, FRESH, Problem, Role, Status, Surface, Who};
+use crate::control::{self, Code, Command, FRESH, Problem, Role, Status, Surface, Who};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock as _, MonoTime};
 
@@ -99,18 +99,17 @@ impl Asker {
             }
             return Ok(now);
         };
-        let most = i128::from(u64::try_from(FRESH.as_millis()).unwrap_or(u64::MAX));
-        if age_ms < -most {
-            let detail = format!("{} was sent {} ms from now: the clocks differ", ask.word(), -age_ms);
-            let remedy = "set the clock of the sender, or correct for it with X-Kinocue-Time of the replies";
-            return Err(Problem::new(Code::Late, detail, remedy));
-        }
-        if age_ms > most {
-            let detail = format!("{} came {age_ms} ms after it was sent, more than {most}", ask.word());
-            let remedy = "check the seats, then repeat it; if this happens every time, the clocks differ";
-            return Err(Problem::new(Code::Late, detail, remedy));
-        }
-        Ok(now.before(Duration::from_millis(u64::try_from(age_ms).unwrap_or(0))))
+        control::asked_at(age_ms, now).ok_or_else(|| {
+            let (word, most) = (ask.word(), FRESH.as_millis());
+            let (detail, remedy) = if age_ms < 0 {
+                let detail = format!("{word} was sent {} ms from now: the clocks differ", -age_ms);
+                (detail, "set the clock of the sender, or correct for it with X-Kinocue-Time of the replies")
+            } else {
+                let detail = format!("{word} came {age_ms} ms after it was sent, more than {most}");
+                (detail, "check the seats, then repeat it; if this happens every time, the clocks differ")
+            };
+            Problem::new(Code::Late, detail, remedy)
+        })
     }
 
     /// A stop is set at once; that it is done is replied also where the hall is busy with something long.

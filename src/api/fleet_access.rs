@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::problem::bad_value;
 use crate::config::{self, FleetKey};
-use crate::control::{Code, Command, FRESH, Problem, Surface, Who};
+use crate::control::{self, Code, Command, FRESH, Problem, Surface, Who};
 use crate::fleet::{Letter, Order};
 use crate::time::MonoTime;
 
@@ -14,6 +14,7 @@ use crate::time::MonoTime;
 const REMEMBERED: Duration = Duration::from_secs(600);
 /// Orders of one key within that time.
 const ORDERS: usize = 1024;
+
 /// Who of the fleet may ask, and what they asked of late.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FleetAccess {
@@ -109,13 +110,11 @@ impl FleetAccess {
 /// When an order was given, by our own clock.
 fn asked_at(order: &Order, wall_ns: u64, now: MonoTime) -> Result<MonoTime, Problem> {
     let age_ms = i128::from(wall_ns / 1_000_000) - i128::from(order.sent_ms);
-    let most = i128::from(u64::try_from(FRESH.as_millis()).unwrap_or(u64::MAX));
-    if (-most..=most).contains(&age_ms) {
-        return Ok(now.before(Duration::from_millis(u64::try_from(age_ms).unwrap_or(0))));
-    }
-    let when = if age_ms < 0 { "from now" } else { "ago" };
-    let detail = format!("{} was asked {} ms {when}, more than {most}", order.word, age_ms.abs());
-    Err(Problem::new(Code::Late, detail, "if this happens every time, the clocks of desk and hall differ"))
+    control::asked_at(age_ms, now).ok_or_else(|| {
+        let (when, most) = (if age_ms < 0 { "from now" } else { "ago" }, FRESH.as_millis());
+        let detail = format!("{} was asked {} ms {when}, more than {most}", order.word, age_ms.abs());
+        Problem::new(Code::Late, detail, "if this happens every time, the clocks of desk and hall differ")
+    })
 }
 
 #[cfg(test)]

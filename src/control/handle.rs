@@ -22,6 +22,14 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// How old an ask that [goes stale](Command::goes_stale) may be when its turn comes.
 pub(crate) const FRESH: Duration = Duration::from_secs(2);
 
+/// When something was asked, by our own clock, that is so many milliseconds old by the clock of whoever asked; `None` where that is more
+/// than [`FRESH`] from now, to either side.
+pub(crate) fn asked_at(age_ms: i128, now: MonoTime) -> Option<MonoTime> {
+    let age = Duration::from_millis(u64::try_from(age_ms.unsigned_abs()).unwrap_or(u64::MAX));
+    // One that is asked from now on, by a clock that is ahead, is asked now.
+    (age <= FRESH).then(|| if age_ms > 0 { now.before(age) } else { now })
+}
+
 /// What a surface wants, and on whose behalf.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Desired {

@@ -15,7 +15,7 @@ mod who;
 pub use crate::config::Role;
 pub(crate) use ask::Levels;
 pub use ask::{Command, LevelsChange};
-pub(crate) use handle::{Asked, FRESH, Posted, overtaken};
+pub(crate) use handle::{Asked, FRESH, Posted, asked_at, overtaken};
 pub use handle::{Desired, Handle, Inbox, StatusSource, handle};
 pub(crate) use links::{LinkAxisStatus, LinkStatus};
 pub use model::Health;

@@ -227,9 +227,6 @@ fn records(hall: &HallContext) -> Result<(), Problem> {
 pub(super) fn lacks_room(hall: &HallContext) -> Option<String> {
     let length_s = hall.cued.as_ref()?.timeline.duration().as_secs_f64();
     let (needs, room) = hall.recorder.lacks(length_s)?;
-    if hall.recorder.status_at(hall.now).recording.is_some() {
-        return None;
-    }
     #[expect(clippy::cast_precision_loss, reason = "to a tenth")]
     let [needs, room] = [needs, room].map(|octets| octets as f64 / 1e6);
     Some(format!(

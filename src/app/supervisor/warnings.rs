@@ -68,7 +68,8 @@ impl StatusParts<'_> {
         let troubles = self.record.troubles.iter();
         warnings.extend(troubles.map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));
         warnings.extend(
-            recorded::lacks_room(hall).map(|trouble| in_two(WarningCode::RecordRoom.word(), &trouble)),
+            (self.record.recording.is_none().then(|| recorded::lacks_room(hall)).flatten())
+                .map(|trouble| in_two(WarningCode::RecordRoom.word(), &trouble)),
         );
         warnings.extend(settings_file.map(|trouble| in_two(WarningCode::Settings.word(), &trouble)));
         warnings.extend(features.records.trouble().map(|trouble| Warning {
