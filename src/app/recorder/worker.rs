@@ -69,8 +69,10 @@ impl Worker {
         record: Record,
     ) -> Self {
         link.tell(|status| status.mode = record.mode.word().to_owned());
+        // An incident is of what the flight recorder has.
+        let keeps_ticks = record.flight_s > 0 || record.mode == RecordMode::Full;
         Self {
-            intake: intake.in_full(),
+            intake: if keeps_ticks { intake.in_full() } else { intake },
             asks,
             link,
             opening,
