@@ -90,6 +90,16 @@ impl Subject<'_> {
         self.on.seat.name.clone()
     }
 
+    /// The same with what limits its speed, where that is the controller and not the seat type.
+    fn limited_by(&self, quantity: Quantity) -> String {
+        let axis = self.geometry();
+        let ceiling = axis.speed_ceiling();
+        if quantity != Quantity::Velocity || axis.max_velocity <= ceiling {
+            return self.seat();
+        }
+        format!("{} at {:.0} rpm, its max_rpm", self.seat(), ceiling * 60.0 / axis.lead)
+    }
+
     /// Proves the axis; what is broken goes to `found`.
     pub(super) fn prove(&self, terms: &Terms, stencils: &Stencils, found: &mut Vec<Found>) -> AxisProof {
         let pieces = AxisPieces::new(self.timeline, self.axis, &self.slot);
@@ -189,7 +199,7 @@ impl Subject<'_> {
                 quantity,
                 value: stretch.worst * stroke,
                 limit: limit * stroke,
-                seat: self.seat(),
+                seat: self.limited_by(quantity),
                 at: ShowTime::from_nanos(stretch.at),
                 from: ShowTime::from_nanos(stretch.from),
                 until: ShowTime::from_nanos(stretch.until),

@@ -197,6 +197,16 @@ fn a_jump_is_named_with_line_column_value_and_limit() {
     assert!(proof.violations.iter().all(|v| v.column == "a2"), "{:?}", messages(&proof));
 }
 
+/// Whoever wrote 900 would look for 250 in vain.
+#[test]
+fn a_limit_of_speed_that_is_the_controller_s_is_named_as_its_max_rpm() {
+    let timeline = timeline("# interpolation: linear\ntime_ms,a1\n0,0.1\n1000,0.1\n1100,0.5\n2000,0.5\n");
+    let seat = SeatType::bench3(1).with_each(|axis| axis.max_velocity = 900.0);
+    let proof = prove(&timeline, terms(&timeline, seat, 100.0, 1.0));
+    let velocity = messages(&proof).into_iter().find(|text| text.contains("velocity 600.0")).unwrap();
+    assert!(velocity.contains("over 250.0, the limit of seat bench3 at 3000 rpm, its max_rpm"), "{velocity}");
+}
+
 #[test]
 fn what_one_phase_of_the_grid_hides_is_found() {
     // Between the frames of a grid that begins with the cue nothing happens.
