@@ -127,6 +127,7 @@ fn the_units_are_as_closed_as_they_were_measured_to_be() {
         ("systemd/kinocue-sync.service", "6"),
         ("systemd/kinocue-buttons.service", "6"),
         ("systemd/kinocue-link.service", "12"),
+        ("systemd/kinocue-desk.service", "12"),
     ] {
         let most = format!("--threshold={most}");
         if let Some(output) = tool("systemd-analyze", &["security", "--offline=true", &most, unit]) {
@@ -142,6 +143,7 @@ fn the_units_let_nothing_run_with_rights() {
         ("kinocue-sync", "User=kinocue-sync"),
         ("kinocue-buttons", "User=kinocue-buttons"),
         ("kinocue-link", "User=kinocue-link"),
+        ("kinocue-desk", "User=kinocue-desk"),
     ] {
         let unit = text(&format!("systemd/{name}.service"));
         for line in [user, "CapabilityBoundingSet=", "AmbientCapabilities=", "NoNewPrivileges=yes"] {
@@ -198,12 +200,15 @@ fn serial_lines_are_the_only_devices_of_the_drop_in_for_drives_which_nobody_gets
 }
 
 #[test]
-fn alerts_are_what_prometheus_takes_and_a_lost_film_raises_one_only_where_seats_wait_for_it() {
+fn alerts_are_what_prometheus_takes_and_are_raised_where_they_should_be_and_nowhere_else() {
     if let Some(output) = tool("promtool", &["check", "rules", "systemd/prometheus/kinocue.rules.yml"]) {
         assert!(output.status.success(), "{}", said(&output));
     }
-    if let Some(output) = tool("promtool", &["test", "rules", "tests/data/prometheus/film.test.yml"]) {
-        assert!(output.status.success(), "{}", said(&output));
+    for cases in ["film", "fleet"] {
+        let cases = format!("tests/data/prometheus/{cases}.test.yml");
+        if let Some(output) = tool("promtool", &["test", "rules", &cases]) {
+            assert!(output.status.success(), "{}", said(&output));
+        }
     }
 }
 

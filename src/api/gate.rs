@@ -17,7 +17,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use sha2::{Digest as _, Sha256};
 
-use super::access::one;
+use super::access::{Access, one};
 use super::input::whole;
 use super::once::{KeptReply, KeyHolder, KeyedRequest};
 use super::peer::{self, Peer};
@@ -25,8 +25,9 @@ use super::problem::{bad_value, panicked, render};
 use super::rest::BodyRest;
 use super::shared::{Shared, StillAsked};
 use super::show::STOP;
+use super::tries::Tries;
 use crate::control::{Code, Place, Problem, Surface, Who};
-use crate::log::{Line, Priority};
+use crate::log::{Line, Log, Priority};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
 
@@ -56,10 +57,10 @@ pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, ne
 }
 
 async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
-    let who = match admit(shared, &request) {
+    let who = match admit(&shared.access, &shared.tries, &request) {
         Ok(who) => who,
         Err(problem) => {
-            note(shared, &request, &problem);
+            note(&shared.log, &request, &problem);
             return render(problem.into_response(), None);
         }
     };
@@ -88,12 +89,12 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
 }
 
 /// Who asks; `None` if it does not matter.
-fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
+pub(super) fn admit(access: &Access, tries: &Tries, request: &Request) -> Result<Option<Who>, Problem> {
     let (headers, path) = (request.headers(), request.uri().path());
-    shared.access.check_origin(headers)?;
+    access.check_origin(headers)?;
     let peer = request.extensions().get::<Peer>().expect("every connection has another end");
     if let Peer::Tcp(_) = peer {
-        shared.access.check_host(headers, request.uri())?;
+        access.check_host(headers, request.uri())?;
     }
     let in_the_open = is_public(path);
     if !in_the_open && path != STOP && !takes_query(path) && request.uri().query().is_some() {
@@ -106,7 +107,7 @@ fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
         Peer::Socket(name) => Some(peer::local(name)),
         Peer::Fleet(name) => Some(peer::link(name)),
         Peer::Tcp(_) if in_the_open => None,
-        Peer::Tcp(address) => Some(shared.access.who(headers, *address, &shared.tries, Monotonic.now())?),
+        Peer::Tcp(address) => Some(access.who(headers, *address, tries, Monotonic.now())?),
     })
 }
 
@@ -120,13 +121,13 @@ fn is_public(path: &str) -> bool {
 }
 
 /// Says who was turned away at the door: nobody guesses tokens unseen. Who just comes without one is not worth a line.
-fn note(shared: &Shared, request: &Request, problem: &Problem) {
+pub(super) fn note(log: &Log, request: &Request, problem: &Problem) {
     let guessed = request.headers().contains_key(AUTHORIZATION);
     if guessed && matches!(problem.code, Code::Token | Code::Busy) || problem.code == Code::Origin {
         let from = request.extensions().get::<Peer>().map_or_else(String::new, ToString::to_string);
         let line =
             Line::new(Priority::Warning, "turned-away", format!("rejected {from}: {}", problem.detail));
-        shared.log.say(line.with("code", problem.code.word()).with("from", from));
+        log.say(line.with("code", problem.code.word()).with("from", from));
     }
 }
 
@@ -160,7 +161,7 @@ async fn once(
 }
 
 /// The response, or a problem where the handler panicked.
-async fn caught(handler: impl Future<Output = Response>) -> Response {
+pub(super) async fn caught(handler: impl Future<Output = Response>) -> Response {
     let mut handler = pin!(handler);
     std::future::poll_fn(|cx| {
         let poll = std::panic::catch_unwind(AssertUnwindSafe(|| handler.as_mut().poll(cx)));
@@ -169,7 +170,8 @@ async fn caught(handler: impl Future<Output = Response>) -> Response {
     .await
 }
 
-fn with_headers(mut response: Response) -> Response {
+/// The reply with what keeps pages of others out.
+pub(super) fn with_headers(mut response: Response) -> Response {
     let headers = response.headers_mut();
     headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));

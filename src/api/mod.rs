@@ -28,6 +28,7 @@ mod access;
 mod asker;
 mod controllers;
 mod cues;
+mod doors;
 mod fleet;
 mod fleet_access;
 mod gate;
@@ -55,6 +56,7 @@ mod stop;
 mod streams;
 mod tries;
 
+pub(crate) use doors::serve_behind_doors;
 #[cfg(feature = "harness")]
 pub(crate) use fleet::try_letter;
 pub(crate) use serving::ServingThread;

@@ -52,8 +52,8 @@ plain::displayed!(Role {
     Self::Engineer => "engineer",
 });
 
-/// Reads the table.
-pub(super) fn api(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Api> {
+/// Reads the table `[api]`.
+pub(crate) fn api(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Api> {
     let mut section = Section::new("[api]", entry.at, entry.table(faults)?, faults);
     let open = [("none", None), ("view", Some(Role::View))];
     let listen = list(&mut section, "listen", address);

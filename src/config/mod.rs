@@ -43,6 +43,7 @@ mod tests;
 mod text;
 
 pub(crate) use crate::wire::{Dialect, Timing, VibrationPort};
+pub(crate) use api::api;
 pub use api::{Api, ApiToken, Role};
 pub(crate) use buttons::{ButtonPad, PadDevice, PadLamp, PadWord};
 pub(crate) use controller::{Accept, Connection, FanOut, FansOut, cue_axes};

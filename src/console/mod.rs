@@ -88,6 +88,22 @@ const VENDOR: &[(&str, Asset)] = files!("":
     "vendor/LICENSE" TEXT,
 );
 
+/// The page of a desk with many halls.
+const FLEET: &[(&str, Asset)] = files!("fleet/":
+    "index.html" HTML,
+    "fleet.css" CSS,
+    "fleet.js" JS,
+);
+
+/// The same of the page of a desk.
+#[must_use]
+pub(crate) fn fleet(path: &str) -> Option<(&'static str, &'static [u8])> {
+    let path = if path == "/" { "/index.html" } else { path };
+    let icon = PAGE.iter().filter(|(at, _)| *at == "/icon.svg");
+    let found = FLEET.iter().chain(icon).find(|(at, _)| *at == path);
+    found.map(|(_, asset)| (asset.content_type, asset.body))
+}
+
 /// What is at a path, which begins with a slash; `/` is the page itself. None where there is nothing.
 #[must_use]
 pub(crate) fn asset(path: &str) -> Option<Asset> {

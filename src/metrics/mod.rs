@@ -13,6 +13,7 @@ use crate::control::{self, Status};
 
 mod controllers;
 mod film;
+pub(crate) mod halls;
 mod links;
 mod record;
 mod shows;

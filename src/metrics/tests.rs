@@ -9,7 +9,7 @@ use crate::control::{
 };
 use crate::state::{PlayMode, State};
 
-mod strict;
+pub(super) mod strict;
 
 use strict::{Page, check};
 

@@ -15,6 +15,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::hall::Hall;
+use crate::http::To;
 use crate::process::{Guarded, PATIENCE, Run};
 use crate::programs::is_installed;
 
@@ -121,6 +122,20 @@ impl Engine {
         Link { process, said }
     }
 
+    /// The page of the desk, with these lines of `[api]` beside where it listens.
+    pub(crate) fn page(&self, lines: &str) -> Page {
+        let settings = self.path("fleet/office/desk.toml");
+        let text = fs::read_to_string(&settings).unwrap();
+        fs::write(&settings, format!("{text}[api]\nlisten = [\"127.0.0.1:0\"]\n{lines}\n")).unwrap();
+        let mut process = Guarded::start(&["fleet", "desk", "--desk", settings.to_str().unwrap()]);
+        let stderr: BufReader<_> = process.stderr();
+        let mut lines = stderr.lines().map_while(Result::ok);
+        let url = lines.find_map(|line| line.split_once(" at http://").map(|(_, url)| url.to_owned()));
+        thread::spawn(move || lines.for_each(drop));
+        let to = To::Tcp(url.expect("it says where").trim_end_matches('/').parse().unwrap());
+        Page { _process: process, to }
+    }
+
     /// A command of the desk.
     pub(crate) fn desk(&self, args: &[&str]) -> Run {
         let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
@@ -153,6 +168,35 @@ impl Engine {
         let run = self.desk(&["report", "--records", "--json"]);
         assert!(matches!(run.code, Some(0 | 1)), "{run:?}");
         run.report()[format!("berlin.{hall}")].as_array().cloned().unwrap_or_default()
+    }
+}
+
+/// A page of all halls that is served.
+pub(crate) struct Page {
+    _process: Guarded,
+    to: To,
+}
+
+impl Page {
+    pub(crate) fn to(&self) -> &To {
+        &self.to
+    }
+
+    pub(crate) fn url(&self) -> String {
+        let To::Tcp(address) = &self.to else { unreachable!("it is served over TCP") };
+        format!("http://{address}/")
+    }
+
+    /// The halls as the page has them, once that is so.
+    pub(crate) fn wait(&self, mut wanted: impl FnMut(&Value) -> bool) -> Value {
+        let until = Monotonic.now() + PATIENCE;
+        loop {
+            let page = self.to.get("/api/v1/fleet/halls").value();
+            if wanted(&page) {
+                return page;
+            }
+            assert!(Monotonic.now() < until, "it did not come to that: {page}");
+        }
     }
 }
 

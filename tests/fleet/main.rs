@@ -6,6 +6,9 @@
     reason = "a program of its own; whatever fails here fails the test"
 )]
 
+#[path = "../console/browser.rs"]
+#[allow(dead_code, reason = "each test uses its own part")]
+mod browser;
 #[path = "../daemon/hall.rs"]
 #[allow(dead_code, reason = "each test uses its own part")]
 mod hall;
@@ -27,6 +30,7 @@ mod demo;
 mod desk;
 mod fleet;
 mod log;
+mod page;
 mod rights;
 mod socket;
 mod trouble;

@@ -97,11 +97,14 @@ pub(super) struct LoadArgs {
 }
 
 /// What is asked of halls.
-struct Asked {
+pub(super) struct Asked {
     word: &'static str,
     args: Value,
     patience: Duration,
 }
+
+/// A stop.
+pub(super) const STOP: Asked = Asked { word: "stop", args: Value::Null, patience: PATIENCE };
 
 /// What a hall's link answers.
 #[derive(Debug, Deserialize)]
@@ -120,7 +123,7 @@ struct HallProblem {
 
 /// What came of it in a hall.
 #[derive(Debug)]
-enum Answer {
+pub(super) enum Answer {
     Done(String),
     Refused(String),
     /// Nobody answered, in words.
@@ -129,8 +132,7 @@ enum Answer {
 
 pub(super) fn stop(args: &StopArgs) -> Result<Exit, Failure> {
     let settings = settings::desk(&args.desk.desk)?;
-    let asked = Asked { word: "stop", args: Value::Null, patience: PATIENCE };
-    ask_all(&settings, &args.halls, &asked, args.json)
+    ask_all(&settings, &args.halls, &STOP, args.json)
 }
 
 pub(super) fn pause(args: &PauseArgs) -> Result<Exit, Failure> {
@@ -188,7 +190,7 @@ fn exit<'a>(answers: impl Iterator<Item = &'a Answer> + Clone) -> Exit {
 }
 
 /// The halls of a desk that are meant.
-fn chosen(all: &[String], meant: &[String]) -> Result<Vec<String>, Failure> {
+pub(super) fn chosen(all: &[String], meant: &[String]) -> Result<Vec<String>, Failure> {
     let mut halls: Vec<String> = Vec::new();
     for one in meant {
         let site = one.strip_suffix(".*");
@@ -209,7 +211,7 @@ fn chosen(all: &[String], meant: &[String]) -> Result<Vec<String>, Failure> {
     Ok(halls)
 }
 
-async fn ask_one(settings: &DeskSettings, client: &Client, hall: &str, asked: &Asked) -> Answer {
+pub(super) async fn ask_one(settings: &DeskSettings, client: &Client, hall: &str, asked: &Asked) -> Answer {
     let (subject, letter) = match asked.word {
         "stop" => (fleet::stop_to(hall, &settings.name), String::new()),
         word => match letter(settings, hall, asked) {
@@ -250,6 +252,15 @@ fn id() -> String {
 }
 
 impl Answer {
+    /// What came of it, in a word of figures.
+    pub(super) const fn result(&self) -> &'static str {
+        match self {
+            Self::Done(_) => "done",
+            Self::Refused(_) => "refused",
+            Self::Silent(_) => "silent",
+        }
+    }
+
     fn of(payload: &[u8], word: &str) -> Self {
         let Ok(LinkReply { status, reply }) = serde_json::from_slice(payload) else {
             return Self::Refused("what answers there is no link of ours".to_owned());
@@ -271,7 +282,7 @@ impl Answer {
         }
     }
 
-    fn json(&self, hall: &str) -> Value {
+    pub(super) fn json(&self, hall: &str) -> Value {
         let (answered, done) = (!matches!(self, Self::Silent(_)), matches!(self, Self::Done(_)));
         json!({ "hall": hall, "answered": answered, "done": done, "text": self.line() })
     }

@@ -1,7 +1,7 @@
 //! `kinocue fleet demo`: an engine, three halls with simulated seats, and their links, on this machine alone and gone at the end.
 
 use std::env;
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{Ipv4Addr, TcpListener, TcpStream, UdpSocket};
 use std::path::{Path, PathBuf};
@@ -120,15 +120,29 @@ fn start(
         });
         print::tell(&format!("demo.{hall}, its console with all rights: {}", link.or_exit(Exit::Internal)?));
     }
-    tell(&fleet.join("office/desk.toml"));
+    let desk = fleet.join("office/desk.toml");
+    let page = started(&start_page(&desk, folder, running)?, leave)
+        .context("the page of all halls does not start")
+        .or_exit(Exit::Internal)?;
+    print::tell(&format!("the page of all three: {page}"));
+    tell(&desk);
     Ok(())
 }
 
-/// The console of a hall, once it serves; none where it does not, or nobody wants it any more.
-fn started(console: &Receiver<String>, leave: &AtomicBool) -> Option<String> {
+/// Starts the page of all halls, for whoever comes: its halls are simulated.
+fn start_page(desk: &Path, folder: &OwnFolder, running: &mut Running) -> Result<Receiver<String>, Failure> {
+    let mut settings = OpenOptions::new().append(true).open(desk).or_exit(Exit::Io)?;
+    settings.write_all(b"[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"view\"\n").or_exit(Exit::Io)?;
+    let mut page = Command::new(env::current_exe().context("this program is not to be found").or_system()?);
+    page.args(["fleet", "desk", "--desk"]).arg(desk);
+    running.start_told(&mut page, "shows 3 halls at ", &folder.path("desk.log"))
+}
+
+/// Where a page is, once it is served; none where it is not, or nobody wants it any more.
+fn started(page: &Receiver<String>, leave: &AtomicBool) -> Option<String> {
     let until = Monotonic.now() + START;
     while Monotonic.now() < until && !leave.load(Ordering::Acquire) {
-        match console.recv_timeout(LOOK) {
+        match page.recv_timeout(LOOK) {
             Err(RecvTimeoutError::Timeout) => {}
             told => return told.ok(),
         }
@@ -163,7 +177,11 @@ fn start_hall(
     let mut serve = Command::new(&program);
     serve.args(["serve", "--rehearse", "--config"]).arg(path("hall.toml"));
     serve.arg("--socket").arg(path("control.sock")).arg("--state").arg(path("state"));
-    let console = running.start_told(&mut serve, &folder.path(format!("{hall}.log")))?;
+    let console = running.start_told(
+        &mut serve,
+        "to rehearse, with all rights: ",
+        &folder.path(format!("{hall}.log")),
+    )?;
     let mut link = Command::new(&program);
     link.args(["fleet", "link", "--config"]).arg(fleet.join(hall).join("fleet.toml"));
     link.arg("--socket").arg(path("fleet.sock"));
@@ -220,15 +238,20 @@ impl Running {
         self.spawn(command, log.into()).map(|_| ())
     }
 
-    /// The same of a hall; the address of its console comes by the channel.
-    fn start_told(&mut self, command: &mut Command, log: &Path) -> Result<Receiver<String>, Failure> {
+    /// The same of one that says where its page is, behind these words; that comes by the channel.
+    fn start_told(
+        &mut self,
+        command: &mut Command,
+        before: &'static str,
+        log: &Path,
+    ) -> Result<Receiver<String>, Failure> {
         let mut log = File::create(log).or_exit(Exit::Io)?;
         let child = self.spawn(command, Stdio::piped())?;
         let said = child.stderr.take().map(BufReader::new);
         let (tell, told) = channel();
         thread::spawn(move || {
             for line in said.into_iter().flat_map(|said| said.lines()).map_while(Result::ok) {
-                if let Some(link) = line.strip_prefix("to rehearse, with all rights: ") {
+                if let Some(link) = line.strip_prefix(before) {
                     let _ = tell.send(link.to_owned());
                 }
                 let _ = writeln!(log, "{line}"); // a full disk ends no hall

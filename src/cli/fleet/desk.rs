@@ -61,24 +61,24 @@ pub(super) struct WatchArgs {
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct HallSeen {
     /// `SITE.HALL`.
-    name: String,
+    pub(super) name: String,
     /// How old that is, s; null if nothing is known.
-    age_s: Option<f64>,
+    pub(super) age_s: Option<f64>,
     /// True if nothing was heard of it for 1.5 s.
-    silent: bool,
+    pub(super) silent: bool,
     /// Its last status; null if nothing is known.
-    status: Option<BriefStatus>,
+    pub(super) status: Option<BriefStatus>,
 }
 
 /// The halls of a desk, and when each was heard last.
-struct Halls {
+pub(super) struct Halls {
     seen: BTreeMap<String, (BriefStatus, MonoTime)>,
     kept: BTreeMap<String, Kept>,
     names: Vec<String>,
 }
 
 /// A status that the engine has kept, with how long ago that was so when it was asked.
-type Kept = (BriefStatus, Duration, MonoTime);
+pub(super) type Kept = (BriefStatus, Duration, MonoTime);
 
 pub(super) fn status(args: &StatusArgs) -> Result<Exit, Failure> {
     let settings = settings::desk(&args.desk.desk)?;
@@ -143,13 +143,13 @@ async fn show(halls: &mut Halls, heard: &mut Subscriber, json: bool) -> Result<E
 }
 
 impl Halls {
-    fn of(settings: &DeskSettings) -> Self {
+    pub(super) fn of(settings: &DeskSettings) -> Self {
         Self { seen: BTreeMap::new(), kept: BTreeMap::new(), names: settings.halls.clone() }
     }
 
     /// Takes in a status; says whose it is. The engine answers to whatever subject it is asked to answer to, so that the key of one hall
     /// could have it speak for another: such an answer has headers, or is no status.
-    fn hear(&mut self, message: &Message) -> Option<String> {
+    pub(super) fn hear(&mut self, message: &Message) -> Option<String> {
         let name = message.subject.strip_prefix("kc.status.")?;
         let status: BriefStatus = serde_json::from_slice(&message.payload).ok()?;
         if message.headers.is_some() || status.format == 0 {
@@ -166,6 +166,11 @@ impl Halls {
                 None => sleep_until(until).await, // the engine is gone for good
             }
         }
+    }
+
+    /// Takes in what the engine has kept.
+    pub(super) fn take(&mut self, kept: BTreeMap<String, Kept>) {
+        self.kept = kept;
     }
 
     /// Asks the engine for the last status of each hall of the desk. Halls are heard meanwhile: an engine may take its time, and what
@@ -197,7 +202,7 @@ impl Halls {
     }
 
     /// All halls of the desk, and others that were heard, worst first.
-    fn table(&self, now: MonoTime) -> Vec<HallSeen> {
+    pub(super) fn table(&self, now: MonoTime) -> Vec<HallSeen> {
         let others = self.seen.keys().filter(|name| !self.names.contains(name));
         let mut table: Vec<_> = self.names.iter().chain(others).map(|name| self.one(name, now)).collect();
         table.sort_by(|a, b| a.rank().cmp(&b.rank()).then_with(|| a.name.cmp(&b.name)));
@@ -206,7 +211,7 @@ impl Halls {
 }
 
 /// What the engine has kept of halls.
-async fn kept_of(client: &Client, names: &[String]) -> Result<BTreeMap<String, Kept>, Failure> {
+pub(super) async fn kept_of(client: &Client, names: &[String]) -> Result<BTreeMap<String, Kept>, Failure> {
     let kept = engine::kept(client);
     engine::prepare(&kept).await?;
     let bucket = kept.get_stream_no_info(format!("KV_{}", fleet::SEEN)).await.or_exit(Exit::Unavailable)?;
@@ -225,8 +230,15 @@ async fn kept_of(client: &Client, names: &[String]) -> Result<BTreeMap<String, K
 }
 
 impl HallSeen {
+    /// The same that much later, if nothing is heard until then.
+    pub(super) fn later(&self, by: Duration) -> Self {
+        let age_s = self.age_s.map(|age_s| age_s + by.as_secs_f64());
+        let silent = self.silent || age_s.is_none_or(|age_s| age_s > SILENT.as_secs_f64());
+        Self { age_s, silent, ..self.clone() }
+    }
+
     /// How much it needs a person: 0 most.
-    fn rank(&self) -> u8 {
+    pub(super) fn rank(&self) -> u8 {
         let Some(status) = self.status.as_ref().filter(|_| !self.silent) else { return 0 };
         let gravest = status.warnings.iter().map(|warning| warning.severity).max();
         match status.state.to_string().as_str() {
@@ -323,6 +335,17 @@ mod tests {
         let text = drawn(&halls);
         assert!(text.contains("silent, was parked") && text.contains("never heard"), "{text}");
         assert!(halls[4].line().starts_with("silent; it was parked"));
+    }
+
+    #[test]
+    fn a_hall_that_is_not_heard_meanwhile_falls_silent() {
+        let hall = seen("a", State::Parked, 0, 0.2);
+        assert!(!hall.later(Duration::from_millis(1_200)).silent);
+        let later = hall.later(Duration::from_secs(2));
+        assert!(
+            later.silent && later.rank() == 0 && later.age_s.is_some_and(|age_s| age_s > 2.1),
+            "{later:?}"
+        );
     }
 
     #[test]

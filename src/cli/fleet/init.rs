@@ -102,8 +102,18 @@ pub(super) fn make(plan: &Plan<'_>, folder: &Path) -> Result<(), Failure> {
     let names: Vec<_> = halls.iter().map(|(hall, _)| format!("\"{}.{hall}\"", plan.site)).collect();
     put(&of_desk.join("desk.nk"), &seed(&desk)?, 0o600)?;
     let settings = format!("{}name = \"{}\"\nhalls = [{}]\n", access("desk.nk"), plan.desk, names.join(", "));
-    put(&of_desk.join("desk.toml"), &settings, 0o644)
+    put(&of_desk.join("desk.toml"), &(settings + PAGE), 0o644)
 }
+
+/// What the settings of a desk say of its page.
+const PAGE: &str = "
+# The page of all halls, `kinocue fleet desk`: where it is, and who may come. Take the # away.
+#[api]
+#listen = [\"127.0.0.1:8470\"]
+#open_role = \"view\"            # whoever comes looks and stops; without it only who has a token ([[api.token]], `kinocue token`)
+#[consoles]                     # links to the consoles of halls
+#\"SITE.HALL\" = \"http://10.0.0.3:8480\"
+";
 
 /// The lines of a hall's own configuration.
 fn hall_table(plan: &Plan<'_>, hall: &str, desk: &KeyPair) -> String {

@@ -13,6 +13,7 @@ mod hall;
 mod init;
 mod link;
 mod log;
+mod page;
 mod report;
 mod settings;
 
@@ -23,6 +24,7 @@ Examples:
   kinocue fleet link --config /etc/kinocue/fleet.toml    carries what a hall says and is asked, as its unit starts it
   kinocue fleet status
   kinocue fleet watch
+  kinocue fleet desk                                     the page of all halls, with a STOP for each
   kinocue fleet stop
   kinocue fleet stop berlin.h2
   kinocue fleet level 60% 'berlin.*'
@@ -48,6 +50,7 @@ enum FleetCommand {
     Link(link::Args),
     Status(desk::StatusArgs),
     Watch(desk::WatchArgs),
+    Desk(page::Args),
     Stop(act::StopArgs),
     Pause(act::PauseArgs),
     Park(act::ParkArgs),
@@ -72,6 +75,7 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Link(args) => link::run(args),
         FleetCommand::Status(args) => desk::status(args),
         FleetCommand::Watch(args) => desk::watch(args),
+        FleetCommand::Desk(args) => page::run(args),
         FleetCommand::Stop(args) => act::stop(args),
         FleetCommand::Pause(args) => act::pause(args),
         FleetCommand::Park(args) => act::park(args),

@@ -1,5 +1,6 @@
 //! `fleet.toml` of a hall's link and `desk.toml` of a desk: where the engine is, who it is that comes, and by which key.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
@@ -9,7 +10,7 @@ use nkeys::KeyPair;
 use toml::de::DeTable;
 
 use crate::cli::{Exit, Failure, OrExit as _};
-use crate::config::{Entry, Faults, Section, is_fleet_id};
+use crate::config::{self, Entry, Faults, Section, is_fleet_id};
 
 /// The longest file that is read.
 const LONGEST: u64 = 64 << 10;
@@ -41,6 +42,10 @@ pub(super) struct DeskSettings {
     pub(super) name: String,
     /// The halls that there are, `SITE.HALL` each.
     pub(super) halls: Vec<String>,
+    /// Where its page is served, and to whom.
+    pub(super) api: Option<config::Api>,
+    /// Where the consoles of halls are.
+    pub(super) consoles: BTreeMap<String, String>,
 }
 
 /// Reads the settings of a link.
@@ -61,8 +66,11 @@ pub(super) fn desk(path: &Path) -> Result<DeskSettings, Failure> {
         let name = section.get("name").and_then(|entry| id(entry, section.faults));
         let halls = section.get("halls").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
         let halls = halls.into_iter().filter_map(|entry| member(entry, section.faults)).collect();
+        let api = section.get("api").and_then(|entry| config::api(entry, section.faults));
+        let consoles =
+            section.get("consoles").map(|entry| consoles(entry, section.faults)).unwrap_or_default();
         section.require(&["name", "halls"]);
-        Some(DeskSettings { access: access?, name: name?, halls })
+        Some(DeskSettings { access: access?, name: name?, halls, api, consoles })
     })
 }
 
@@ -150,6 +158,23 @@ fn id(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
         return None;
     }
     Some(text.to_owned())
+}
+
+/// `"berlin.h3" = "http://10.0.0.3:8480"`, by hall.
+fn consoles(entry: Entry<'_>, faults: &mut Faults<'_>) -> BTreeMap<String, String> {
+    let Some(table) = entry.table(faults) else { return BTreeMap::new() };
+    let mut consoles = BTreeMap::new();
+    for (hall, value) in table {
+        let entry = Entry::new(hall.get_ref(), value);
+        let Some(text) = entry.text(faults) else { continue };
+        // A link that a page shows: nothing but where a console is.
+        if text.starts_with("https://") || text.starts_with("http://") {
+            consoles.insert(hall.get_ref().to_string(), text.to_owned());
+        } else {
+            entry.fault(faults, &format!("{text:?} is no console, such as http://10.0.0.3:8480"));
+        }
+    }
+    consoles
 }
 
 fn member(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What a page holds.
 #[derive(Debug, Default)]
-pub(super) struct Page {
+pub(in crate::metrics) struct Page {
     /// The families that were declared.
     pub(crate) families: BTreeSet<String>,
     /// Each series as it is written, labels included, with its value.
@@ -17,7 +17,7 @@ struct Family {
 }
 
 /// The page, or what is wrong with it.
-pub(super) fn check(text: &str) -> Result<Page, String> {
+pub(in crate::metrics) fn check(text: &str) -> Result<Page, String> {
     let body = text.strip_suffix("# EOF\n").ok_or("it does not end with EOF")?;
     let mut page = Page::default();
     let (mut helped, mut family) = (None, None::<Family>);

@@ -1,0 +1,251 @@
+//! `kinocue fleet desk`: a page with all halls of a desk, worst first, and a STOP for each of them; the same as figures for Prometheus.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use anyhow::{Context as _, anyhow};
+use async_nats::Client;
+use async_nats::connection::State as EngineState;
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::{DefaultBodyLimit, State};
+use axum::http::{StatusCode, Uri, header};
+use axum::response::{IntoResponse as _, Response};
+use axum::routing::{get, post};
+use futures_util::StreamExt as _;
+use futures_util::future::join_all;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::{mpsc, watch};
+use tokio::time::{MissedTickBehavior, interval, sleep};
+
+use super::desk::{HallSeen, Halls, Kept, kept_of};
+use super::settings::DeskSettings;
+use super::{DeskArgs, act, engine, settings};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::control::{Code, Problem};
+use crate::fleet;
+use crate::log::Log;
+use crate::metrics::halls::{CONTENT_TYPE, FleetFigures, HallFigures};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+use crate::{api, console};
+
+/// How often what was heard is laid out for whoever looks.
+const LAY_OUT: Duration = Duration::from_millis(100);
+/// How often the engine is asked for what it has kept of halls that are not heard.
+const LOOK_UP: Duration = Duration::from_secs(10);
+/// The longest request that somebody may send.
+const LONGEST: usize = 64 << 10;
+
+/// Serves the page of all halls of a desk.
+///
+/// Worst first, each with the age of what is known of it, and a STOP for each hall and one for all. Where it listens, and who may come,
+/// is in the table [api] of the desk's settings, with the keys of that of a hall. Figures for Prometheus are at /metrics.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue fleet desk --desk fleet/office/desk.toml
+
+Ends on SIGTERM and Ctrl-C. While it is down halls play on, and `kinocue fleet status` and `stop` do the same.")]
+pub(super) struct Args {
+    #[command(flatten)]
+    desk: DeskArgs,
+}
+
+/// What all requests share.
+struct Desk {
+    settings: DeskSettings,
+    client: Client,
+    /// What was last laid out, and when.
+    laid_out: watch::Receiver<(MonoTime, Vec<HallSeen>)>,
+    /// How many halls were asked for a stop from here, by what came of it.
+    stops: Mutex<BTreeMap<&'static str, u64>>,
+}
+
+/// The halls as the page shows them.
+#[derive(Debug, Serialize)]
+struct DeskPage<'d> {
+    desk: &'d str,
+    /// False while the engine is not reached: no hall is heard then, and no stop goes out.
+    engine: bool,
+    halls: Vec<Tile<'d>>,
+}
+
+#[derive(Debug, Serialize)]
+struct Tile<'d> {
+    #[serde(flatten)]
+    seen: HallSeen,
+    /// How much it needs a person: 0 most.
+    rank: u8,
+    /// Where its console is; null if the settings do not say.
+    console: Option<&'d String>,
+}
+
+/// Whom a stop is for: `SITE.HALL`, `SITE.*` or `all`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StopRequest {
+    halls: Vec<String>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let settings = settings::desk(&args.desk.desk)?;
+    let Some(api) = settings.api.clone().filter(|api| !api.listen.is_empty()) else {
+        let file = args.desk.desk.display();
+        let error = anyhow!(
+            "{file} does not say where the page is served; add\n  [api]\n  listen = [\"127.0.0.1:8470\"]\nand \
+             open_role = \"view\" if whoever comes may look and stop, or tokens ([[api.token]], `kinocue token`)"
+        );
+        return Err(error).or_exit(Exit::Config);
+    };
+    let log = Log::start(print::tell).context("no thread could be started").or_system()?;
+    engine::block_on(async {
+        let mut ends = signal(SignalKind::terminate()).context("signals cannot be handled").or_system()?;
+        let client = engine::connect_link(&settings.access, &settings.name).await?;
+        let (lay_out, laid_out) =
+            watch::channel((Monotonic.now(), Halls::of(&settings).table(Monotonic.now())));
+        let desk = Arc::new(Desk { settings, client, laid_out, stops: Mutex::default() });
+        let (closing, closed) = watch::channel(false);
+        let addresses = api::serve_behind_doors(&api, routes(Arc::clone(&desk)), closed, log);
+        for address in addresses.map_err(anyhow::Error::from).or_exit(Exit::Unavailable)? {
+            print::tell(&format!("shows {} halls at http://{address}/", desk.settings.halls.len()));
+        }
+        tokio::select! {
+            heard = desk.hear(&lay_out) => heard?,
+            _ = ends.recv() => {}
+            _ = tokio::signal::ctrl_c() => {}
+        }
+        closing.send_replace(true);
+        Ok(Exit::Done)
+    })
+}
+
+fn routes(desk: Arc<Desk>) -> Router {
+    Router::new()
+        .route("/api/v1/fleet/halls", get(halls))
+        .route("/api/v1/fleet/stop", post(stop))
+        .route("/metrics", get(figures))
+        .fallback(get(page))
+        .layer(DefaultBodyLimit::max(LONGEST))
+        .with_state(desk)
+}
+
+impl Desk {
+    /// Hears the halls, and lays out what is known of them.
+    async fn hear(&self, lay_out: &watch::Sender<(MonoTime, Vec<HallSeen>)>) -> Result<(), Failure> {
+        let mut halls = Halls::of(&self.settings);
+        let mut heard = self.client.subscribe(fleet::status_of("*.*")).await.or_exit(Exit::Unavailable)?;
+        let (found, mut kept) = mpsc::channel(1);
+        tokio::spawn(look_up(self.client.clone(), self.settings.halls.clone(), found));
+        let mut pace = interval(LAY_OUT);
+        pace.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            tokio::select! {
+                message = heard.next() => match message {
+                    Some(message) => drop(halls.hear(&message)),
+                    None => return Err(anyhow!("the engine takes this desk no more")).or_exit(Exit::Unavailable),
+                },
+                Some(kept) = kept.recv() => halls.take(kept),
+                _ = pace.tick() => {
+                    let now = Monotonic.now();
+                    lay_out.send_replace((now, halls.table(now)));
+                }
+            }
+        }
+    }
+
+    /// The halls as they are now, worst first: also where what was laid out is old.
+    fn table(&self) -> Vec<HallSeen> {
+        let (at, table) = &*self.laid_out.borrow();
+        let since = Monotonic.now().since(*at);
+        let mut table: Vec<_> = table.iter().map(|hall| hall.later(since)).collect();
+        table.sort_by_key(HallSeen::rank); // stable: by name among those of a rank
+        table
+    }
+
+    fn is_connected(&self) -> bool {
+        self.client.connection_state() == EngineState::Connected
+    }
+
+    fn stops(&self) -> MutexGuard<'_, BTreeMap<&'static str, u64>> {
+        self.stops.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Asks the engine again and again for what it has kept.
+async fn look_up(client: Client, names: Vec<String>, found: mpsc::Sender<BTreeMap<String, Kept>>) {
+    loop {
+        if let Ok(kept) = kept_of(&client, &names).await
+            && found.send(kept).await.is_err()
+        {
+            return;
+        }
+        sleep(LOOK_UP).await;
+    }
+}
+
+async fn halls(State(desk): State<Arc<Desk>>) -> Response {
+    let consoles = &desk.settings.consoles;
+    let tile = |seen: HallSeen| Tile { rank: seen.rank(), console: consoles.get(&seen.name), seen };
+    let page = DeskPage {
+        desk: &desk.settings.name,
+        engine: desk.is_connected(),
+        halls: desk.table().into_iter().map(tile).collect(),
+    };
+    json(&page)
+}
+
+/// Asks halls for a stop, and says what came of it in each.
+async fn stop(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
+    let wrong = |detail: String| {
+        let remedy = "send {\"halls\": [\"all\"]}, or names of halls of this desk";
+        Problem::new(Code::Value, detail, remedy).into_response()
+    };
+    let asked: StopRequest = match serde_json::from_slice(&body) {
+        Ok(asked) => asked,
+        Err(error) => return wrong(format!("no list of halls: {error}")),
+    };
+    let halls = match act::chosen(&desk.settings.halls, &asked.halls) {
+        Ok(halls) if halls.is_empty() => return wrong("no hall is named".to_owned()),
+        Ok(halls) => halls,
+        Err(failure) => return wrong(failure.to_string()),
+    };
+    let ask = async |hall: String| {
+        let answer = act::ask_one(&desk.settings, &desk.client, &hall, &act::STOP).await;
+        *desk.stops().entry(answer.result()).or_default() += 1;
+        answer.json(&hall)
+    };
+    let answers: Vec<Value> = join_all(halls.into_iter().map(ask)).await;
+    json(&answers)
+}
+
+async fn figures(State(desk): State<Arc<Desk>>) -> Response {
+    let halls = desk.table();
+    let of_hall = |hall: &HallSeen| HallFigures {
+        name: hall.name.clone(),
+        age_s: hall.age_s,
+        silent: hall.silent,
+        status: hall.status.clone().filter(|_| !hall.silent),
+    };
+    let figures = FleetFigures {
+        engine: desk.is_connected(),
+        halls: halls.iter().map(of_hall).collect(),
+        stops: desk.stops().clone(),
+    };
+    ([(header::CONTENT_TYPE, CONTENT_TYPE)], figures.render()).into_response()
+}
+
+async fn page(uri: Uri) -> Response {
+    match console::fleet(uri.path()) {
+        Some((content_type, body)) => ([(header::CONTENT_TYPE, content_type)], body).into_response(),
+        None => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+fn json(value: &impl Serialize) -> Response {
+    let text = serde_json::to_string(value).expect("text and numbers are written without fail");
+    ([(header::CONTENT_TYPE, "application/json")], text).into_response()
+}
