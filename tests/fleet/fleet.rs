@@ -27,6 +27,8 @@ pub(crate) struct Engine {
     dir: TempDir,
     address: String,
     process: Option<Guarded>,
+    /// What was said as its files were made.
+    said: String,
 }
 
 /// A link that runs.
@@ -38,13 +40,50 @@ pub(crate) struct Link {
 impl Engine {
     /// None where there is no such program, and somebody asked for that.
     pub(crate) fn start(halls: &str) -> Option<Self> {
+        let mut engine = Self::made(halls, "127.0.0.1")?;
+        engine.restart();
+        Some(engine)
+    }
+
+    /// The same over TLS, with the certificates that `fleet init` says how to make; as for an engine on another machine, and on this one.
+    pub(crate) fn start_over_tls(halls: &str) -> Option<Self> {
+        if !is_installed("openssl") {
+            return None;
+        }
+        let mut engine = Self::made(halls, "10.9.9.1")?;
+        let fleet = engine.path("fleet");
+        let lines: Vec<_> = engine.said.lines().filter(|line| line.starts_with("openssl ")).collect();
+        assert_eq!(lines.len(), 2, "{}", engine.said);
+        let lines = lines.join(" 2> openssl.log && ").replace("10.9.9.1", "127.0.0.1");
+        let made = Command::new("bash").args(["-c", &lines]).current_dir(&fleet).output().unwrap();
+        assert!(made.status.success(), "{made:?}");
+        let here = |text: String| {
+            let folder = format!("{}/", fleet.to_str().unwrap());
+            text.replace("0.0.0.0", "127.0.0.1")
+                .replace("10.9.9.1", "127.0.0.1")
+                .replace("/etc/nats/", &folder)
+        };
+        for name in ["nats-server.conf", "h1/fleet.toml", "office/desk.toml"] {
+            let path = fleet.join(name);
+            fs::write(&path, here(fs::read_to_string(&path).unwrap())).unwrap();
+        }
+        for member in ["h1", "office"] {
+            fs::copy(fleet.join("fleet-ca.pem"), fleet.join(member).join("fleet-ca.pem")).unwrap();
+        }
+        engine.address = here(engine.address);
+        engine.restart();
+        Some(engine)
+    }
+
+    /// Its files, for an engine at that host.
+    fn made(halls: &str, host: &str) -> Option<Self> {
         if !is_installed("nats-server") {
             return None;
         }
         let dir = tempfile::tempdir().unwrap();
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let address = format!("127.0.0.1:{port}");
-        let mut engine = Self { dir, address, process: None };
+        let address = format!("{host}:{port}");
+        let mut engine = Self { dir, address, process: None, said: String::new() };
         let folder = engine.path("fleet");
         let folder = folder.to_str().unwrap();
         let init = [
@@ -59,13 +98,14 @@ impl Engine {
             "--folder",
             folder,
         ];
-        assert_eq!(crate::process::kinocue(&init).code, Some(0));
+        let run = crate::process::kinocue(&init);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        engine.said = run.stdout;
         let conf = engine.path("fleet/nats-server.conf");
         let store = engine.path("jetstream");
         let text = fs::read_to_string(&conf).unwrap();
         let text = text.replace("/var/lib/nats/jetstream", store.to_str().unwrap());
         fs::write(conf, text).unwrap();
-        engine.restart();
         Some(engine)
     }
 

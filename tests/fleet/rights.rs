@@ -200,3 +200,37 @@ fn what_is_no_record_keeps_no_later_show_from_the_log_and_each_show_is_reported_
     assert_eq!(run.code, Some(1), "{run:?}");
     assert!(run.stderr.contains("a record is none of ours"), "{run:?}");
 }
+
+#[test]
+fn over_a_network_the_engine_is_known_by_its_certificate_and_nobody_speaks_to_another_or_in_the_open() {
+    let Some(engine) = Engine::start_over_tls("h1") else { return };
+    let hall = engine.hall("h1", "[]");
+    let _link = engine.link("h1", &hall);
+    engine.hears_all();
+    assert_eq!(engine.desk(&["stop"]).stdout, "berlin.h1: stopping\n");
+    // An authority that signed nothing here: another engine, or somebody between.
+    let other = [
+        "req",
+        "-x509",
+        "-newkey",
+        "ed25519",
+        "-nodes",
+        "-subj",
+        "/CN=other",
+        "-keyout",
+        "other.key",
+        "-out",
+        "fleet-ca.pem",
+    ];
+    let office = engine.path("fleet/office");
+    let made = std::process::Command::new("openssl").args(other).current_dir(&office).output().unwrap();
+    assert!(made.status.success(), "{made:?}");
+    let run = engine.desk(&["stop"]);
+    assert_eq!(run.code, Some(69), "{run:?}");
+    assert!(run.stderr.contains("certificate"), "{run:?}");
+    // In the open nothing is said, not even to the right one.
+    let settings = office.join("desk.toml");
+    std::fs::write(&settings, std::fs::read_to_string(&settings).unwrap().replace("tls://", "nats://"))
+        .unwrap();
+    assert_ne!(engine.desk(&["status"]).code, Some(0));
+}
