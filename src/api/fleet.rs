@@ -72,6 +72,30 @@ pub(crate) fn try_letter(text: &str) {
     }
 }
 
+/// Opens a letter of a key that the hall has, with any text: what is taken is one of the few words of the fleet, and is so once.
+#[cfg(feature = "harness")]
+pub(crate) fn try_order(text: &str) {
+    use nkeys::{KeyPair, KeyPairType};
+    let pair = KeyPair::new_from_raw(KeyPairType::User, [7; 32]).expect("any 32 octets are a key");
+    let key = config::FleetKey {
+        name: "office".to_owned(),
+        role: config::Role::Operate,
+        public: pair.public_key(),
+    };
+    let fleet = config::Fleet { name: "berlin.h3".to_owned(), allow: Vec::new(), keys: vec![key] };
+    let access = super::FleetAccess::of(Some(&fleet));
+    let letter = Letter::sign(&pair, text.to_owned()).expect("the key has both halves");
+    assert!(letter.is_signed());
+    let now = Monotonic.now();
+    let open = |letter: &Letter| access.open(letter, command, 2_000_000_000, now);
+    let Ok((who, ask, _)) = open(&letter) else { return };
+    assert!(ask.fleet_word().is_some() && ask.least_role() <= who.role, "{ask:?}");
+    assert!(open(&letter).is_err(), "it came before");
+    let other = config::Fleet { keys: Vec::new(), ..fleet };
+    access.set(Some(&other));
+    assert!(open(&letter).is_err(), "its key was taken away");
+}
+
 /// How the hall is, in short; 503 where nothing new of it was heard for two seconds.
 pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<JsonReply<BriefStatus>, Problem> {
     check_pulse(&shared)?;

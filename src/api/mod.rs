@@ -58,7 +58,7 @@ mod tries;
 
 pub(crate) use doors::serve_behind_doors;
 #[cfg(feature = "harness")]
-pub(crate) use fleet::try_letter;
+pub(crate) use fleet::{try_letter, try_order};
 pub(crate) use serving::ServingThread;
 pub(crate) use stop::fleet_stop_socket;
 pub use stop::{StopSocket, stop_socket};

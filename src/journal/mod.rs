@@ -22,6 +22,8 @@ mod report;
 mod tail;
 #[cfg(test)]
 mod tests;
+#[cfg(feature = "harness")]
+mod tried;
 mod writer;
 
 pub(crate) use fold::Folds;
@@ -31,6 +33,8 @@ pub(crate) use report::{
     JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report, report_of,
 };
 pub(crate) use tail::{JournalPart, TOLD_FILES, tail};
+#[cfg(feature = "harness")]
+pub(crate) use tried::try_file;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,6 +1,6 @@
 //! Reads lines back, whatever is in the files.
 
-use std::io::{self, BufRead as _, BufReader, Read as _};
+use std::io::{self, BufRead, BufReader, Read as _};
 
 use super::files::FileId;
 use super::record::Line;
@@ -18,7 +18,16 @@ pub(super) fn each(
 ) -> io::Result<()> {
     let name = file.name();
     let Some((file, _)) = folder.file(&name)? else { return Ok(()) };
-    let mut input = BufReader::new(file);
+    each_in(BufReader::new(file), &name, notes, &mut take)
+}
+
+/// The same of what stands in a file of that name.
+pub(super) fn each_in(
+    mut input: impl BufRead,
+    name: &str,
+    notes: &mut Vec<String>,
+    take: &mut impl FnMut(Line),
+) -> io::Result<()> {
     let mut line = Vec::new();
     for number in 1_u64.. {
         line.clear();

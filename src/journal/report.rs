@@ -18,7 +18,7 @@ use crate::sys::folder::Folder;
 /// How long after its day the end of a show is looked for, days.
 const LONGEST_SHOW: i32 = 2;
 /// Notes that are told; of a file that is no journal there would be one for each line.
-const MOST_NOTES: usize = 20;
+pub(super) const MOST_NOTES: usize = 20;
 
 /// How much of some days is taken into a report; of more the newest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -132,7 +132,7 @@ pub(crate) fn report(
         for file in files::all(&folder)?.into_iter().filter(|file| (first..=until).contains(&file.day)) {
             read::each(&folder, file, &mut notes, |line| days.take(line))?;
         }
-        days.notes.append(&mut notes);
+        days.note(notes);
         Ok(folder.is_claimed())
     };
     let runs = gather().map_err(|source| JournalError { path: dir.to_owned(), source })?;
@@ -152,7 +152,7 @@ pub(crate) fn report_of(lines: impl IntoIterator<Item = Value>, from: Date, to: 
 }
 
 /// What has been read so far.
-struct Days {
+pub(super) struct Days {
     from: Date,
     to: Date,
     most: ReportBounds,
@@ -170,12 +170,17 @@ struct Open {
 }
 
 impl Days {
-    fn new(from: Date, to: Date, most: ReportBounds) -> Self {
+    pub(super) fn new(from: Date, to: Date, most: ReportBounds) -> Self {
         let (shows, actions) = (VecDeque::new(), VecDeque::new());
         Self { from, to, most, shows, actions, more: (0, 0), notes: Vec::new() }
     }
 
-    fn take(&mut self, line: Line) {
+    /// What a reader should know of the journal itself.
+    pub(super) fn note(&mut self, mut notes: Vec<String>) {
+        self.notes.append(&mut notes);
+    }
+
+    pub(super) fn take(&mut self, line: Line) {
         let (from, to) = (self.from, self.to);
         let within = |at: &str| day_of(at).is_some_and(|day| (from..=to).contains(&day));
         match line {
@@ -206,7 +211,7 @@ impl Days {
         }
     }
 
-    fn report(self, runs: bool) -> JournalReport {
+    pub(super) fn report(self, runs: bool) -> JournalReport {
         let Self { from, to, shows, actions, more: left_out, mut notes, .. } = self;
         let last = shows.len();
         let shows: Vec<_> = shows

@@ -1,7 +1,7 @@
 //! What the journal says of shows beyond what somebody has been told already: it is the queue of those who pass it on.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufRead as _, BufReader, Read as _};
+use std::io::{self, BufRead, BufReader, Read as _};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -62,7 +62,17 @@ fn of_file(
     parts: &mut Vec<JournalPart>,
 ) -> io::Result<()> {
     let Some((file, _)) = folder.file(name)? else { return Ok(()) };
-    let mut input = BufReader::new(file);
+    told_in(BufReader::new(file), name, told, most, parts)
+}
+
+/// The same of what stands in a file of that name.
+pub(super) fn told_in(
+    mut input: impl BufRead,
+    name: &str,
+    told: u64,
+    most: usize,
+    parts: &mut Vec<JournalPart>,
+) -> io::Result<()> {
     let mut text = Vec::new();
     let mut line = 0;
     while parts.len() < most {

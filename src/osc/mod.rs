@@ -89,8 +89,15 @@ impl Osc {
     }
 }
 
-/// What any datagram comes to.
+/// What any datagram asks of a hall that allows whatever can be allowed.
 #[cfg(feature = "harness")]
-pub(crate) fn try_datagram(datagram: &[u8]) {
-    drop(packet::read(datagram, 0));
+pub(crate) fn try_datagram(datagram: &[u8]) -> Vec<crate::control::Command> {
+    let all = crate::config::GearWord::ALL.map(|(_, word)| word);
+    let messages = packet::read(datagram, 0).into_iter().flatten();
+    let orders = messages.filter_map(|timed| order::order(&timed.message, &all).ok());
+    let commands = orders.filter_map(|order| match order {
+        order::OscOrder::Command(command) => Some(command),
+        order::OscOrder::Subscribe { .. } | order::OscOrder::Released => None,
+    });
+    commands.collect()
 }

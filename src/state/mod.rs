@@ -16,6 +16,8 @@ mod cause;
 mod kinds;
 mod next;
 mod refusal;
+#[cfg(any(test, feature = "harness"))]
+pub(crate) mod rules;
 mod tell;
 #[cfg(test)]
 mod tests;
@@ -146,7 +148,7 @@ impl Machine {
 
     /// True if every controller knows its position.
     #[must_use]
-    #[cfg(test)]
+    #[cfg(any(test, feature = "harness"))]
     pub(crate) const fn is_homed(&self) -> bool {
         self.facts.homed
     }

@@ -6,6 +6,7 @@ mod table;
 use super::*;
 use crate::film::chase::{HoldCause, ParkCause};
 use crate::film::point::FilmState;
+use crate::state::rules::{Step, take};
 
 const fn s(seconds: u64) -> MonoTime {
     MonoTime::from_nanos(seconds * 1_000_000_000)
@@ -40,23 +41,6 @@ fn way_to(state: State) -> (Vec<Step>, State) {
         State::Fault => then(&[Step::Tell(Event::Trouble(Trouble::Limiter))]),
     };
     (way, state)
-}
-
-/// A request or an event.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Step {
-    Command(Transition),
-    Tell(Event),
-}
-
-fn take(hall: &mut Machine, step: Step, now: MonoTime) -> Result<(), Refusal> {
-    match step {
-        Step::Command(request) => hall.request(request, now),
-        Step::Tell(event) => {
-            hall.event(event, now);
-            Ok(())
-        }
-    }
 }
 
 /// A hall in a state, since second 0.

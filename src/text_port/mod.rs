@@ -107,8 +107,12 @@ impl Text {
     }
 }
 
-/// What any line comes to.
+/// What any line asks of a hall that allows whatever can be allowed.
 #[cfg(feature = "harness")]
-pub(crate) fn try_line(octets: &[u8]) {
-    drop(line::order(octets, &[]));
+pub(crate) fn try_line(octets: &[u8]) -> Option<crate::control::Command> {
+    let all = crate::config::GearWord::ALL.map(|(_, word)| word);
+    match line::order(octets, &all) {
+        Ok(line::TextOrder::Command(command)) => Some(command),
+        _ => None,
+    }
 }

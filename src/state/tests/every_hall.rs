@@ -3,9 +3,9 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::chance::height;
 use super::remedies::follow_to_the_show;
 use super::*;
+use crate::state::rules::height;
 
 /// All of a hall that decides what it does. Since when it is so and how often it was cleared decide nothing, and of controllers and
 /// groups the number is only passed on: one of each stands for all.

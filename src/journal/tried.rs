@@ -1,0 +1,36 @@
+//! What any octets come to where they stand in a file of the journal. For tests and fuzzing.
+
+use jiff::civil::Date;
+
+use super::report::{Days, MOST_NOTES, ReportBounds};
+use super::{JournalPart, read, tail};
+
+const NAME: &str = "kinocue-2026-11-20-000.jsonl";
+const IN_MEMORY: &str = "octets in memory can be read";
+
+/// Nothing of it grows over its bounds, and lines that are passed on are each told once.
+pub(crate) fn try_file(octets: &[u8]) {
+    let mut days = Days::new(Date::MIN, Date::MAX, ReportBounds { shows: 3, actions: 3 });
+    let (mut notes, mut lines) = (Vec::new(), 0);
+    let mut take = |line| {
+        lines += 1;
+        days.take(line);
+    };
+    read::each_in(octets, NAME, &mut notes, &mut take).expect(IN_MEMORY);
+    assert!(lines + notes.len() <= octets.len());
+    days.note(notes);
+    let report = days.report(true);
+    assert!(report.shows.len() <= 3 && report.actions.len() <= 3 && report.notes.len() <= MOST_NOTES + 3);
+    serde_json::to_vec(&report).expect("a report is text and numbers");
+    let mut at_once = Vec::new();
+    tail::told_in(octets, NAME, 0, usize::MAX, &mut at_once).expect(IN_MEMORY);
+    let mut in_parts: Vec<JournalPart> = Vec::new();
+    loop {
+        let (before, told) = (in_parts.len(), in_parts.last().map_or(0, |part| part.line));
+        tail::told_in(octets, NAME, told, before + 100, &mut in_parts).expect(IN_MEMORY);
+        if in_parts.len() == before {
+            break;
+        }
+    }
+    assert_eq!(in_parts, at_once);
+}
