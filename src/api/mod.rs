@@ -58,6 +58,7 @@ mod tries;
 #[cfg(feature = "harness")]
 pub(crate) use fleet::try_letter;
 pub(crate) use serving::ServingThread;
+pub(crate) use socket::unix as unix_socket;
 pub(crate) use stop::fleet_stop_socket;
 pub use stop::{StopSocket, stop_socket};
 
