@@ -73,6 +73,7 @@ mod control;
 mod fleet;
 mod journal;
 mod library;
+mod pair;
 mod playlist;
 mod settings;
 

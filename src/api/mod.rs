@@ -60,6 +60,7 @@ pub(crate) use doors::serve_behind_doors;
 #[cfg(feature = "harness")]
 pub(crate) use fleet::{try_letter, try_order};
 pub(crate) use serving::ServingThread;
+pub(crate) use socket::unix as unix_socket;
 pub(crate) use stop::fleet_stop_socket;
 pub use stop::{StopSocket, stop_socket};
 

@@ -24,7 +24,7 @@ const BACKLOG: i32 = 128;
 
 /// The file of a socket, removed when it is dropped.
 #[derive(Debug)]
-pub(super) struct SocketFile(PathBuf);
+pub(crate) struct SocketFile(PathBuf);
 
 impl Drop for SocketFile {
     fn drop(&mut self) {
@@ -34,7 +34,7 @@ impl Drop for SocketFile {
 
 /// Listens, without blocking, on a socket at `path`, whose folder has to be there. A socket that a dead process left is
 /// replaced.
-pub(super) fn unix(path: &Path) -> Result<(UnixListener, SocketFile), ApiError> {
+pub(crate) fn unix(path: &Path) -> Result<(UnixListener, SocketFile), ApiError> {
     let failed = |source| ApiError::Socket { path: path.to_owned(), source };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     // Of two programs that start at once one looks and binds after the other.

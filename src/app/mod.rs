@@ -6,6 +6,7 @@ pub(crate) mod film;
 mod helpers;
 mod links;
 pub(crate) mod notify;
+pub(crate) mod pair;
 mod play;
 pub(crate) mod player;
 pub(crate) mod recorder;

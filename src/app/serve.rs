@@ -18,6 +18,7 @@ use signal_hook::flag;
 
 use super::film::HallFilm;
 use super::notify::AlarmTeller;
+use super::pair::Pair;
 use super::recorder::{HallRecorder, RecordLink, RecordPlaces};
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
@@ -85,6 +86,9 @@ pub(crate) enum ServeError {
         #[source]
         cause: io::Error,
     },
+    /// Somebody else sends to controllers, though this machine leads its hall.
+    #[error("another master sends to {0}; end it, and start this service again")]
+    OtherMaster(String),
     /// The supervisor does not end: what it had to write down may be lost.
     #[error(
         "the supervisor hangs, and the program ends without it: the seats are parked or at rest; its last journal lines may be lost"
@@ -144,6 +148,8 @@ pub(crate) struct Parts {
     pub(crate) signals: SystemSignals,
     /// Where it says what happens.
     pub(crate) log: Log,
+    /// What it leads by, where its hall has two show machines.
+    pub(crate) pair: Option<Pair>,
 }
 
 /// What a daemon came to.
@@ -195,15 +201,16 @@ fn serve_halls(
     crashed: bool,
     up: impl FnOnce(Handle, &[SocketAddr]),
 ) -> Result<Served, ServeError> {
-    let Parts { config, places, pages, signals, log } = parts;
+    let Parts { config, places, pages, signals, log, mut pair } = parts;
     let began = Monotonic.now();
     let mut config = Arc::new(config);
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     // A person puts playlists there. Where it cannot be made, whoever loads one is told.
     let _ = fs::create_dir_all(config.playlists());
-    let mut numbers = Numbers::new();
+    let (mut numbers, took_over) = before(pair.as_ref(), &config);
     let mut film = HallFilm::default();
-    let mut runtime = open(&config, crashed, &numbers, &signals.leave, &mut film)?;
+    let opening = Opening { leave: &signals.leave, pair: pair.as_ref() };
+    let mut runtime = opening.first(&config, crashed || took_over.is_some(), &numbers, &mut film)?;
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let record_places = places.of_recordings(&config);
@@ -225,12 +232,14 @@ fn serve_halls(
         osc: surfaces.osc_counts(),
         buttons: surfaces.pads(),
         recorder: RecordLink::default(),
+        pair: pair.as_ref().map(Pair::watch),
     };
+    ports.carryover.tell(took_over);
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
     mark.leave()?;
     up(handle, surfaces.addresses());
-    let mut feeder = None;
+    let mut feeder = pair.as_mut().and_then(Pair::take_feeder);
     let served = loop {
         (ports.film, ports.player) = (film.table(), film.player());
         let recorder = HallRecorder::start(&mut runtime, &record_places);
@@ -243,8 +252,8 @@ fn serve_halls(
         };
         // Also of controllers that come back with a later configuration.
         numbers.extend(left.closed.numbers.clone());
-        (runtime, config) =
-            reopen(next, config, &numbers, &mut ports.carryover, &ports.signals.leave, &mut film)?;
+        let opening = Opening { leave: &ports.signals.leave, pair: pair.as_ref() };
+        (runtime, config) = opening.reopen(next, config, &numbers, &mut ports.carryover, &mut film)?;
         surfaces.take_tokens(&config);
     };
     surfaces.close();
@@ -259,37 +268,68 @@ fn end_recording(recorder: HallRecorder, log: &Log) {
     }
 }
 
-/// Opens the hall, and reads what tells of its film.
-fn open(
-    config: &Arc<Config>,
-    crashed: bool,
-    numbers: &Numbers,
-    leave: &Arc<AtomicBool>,
-    film: &mut HallFilm,
-) -> Result<Runtime, RuntimeError> {
-    let runtime = Runtime::open(Arc::clone(config), Purpose::Hall { crashed }, numbers, leave)?;
-    let point = film.follow(config).map_err(RuntimeError::Thread)?;
-    Ok(runtime.with_film(point))
+/// From where frame numbers go on, and what to tell of whoever led before.
+fn before(pair: Option<&Pair>, config: &Config) -> (Numbers, Option<String>) {
+    pair.map_or_else(Default::default, |pair| (pair.numbers(config), pair.took_over()))
 }
 
-/// Opens the hall with another configuration; where it does not open so, with the one before, which did.
-fn reopen(
-    next: Arc<Config>,
-    before: Arc<Config>,
-    numbers: &Numbers,
-    carryover: &mut Carryover,
-    leave: &Arc<AtomicBool>,
-    film: &mut HallFilm,
-) -> Result<(Runtime, Arc<Config>), RuntimeError> {
-    // The seats are parked or at rest, so nothing tells of a crash.
-    let mut open = |config: &Arc<Config>| open(config, false, numbers, leave, film);
-    match open(&next) {
-        Ok(runtime) => Ok((runtime, next)),
-        Err(error) => {
-            carryover.refuse(format!(
-                "the hall does not open with the new configuration, and has the old one: {error}"
-            ));
-            Ok((open(&before)?, before))
+/// How halls are opened.
+struct Opening<'a> {
+    leave: &'a Arc<AtomicBool>,
+    pair: Option<&'a Pair>,
+}
+
+impl Opening<'_> {
+    /// Opens the first hall of this program. Whatever a second machine was promised, nothing may move where somebody else sends.
+    fn first(
+        &self,
+        config: &Arc<Config>,
+        crashed: bool,
+        numbers: &Numbers,
+        film: &mut HallFilm,
+    ) -> Result<Runtime, ServeError> {
+        let mut runtime = self.open(config, crashed, numbers, film)?;
+        let others = if self.pair.is_some() { runtime.find_other_masters() } else { Vec::new() };
+        let names: Vec<_> = others.iter().map(|(lane, _)| config.controllers[*lane].name.as_str()).collect();
+        if names.is_empty() { Ok(runtime) } else { Err(ServeError::OtherMaster(names.join(", "))) }
+    }
+
+    /// Opens the hall, and reads what tells of its film.
+    fn open(
+        &self,
+        config: &Arc<Config>,
+        crashed: bool,
+        numbers: &Numbers,
+        film: &mut HallFilm,
+    ) -> Result<Runtime, RuntimeError> {
+        let purpose = Purpose::Hall { crashed };
+        let lead = self.pair.map(Pair::lead);
+        let runtime = Runtime::open(Arc::clone(config), purpose, numbers, self.leave, lead)?;
+        if let Some(pair) = self.pair {
+            pair.shows(&runtime.control().live, numbers);
+        }
+        let point = film.follow(config).map_err(RuntimeError::Thread)?;
+        Ok(runtime.with_film(point))
+    }
+
+    /// Opens the hall with another configuration; where it does not open so, with the one before, which did.
+    fn reopen(
+        &self,
+        next: Arc<Config>,
+        before: Arc<Config>,
+        numbers: &Numbers,
+        carryover: &mut Carryover,
+        film: &mut HallFilm,
+    ) -> Result<(Runtime, Arc<Config>), RuntimeError> {
+        // The seats are parked or at rest, so nothing tells of a crash.
+        match self.open(&next, false, numbers, film) {
+            Ok(runtime) => Ok((runtime, next)),
+            Err(error) => {
+                carryover.refuse(format!(
+                    "the hall does not open with the new configuration, and has the old one: {error}"
+                ));
+                Ok((self.open(&before, false, numbers, film)?, before))
+            }
         }
     }
 }
@@ -368,9 +408,10 @@ mod tests {
         let (next, before) = (hall("192.0.2.1:0"), hall("127.0.0.1:0"));
         let mut carryover = Carryover::default();
         let mut film = HallFilm::default();
+        let leave = Arc::default();
+        let opening = Opening { leave: &leave, pair: None };
         let (_house, config) =
-            reopen(next, Arc::clone(&before), &Numbers::new(), &mut carryover, &Arc::default(), &mut film)
-                .unwrap();
+            opening.reopen(next, Arc::clone(&before), &Numbers::new(), &mut carryover, &mut film).unwrap();
         assert!(Arc::ptr_eq(&config, &before));
         assert!(
             format!("{carryover:?}").contains("does not open with the new configuration"),
@@ -378,8 +419,7 @@ mod tests {
         );
         let next = hall("127.0.0.1:0");
         let (_house, config) =
-            reopen(Arc::clone(&next), before, &Numbers::new(), &mut carryover, &Arc::default(), &mut film)
-                .unwrap();
+            opening.reopen(Arc::clone(&next), before, &Numbers::new(), &mut carryover, &mut film).unwrap();
         assert!(Arc::ptr_eq(&config, &next));
     }
 }

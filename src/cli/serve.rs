@@ -9,6 +9,7 @@ use super::rehearsal::Rehearsal;
 use super::token::link;
 use super::{Exit, Failure, OrExit as _, exit, load, metres, places, print};
 use crate::api::ApiError;
+use crate::app::pair::{PairError, PairPlaces, StoodBy, stand_by};
 use crate::app::serve::{Parts, Places, ServeError, serve, signals};
 use crate::app::surfaces::{Sockets, SurfaceError};
 use crate::console;
@@ -36,8 +37,9 @@ Exit codes:
   0   ended by a signal, with the seats parked
   66  the configuration is missing
   71  the system refused a socket, a thread or a folder
-  75  another program holds the frame port, a socket or a port of the API
-  78  the configuration is bad")]
+  75  another program holds the frame port, a socket or a port of the API; or, with [pair], this machine has lost the lead
+  78  the configuration is bad, or the key of [pair]
+  79  another master sends to the seats")]
 pub(super) struct Args {
     /// The configuration of the hall.
     #[arg(long, value_name = "FILE", env = "KINOCUE_CONFIG")]
@@ -83,7 +85,17 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     for text in metres::of_hall(&config) {
         log.say(Line::new(Priority::Warning, "metres", text));
     }
-    let parts = Parts { config, places, pages: console::page, signals: signals()?, log: log.clone() };
+    let signals = signals()?;
+    let mut pair = None;
+    if let Some(machines) = &config.pair {
+        let Places { config: file, state, sockets } = &places;
+        let of_pair = PairPlaces { config: file, state, control: &sockets.control, fleet: &sockets.fleet };
+        match stand_by(&config, machines, &of_pair, &signals.leave, &log)? {
+            StoodBy::Leads(leads) => pair = Some(leads),
+            StoodBy::Ended => return Ok(Exit::Done),
+        }
+    }
+    let parts = Parts { config, places, pages: console::page, signals, log: log.clone(), pair };
     serve(parts, |_, addresses| {
         for address in addresses {
             let text = format!("the API and the console: http://{address}/");
@@ -100,6 +112,18 @@ impl From<ServeError> for Failure {
     fn from(error: ServeError) -> Self {
         let exit = match &error {
             ServeError::Surface(SurfaceError::Api(ApiError::Served { .. })) => Exit::TryAgain,
+            ServeError::OtherMaster(_) => Exit::OtherMaster,
+            _ => exit::of_system(&error),
+        };
+        Self { exit, error: error.into() }
+    }
+}
+
+impl From<PairError> for Failure {
+    fn from(error: PairError) -> Self {
+        let exit = match &error {
+            PairError::Key(_) => Exit::Config,
+            PairError::Socket(ApiError::Served { .. }) => Exit::TryAgain,
             _ => exit::of_system(&error),
         };
         Self { exit, error: error.into() }

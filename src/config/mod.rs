@@ -29,6 +29,7 @@ pub(crate) mod link;
 mod log;
 mod notify;
 mod osc;
+mod pair;
 mod preset;
 mod read;
 mod record;
@@ -62,6 +63,7 @@ pub(crate) use link::Link;
 pub(crate) use log::{Log, journal_in};
 pub(crate) use notify::{Mail, Notify, WebHook};
 pub(crate) use osc::OscPort;
+pub(crate) use pair::Pair;
 pub(crate) use preset::Preset;
 pub(crate) use record::{Record, RecordMode};
 pub(crate) use section::{Entry, Section, did_you_mean, there_is_no};
@@ -111,6 +113,8 @@ pub struct Config {
     pub(crate) notify: Option<Notify>,
     /// The fleet that the hall belongs to, if it does.
     pub(crate) fleet: Option<Fleet>,
+    /// The two show machines of the hall, where it has two.
+    pub(crate) pair: Option<Pair>,
     /// HTTP over TCP.
     pub(crate) api: Api,
     /// The film that leads the shows, where one does.

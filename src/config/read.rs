@@ -26,6 +26,7 @@ use super::link::{LinkEntry, links};
 use super::log::log;
 use super::notify::notify;
 use super::osc::osc;
+use super::pair::pair;
 use super::preset::presets;
 use super::record::record;
 use super::seat::seats;
@@ -89,8 +90,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; add at least one");
     }
-    let [preset_at, library_at, log_at, osc_at, text_at, sync_at, film_at] =
-        ["preset", "library", "log", "osc", "text", "sync", "film"].map(|key| section.get(key));
+    let [preset_at, library_at, log_at, osc_at, text_at, sync_at, film_at, pair_at] =
+        ["preset", "library", "log", "osc", "text", "sync", "film", "pair"].map(|key| section.get(key));
     section.finish();
     let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
     let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
@@ -109,6 +110,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let buttons = buttons_at.map_or_else(Vec::new, |entry| buttons(entry, faults));
     let notify = notify_at.and_then(|entry| notify(entry, faults));
     let fleet = fleet_at.and_then(|entry| fleet(entry, faults));
+    let pair = pair_at.and_then(|entry| pair(entry, !links.is_empty(), fleet.is_some(), faults));
     let film = film_at.and_then(|entry| film(entry, faults));
     // The player tells where its film is, whoever else does.
     let of_player = film.is_some().then(FilmSync::default);
@@ -130,6 +132,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         buttons,
         notify,
         fleet,
+        pair,
         api: api?,
         sync,
         film,

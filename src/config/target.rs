@@ -101,6 +101,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         buttons: Vec::new(),
         notify: None,
         fleet: None,
+        pair: None,
         api: Api::default(),
         sync: None,
         film: None,

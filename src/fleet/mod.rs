@@ -38,3 +38,13 @@ pub(crate) fn stop_to(hall: &str, who: &str) -> String {
 pub(crate) fn log_of(hall: &str) -> String {
     format!("kc.log.{hall}")
 }
+
+/// Where the lease of a hall with two show machines is kept.
+pub(crate) fn lease_of(hall: &str) -> String {
+    format!("kc.lease.{hall}")
+}
+
+/// The stream of that, one for each hall.
+pub(crate) fn lease_stream(hall: &str) -> String {
+    format!("kc_lease_{}", hall.replace('.', "_"))
+}

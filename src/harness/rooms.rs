@@ -71,7 +71,7 @@ pub mod motion {
     };
 }
 pub mod net {
-    pub use crate::net::{Delivery, DrainGrid, Network, Origin, Ports, SendFault, Sender, over};
+    pub use crate::net::{Delivery, DrainGrid, Lead, Network, Origin, Ports, SendFault, Sender, over};
 }
 pub mod observe {
     pub use crate::observe::Watched;

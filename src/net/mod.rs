@@ -7,6 +7,7 @@
 
 mod cost;
 mod error;
+mod lead;
 mod network;
 mod open;
 mod recv;
@@ -26,6 +27,7 @@ use crate::time::MonoTime;
 
 pub(crate) use cost::SendCost;
 pub(crate) use error::NetError;
+pub use lead::Lead;
 pub use network::{Network, over};
 pub use recv::Origin;
 pub(crate) use recv::Receiver;

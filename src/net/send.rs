@@ -8,7 +8,9 @@ use std::sync::atomic::Ordering;
 use rustix::io::Errno;
 use rustix::net::SendFlags;
 
-use super::{Lane, Network};
+use super::{Lane, Lead, Network};
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
 
 /// What became of a datagram on its way into the kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +32,8 @@ pub struct SendFault {
 impl SendFault {
     /// Kept back, because what it belongs to was called off.
     pub(crate) const CALLED_OFF: Self = Self { errno: libc::ECANCELED };
+    /// Kept back, because this machine does not lead its hall, or not any more.
+    pub(crate) const NOT_LEADING: Self = Self { errno: libc::EOWNERDEAD };
 
     /// That of a system's error number.
     #[must_use]
@@ -63,6 +67,7 @@ impl SendFault {
                 "no route to it: check the cable and this machine's address"
             }
             libc::ECANCELED => "it was cancelled",
+            libc::EOWNERDEAD => "the other show machine of the hall may lead it: look there",
             libc::EPERM | libc::EACCES => "a firewall of this machine blocks it",
             _ => "the system is out of some resource; see its log",
         }
@@ -77,7 +82,11 @@ impl fmt::Display for SendFault {
 
 /// The sending half of [`Ports`](super::Ports), or of a [`Network`]. Clones send by the same sockets.
 #[derive(Debug, Clone)]
-pub struct Sender(SendWay);
+pub struct Sender {
+    way: SendWay,
+    /// Until when it sends, where that may end.
+    lead: Option<Arc<Lead>>,
+}
 
 /// Where datagrams go.
 #[derive(Debug, Clone)]
@@ -88,27 +97,49 @@ enum SendWay {
 
 impl Sender {
     pub(super) const fn new(lanes: Arc<[Lane]>) -> Self {
-        Self(SendWay::Kernel(lanes))
+        Self { way: SendWay::Kernel(lanes), lead: None }
     }
 
     pub(super) const fn over(network: Arc<dyn Network>) -> Self {
-        Self(SendWay::Network(network))
+        Self { way: SendWay::Network(network), lead: None }
+    }
+
+    /// The same for as long as that lasts; without it, for ever.
+    #[must_use]
+    pub fn led_by(self, lead: Option<Arc<Lead>>) -> Self {
+        Self { lead, ..self }
+    }
+
+    /// How long it sends, where that may end.
+    #[must_use]
+    pub(crate) fn lead(&self) -> Option<Arc<Lead>> {
+        self.lead.clone()
+    }
+
+    /// True if nothing may leave any more.
+    fn is_over(&self) -> bool {
+        self.lead.as_ref().is_some_and(|lead| lead.is_over(Monotonic.now()))
     }
 
     /// Sends one datagram to controller `lane`, counted from 0 in the order in which they were opened.
     ///
     /// The kernel reports a closed port by failing a *later* call, without having sent that one's datagram; so it is
-    /// sent once more, at once. There is no other retry: late motion is worse than none.
+    /// sent once more, at once. There is no other retry: late motion is worse than none. Each time the lead is looked at right
+    /// before: a thread may have been held up anywhere until then.
     ///
     /// # Panics
     /// If there is no such lane.
     pub(crate) fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
-        let lane = match &self.0 {
+        if self.is_over() {
+            return Delivery::Failed(SendFault::NOT_LEADING);
+        }
+        let lane = match &self.way {
             SendWay::Kernel(lanes) => &lanes[lane],
             SendWay::Network(network) => return network.send(lane, datagram),
         };
         match lane.send(datagram) {
             Ok(()) => Delivery::Sent,
+            Err(Errno::CONNREFUSED) if self.is_over() => Delivery::Failed(SendFault::NOT_LEADING),
             Err(Errno::CONNREFUSED) => match lane.send(datagram) {
                 Ok(()) => Delivery::SentAfterRefusal,
                 Err(errno) => failed(errno),

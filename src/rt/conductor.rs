@@ -1,12 +1,14 @@
 //! Between the state machine of the hall and the engine of the play: what is asked and what happens goes to the machine,
 //! what the machine says is done by the engine, and what the engine then does is told to the machine. Tick thread.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::film::{FilmLead, FilmStart};
 use super::mail::{Alarm, News};
 use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, PlayProgress, Rest};
 use crate::film::chase::{FilmLeave, ParkCause};
+use crate::net::Lead;
 use crate::state::{
     Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
 };
@@ -36,6 +38,8 @@ pub struct Conductor {
     film_is_over: bool,
     /// How far ahead of the film the seats are that follow it.
     film_error_ns: Option<i64>,
+    /// Until when this machine leads the hall; none where it is the only one.
+    lead: Option<Arc<Lead>>,
 }
 
 /// A signal goes to whoever leads the hall as well, who knows more: this long it is left to them.
@@ -44,6 +48,9 @@ const LEFT_TO_KEEPER: Duration = Duration::from_millis(500);
 const PLANNED_WITHIN: Duration = Duration::from_secs(1);
 /// After a gap the ack thread has this long to read what came in it.
 const EXCUSED_FOR: Duration = Duration::from_millis(100);
+/// Where no more of the lead is left than this, the seats are braked: nobody has promised more for the rest of its second. Whatever the
+/// limits of a seat are, what is not at rest by then halts with the last frame.
+const BRAKES_IN: Duration = Duration::from_millis(400);
 
 impl Conductor {
     /// One of a hall in that state.
@@ -61,6 +68,7 @@ impl Conductor {
             film: None,
             film_is_over: false,
             film_error_ns: None,
+            lead: None,
         }
     }
 
@@ -102,6 +110,22 @@ impl Conductor {
             self.machine.event(Event::Trouble(Trouble::Deaf), now);
             self.steer(engine);
         }
+    }
+
+    /// Minds how long this machine still leads the hall. Where it hears nothing any more of whoever may promise that, it cannot know whether
+    /// it is alone, and brakes as for a stop while it may.
+    pub(super) fn mind_lead(&mut self, engine: &mut Engine, now: MonoTime) {
+        let is_short = self.lead.as_ref().is_some_and(|lead| lead.until().since(now) <= BRAKES_IN);
+        if is_short && self.machine.may_send_motion() && self.machine.fault().is_none() {
+            self.machine.event(Event::Trouble(Trouble::Alone), now);
+            self.steer(engine);
+        }
+    }
+
+    /// The same of a machine that leads its hall until then.
+    #[must_use]
+    pub fn led_by(self, lead: Option<Arc<Lead>>) -> Self {
+        Self { lead, ..self }
     }
 
     /// Whether the hall lives on when its show is over.

@@ -179,6 +179,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
         conductor.tick(engine, now);
         conductor.mind_acks(mail.told_by(), engine, now);
+        conductor.mind_lead(engine, now);
         for lane in 0..desk.lanes() {
             engine.mix(lane, desk.mix(lane));
         }

@@ -225,8 +225,19 @@ fn read(folder: &Path) -> Kept {
     }
 }
 
+/// Keeps what is set in the file of a folder, where nobody else does.
+///
+/// # Errors
+/// Those of the disk.
+pub(crate) fn keep(folder: &Path, settings: &Settings) -> io::Result<()> {
+    write(folder, &settings.text())
+}
+
 /// The text of the file; `None` if there is none.
-fn text(folder: &Path) -> Result<Option<String>, String> {
+///
+/// # Errors
+/// Why it cannot be read.
+pub(crate) fn text(folder: &Path) -> Result<Option<String>, String> {
     let read = || -> io::Result<Option<String>> {
         let folder = Folder::open(folder)?;
         let Some((file, _)) = folder.file(FILE)? else {

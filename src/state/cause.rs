@@ -66,6 +66,8 @@ pub enum Trouble {
     Planner,
     /// Replies are no longer read: nobody would hear of an emergency stop.
     Deaf,
+    /// Neither the other show machine of the hall nor the engine was heard: the other one may take over.
+    Alone,
     /// A controller did not get home.
     Homing(usize),
     /// Homing took too long.
@@ -109,7 +111,12 @@ impl Trouble {
     const fn whose(self) -> Option<Whose> {
         match self {
             Self::Homing(controller) | Self::OtherMaster(controller) => Some(Whose::Controller(controller)),
-            Self::Limiter | Self::Planner | Self::Deaf | Self::HomingTime | Self::ParkingTime => None,
+            Self::Limiter
+            | Self::Planner
+            | Self::Deaf
+            | Self::Alone
+            | Self::HomingTime
+            | Self::ParkingTime => None,
         }
     }
 }

@@ -175,6 +175,10 @@ impl Trouble {
             Self::Deaf => {
                 ("deaf", "replies were not read for too long; an emergency stop would have gone unnoticed")
             }
+            Self::Alone => (
+                "alone",
+                "neither the other show machine nor the engine was heard for 0.6 s; the other one may take over",
+            ),
             Self::Homing(_) => ("homing", "a seat failed to home"),
             Self::HomingTime => ("homing-time", "homing took too long"),
             Self::ParkingTime => ("parking-time", "parking took too long"),

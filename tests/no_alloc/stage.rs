@@ -17,7 +17,7 @@ use kinocue::harness::engine::{Mix, Show};
 use kinocue::harness::film::chase::ChaseRules;
 use kinocue::harness::film::point::{FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
-use kinocue::harness::net::{Delivery, DrainGrid, Ports, Sender};
+use kinocue::harness::net::{Delivery, DrainGrid, Lead, Ports, Sender};
 use kinocue::harness::observe::Watched;
 use kinocue::harness::record::{Asked, FrameKind, RecordedSeat, Tap, TickHead, ack_tap, tap};
 use kinocue::harness::rt::{
@@ -377,15 +377,19 @@ fn play_to(
         let seats = [6, 3].map(recorded_seat);
         // Nobody empties it: after two seconds each tick is dropped, which allocates nothing either.
         let (tap, _recorder) = tap(&seats, rate);
+        // It leads for ever, and looks at that each time.
+        let lasting = Arc::<Lead>::default();
+        lasting.extend(MonoTime::from_nanos(u64::MAX));
         let mut tick_loop = TickLoop {
             clock: &spinning,
             grid: TickGrid::new(origin, rate),
             engine,
             conductor: Conductor::of_a_play(origin, attended)
-                .chasing(lead.then(|| FilmLead::new(Arc::clone(&film), rules, origin))),
+                .chasing(lead.then(|| FilmLead::new(Arc::clone(&film), rules, origin)))
+                .led_by(Some(Arc::clone(&lasting))),
             lanes,
             places,
-            sink: Counted { sender, pace, tap },
+            sink: Counted { sender: sender.led_by(Some(lasting)), pace, tap },
             mail,
             desk,
             leave: &pace.leave,

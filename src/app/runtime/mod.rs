@@ -25,7 +25,7 @@ use crate::engine::{Engine, Mix};
 use crate::film::chase::ChaseRules;
 use crate::film::point::PublishedPoint;
 use crate::health::{Groups, HealthTable};
-use crate::net::{DrainGrid, NetError, Receiver, Sender};
+use crate::net::{DrainGrid, Lead, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::record::{Judging, Taps};
@@ -160,7 +160,7 @@ pub(crate) struct RuntimeEnd {
 
 impl Runtime {
     /// Opens the frame port for a configuration. Where `signals` ask for the end, the seats park and the hall closes, even if
-    /// whoever leads it does not hear them.
+    /// whoever leads it does not hear them. Where there is a `lead`, nothing leaves once that is over.
     ///
     /// # Errors
     /// Why not.
@@ -169,11 +169,13 @@ impl Runtime {
         purpose: Purpose,
         numbers: &Numbers,
         signals: &Arc<AtomicBool>,
+        lead: Option<Arc<Lead>>,
     ) -> Result<Self, RuntimeError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
         let ports = links::open(&config, &purpose)?;
-        let halves = boot::bind(&config)?;
+        let (sender, receiver) = boot::bind(&config)?;
+        let halves = (sender.led_by(lead), receiver);
         let crowding = boot::crowding(&config);
         let mut runtime = Self::over_all(config, purpose, numbers, signals, halves, ports)?;
         runtime.handle.crowding = crowding;
@@ -231,6 +233,7 @@ impl Runtime {
             Purpose::Play { film, .. } => (engine.waiting(), watch(health), film),
         };
         let links = links::Links::over(&config, &lanes, &watch, ports, &live)?;
+        let lead = sender.lead();
         let watched: Vec<_> = config.stations().iter().map(Watched::of).collect();
         let sink = Outlets::new(sender, watched.len(), links.poses, links.led);
         let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
@@ -253,7 +256,7 @@ impl Runtime {
             crowding: None,
         };
         let silent = manner.silent;
-        let ticks = Ticks { engine, lanes, film, sink, mail };
+        let ticks = Ticks { engine, lanes, film, lead, sink, mail };
         Ok(Self { handle, line, silent, acks, watch, plans, links: loops, ticks })
     }
 
@@ -406,6 +409,7 @@ struct Ticks {
     engine: Engine,
     lanes: Vec<Lane>,
     film: Option<LeadingFilm>,
+    lead: Option<Arc<Lead>>,
     sink: Outlets,
     mail: Mail,
 }
@@ -418,13 +422,13 @@ impl Ticks {
         grid: TickGrid,
         control: &'a Control,
     ) -> TickLoop<'a, C, Outlets> {
-        let Self { engine, lanes, film, sink, mail } = self;
+        let Self { engine, lanes, film, lead, sink, mail } = self;
         let now = grid.next_deadline();
         let film = film.map(|LeadingFilm { source, rules }| match rules {
             Some(rules) => FilmLead::new(source, rules, now),
             None => FilmLead::of_a_hall(source, now),
         });
-        let conductor = Conductor::of_a_hall(now).chasing(film);
+        let conductor = Conductor::of_a_hall(now).chasing(film).led_by(lead);
         let places = Places::new(&lanes, grid.rate());
         let Control { desk, leave, .. } = control;
         TickLoop { clock, grid, engine, conductor, lanes, places, sink, mail, desk, leave }

@@ -61,6 +61,8 @@ words! {
         Link = "link",
         /// Of a pad.
         Buttons = "buttons",
+        /// Of the other show machine, and of the engine by which it would take over.
+        Pair = "pair",
         /// Of alarms that nobody was told.
         Notify = "notify",
         /// Of the recording of a show.
@@ -140,8 +142,7 @@ mod tests {
         let (asked, films) = (Transition::ALL.map(Cause::Asked), FilmState::ALL.map(HoldCause::Film));
         let ready =
             each!(Readiness { NoCue, NotProved, NotPreflighted, Ready }).into_iter().map(Cause::NotReady);
-        let troubles =
-            each!(Trouble { Limiter, Planner, Deaf, Homing(0), HomingTime, ParkingTime, OtherMaster(0) });
+        let troubles = each!(Trouble { Limiter, Planner, Deaf, Alone, Homing(0), HomingTime, ParkingTime, OtherMaster(0) });
         let over = each!(ParkCause { FilmEnded, FilmCutShort, CueLeft, HeldTooLong });
         let awaited = each!(HoldCause { Film(FilmState::Lost), Apart, Behind, Unstable, Asks });
         let mut all = each!(Cause {

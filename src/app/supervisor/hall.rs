@@ -11,6 +11,7 @@ use super::state_mirror::StateMirror;
 use crate::app::buttons::PadTable;
 use crate::app::film::SharedTable;
 use crate::app::notify::NotifyTable;
+use crate::app::pair::PairWatch;
 use crate::app::player::PlayerLink;
 use crate::app::recorder::RecordLink;
 use crate::app::runtime::RuntimeHandle;
@@ -57,6 +58,8 @@ pub(super) struct HallContext {
     pub(super) osc: Option<Arc<Counts>>,
     /// How the pads are, if there are any.
     pub(super) buttons: Option<PadTable>,
+    /// The other show machine, where there is one.
+    pub(super) pair: Option<PairWatch>,
     /// How the ways to tell alarms are, if there are any.
     pub(super) notify: Option<NotifyTable>,
     /// The way to the recorder.
@@ -133,6 +136,7 @@ impl HallContext {
             player: None,
             osc: None,
             buttons: None,
+            pair: None,
             notify: None,
             recorder: RecordLink::default(),
             links: runtime.links.clone(),

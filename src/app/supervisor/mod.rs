@@ -59,6 +59,7 @@ use jiff::Zoned;
 
 use super::buttons::PadTable;
 use super::film::SharedTable;
+use super::pair::PairWatch;
 use super::player::PlayerLink;
 use super::recorder::RecordLink;
 use super::runtime::{RuntimeEnd, RuntimeHandle};
@@ -121,6 +122,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) buttons: Option<PadTable>,
     /// The way to the recorder.
     pub(crate) recorder: RecordLink,
+    /// The other show machine, where there is one.
+    pub(crate) pair: Option<PairWatch>,
 }
 
 /// What is left once the hall has closed.
@@ -180,7 +183,7 @@ impl Supervisor {
         let mut hall = HallContext::new(&runtime, settings, now);
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
         (hall.buttons, hall.recorder) = (ports.buttons.clone(), ports.recorder.clone());
-        hall.notify = ports.service_log.notify_table();
+        (hall.pair, hall.notify) = (ports.pair.clone(), ports.service_log.notify_table());
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,

@@ -50,6 +50,11 @@ impl Carryover {
             .map_or_else(|| HallSettings::new(config), |before| HallSettings::with(config, before))
     }
 
+    /// What happened before this hall, for a person.
+    pub(crate) fn tell(&mut self, text: Option<String>) {
+        self.untold.extend(text);
+    }
+
     /// Another configuration was not taken: a person should know that, whoever asked for it first.
     pub(crate) fn refuse(&mut self, why: String) {
         if let Some((_, result)) = &mut self.reloading {
@@ -84,6 +89,7 @@ pub(super) fn not_taken(now: &Config, next: &Config) -> Vec<&'static str> {
         ("[osc]", next.osc != now.osc),
         ("[text]", next.text != now.text),
         ("[buttons]", next.buttons != now.buttons),
+        ("[pair]", next.pair != now.pair),
         ("[notify]", next.notify != now.notify),
     ];
     changed.into_iter().filter(|(_, changed)| *changed).map(|(table, _)| table).collect()

@@ -421,6 +421,7 @@ fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, Supe
             player: None,
             osc: None,
             buttons: None,
+            pair: None,
             recorder: crate::app::recorder::RecordLink::default(),
         },
     )

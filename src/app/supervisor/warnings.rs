@@ -9,6 +9,7 @@ use super::status::StatusParts;
 use super::{belts, player, recorded};
 use crate::app::links;
 use crate::app::notify::NotifyTable;
+use crate::app::pair::PairWatch;
 use crate::control::{Coded, Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -57,6 +58,8 @@ impl StatusParts<'_> {
         warnings
             .extend(links::troubles(&hall.links).map(|trouble| in_two(WarningCode::Link.word(), &trouble)));
         warnings.extend(hall.buttons.iter().flat_map(|pads| pads.warnings(WarningCode::Buttons.word())));
+        let of_pair = hall.pair.iter().flat_map(PairWatch::troubles);
+        warnings.extend(of_pair.map(|trouble| in_two(WarningCode::Pair.word(), &trouble)));
         let untold = hall.notify.iter().flat_map(NotifyTable::status).filter_map(|way| {
             Some(in_two(
                 WarningCode::Notify.word(),

@@ -81,7 +81,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let screen = Screen::new();
     let lines = screen.clone();
     let log = Log::start(move |line| lines.tell(line)).or_system()?;
-    let parts = Parts { config, places, pages: console::page, signals: signals.clone(), log };
+    let parts = Parts { config, places, pages: console::page, signals: signals.clone(), log, pair: None };
     drop(port);
     let mut script = None;
     let served = serve(parts, |handle, addresses| {

@@ -183,6 +183,11 @@ fn of_hall(site: &str, member: &str) -> Rights {
     let mut publish = vec![fleet::status_of(member), fleet::log_of(member)];
     publish.extend(api(&format!("DIRECT.GET.{LOG}.{}", fleet::log_of(member))));
     publish.extend(api(&format!("$KV.{SEEN}.{member}")));
+    // For its lease, where it has two show machines.
+    publish.push(fleet::lease_of(member));
+    let lease = fleet::lease_stream(member);
+    publish
+        .extend(["INFO", "CREATE", "MSG.GET"].iter().flat_map(|what| api(&format!("STREAM.{what}.{lease}"))));
     let all = fleet::stop_to(&format!("{site}.{}", fleet::ALL), "*");
     let inbox = format!("{}.>", inbox(member));
     let subscribe = vec![fleet::command_to(member, "*", "*"), fleet::stop_to(member, "*"), all, inbox];

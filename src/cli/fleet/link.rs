@@ -17,7 +17,7 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 use super::hall::Link;
 use super::log::LogTeller;
-use super::{engine, settings};
+use super::{engine, lease, settings};
 use crate::cli::{Exit, Failure, OrExit as _, places, print};
 use crate::fleet::{self, BriefStatus};
 use crate::sys::clock::Monotonic;
@@ -69,7 +69,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
                 link.keep(told),
                 link.hear_stops(),
                 link.hear_orders(),
-                link.tell_log()
+                link.tell_log(),
+                lease::carry(&link)
             );
         };
         tokio::select! {

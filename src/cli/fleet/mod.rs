@@ -11,6 +11,7 @@ mod desk;
 mod engine;
 mod hall;
 mod init;
+mod lease;
 mod link;
 mod log;
 mod page;

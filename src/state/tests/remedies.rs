@@ -5,10 +5,11 @@ use std::time::Duration;
 use super::*;
 
 /// All there are.
-pub(super) const TROUBLES: [Trouble; 7] = [
+pub(super) const TROUBLES: [Trouble; 8] = [
     Trouble::Limiter,
     Trouble::Planner,
     Trouble::Deaf,
+    Trouble::Alone,
     Trouble::Homing(2),
     Trouble::HomingTime,
     Trouble::ParkingTime,

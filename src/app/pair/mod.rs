@@ -1,0 +1,266 @@
+//! This machine as one of the two show machines of its hall. It stands by until it leads (`stand_by`); from then on it serves the hall, for
+//! as long as it leads. What leads to that is decided by `pair::Claim`; here is what carries its messages: heartbeats between the machines
+//! (`beats`), the lease by the link to the engine (`lease`), and what people have set (`settings`). All on ordinary threads, none of which
+//! the show waits for.
+
+mod beats;
+mod lease;
+mod settings;
+mod stand_by;
+
+use std::fs;
+use std::io::{self, Read as _};
+use std::net::UdpSocket;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::Builder;
+
+use sha2::{Digest as _, Sha256};
+
+pub(crate) use stand_by::{PairPlaces, StoodBy, stand_by};
+
+use super::runtime::Numbers;
+use crate::api::ApiError;
+use crate::config::{Config, Pair as PairConfig};
+use crate::log::{Line, Log, Priority};
+use crate::net::Lead;
+use crate::pair::{Carried, Claim, PairKey, Role};
+use crate::rt::Live;
+use crate::sd::WatchdogThread;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+use crate::wire::FrameNo;
+
+/// How the program ends once it has lost the lead: it is to be started again, and stands by then.
+const LOST: i32 = 75;
+/// The frame numbers of whoever takes over are so far above those that were heard last.
+const ABOVE: u32 = 100_000;
+/// That this machine leads, for whoever moves the address of the hall; beside the control socket.
+const LEAD_FILE: &str = "lead";
+/// The longest file of a key.
+const LONGEST_KEY: u64 = 1_024;
+
+/// Why a machine cannot be one of a pair. Nothing has moved then.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum PairError {
+    /// The key.
+    #[error("{0}")]
+    Key(String),
+    /// This machine is none of the two.
+    #[error(
+        "no machine of [pair] has its addresses here ({0}); check the addresses of this machine, and whether the program runs already"
+    )]
+    NoMachine(#[source] io::Error),
+    /// The socket of the lease.
+    #[error(transparent)]
+    Socket(#[from] ApiError),
+    /// The address by which controllers know the hall has not come.
+    #[error(
+        "this machine leads, but has not got the address {address} of [show] bind; have it moved here as the file {} says (docs/pair.md)",
+        lead.display()
+    )]
+    Address {
+        /// The address.
+        address: std::net::SocketAddrV4,
+        /// The file.
+        lead: PathBuf,
+        /// Why not.
+        #[source]
+        cause: io::Error,
+    },
+    /// No file can be written, or the system has no thread.
+    #[error("the system refused a file, a number by chance or a thread for [pair]: {0}")]
+    System(#[source] io::Error),
+}
+
+/// What was heard of the machine that led.
+#[derive(Debug, Clone)]
+struct Heard {
+    carried: Carried,
+    at: MonoTime,
+}
+
+/// What the threads of a pair share.
+#[derive(Debug)]
+struct PairShared {
+    claim: Mutex<Claim>,
+    lead: Arc<Lead>,
+    key: PairKey,
+    digest: [u8; 32],
+    /// The other machine, as people call it.
+    other: String,
+    /// The show of this machine, and the number of its first frame.
+    show: Mutex<Option<(Arc<Live>, u32)>>,
+    heard: Mutex<Option<Heard>>,
+    /// What people have set: here while this machine leads, else there.
+    settings: Mutex<Option<String>>,
+    differs: AtomicBool,
+    beats: AtomicU64,
+    lead_file: PathBuf,
+    log: Log,
+}
+
+/// This machine while it leads. Dropped, it goes on until the program ends.
+#[derive(Debug)]
+pub(crate) struct Pair {
+    shared: Arc<PairShared>,
+    feeder: Option<WatchdogThread>,
+}
+
+/// What is to be told of the pair.
+#[derive(Debug, Clone)]
+pub(crate) struct PairWatch(Arc<PairShared>);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl PairShared {
+    /// Does one thing with the claim, now, and passes on what comes of it.
+    fn act<T>(&self, act: impl FnOnce(&mut Claim, MonoTime) -> T) -> T {
+        let mut claim = lock(&self.claim);
+        let now = Monotonic.now();
+        let done = act(&mut claim, now);
+        match claim.role(now) {
+            Role::Leads { until } => self.lead.extend(until),
+            Role::Lost => self.end(),
+            Role::Follows | Role::Claims { .. } => {}
+        }
+        done
+    }
+
+    /// The lead is lost: nothing leaves any more, whatever this program does. So it ends, and stands by when it is started again.
+    fn end(&self) {
+        let _ = fs::remove_file(&self.lead_file); // whoever moves the address looks at the service as well
+        let text = format!(
+            "this machine leads the hall no more: neither {} nor the engine was heard for a second, or it stood still for that long",
+            self.other
+        );
+        self.log.say(Line::new(Priority::Error, "pair", text));
+        self.log.close();
+        std::process::exit(LOST);
+    }
+
+    fn say(&self, priority: Priority, text: String) {
+        self.log.say(Line::new(priority, "pair", text));
+    }
+}
+
+impl Pair {
+    /// Until when it leads.
+    pub(crate) fn lead(&self) -> Arc<Lead> {
+        Arc::clone(&self.shared.lead)
+    }
+
+    /// What feeds the watchdog of the service manager until the hall does.
+    pub(crate) fn take_feeder(&mut self) -> Option<WatchdogThread> {
+        self.feeder.take()
+    }
+
+    /// The show that runs here from now on, whose frames go on from those numbers.
+    pub(crate) fn shows(&self, live: &Arc<Live>, numbers: &Numbers) {
+        let first = numbers.values().map(|number| number.0).max().unwrap_or_default();
+        *lock(&self.shared.show) = Some((Arc::clone(live), first));
+    }
+
+    /// From where frame numbers go on: far above those of the machine that led.
+    pub(crate) fn numbers(&self, config: &Config) -> Numbers {
+        let heard = lock(&self.shared.heard);
+        let next = heard.iter().map(|heard| FrameNo(heard.carried.frame.wrapping_add(ABOVE)));
+        let of_each = |next| config.controllers.iter().map(move |one| (one.address(), next));
+        next.flat_map(of_each).collect()
+    }
+
+    /// True if the other machine led before; what a person should know of that.
+    pub(crate) fn took_over(&self) -> Option<String> {
+        let other = &self.shared.other;
+        lock(&self.shared.heard).as_ref().map(|heard| {
+            let was = if heard.carried.moves { "its seats were moving" } else { "its seats did not move" };
+            format!("took over from {other}: {was}; look at the seats, then park, or home, and start the show again")
+        })
+    }
+
+    /// What is to be told of it.
+    pub(crate) fn watch(&self) -> PairWatch {
+        PairWatch(Arc::clone(&self.shared))
+    }
+}
+
+impl PairWatch {
+    /// What is wrong with it, each with what to do.
+    pub(crate) fn troubles(&self) -> Vec<String> {
+        let shared = &self.0;
+        let now = Monotonic.now();
+        let (hears, has_lease) = {
+            let claim = lock(&shared.claim);
+            (claim.hears(now), claim.has_lease(now))
+        };
+        let other = &shared.other;
+        let mut troubles = Vec::new();
+        if !hears {
+            troubles.push(format!(
+                "{other} is not heard: it takes over only once it is; look at it, and at the networks between"
+            ));
+        }
+        if !has_lease {
+            troubles.push(format!(
+                "the engine does not answer: {other} does not take over; look at kinocue-link and at the engine"
+            ));
+        }
+        if shared.differs.load(Ordering::Relaxed) {
+            troubles.push(format!(
+                "{other} has another configuration: it does not take over; give both the same, and restart them"
+            ));
+        }
+        troubles
+    }
+}
+
+/// The key of a file that nobody else may read.
+fn key(path: &Path) -> Result<PairKey, PairError> {
+    use std::os::unix::fs::PermissionsExt as _;
+    let name = path.display();
+    let read = || -> io::Result<(u32, String)> {
+        let file = fs::File::open(path)?;
+        let mode = file.metadata()?.permissions().mode();
+        let mut text = String::new();
+        file.take(LONGEST_KEY).read_to_string(&mut text)?;
+        Ok((mode, text))
+    };
+    let (mode, text) = read().map_err(|error| PairError::Key(format!("cannot read {name}: {error}")))?;
+    if mode & 0o077 != 0 {
+        return Err(PairError::Key(format!("others may read {name}: `chmod 600` it, and make a new key")));
+    }
+    let none =
+        || format!("{name} has no key of 64 hexadecimal digits; make one: openssl rand -hex 32 > {name}");
+    PairKey::parse(&text).ok_or_else(|| PairError::Key(none()))
+}
+
+/// Which machine of the pair this is, by its addresses: the sockets of that one, and the other one.
+fn find_machine(pair: &PairConfig) -> Result<(usize, Vec<UdpSocket>), PairError> {
+    let bind = |machine: usize| -> io::Result<Vec<UdpSocket>> {
+        pair.machines[machine].addresses.iter().map(UdpSocket::bind).collect()
+    };
+    match (bind(0), bind(1)) {
+        (Ok(sockets), Err(_)) => Ok((0, sockets)),
+        (Err(_), Ok(sockets)) => Ok((1, sockets)),
+        (Ok(_), Ok(_)) => Err(PairError::NoMachine(io::Error::other("the addresses of both are here"))),
+        (Err(cause), Err(_)) => Err(PairError::NoMachine(cause)),
+    }
+}
+
+/// A number that nobody else has.
+fn session() -> io::Result<u64> {
+    let mut octets = [0; 8];
+    fs::File::open("/dev/urandom")?.read_exact(&mut octets)?;
+    Ok(u64::from_be_bytes(octets).max(1))
+}
+
+fn digest(path: &Path) -> io::Result<[u8; 32]> {
+    Ok(Sha256::digest(fs::read(path)?).into())
+}
+
+fn thread(name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), PairError> {
+    Builder::new().name(name.to_owned()).spawn(run).map(drop).map_err(PairError::System)
+}

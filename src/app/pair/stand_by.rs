@@ -1,0 +1,139 @@
+//! Standing by: nothing is sent to any controller, and no surface is open, until this machine leads.
+
+use std::fs;
+use std::net::{SocketAddrV4, UdpSocket};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use super::{Pair, PairError, PairShared, beats, digest, find_machine, key, lease, session, settings};
+use crate::config::{Config, Pair as PairConfig};
+use crate::log::{Log, Priority};
+use crate::net::Lead;
+use crate::pair::{BEAT, Claim, Role};
+use crate::sd::{self, Notifier, WatchdogThread};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+
+/// How often it is looked whether this machine leads.
+const LOOK: Duration = Duration::from_millis(20);
+/// How long the address of the hall may take to come here.
+const ADDRESS: Duration = Duration::from_secs(3);
+/// By this file in the folder of the state a person says that the other machine is off.
+const ALONE: &str = "alone";
+/// The name of the socket of the lease, beside that of the fleet.
+const SOCKET: &str = "pair.sock";
+
+/// Where the service has its files.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PairPlaces<'a> {
+    /// The configuration.
+    pub(crate) config: &'a Path,
+    /// The folder of the state.
+    pub(crate) state: &'a Path,
+    /// The control socket.
+    pub(crate) control: &'a Path,
+    /// The socket of the link.
+    pub(crate) fleet: &'a Path,
+}
+
+/// What standing by came to.
+#[derive(Debug)]
+pub(crate) enum StoodBy {
+    /// This machine leads from now on.
+    Leads(Pair),
+    /// The program is to end.
+    Ended,
+}
+
+/// Stands by until this machine leads and has the address of its hall, or the program is to end.
+///
+/// # Errors
+/// Why it cannot be one of a pair.
+pub(crate) fn stand_by(
+    config: &Config,
+    pair: &PairConfig,
+    places: &PairPlaces<'_>,
+    leave: &AtomicBool,
+    log: &Log,
+) -> Result<StoodBy, PairError> {
+    let (shared, name) = start(pair, places, log)?;
+    let interval = sd::watchdog();
+    let beats = Arc::clone(&shared);
+    let pulse = move || {
+        let beats = beats.beats.load(Ordering::Relaxed);
+        Some([beats, beats])
+    };
+    let feeder = interval.and_then(|interval| WatchdogThread::start(interval, BEAT, pulse).ok());
+    let mut notifier = Notifier::default();
+    // Without a service manager there is nobody to be told.
+    let _ = notifier.ready(&format!("{name} stands by"), Monotonic.now());
+    shared.say(Priority::Info, format!("{name} stands by, and sends nothing to the seats"));
+    let alone = places.state.join(ALONE);
+    loop {
+        if leave.load(Ordering::Acquire) {
+            return Ok(StoodBy::Ended);
+        }
+        if fs::remove_file(&alone).is_ok() {
+            shared.say(Priority::Notice, format!("{} is off, as somebody says", shared.other));
+            shared.act(|claim, now| claim.is_alone(now));
+        }
+        if matches!(shared.act(|claim, now| claim.role(now)), Role::Leads { .. }) {
+            break;
+        }
+        Monotonic.sleep_until(Monotonic.now() + LOOK);
+    }
+    shared.say(Priority::Notice, format!("{name} leads the hall"));
+    let _ = fs::create_dir_all(places.state); // what cannot be kept there is told
+    settings::keep(&shared, places.state);
+    settings::start(&shared, places.state.to_owned())?;
+    fs::write(&shared.lead_file, format!("{name}\n")).map_err(PairError::System)?;
+    await_address(config.show.bind, &shared.lead_file)?;
+    Ok(StoodBy::Leads(Pair { shared, feeder }))
+}
+
+/// The threads of this machine, and what it is called.
+fn start(
+    pair: &PairConfig,
+    places: &PairPlaces<'_>,
+    log: &Log,
+) -> Result<(Arc<PairShared>, String), PairError> {
+    let key_file = places.config.parent().map_or_else(|| pair.key.clone(), |folder| folder.join(&pair.key));
+    let key = key(&key_file)?;
+    let (number, sockets) = find_machine(pair)?;
+    let (own, other) = (&pair.machines[number], &pair.machines[1 - number]);
+    let lead_file = places.control.with_file_name(super::LEAD_FILE);
+    let _ = fs::remove_file(&lead_file); // of a program that was killed while it led
+    let session = session().map_err(PairError::System)?;
+    let shared = Arc::new(PairShared {
+        claim: Claim::new(session, number == 0, Monotonic.now()).into(),
+        lead: Arc::<Lead>::default(),
+        key,
+        digest: digest(places.config).map_err(PairError::System)?,
+        other: other.name.clone(),
+        show: None.into(),
+        heard: None.into(),
+        settings: None.into(),
+        differs: false.into(),
+        beats: 0.into(),
+        lead_file,
+        log: log.clone(),
+    });
+    lease::start(&shared, &places.fleet.with_file_name(SOCKET))?;
+    beats::start(&shared, sockets, other.addresses.clone())?;
+    Ok((shared, own.name.clone()))
+}
+
+/// Waits for the address that controllers know.
+fn await_address(bind: SocketAddrV4, lead: &Path) -> Result<(), PairError> {
+    let until: MonoTime = Monotonic.now() + ADDRESS;
+    loop {
+        let address = SocketAddrV4::new(*bind.ip(), 0);
+        let Err(cause) = UdpSocket::bind(address) else { return Ok(()) };
+        if Monotonic.now() >= until {
+            return Err(PairError::Address { address: bind, lead: PathBuf::from(lead), cause });
+        }
+        Monotonic.sleep_until(Monotonic.now() + LOOK);
+    }
+}

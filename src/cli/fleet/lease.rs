@@ -1,0 +1,102 @@
+//! The lease of a hall with two show machines: what its service wants is asked of the engine, one request at a time. Nothing is kept here,
+//! and nothing asked again: an answer that is late, or none, the service counts as it is.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use async_nats::jetstream::context::{Context, ContextBuilder, PublishErrorKind};
+use async_nats::jetstream::message::PublishMessage;
+use async_nats::jetstream::stream::{Config, DiscardPolicy, LastRawMessageErrorKind, StorageType};
+use tokio::io::{AsyncBufReadExt as _, AsyncWriteExt as _, BufReader};
+use tokio::net::UnixStream;
+use tokio::time::{sleep, timeout};
+
+use super::hall::Link;
+use crate::fleet::{self, DOMAIN};
+use crate::pair::{Holder, LeaseAnswer, LeaseAsk, LeaseSwap, LeaseTold};
+
+/// How often the socket of the service is looked for.
+const AGAIN: Duration = Duration::from_millis(200);
+/// How long the engine may take: what it says later is worth nothing.
+const ANSWER: Duration = Duration::from_millis(800);
+
+/// Carries what a service asks of its lease, for ever. A hall of one machine has no such socket.
+pub(super) async fn carry(link: &Link) {
+    let socket = link.socket.with_file_name("pair.sock");
+    loop {
+        let _ = serve(link, &socket).await; // the service is gone, or has no second machine: it is looked for again
+        sleep(AGAIN).await;
+    }
+}
+
+async fn serve(link: &Link, socket: &Path) -> anyhow::Result<()> {
+    let mut stream = UnixStream::connect(socket).await?;
+    let (read, mut write) = stream.split();
+    let mut lines = BufReader::new(read).lines();
+    let engine = ContextBuilder::new().domain(DOMAIN).timeout(ANSWER).build(link.client.clone());
+    while let Some(line) = lines.next_line().await? {
+        let ask: LeaseAsk = serde_json::from_str(&line)?;
+        let told = if link.is_connected() { put(link, &engine, &ask).await } else { None };
+        let mut reply = serde_json::to_string(&LeaseAnswer { ticket: ask.ticket, told })?;
+        reply.push('\n');
+        write.write_all(reply.as_bytes()).await?;
+    }
+    Ok(())
+}
+
+/// Asks; `None` where nobody answered in time.
+async fn put(link: &Link, engine: &Context, ask: &LeaseAsk) -> Option<LeaseTold> {
+    let asked = async {
+        match &ask.swap {
+            Some(swap) => write(link, engine, swap).await,
+            None => read(link, engine).await,
+        }
+    };
+    timeout(ANSWER, asked).await.ok()?.ok()
+}
+
+async fn read(link: &Link, engine: &Context) -> anyhow::Result<LeaseTold> {
+    // Made where it is missing: with nothing in it, which is no key.
+    let stream = engine.get_or_create_stream(bucket(&link.hall)).await?;
+    match stream.get_last_raw_message_by_subject(&fleet::lease_of(&link.hall)).await {
+        Ok(message) => {
+            let holder: Holder = serde_json::from_slice(&message.payload).context("it is no lease")?;
+            Ok(LeaseTold::Key { holder, revision: message.sequence })
+        }
+        Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(LeaseTold::NoKey),
+        Err(error) => Err(error.into()),
+    }
+}
+
+async fn write(link: &Link, engine: &Context, swap: &LeaseSwap) -> anyhow::Result<LeaseTold> {
+    let text = serde_json::to_vec(&swap.holder)?;
+    let message = PublishMessage::build().payload(text.into()).expected_last_subject_sequence(swap.revision);
+    let sent = engine.send_publish(fleet::lease_of(&link.hall), message).await?;
+    match sent.await {
+        Ok(ack) => Ok(LeaseTold::Granted { revision: ack.sequence }),
+        // An engine that has lost the stream has no such revision either; it is made anew at the next look.
+        Err(error)
+            if matches!(
+                error.kind(),
+                PublishErrorKind::WrongLastSequence | PublishErrorKind::StreamNotFound
+            ) =>
+        {
+            Ok(LeaseTold::Refused)
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The stream of one hall's lease, in memory: what an engine that was killed still had on its disk would be an old one. One of its own, so that
+/// nobody else moves its numbers on.
+fn bucket(hall: &str) -> Config {
+    Config {
+        name: fleet::lease_stream(hall),
+        subjects: vec![fleet::lease_of(hall)],
+        max_messages_per_subject: 1,
+        storage: StorageType::Memory,
+        discard: DiscardPolicy::Old,
+        ..Config::default()
+    }
+}

@@ -1,0 +1,364 @@
+//! The claim of one machine to the lead.
+
+use serde::{Deserialize, Serialize};
+
+use super::{ALONE, AWAY, FRESH, KEPT, LEAST_REVISION, PROMISED, RENEW, UNCHANGED};
+use crate::time::MonoTime;
+
+/// Heartbeats whose instants are kept; one that was sent longer ago promises nothing any more.
+const BEATS: u64 = 64;
+
+/// What a machine is in its pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// The other one may lead; this one sends nothing.
+    Follows,
+    /// It asks the engine for the lead with that ticket, which left then. It gives its word to nobody.
+    Claims { ticket: u64, left: MonoTime },
+    /// It leads until then, unless it is promised more.
+    Leads { until: MonoTime },
+    /// Its promises have run out. It never leads again: the program has to start anew.
+    Lost,
+}
+
+/// What one machine tells the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Beat {
+    /// Whose it is: a number by chance, another one at each start.
+    pub(crate) from: u64,
+    /// Whom it is for, by the same; 0 before anything was heard of it.
+    pub(crate) to: u64,
+    /// Its number, from 1.
+    pub(crate) number: u64,
+    /// True if it leads.
+    pub(crate) leads: bool,
+    /// True if it wants to lead and asks for the other's word.
+    pub(crate) wants: bool,
+    /// The word not to lead, in answer to the beat of that number; 0 for none.
+    pub(crate) word: u64,
+}
+
+/// Who wrote the key, and the how-manieth time: no two writes are the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Holder {
+    /// The session of the machine.
+    pub(crate) session: u64,
+    /// Its count of what it asked.
+    pub(crate) count: u64,
+}
+
+/// What is asked of the engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Want {
+    /// What the key is.
+    Read,
+    /// To write the key where its revision is still that one; 0 where there is none.
+    Swap { revision: u64, holder: Holder },
+}
+
+/// One request to the engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Ask {
+    /// Its number; an answer to another one is none.
+    pub(crate) ticket: u64,
+    /// What.
+    pub(crate) want: Want,
+}
+
+/// What the engine answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// The key, as it is.
+    Key { holder: Holder, revision: u64 },
+    /// There is no key.
+    NoKey,
+    /// It is written, and has that revision.
+    Granted { revision: u64 },
+    /// Its revision is another one.
+    Refused,
+}
+
+/// The other machine, as far as it was heard.
+#[derive(Debug, Clone, Copy, Default)]
+struct Partner {
+    session: u64,
+    /// The newest beat of it that knew who we are.
+    number: u64,
+    /// A beat of it that is not answered yet.
+    unanswered: u64,
+    leads: bool,
+    wants: bool,
+    heard: Option<MonoTime>,
+}
+
+/// The key, and since when it was seen so.
+#[derive(Debug, Clone, Copy)]
+struct SeenKey {
+    holder: Holder,
+    revision: u64,
+    since: MonoTime,
+    /// When the newest request left that found it so.
+    asked: MonoTime,
+}
+
+/// What is known of the lease.
+#[derive(Debug, Clone, Copy)]
+enum Lease {
+    Unknown,
+    Missing,
+    Seen(SeenKey),
+    /// Written by us.
+    Ours {
+        revision: u64,
+    },
+}
+
+/// The claim of one machine.
+#[derive(Debug, Clone)]
+pub(crate) struct Claim {
+    session: u64,
+    /// Of two that start together this one leads.
+    is_first: bool,
+    role: Role,
+    /// It has promised not to lead before that.
+    bound_until: MonoTime,
+    partner: Partner,
+    number: u64,
+    sent: [MonoTime; BEATS as usize],
+    lease: Lease,
+    ticket: u64,
+    asked: MonoTime,
+    open: bool,
+    /// When the newest request left that was granted.
+    granted: Option<MonoTime>,
+    /// Until then it makes the key where there is none: a person has said that the other machine is off.
+    may_make_until: MonoTime,
+    /// True unless the other machine has another configuration: then nothing is taken over.
+    is_fit: bool,
+}
+
+impl Claim {
+    /// Of a program that has just started, in a session that no other has. What it may have promised before it ended, it keeps.
+    pub(crate) fn new(session: u64, is_first: bool, now: MonoTime) -> Self {
+        Self {
+            session,
+            is_first,
+            role: Role::Follows,
+            bound_until: now + KEPT,
+            partner: Partner::default(),
+            number: 0,
+            sent: [MonoTime::default(); BEATS as usize],
+            lease: Lease::Unknown,
+            ticket: 0,
+            asked: MonoTime::default(),
+            open: false,
+            granted: None,
+            may_make_until: MonoTime::default(),
+            is_fit: true,
+        }
+    }
+
+    /// A person says that the other machine is off: for a while it may make the key where the engine has none.
+    pub(crate) fn is_alone(&mut self, now: MonoTime) {
+        self.may_make_until = now + ALONE;
+    }
+
+    /// Says whether the other machine has the same configuration.
+    pub(crate) fn set_fit(&mut self, is_fit: bool) {
+        self.is_fit = is_fit;
+    }
+
+    /// What it is.
+    pub(crate) fn role(&mut self, now: MonoTime) -> Role {
+        self.age(now);
+        self.role
+    }
+
+    /// True if the other machine was heard of late.
+    pub(crate) fn hears(&self, now: MonoTime) -> bool {
+        self.partner.heard.is_some_and(|heard| now.since(heard) < AWAY)
+    }
+
+    /// True if the newest word of the other machine is that it leads.
+    pub(crate) fn hears_leader(&self, now: MonoTime) -> bool {
+        self.hears(now) && self.partner.leads
+    }
+
+    /// Ends what has lasted its time; before anything else is done at `now`.
+    fn age(&mut self, now: MonoTime) {
+        match self.role {
+            Role::Leads { until } if now >= until => self.role = Role::Lost,
+            Role::Claims { left, .. } if now >= left + PROMISED => {
+                (self.role, self.lease) = (Role::Follows, Lease::Unknown);
+            }
+            _ => {}
+        }
+    }
+
+    /// The next heartbeat, which leaves at `now` or later. It is the word not to lead where that was asked for and may be given.
+    pub(crate) fn beat(&mut self, now: MonoTime) -> Beat {
+        self.age(now);
+        self.number += 1;
+        self.sent[slot(self.number)] = now;
+        let asked = self.partner.leads || self.partner.wants;
+        let unanswered = std::mem::take(&mut self.partner.unanswered);
+        let word = if asked && self.role == Role::Follows { unanswered } else { 0 };
+        if word > 0 {
+            self.bound_until = self.bound_until.max(now + KEPT);
+        }
+        Beat {
+            from: self.session,
+            to: self.partner.session,
+            number: self.number,
+            leads: matches!(self.role, Role::Leads { .. }),
+            wants: self.wants(now),
+            word,
+        }
+    }
+
+    /// True if it asks for the other's word so as to begin to lead.
+    fn wants(&self, now: MonoTime) -> bool {
+        self.is_first && self.role == Role::Follows && now >= self.bound_until && !self.partner.leads
+    }
+
+    /// Takes a heartbeat that is authentic. One that is old, or from before we or the other machine started, says nothing; true of others.
+    pub(crate) fn hear(&mut self, beat: &Beat, now: MonoTime) -> bool {
+        self.age(now);
+        let Partner { session, number, .. } = self.partner;
+        if beat.from != session {
+            // Who was heard a moment ago is not given up for what may have been recorded on another day.
+            if !self.hears(now) && beat.from != self.session {
+                self.partner = Partner { session: beat.from, ..Partner::default() };
+            } else {
+                return false;
+            }
+        } else if beat.number <= number {
+            return false;
+        }
+        if beat.to != self.session {
+            return false;
+        }
+        let Beat { number, leads, wants, word, .. } = *beat;
+        self.partner =
+            Partner { session: beat.from, number, unanswered: number, leads, wants, heard: Some(now) };
+        self.take_word(word, now);
+        true
+    }
+
+    fn take_word(&mut self, word: u64, now: MonoTime) {
+        if word == 0 || word > self.number || self.number - word >= BEATS {
+            return;
+        }
+        let until = self.sent[slot(word)] + PROMISED;
+        match self.role {
+            Role::Leads { until: before } => self.role = Role::Leads { until: before.max(until) },
+            Role::Follows if self.wants(now) && now < until => self.role = Role::Leads { until },
+            _ => {}
+        }
+    }
+
+    /// What is to be asked of the engine next, leaving at `now` or later.
+    pub(crate) fn ask(&mut self, now: MonoTime) -> Ask {
+        self.age(now);
+        self.ticket += 1;
+        (self.asked, self.open) = (now, true);
+        let revision = match self.role {
+            Role::Leads { .. } => self.to_renew(now),
+            Role::Follows => self.to_claim(now),
+            Role::Claims { .. } | Role::Lost => None,
+        };
+        if revision.is_some() && self.role == Role::Follows {
+            self.role = Role::Claims { ticket: self.ticket, left: now };
+        }
+        let holder = Holder { session: self.session, count: self.ticket };
+        let want = revision.map_or(Want::Read, |revision| Want::Swap { revision, holder });
+        Ask { ticket: self.ticket, want }
+    }
+
+    /// The revision that whoever leads replaces: its own, none where the engine has lost it, or one that nobody renews.
+    fn to_renew(&self, now: MonoTime) -> Option<u64> {
+        match self.lease {
+            Lease::Ours { revision } => Some(revision),
+            Lease::Missing => Some(0),
+            Lease::Seen(key) if key.holder.session == self.session => Some(key.revision),
+            Lease::Seen(key) if now.since(key.since) >= UNCHANGED => Some(key.revision),
+            Lease::Seen(_) | Lease::Unknown => None,
+        }
+    }
+
+    /// The revision that a machine replaces to lead from now on: one that nobody has renewed for long enough.
+    fn to_claim(&self, now: MonoTime) -> Option<u64> {
+        if now < self.bound_until || self.hears_leader(now) || !self.is_fit {
+            return None;
+        }
+        match self.lease {
+            Lease::Seen(key)
+                if now.since(key.since) >= UNCHANGED
+                    && now.since(key.asked) <= FRESH
+                    && key.revision >= LEAST_REVISION =>
+            {
+                Some(key.revision)
+            }
+            Lease::Missing if now < self.may_make_until => Some(0),
+            _ => None,
+        }
+    }
+
+    /// When the next request is due.
+    pub(crate) fn ask_at(&self) -> MonoTime {
+        self.asked + RENEW
+    }
+
+    /// Takes what the engine answered; what answers an older request says nothing.
+    pub(crate) fn answer(&mut self, ticket: u64, answer: Answer, now: MonoTime) {
+        self.age(now);
+        if ticket != self.ticket || !std::mem::take(&mut self.open) {
+            return;
+        }
+        self.lease = match answer {
+            Answer::NoKey => Lease::Missing,
+            Answer::Key { holder, revision } => Lease::Seen(self.seen(holder, revision, now)),
+            Answer::Granted { revision } => {
+                self.granted(ticket);
+                Lease::Ours { revision }
+            }
+            Answer::Refused => Lease::Unknown,
+        };
+        if matches!(self.role, Role::Claims { ticket: claimed, .. } if claimed == ticket) {
+            (self.role, self.lease) = (Role::Follows, Lease::Unknown);
+        }
+        self.age(now);
+    }
+
+    /// What it asked for is granted: it leads, from when it asked on.
+    fn granted(&mut self, ticket: u64) {
+        let until = self.asked + PROMISED;
+        self.granted = Some(self.asked);
+        match self.role {
+            Role::Leads { until: before } => self.role = Role::Leads { until: before.max(until) },
+            Role::Claims { ticket: claimed, .. } if claimed == ticket => self.role = Role::Leads { until },
+            _ => {}
+        }
+    }
+
+    fn seen(&self, holder: Holder, revision: u64, now: MonoTime) -> SeenKey {
+        let asked = self.asked;
+        match self.lease {
+            Lease::Seen(before) if before.holder == holder && before.revision == revision => {
+                SeenKey { asked, ..before }
+            }
+            _ => SeenKey { holder, revision, since: now, asked },
+        }
+    }
+
+    /// True if the engine has granted the lease of late.
+    pub(crate) fn has_lease(&self, now: MonoTime) -> bool {
+        self.granted.is_some_and(|granted| now.since(granted) < AWAY)
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "less than the number of slots")]
+const fn slot(number: u64) -> usize {
+    (number % BEATS) as usize
+}

@@ -1,0 +1,182 @@
+//! What dies, stands still or is cut off, and who leads then.
+
+use std::io::Write as _;
+use std::time::Duration;
+
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::{Clock as _, MonoTime};
+use rustix::process::Signal;
+
+use crate::house::{House, pair_troubles};
+use crate::process::Row;
+
+/// Numbers of the second machine are so far above those of the first, at the least.
+const ABOVE: u32 = 100_000;
+/// The greatest speed of the bench seat, pulses in a millisecond, with its roundings.
+const FASTEST: f64 = 240.0 * 2.0 * 1.01;
+
+/// How many takeovers of each kind there are; a night has more.
+fn trials(usual: usize) -> usize {
+    std::env::var("KINOCUE_TAKEOVERS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// Of the frames that came to a seat: none of the first machine came once one of the second had, and none leads faster than the seat may
+/// from where it was.
+fn judge(rows: &[Row], takes_over: bool) {
+    let is_second = |row: &Row| row.frame >= ABOVE;
+    let from = rows.iter().position(is_second);
+    assert_eq!(from.is_some(), takes_over);
+    if let Some(from) = from {
+        let back = rows[from..].iter().find(|row| !is_second(row));
+        assert!(back.is_none(), "a frame of the first machine after the second led: {back:?}");
+    }
+    for pair in rows.windows(2) {
+        let [before, row] = pair else { continue };
+        let far =
+            pair[0].commanded.iter().zip(&row.commanded).map(|(from, to)| f64::from(to.abs_diff(*from)));
+        let ms = if row.frame == before.frame + 1 { row.time_ms } else { row.time_ms.max(80) };
+        let far = far.fold(0.0, f64::max);
+        assert!(far <= f64::from(ms) * FASTEST + 2.0, "it leaps: {pair:?}");
+    }
+}
+
+/// Waits until the second machine leads and knows where its seats are; gives when it did.
+fn second_leads(house: &House) -> MonoTime {
+    let at = house.shows[1].leads("B", "recovering");
+    let status = house.shows[1].wait(|status| {
+        status["state"] == "recovering"
+            && status["next"] == "park, or home"
+            && status["show"]["cue"] == "night"
+    });
+    let notes = status["warnings"].to_string();
+    assert!(notes.contains("took over from A: its seats were moving"), "{notes}");
+    assert_eq!(status["levels"]["motion"], 0.6, "{status}");
+    at
+}
+
+/// A person has the seats parked by the second machine; then all ends, and the frames are judged.
+fn parks_and_ends(mut house: House) {
+    let _ = house.shows[1].run(&["park"]); // they may be on their way
+    house.shows[1].comes_to("parked");
+    house.shows[1].kill();
+    house.ends().iter().for_each(|rows| judge(rows, true));
+}
+
+#[test]
+fn a_machine_that_is_killed_is_replaced_and_its_seats_rest_until_a_person_parks_them() {
+    let mut took = Vec::new();
+    for _ in 0..trials(1) {
+        let Some(mut house) = House::playing() else { return };
+        let killed = Monotonic.now();
+        house.shows[0].kill();
+        let leads = second_leads(&house).since(killed);
+        let knows = Monotonic.now().since(killed);
+        assert!(leads < Duration::from_secs(5), "{leads:?}");
+        took.push((leads, knows));
+        parks_and_ends(house);
+    }
+    took.sort_unstable();
+    tell(&format!(
+        "killed: leads and knows its seats after {:?} (p50), {:?} (worst)",
+        took[took.len() / 2],
+        took.last()
+    ));
+}
+
+#[test]
+fn a_machine_that_stands_still_for_long_ends_without_a_frame_once_it_wakes_up() {
+    for trial in 0..trials(1) {
+        let Some(mut house) = House::playing() else { return };
+        house.shows[0].serving().signal(Signal::STOP);
+        second_leads(&house);
+        // It wakes up while the other one looks on, or while that moves the seats.
+        if trial % 2 == 0 {
+            house.shows[1].done(&["park"]);
+        }
+        house.shows[0].serving().signal(Signal::CONT);
+        let (code, lines) = house.shows[0].ended();
+        assert_eq!(code, Some(75), "{lines:?}");
+        assert!(lines.iter().any(|line| line.contains("leads the hall no more")), "{lines:?}");
+        // Started again, it stands by.
+        house.start(0);
+        house.shows[0].serving().heard(|line| line.contains("A stands by").then_some(()));
+        parks_and_ends(house);
+    }
+}
+
+#[test]
+fn a_machine_that_loses_both_the_other_one_and_the_engine_brakes_and_the_other_one_takes_over() {
+    for trial in 0..trials(1) {
+        let Some(mut house) = House::playing() else { return };
+        if trial % 2 == 0 {
+            house.cut_engine(0, true);
+            house.cut_pair(true);
+        } else {
+            house.cut_pair(true);
+            house.cut_engine(0, true);
+        }
+        let (code, lines) = house.shows[0].ended();
+        assert_eq!(code, Some(75), "{lines:?}");
+        assert!(
+            lines.iter().any(|line| line.contains("neither the other show machine nor the engine")),
+            "{lines:?}"
+        );
+        let _ = std::fs::remove_file(house.shows[0].path("lead"));
+        second_leads(&house);
+        parks_and_ends(house);
+    }
+}
+
+#[test]
+fn with_either_of_them_away_the_show_goes_on_and_what_is_away_is_told() {
+    let Some(mut house) = House::playing() else { return };
+    let goes_on = |house: &House, says: &str| {
+        let told = |status: &serde_json::Value| pair_troubles(status).iter().any(|text| text.contains(says));
+        let first = house.shows[0].wait(told);
+        let until = first["ticks"].as_u64().unwrap() + 300;
+        let later = house.shows[0].wait(|status| status["ticks"].as_u64().unwrap() >= until);
+        assert_eq!(later["state"], "playing", "{later}");
+    };
+    let is_well = |house: &House| drop(house.shows[0].wait(|status| pair_troubles(status).is_empty()));
+    house.cut_pair(true);
+    goes_on(&house, "B is not heard");
+    house.cut_pair(false);
+    is_well(&house);
+    house.kill_engine();
+    goes_on(&house, "the engine does not answer");
+    house.start_engine();
+    is_well(&house);
+    house.shows[1].kill();
+    goes_on(&house, "B is not heard");
+    house.start(1);
+    is_well(&house);
+    house.shows[0].done(&["park"]);
+    house.shows[0].comes_to("parked");
+    house.ends().iter().for_each(|rows| judge(rows, false));
+}
+
+#[test]
+fn one_machine_alone_leads_only_on_a_persons_word_where_the_engine_knows_of_no_lead() {
+    let Some(mut house) = House::open() else { return };
+    house.start(1);
+    house.shows[1].serving().heard(|line| line.contains("B stands by, and sends nothing").then_some(()));
+    std::fs::write(house.shows[1].path("state/alone"), "").unwrap();
+    house.shows[1].leads("B", "parked");
+    house.ends().iter().for_each(|rows| assert!(rows.is_empty()));
+}
+
+#[test]
+fn where_somebody_else_still_sends_to_a_seat_the_second_machine_moves_nothing_and_ends() {
+    let Some(mut house) = House::playing() else { return };
+    let stranger = house.stranger();
+    house.shows[0].kill();
+    let (code, lines) = house.shows[1].ended();
+    assert_eq!(code, Some(79), "{lines:?}");
+    assert!(lines.iter().any(|line| line.contains("another master sends to A1")), "{lines:?}");
+    drop(stranger);
+    house.ends().iter().for_each(|rows| judge(rows, false));
+}
