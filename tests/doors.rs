@@ -74,6 +74,19 @@ fn beginnings(door: &str) -> Vec<Vec<u8>> {
             let body = r#"{\"id\":\"1\",\"to\":\"a.b\",\"word\":\"levels\",\"args\":{\"motion\":0.5},\"sent_ms\":1}"#;
             vec![format!("{{\"key\":\"U\",\"sig\":\"AA==\",\"body\":\"{body}\"}}").into_bytes()]
         }
+        "wish" => {
+            let digest = "5f".repeat(32);
+            let body = format!(
+                r#"{{\"to\":\"a.b\",\"rev\":7,\"cues\":{{\"storm\":{{\"sha256\":\"{digest}\",\"bytes\":9}}}}}}"#
+            );
+            let report = format!(
+                r#"{{"rev":7,"cues":{{"storm":{{"sha256":"{digest}","bytes":9,"state":"fetching","percent":61}}}}}}"#
+            );
+            vec![
+                format!("{{\"key\":\"U\",\"sig\":\"AA==\",\"body\":\"{body}\"}}").into_bytes(),
+                report.into_bytes(),
+            ]
+        }
         "buttons" => vec![[[0; 16], [1, 0, 2, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0]].concat(), vec![0; 48]],
         "ltc" => vec![[[0_u8, 0x20].repeat(20), [0, 0xe0].repeat(20)].concat().repeat(40)],
         "mtc" => vec![(0..8).flat_map(|piece| [0xf1, piece << 4]).collect(), octets("f07f7f0101610203 04f7")],

@@ -30,6 +30,7 @@ mod controllers;
 mod cues;
 mod fleet;
 mod fleet_access;
+mod fleet_cues;
 mod gate;
 mod guarded;
 mod history;
@@ -57,6 +58,8 @@ mod tries;
 
 #[cfg(feature = "harness")]
 pub(crate) use fleet::try_letter;
+#[cfg(feature = "harness")]
+pub(crate) use fleet_cues::try_wish;
 pub(crate) use serving::ServingThread;
 pub(crate) use stop::fleet_stop_socket;
 pub use stop::{StopSocket, stop_socket};

@@ -47,6 +47,7 @@ pub const DOORS: &[Door] = &[
     ("text", text_port::try_line),
     ("buttons", app::buttons::try_records),
     ("letter", |octets| with_text(octets, api::try_letter)),
+    ("wish", |octets| with_text(octets, api::try_wish)),
     ("ltc", ltc),
     ("mtc", mtc),
     ("artnet", artnet),

@@ -188,7 +188,7 @@ fn exit<'a>(answers: impl Iterator<Item = &'a Answer> + Clone) -> Exit {
 }
 
 /// The halls of a desk that are meant.
-fn chosen(all: &[String], meant: &[String]) -> Result<Vec<String>, Failure> {
+pub(super) fn chosen(all: &[String], meant: &[String]) -> Result<Vec<String>, Failure> {
     let mut halls: Vec<String> = Vec::new();
     for one in meant {
         let site = one.strip_suffix(".*");
