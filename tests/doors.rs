@@ -104,6 +104,19 @@ fn beginnings(door: &str) -> Vec<Vec<u8>> {
         "hall" => vec![vec![
             1, 11, 1, 1, 0, 1, 13, 0, 0, 1, 0, 4, 1, 3, 3, 0, 2, 1, 4, 1, 2, 1, 3, 0, 9, 1, 7, 0, 8,
         ]],
+        "wish" => {
+            let digest = "5f".repeat(32);
+            let body = format!(
+                r#"{{\"to\":\"a.b\",\"rev\":7,\"cues\":{{\"storm\":{{\"sha256\":\"{digest}\",\"bytes\":9}}}}}}"#
+            );
+            let report = format!(
+                r#"{{"rev":7,"cues":{{"storm":{{"sha256":"{digest}","bytes":9,"state":"fetching","percent":61}}}}}}"#
+            );
+            vec![
+                format!("{{\"key\":\"U\",\"sig\":\"AA==\",\"body\":\"{body}\"}}").into_bytes(),
+                report.into_bytes(),
+            ]
+        }
         "buttons" => vec![[[0; 16], [1, 0, 2, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0]].concat(), vec![0; 48]],
         "ltc" => vec![
             [0].into_iter()

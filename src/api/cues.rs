@@ -22,7 +22,7 @@ use super::input::{Id, check_length};
 use super::problem::bad_value;
 use super::shared::{Shared, StillAsked, turn};
 use crate::control::{Code, Problem};
-use crate::library::{Awaited, CueId, CueInfo, CurveData, Library, MAX_POINTS};
+use crate::library::{Awaited, CueId, CueInfo, CurveData, Library, MAX_POINTS, Upload};
 
 /// Pieces that wait for the disk at the most.
 const PIECES: usize = 4;
@@ -103,14 +103,26 @@ pub(super) async fn upload(
 ) -> Result<JsonReply<CueInfo>, Problem> {
     asker.engineer()?;
     no_form(&request)?;
+    receive(&shared, id, request, |upload, awaited| upload.finish(Some(awaited))).await
+}
+
+/// Takes the body of a request in as a cue, which `finish` puts into the library.
+pub(super) async fn receive(
+    shared: &Arc<Shared>,
+    id: CueId,
+    request: Request,
+    finish: impl FnOnce(Upload, &Awaited) -> Result<CueInfo, Problem> + Send + 'static,
+) -> Result<JsonReply<CueInfo>, Problem> {
     check_length(request.headers(), shared.library.max_bytes())?;
     let (to, pieces) = mpsc::channel(PIECES);
     let asked = StillAsked::of(&request);
     let library = shared.library.clone();
     let fed =
         async { timeout(WHOLE, feed(request.into_body(), to)).await.unwrap_or_else(|_| Err(slow(WHOLE))) };
-    let (fed, taken) =
-        tokio::join!(fed, shared.awaiting(asked, move |awaited| take_in(&library, &id, pieces, awaited)));
+    let (fed, taken) = tokio::join!(
+        fed,
+        shared.awaiting(asked, move |awaited| finish(take_in(&library, &id, pieces)?, awaited))
+    );
     fed?;
     taken.map(JsonReply)
 }
@@ -141,18 +153,17 @@ async fn feed(mut body: Body, to: mpsc::Sender<UploadPiece>) -> Result<(), Probl
     }
 }
 
-/// Takes the pieces into the library; what ends before its end leaves nothing.
+/// Takes the pieces in; what ends before its end leaves nothing.
 fn take_in(
     library: &Library,
     id: &CueId,
     mut pieces: mpsc::Receiver<UploadPiece>,
-    awaited: &Awaited,
-) -> Result<CueInfo, Problem> {
+) -> Result<Upload, Problem> {
     let mut upload = library.begin(id)?;
     loop {
         match pieces.blocking_recv() {
             Some(UploadPiece::Bytes(bytes)) => upload.write(&bytes)?,
-            Some(UploadPiece::End) => return upload.finish(Some(awaited)),
+            Some(UploadPiece::End) => return Ok(upload),
             None => return Err(cut_short()),
         }
     }

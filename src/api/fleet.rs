@@ -44,7 +44,8 @@ fn command(order: &Order) -> Result<Command, Problem> {
         }
         "trim" => args::<Trim>(order)?.command()?,
         word => {
-            let words = config::FleetWord::ALL.map(|(word, _)| word).join(", ");
+            let asked = config::FleetWord::ALL.iter().filter(|(_, word)| *word != config::FleetWord::Cues);
+            let words = asked.map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
             let detail = format!("the fleet may not {word:?}; it may ask {words}, and a stop by its own way");
             return Err(Problem::new(Code::Role, detail, "ask somebody in the hall"));
         }

@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Duration;
 
 use super::problem::bad_value;
-use crate::config::{self, FleetKey};
+use crate::config::{self, FleetKey, FleetWord, Role};
 use crate::control::{self, Code, Command, FRESH, Problem, Surface, Who};
-use crate::fleet::{Letter, Order};
+use crate::fleet::{Letter, Order, Wish};
 use crate::time::MonoTime;
 
 /// How long the id of an order is remembered; far longer than one may be under way, for clocks may be set.
@@ -29,6 +29,9 @@ struct AskedOrder {
     id: String,
     at: MonoTime,
 }
+
+/// How far the rev of a wish may be ahead of our clock.
+const AHEAD: Duration = Duration::from_secs(86_400);
 
 /// What a letter asks, for whom, and when it was asked.
 type Opened = (Who, Command, MonoTime);
@@ -64,6 +67,39 @@ impl FleetAccess {
         let ask = command(&order)?;
         self.first_time(letter, &order, now)?;
         Ok((who, ask, asked_at))
+    }
+
+    /// What a letter wishes, and who wishes it, where one of the keys that may has signed it for this hall, however long ago.
+    pub(super) fn open_wish(&self, letter: &Letter, wall_ns: u64) -> Result<(Who, Wish), Problem> {
+        let (who, name) = self.sender(letter)?;
+        if who.role < Role::Operate {
+            return Err(Problem::role("to wish for cues", Role::Operate, &who));
+        }
+        let wish = Wish::of(letter).map_err(|why| bad_value(format!("no wish: {why}"), "send one"))?;
+        if wish.to != name {
+            let detail = format!("the wish is for {}, and this hall is {name}", wish.to);
+            return Err(Problem::new(Code::Origin, detail, "wish for the hall that is meant"));
+        }
+        // Else one wish of long after would outlast all others.
+        let most = Duration::from_nanos(wall_ns) + AHEAD;
+        if u128::from(wish.rev) > most.as_millis() {
+            let detail = format!("the rev of the wish, {}, is of more than a day from now", wish.rev);
+            return Err(Problem::new(Code::Late, detail, "set the clocks of desk and hall, and push again"));
+        }
+        if !self.allows(FleetWord::Cues) {
+            let detail = "allow of [fleet] does not name cues";
+            return Err(Problem::new(
+                Code::Role,
+                detail,
+                "ask somebody in the hall, or add it there and reload",
+            ));
+        }
+        Ok((who, wish))
+    }
+
+    fn allows(&self, word: FleetWord) -> bool {
+        let fleet = self.fleet.read().unwrap_or_else(PoisonError::into_inner);
+        fleet.as_ref().is_some_and(|fleet| fleet.allow.contains(&word))
     }
 
     /// Whose key has signed a letter, and what the hall is called in the fleet.
@@ -122,7 +158,7 @@ mod tests {
     use nkeys::KeyPair;
 
     use super::*;
-    use crate::config::{Fleet, Role};
+    use crate::config::Fleet;
 
     const NOW_MS: i64 = 1_795_306_800_123;
 
@@ -171,6 +207,33 @@ mod tests {
         assert_eq!(open(&access, &pause("6", "berlin.h3", NOW_MS)).err(), Some(Code::Token), "revoked");
         access.set(None);
         assert_eq!(open(&access, &pause("7", "berlin.h3", NOW_MS)).err(), Some(Code::Off));
+    }
+
+    #[test]
+    fn a_wish_counts_for_a_key_that_may_operate_in_this_hall_where_cues_are_allowed_however_old_it_is() {
+        let (access, pair) = access();
+        let fleet = |role, allow: &[FleetWord]| {
+            let key = FleetKey { name: "office".to_owned(), role, public: pair.public_key() };
+            Some(Fleet { name: "berlin.h3".to_owned(), allow: allow.to_vec(), keys: vec![key] })
+        };
+        let wall_ns = u64::try_from(NOW_MS).unwrap() * 1_000_000;
+        let open = |pair: &KeyPair, to: &str, rev: i64| {
+            let body = format!("{{\"to\":\"{to}\",\"rev\":{rev},\"cues\":{{}}}}");
+            let opened = access.open_wish(&Letter::sign(pair, body).unwrap(), wall_ns);
+            opened.map(|(who, wish)| (who.name, wish.rev)).map_err(|problem| problem.code)
+        };
+        assert_eq!(open(&pair, "berlin.h3", 5), Err(Code::Role), "nothing by default");
+        access.set(fleet(Role::View, &[FleetWord::Cues]).as_ref());
+        assert_eq!(open(&pair, "berlin.h3", 5), Err(Code::Role), "who may look wishes nothing");
+        access.set(fleet(Role::Operate, &[FleetWord::Load]).as_ref());
+        assert_eq!(open(&pair, "berlin.h3", 5), Err(Code::Role), "to load is another thing");
+        access.set(fleet(Role::Operate, &[FleetWord::Cues]).as_ref());
+        assert_eq!(open(&pair, "berlin.h3", 5), Ok(("office".to_owned(), 5)));
+        assert_eq!(open(&pair, "berlin.h4", 5), Err(Code::Origin));
+        assert_eq!(open(&KeyPair::new_user(), "berlin.h3", 5), Err(Code::Token));
+        let day = 86_400_000;
+        assert!(open(&pair, "berlin.h3", NOW_MS + day).is_ok());
+        assert_eq!(open(&pair, "berlin.h3", NOW_MS + day + 1), Err(Code::Late));
     }
 
     #[test]

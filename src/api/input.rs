@@ -116,10 +116,15 @@ pub(super) fn id(text: &str) -> Result<library::Id, Problem> {
 
 /// The body, of at most [`MAX_BODY`] bytes.
 pub(super) async fn whole(headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
-    check_length(headers, MAX_BODY as u64)?;
-    match tokio::time::timeout(BODY_TIME, Limited::new(body, MAX_BODY).collect()).await {
+    whole_within(headers, body, MAX_BODY).await
+}
+
+/// The body, of at most so many bytes.
+pub(super) async fn whole_within(headers: &HeaderMap, body: Body, most: usize) -> Result<Bytes, Problem> {
+    check_length(headers, most as u64)?;
+    match tokio::time::timeout(BODY_TIME, Limited::new(body, most).collect()).await {
         Ok(Ok(body)) => Ok(body.to_bytes()),
-        Ok(Err(error)) if error.is::<LengthLimitError>() => Err(too_long(MAX_BODY as u64)),
+        Ok(Err(error)) if error.is::<LengthLimitError>() => Err(too_long(most as u64)),
         Ok(Err(_)) => Err(bad_value("the body ended before its length", "send it whole")),
         Err(_) => {
             let detail = format!("the body took more than {} s", BODY_TIME.as_secs());
@@ -151,7 +156,7 @@ fn json_only(headers: &HeaderMap) -> Result<(), Problem> {
     Err(Problem::new(Code::Media, detail, "send it with Content-Type: application/json"))
 }
 
-fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
+pub(super) fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
     serde_json::from_slice(body).map_err(|error| {
         bad_value(format!("the body is not valid here: {error}"), "see /api/v1/openapi.json")
     })

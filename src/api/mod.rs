@@ -31,6 +31,7 @@ mod cues;
 mod doors;
 mod fleet;
 mod fleet_access;
+mod fleet_cues;
 mod gate;
 mod guarded;
 mod history;
@@ -59,6 +60,8 @@ mod tries;
 pub(crate) use doors::serve_behind_doors;
 #[cfg(feature = "harness")]
 pub(crate) use fleet::{try_letter, try_order};
+#[cfg(feature = "harness")]
+pub(crate) use fleet_cues::try_wish;
 pub(crate) use serving::ServingThread;
 pub(crate) use socket::unix as unix_socket;
 pub(crate) use stop::fleet_stop_socket;

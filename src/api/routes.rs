@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::middleware::from_fn_with_state;
-use axum::routing::{get, post};
+use axum::routing::{get, post, put};
 use utoipa::openapi::path::{Operation, Parameter, ParameterBuilder, ParameterIn, PathItem};
 use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{ObjectBuilder, Type};
@@ -16,7 +16,8 @@ use utoipa_axum::routes;
 use super::problem::{PROBLEM_JSON, ProblemBody};
 use super::shared::Shared;
 use super::{
-    controllers, cues, fleet, gate, history, playlist, recordings, reports, service, settings, show, status,
+    controllers, cues, fleet, fleet_cues, gate, history, playlist, recordings, reports, service, settings,
+    show, status,
 };
 use crate::control::Code;
 
@@ -90,6 +91,8 @@ pub(super) fn of_fleet() -> axum::Router<Arc<Shared>> {
         .route("/api/v1/fleet/status", get(fleet::status))
         .route("/api/v1/fleet/order", post(fleet::order))
         .route("/api/v1/fleet/journal", post(fleet::journal))
+        .route("/api/v1/fleet/wish", get(fleet_cues::kept).put(fleet_cues::wish))
+        .route("/api/v1/fleet/cues/{id}", put(fleet_cues::take))
         .route("/api/v1/status", get(status::status))
         .route("/api/v1/cues", get(cues::all))
         .fallback(service::nothing)

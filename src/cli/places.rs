@@ -8,6 +8,7 @@ use rustix::fs::{Access, access};
 
 /// Folders of the package.
 const STATE: &str = "/var/lib/kinocue";
+const LINK_STATE: &str = "/var/lib/kinocue-link";
 const RUNTIME: &str = "/run/kinocue";
 /// Its folder among those of a user.
 const NAME: &str = "kinocue";
@@ -17,6 +18,12 @@ pub(super) fn state() -> PathBuf {
     let own =
         || of_user("XDG_STATE_HOME").or_else(|| home().map(|home| home.join(".local/state").join(NAME)));
     of_system("STATE_DIRECTORY", STATE).or_else(own).unwrap_or_else(|| PathBuf::from(STATE))
+}
+
+/// The folder of what the link of a fleet is fetching.
+pub(super) fn link_state() -> PathBuf {
+    let own = || home().map(|home| home.join(".local/state").join(NAME).join("link"));
+    of_system("STATE_DIRECTORY", LINK_STATE).or_else(own).unwrap_or_else(|| PathBuf::from(LINK_STATE))
 }
 
 /// The control socket of a service that is started without arguments.

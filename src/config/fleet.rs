@@ -48,17 +48,20 @@ pub(crate) enum FleetWord {
     Levels,
     /// To move the motion against the film.
     Trim,
+    /// To put cues into the library, while parked; loads none of them.
+    Cues,
 }
 
 impl FleetWord {
     /// All of them, by the words of the configuration.
-    pub(crate) const ALL: [(&'static str, Self); 6] = [
+    pub(crate) const ALL: [(&'static str, Self); 7] = [
         ("pause", Self::Pause),
         ("park", Self::Park),
         ("disarm", Self::Disarm),
         ("load", Self::Load),
         ("levels", Self::Levels),
         ("trim", Self::Trim),
+        ("cues", Self::Cues),
     ];
     /// What nobody who is elsewhere may ask, whatever the configuration says.
     const NEVER: [&'static str; 13] = [
@@ -74,6 +77,7 @@ plain::displayed!(FleetWord {
     Self::Load => "load",
     Self::Levels => "levels",
     Self::Trim => "trim",
+    Self::Cues => "cues",
 });
 
 /// Reads the table.

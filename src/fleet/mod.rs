@@ -1,14 +1,16 @@
 //! What halls of a fleet and their desks say to each other, and how it is called there: signed letters, the brief status, records of
-//! proof of play, subjects and buckets of the engine (NATS). Pure; who carries it is `cli::fleet`, and what a hall takes of it is decided
+//! proof of play, wishes of what libraries shall have, subjects and buckets of the engine (NATS). Pure; who carries it is `cli::fleet`, and what a hall takes of it is decided
 //! by the hall: signatures in `api`, words and states in `app::supervisor`.
 
 mod brief;
 mod letter;
 mod proof;
+mod wish;
 
 pub(crate) use brief::BriefStatus;
 pub(crate) use letter::{Letter, Order};
 pub(crate) use proof::LogRecord;
+pub(crate) use wish::{CHUNK, CueHad, HadState, HaveReport, LONGEST_WISH, Wish, WishedCue};
 
 /// The JetStream domain that has all streams and buckets.
 pub(crate) const DOMAIN: &str = "hub";
@@ -16,6 +18,12 @@ pub(crate) const DOMAIN: &str = "hub";
 pub(crate) const LOG: &str = "kc_log";
 /// The bucket of the last status of each hall.
 pub(crate) const SEEN: &str = "kc_seen";
+/// The stream of the files of cues, each in messages of [`CHUNK`] bytes that are never overwritten.
+pub(crate) const CUES: &str = "kc_cues";
+/// The bucket of what each hall shall have.
+pub(crate) const WANT: &str = "kc_want";
+/// The bucket of what each hall has.
+pub(crate) const HAVE: &str = "kc_have";
 /// What stands for every hall of a site in the subject of a stop.
 pub(crate) const ALL: &str = "all";
 
@@ -47,4 +55,9 @@ pub(crate) fn lease_of(hall: &str) -> String {
 /// The stream of that, one for each hall.
 pub(crate) fn lease_stream(hall: &str) -> String {
     format!("kc_lease_{}", hall.replace('.', "_"))
+}
+
+/// Where a part of a file is kept; `sha256` is that of the whole file, `n` counts from 0; both may be wildcards.
+pub(crate) fn chunk_of(sha256: &str, n: &str) -> String {
+    format!("kc.cue.{sha256}.{n}")
 }

@@ -5,6 +5,7 @@
 //! checked and proved in a process of its own, of the lowest priority and with limits on memory, time and files, before it
 //! gets that name. The library's verdict is for people and playlists: a cue is proved again before it is played.
 
+mod brought;
 mod child;
 mod curve;
 mod hashed;
@@ -14,6 +15,7 @@ mod info;
 mod sketch;
 mod upload;
 
+pub(crate) use brought::{StandingOfCue, theirs};
 pub use child::Awaited;
 pub(crate) use curve::{CurveData, Drawing, MAX_POINTS, draw, needs_hall};
 pub(crate) use hashed::Hashed;
@@ -38,6 +40,7 @@ use crate::control::{Code, Problem};
 use crate::cue::{self, Source, limits};
 use crate::sys::folder::{Folder, Stamp};
 use crate::timeline::Timeline;
+use brought::Brought;
 use index::Index;
 
 /// A CSV file of so many bytes is read by whoever wants to play it, known or not; MCAP may unpack to more.
@@ -101,8 +104,11 @@ impl Hall {
     /// What a proof holds for: this version of the program, and the configuration's file as it now is.
     fn fingerprint(&self) -> String {
         let hash = Sha256::new().chain_update(env!("CARGO_PKG_VERSION"));
-        let text = fs::read(&self.config).unwrap_or_default(); // the check itself says that it cannot be read
-        hex(&hash.chain_update(text).finalize())
+        hex(&hash.chain_update(self.text()).finalize())
+    }
+
+    fn text(&self) -> Vec<u8> {
+        fs::read(&self.config).unwrap_or_default() // the check itself says that it cannot be read
     }
 }
 
@@ -117,6 +123,8 @@ struct Inner {
     dir: PathBuf,
     hall: Hall,
     index: Mutex<Index>,
+    /// What a fleet brought; held while a cue is put into its place.
+    brought: Mutex<Brought>,
     /// Held while a cue is checked: one at a time.
     proving: Mutex<()>,
     /// Uploads that have begun.
@@ -149,19 +157,20 @@ impl Library {
     /// # Errors
     /// [`LibraryError`] where the folder cannot be made, read or written.
     pub fn open(dir: &Path, hall: Hall) -> Result<Self, LibraryError> {
-        let open = || -> io::Result<Index> {
+        let open = || -> io::Result<(Index, Brought)> {
             fs::create_dir_all(dir)?;
             let folder = Folder::open(dir)?;
             for name in folder.names()?.iter().filter(|name| name.starts_with(upload::UNFINISHED)) {
                 folder.remove_abandoned(name)?;
             }
-            Ok(Index::read(&folder))
+            Ok((Index::read(&folder), Brought::read(&folder)))
         };
-        let index = open().map_err(|source| LibraryError { path: dir.to_owned(), source })?;
+        let (index, brought) = open().map_err(|source| LibraryError { path: dir.to_owned(), source })?;
         let inner = Inner {
             dir: dir.to_owned(),
             hall,
             index: Mutex::new(index),
+            brought: Mutex::new(brought),
             proving: Mutex::new(()),
             uploads: AtomicUsize::new(0),
             serial: AtomicU64::new(0),
@@ -314,6 +323,12 @@ impl Library {
                 Err(Problem::new(Code::Unknown, fault, "GET /api/v1/recordings lists what is there"))
             }
         }
+    }
+
+    /// SHA-256 of the file of the hall's configuration as it now is, hexadecimal.
+    #[must_use]
+    pub(crate) fn config_digest(&self) -> String {
+        hex(&Sha256::digest(self.inner.hall.text()))
     }
 
     /// The longest file that is taken in, bytes.

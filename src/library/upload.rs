@@ -7,9 +7,9 @@ use std::sync::atomic::Ordering;
 
 use sha2::{Digest as _, Sha256};
 
-use super::{Awaited, CueId, CueInfo, Library, child, file_name, file_problem, hex, lock};
+use super::{Awaited, CueId, CueInfo, Library, Verdict, child, file_name, file_problem, hex, lock};
 use crate::control::{Code, Problem};
-use crate::sys::folder::Folder;
+use crate::sys::folder::{Folder, Stamp};
 
 /// What the names of unfinished files begin with; no id does.
 pub(super) const UNFINISHED: &str = ".upload-";
@@ -82,6 +82,24 @@ impl Upload {
     /// # Errors
     /// [`Problem`] with every fault where the cue is refused; where the check cannot be done, or the disk fails.
     pub fn finish(self, awaited: Option<&Awaited>) -> Result<CueInfo, Problem> {
+        let library = self.library().clone();
+        let proved = self.prove(awaited)?;
+        let _placing = lock(&library.inner.brought);
+        proved.put()
+    }
+
+    /// Where it goes.
+    pub(super) fn library(&self) -> &Library {
+        &self.place.library
+    }
+
+    /// SHA-256 of what was written so far, hexadecimal.
+    pub(super) fn sha256(&self) -> String {
+        hex(&self.hash.clone().finalize())
+    }
+
+    /// Has it checked and proved.
+    pub(super) fn prove(self, awaited: Option<&Awaited>) -> Result<ProvedUpload, Problem> {
         let Self { place, id, file, hash, .. } = self;
         let inner = &place.library.inner;
         file.sync_all().map_err(|error| unwritten(&error))?;
@@ -101,22 +119,47 @@ impl Upload {
             let code = if verdict.playable { Code::Check } else { Code::Cue };
             return Err(Problem::new(code, detail, remedy).with(faults));
         }
+        Ok(ProvedUpload { place, id, print, verdict })
+    }
+}
+
+/// A cue that has passed, and is not in the library yet. Dropped, it leaves nothing.
+pub(super) struct ProvedUpload {
+    place: UploadPlace,
+    id: CueId,
+    print: String,
+    verdict: Verdict,
+}
+
+impl ProvedUpload {
+    /// The name that it gets, and what tells its file from any other, also once it has that name.
+    pub(super) fn file(&self) -> Result<(String, Stamp), Problem> {
+        let stamp = self.place.folder.stamp(&self.place.name);
+        let stamp = stamp.map_err(|error| file_problem("read the cue", &error))?.ok_or_else(gone)?;
+        Ok((file_name(&self.id, self.verdict.mcap), stamp))
+    }
+
+    /// Puts it into its place, while nobody else does: whoever calls this holds what was brought.
+    pub(super) fn put(self) -> Result<CueInfo, Problem> {
+        let Self { place, id, print, verdict } = self;
         let name = file_name(&id, verdict.mcap);
         // From the old whole to the new whole: never a name with half a file.
         let placed = place.folder.rename(&place.name, &name);
         let placed = placed.and_then(|()| place.folder.remove(&file_name(&id, !verdict.mcap)));
         placed.and_then(|()| place.folder.sync()).map_err(|error| unwritten(&error))?;
         let stamp = place.folder.stamp(&name).map_err(|error| file_problem("read the cue", &error))?;
-        let Some(stamp) = stamp else {
-            return Err(Problem::new(Code::File, "the cue has disappeared", "upload it again"));
-        };
+        let stamp = stamp.ok_or_else(gone)?;
         let info = CueInfo::new(&id, stamp.size, Some((&verdict, true)));
-        lock(&inner.index).put(&place.folder, &name, stamp, &print, verdict);
+        lock(&place.library.inner.index).put(&place.folder, &name, stamp, &print, verdict);
         Ok(info)
     }
 }
 
-fn unwritten(error: &io::Error) -> Problem {
+fn gone() -> Problem {
+    Problem::new(Code::File, "the cue has disappeared", "upload it again")
+}
+
+pub(super) fn unwritten(error: &io::Error) -> Problem {
     match error.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Problem::new(
             Code::File,

@@ -6,7 +6,7 @@ use super::{ALONE, AWAY, FRESH, KEPT, LEAST_REVISION, PROMISED, RENEW, UNCHANGED
 use crate::time::MonoTime;
 
 /// Heartbeats whose instants are kept; one that was sent longer ago promises nothing any more.
-const BEATS: u64 = 64;
+const BEATS: usize = 64;
 
 /// What a machine is in its pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,7 +125,7 @@ pub(crate) struct Claim {
     bound_until: MonoTime,
     partner: Partner,
     number: u64,
-    sent: [MonoTime; BEATS as usize],
+    sent: [MonoTime; BEATS],
     lease: Lease,
     ticket: u64,
     asked: MonoTime,
@@ -148,7 +148,7 @@ impl Claim {
             bound_until: now + KEPT,
             partner: Partner::default(),
             number: 0,
-            sent: [MonoTime::default(); BEATS as usize],
+            sent: [MonoTime::default(); BEATS],
             lease: Lease::Unknown,
             ticket: 0,
             asked: MonoTime::default(),
@@ -247,7 +247,7 @@ impl Claim {
     }
 
     fn take_word(&mut self, word: u64, now: MonoTime) {
-        if word == 0 || word > self.number || self.number - word >= BEATS {
+        if word == 0 || word > self.number || self.number - word >= BEATS as u64 {
             return;
         }
         let until = self.sent[slot(word)] + PROMISED;
@@ -360,5 +360,5 @@ impl Claim {
 
 #[expect(clippy::cast_possible_truncation, reason = "less than the number of slots")]
 const fn slot(number: u64) -> usize {
-    (number % BEATS) as usize
+    (number % BEATS as u64) as usize
 }

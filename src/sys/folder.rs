@@ -87,6 +87,15 @@ impl Folder {
         Ok(self.file(name)?.map(|(_, stamp)| stamp))
     }
 
+    /// True if there is anything of that name.
+    pub(crate) fn has(&self, name: &str) -> io::Result<bool> {
+        match rustix::fs::statat(&self.fd, name, AtFlags::SYMLINK_NOFOLLOW) {
+            Ok(_) => Ok(true),
+            Err(Errno::NOENT) => Ok(false),
+            Err(error) => Err(error.into()),
+        }
+    }
+
     /// Makes a new file, locked for as long as it is open, so that [`Folder::remove_abandoned`] leaves it alone.
     pub(crate) fn create(&self, name: &str) -> io::Result<File> {
         let flags = OFlags::RDWR | OFlags::CREATE | OFlags::EXCL | OFlags::NOFOLLOW | OFlags::CLOEXEC;

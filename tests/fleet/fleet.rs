@@ -20,7 +20,7 @@ use crate::process::{Guarded, PATIENCE, Run};
 use crate::programs::is_installed;
 
 /// All words that a hall may allow.
-pub(crate) const ALL: &str = r#"["pause", "park", "disarm", "load", "levels", "trim"]"#;
+pub(crate) const ALL: &str = r#"["pause", "park", "disarm", "load", "levels", "trim", "cues"]"#;
 
 /// An engine that runs, with the keys of all who know it.
 pub(crate) struct Engine {
@@ -146,16 +146,40 @@ impl Engine {
 
     /// A hall that plays, as a member of the fleet.
     pub(crate) fn hall(&self, name: &str, allow: &str) -> Hall {
+        self.hall_with(name, allow, |config| config)
+    }
+
+    /// The same of another configuration.
+    pub(crate) fn hall_with(&self, name: &str, allow: &str, change: impl FnOnce(String) -> String) -> Hall {
         let table = fs::read_to_string(self.path(&format!("fleet/{name}/kinocue-fleet.toml"))).unwrap();
-        Hall::open_with(|config| config + &table.replace("allow = []", &format!("allow = {allow}")))
+        let table = table.replace("allow = []", &format!("allow = {allow}"));
+        Hall::open_with(|config| change(config) + &table)
+    }
+
+    /// Has a member, by the folder of its settings, reach the engine at another address.
+    pub(crate) fn reached_at(&self, member: &str, address: &str) {
+        for name in ["fleet.toml", "desk.toml"] {
+            let file = self.path(&format!("fleet/{member}/{name}"));
+            if let Ok(text) = fs::read_to_string(&file) {
+                let own = format!("engine = [\"nats://{address}\"]");
+                let lines = text.lines().map(|line| if line.starts_with("engine") { &own } else { line });
+                fs::write(file, lines.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+            }
+        }
+    }
+
+    /// Where it listens.
+    pub(crate) fn address(&self) -> &str {
+        &self.address
     }
 
     /// The link of a hall.
     pub(crate) fn link(&self, name: &str, hall: &Hall) -> Link {
         let settings = self.path(&format!("fleet/{name}/fleet.toml"));
-        let (settings, socket) = (settings.to_str().unwrap().to_owned(), hall.path("fleet.sock"));
+        let path = |name: &str| hall.path(name).to_str().unwrap().to_owned();
+        let (settings, socket, state) = (settings.to_str().unwrap(), path("fleet.sock"), path("link"));
         let mut process =
-            Guarded::start(&["fleet", "link", "--config", &settings, "--socket", socket.to_str().unwrap()]);
+            Guarded::start(&["fleet", "link", "--config", settings, "--socket", &socket, "--state", &state]);
         let stderr: BufReader<_> = process.stderr();
         let (tell, said) = channel();
         thread::spawn(move || stderr.lines().map_while(Result::ok).for_each(|line| drop(tell.send(line))));
@@ -181,6 +205,19 @@ impl Engine {
         let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
         command.arg("fleet").args(args).env("KINOCUE_DESK", self.path("fleet/office/desk.toml"));
         command.stdin(Stdio::null()).output().unwrap().into()
+    }
+
+    /// What `kinocue fleet have` says of a hall, once that is so.
+    pub(crate) fn has(&self, hall: &str, mut wanted: impl FnMut(&Value) -> bool) -> Value {
+        let until = Monotonic.now() + PATIENCE;
+        loop {
+            let run = self.desk(&["have", hall, "--json"]);
+            let table: Value = serde_json::from_str(&run.stdout).unwrap_or_default();
+            if wanted(&table[0]) {
+                return table[0].clone();
+            }
+            assert!(Monotonic.now() < until, "it did not come to that: {run:?}");
+        }
     }
 
     /// What the desk says of all halls, once that is so.

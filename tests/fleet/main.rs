@@ -26,11 +26,15 @@ mod serving;
 #[path = "../common/statuses.rs"]
 mod statuses;
 
+mod cues;
+mod cuts;
 mod demo;
 mod desk;
 mod fleet;
+mod forged;
 mod log;
 mod page;
+mod relay;
 mod rights;
 mod socket;
 mod trouble;

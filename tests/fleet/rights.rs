@@ -13,13 +13,13 @@ use crate::fleet::Engine;
 use crate::process::PATIENCE;
 
 /// A member that says whatever it is told to.
-struct Member {
-    client: Client,
+pub(crate) struct Member {
+    pub(crate) client: Client,
     refused: UnboundedReceiver<String>,
 }
 
 impl Member {
-    async fn connect(engine: &Engine, key: &str, inbox: &str) -> Self {
+    pub(crate) async fn connect(engine: &Engine, key: &str, inbox: &str) -> Self {
         let seed = fs::read_to_string(engine.path(&format!("fleet/{key}"))).unwrap().trim().to_owned();
         let (tell, refused) = unbounded_channel();
         let options =
@@ -34,7 +34,12 @@ impl Member {
 
     /// Whether it may publish there.
     async fn may_publish(&mut self, subject: &str) -> bool {
-        self.client.publish(subject.to_owned(), "x".into()).await.unwrap();
+        self.may_publish_text(subject, "x").await
+    }
+
+    /// The same of a text.
+    pub(crate) async fn may_publish_text(&mut self, subject: &str, text: &str) -> bool {
+        self.client.publish(subject.to_owned(), text.to_owned().into()).await.unwrap();
         self.is_let().await
     }
 
@@ -65,7 +70,14 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
     runtime.block_on(async {
         let work = async {
             let mut hall = Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1").await;
-            for may in ["kc.status.berlin.h1", "kc.log.berlin.h1", "$JS.hub.API.$KV.kc_seen.berlin.h1"] {
+            for may in [
+                "kc.status.berlin.h1",
+                "kc.log.berlin.h1",
+                "$JS.hub.API.$KV.kc_seen.berlin.h1",
+                "$JS.hub.API.$KV.kc_have.berlin.h1",
+                "$JS.hub.API.DIRECT.GET.KV_kc_want.$KV.kc_want.berlin.h1",
+                "$JS.hub.API.DIRECT.GET.kc_cues.kc.cue.5f.0",
+            ] {
                 assert!(hall.may_publish(may).await, "{may}");
             }
             for may_not in [
@@ -83,6 +95,20 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
                 "$JS.hub.API.STREAM.INFO.kc_log",
                 "$JS.hub.API.DIRECT.GET.kc_log.kc.log.berlin.h2",
                 "$JS.hub.API.CONSUMER.CREATE.kc_log",
+                "$JS.hub.API.CONSUMER.CREATE.kc_cues",
+                "$JS.hub.API.CONSUMER.CREATE.KV_kc_want",
+                "$JS.hub.API.DIRECT.GET.KV_kc_want",
+                "$JS.hub.API.DIRECT.GET.kc_cues",
+                "$JS.hub.API.DIRECT.GET.KV_kc_want.$KV.kc_want.berlin.h2",
+                "$JS.hub.API.DIRECT.GET.KV_kc_have.$KV.kc_have.berlin.h1",
+                "$JS.hub.API.STREAM.INFO.kc_cues",
+                "$JS.hub.API.STREAM.PURGE.kc_cues",
+                "$JS.hub.API.STREAM.MSG.DELETE.kc_cues",
+                "$JS.hub.API.$KV.kc_have.berlin.h2",
+                "$JS.hub.API.$KV.kc_want.berlin.h1",
+                "$KV.kc_have.berlin.h2",
+                "$KV.kc_want.berlin.h1",
+                "kc.cue.5f.0",
             ] {
                 assert!(!hall.may_publish(may_not).await, "{may_not}");
             }
@@ -100,7 +126,12 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
                 assert!(!hall.may_hear(may_not).await, "{may_not}");
             }
             let mut desk = Member::connect(&engine, "office/desk.nk", "_INBOX_desk.office").await;
-            for may in ["kc.cmd.berlin.h1.office.pause", "kc.stop.berlin.all.office"] {
+            for may in [
+                "kc.cmd.berlin.h1.office.pause",
+                "kc.stop.berlin.all.office",
+                "kc.cue.5f.0",
+                "$JS.hub.API.$KV.kc_want.berlin.h1",
+            ] {
                 assert!(desk.may_publish(may).await, "{may}");
             }
             for may_not in [
@@ -110,6 +141,12 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
                 "kc.log.berlin.h1",
                 "$JS.hub.API.STREAM.DELETE.kc_log",
                 "$JS.hub.API.STREAM.PURGE.kc_log",
+                "$JS.hub.API.STREAM.PURGE.kc_cues",
+                "$JS.hub.API.STREAM.UPDATE.kc_cues",
+                "$JS.hub.API.STREAM.DELETE.kc_cues",
+                "$JS.hub.API.STREAM.MSG.DELETE.kc_cues",
+                "$JS.hub.API.$KV.kc_have.berlin.h1",
+                "$KV.kc_have.berlin.h1",
             ] {
                 assert!(!desk.may_publish(may_not).await, "{may_not}");
             }

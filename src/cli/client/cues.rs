@@ -128,7 +128,7 @@ fn upload(args: &UploadArgs) -> Result<Exit, Failure> {
 }
 
 /// The name of the file without its ending, where that can be an id.
-fn id_of(file: &Path) -> Result<String, Failure> {
+pub(in crate::cli) fn id_of(file: &Path) -> Result<String, Failure> {
     let fits = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"_-".contains(&byte);
     let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     if (1..=64).contains(&stem.len()) && stem.bytes().all(fits) {
@@ -140,13 +140,14 @@ fn id_of(file: &Path) -> Result<String, Failure> {
 
 /// A file as the body of a request, read piece by piece.
 #[derive(Debug)]
-struct FileBody {
+pub(in crate::cli) struct FileBody {
     file: File,
     left: u64,
 }
 
 impl FileBody {
-    fn open(path: &Path) -> io::Result<Self> {
+    /// Of that file, whole.
+    pub(in crate::cli) fn open(path: &Path) -> io::Result<Self> {
         let file = sys::file::open(path)?;
         let left = file.metadata()?.len();
         Ok(Self { file, left })

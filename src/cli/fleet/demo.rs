@@ -153,7 +153,8 @@ fn started(page: &Receiver<String>, leave: &AtomicBool) -> Option<String> {
 fn tell(desk: &Path) {
     print::tell(&format!(
         "a desk over all three, in another terminal:\n  export KINOCUE_DESK={}\n  kinocue fleet watch\n  kinocue fleet load bench-ride \
-         all     then arm and go on a console\n  kinocue fleet level 50% demo.h1\n  kinocue fleet stop\n  kinocue fleet report\nCtrl-C ends \
+         all     then arm and go on a console\n  kinocue fleet level 50% demo.h1\n  kinocue fleet stop\n  kinocue fleet report\n  kinocue fleet push FILE.csv \
+         --to all     a cue of yours into the libraries of all three\n  kinocue fleet have\nCtrl-C ends \
          all of it; nothing leaves this machine",
         desk.display()
     ));
@@ -184,7 +185,7 @@ fn start_hall(
     )?;
     let mut link = Command::new(&program);
     link.args(["fleet", "link", "--config"]).arg(fleet.join(hall).join("fleet.toml"));
-    link.arg("--socket").arg(path("fleet.sock"));
+    link.arg("--socket").arg(path("fleet.sock")).arg("--state").arg(path("link"));
     running.start(&mut link, &folder.path(format!("{hall}-link.log")))?;
     Ok(console)
 }

@@ -17,7 +17,7 @@ use crate::cli::{Exit, Failure, OrExit as _, print, table};
 use crate::control::model::Severity;
 use crate::fleet::{self, BriefStatus};
 use crate::plain;
-use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
 /// How long halls are listened to: each tells its status twice a second.
@@ -220,10 +220,11 @@ pub(super) async fn kept_of(client: &Client, names: &[String]) -> Result<BTreeMa
         async move {
             let subject = format!("$KV.{}.{name}", fleet::SEEN);
             let entry = bucket.direct_get_last_for_subject(subject).await.ok()?;
+            if engine::is_answered(&entry) {
+                return None;
+            }
             let status = serde_json::from_slice(&entry.payload).ok()?;
-            let at = u64::try_from(entry.time.unix_timestamp_nanos()).unwrap_or(0);
-            let age = Duration::from_nanos(wall_now_ns().saturating_sub(at));
-            Some((name, (status, age, Monotonic.now())))
+            Some((name, (status, engine::age_of(&entry), Monotonic.now())))
         }
     };
     Ok(join_all(names.iter().map(of_one)).await.into_iter().flatten().collect())
@@ -298,7 +299,7 @@ pub(super) fn said(text: &str) -> String {
 }
 
 /// An age as a person reads it.
-fn age(seconds: f64) -> String {
+pub(super) fn age(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.1} s"),
         s if s < 120.0 => format!("{s:.0} s"),

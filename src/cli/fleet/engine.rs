@@ -6,12 +6,14 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use async_nats::jetstream::context::{Context, ContextBuilder};
-use async_nats::jetstream::stream::{Config, DiscardPolicy, StorageType};
-use async_nats::{Client, ConnectOptions};
+use async_nats::jetstream::message::StreamMessage;
+use async_nats::jetstream::stream::{Config, DirectGetErrorKind, DiscardPolicy, StorageType};
+use async_nats::{Client, ConnectOptions, header};
 
 use super::settings::Access;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::fleet;
+use crate::sys::clock::wall_now_ns;
 
 /// How long a desk waits for the engine.
 const ENTRY: Duration = Duration::from_secs(3);
@@ -87,12 +89,17 @@ fn options(access: &Access, name: &str) -> Result<ConnectOptions, Failure> {
 
 /// What the engine keeps, by the way that also passes leaf nodes.
 pub(super) fn kept(client: &Client) -> Context {
-    ContextBuilder::new().domain(fleet::DOMAIN).timeout(ANSWER).build(client.clone())
+    kept_within(client, ANSWER)
+}
+
+/// The same, with so long for an answer.
+pub(super) fn kept_within(client: &Client, patience: Duration) -> Context {
+    ContextBuilder::new().domain(fleet::DOMAIN).timeout(patience).build(client.clone())
 }
 
 /// Makes what the engine keeps for a fleet, where it is missing.
 pub(super) async fn prepare(kept: &Context) -> Result<(), Failure> {
-    for config in [log(), seen()] {
+    for config in [log(), bucket(fleet::SEEN, 1), bucket(fleet::WANT, 5), bucket(fleet::HAVE, 1), cues()] {
         let name = config.name.clone();
         let made = kept.get_or_create_stream(config).await;
         let told = || {
@@ -120,12 +127,13 @@ fn log() -> Config {
     }
 }
 
-/// The last status of each hall: a bucket, as other clients of the engine know them.
-fn seen() -> Config {
+/// A bucket, as other clients of the engine know them, with so many values of each key: the last status of each hall, what it shall
+/// have, what it has.
+fn bucket(name: &str, history: i64) -> Config {
     Config {
-        name: format!("KV_{}", fleet::SEEN),
-        subjects: vec![format!("$KV.{}.>", fleet::SEEN)],
-        max_messages_per_subject: 1,
+        name: format!("KV_{name}"),
+        subjects: vec![format!("$KV.{name}.>")],
+        max_messages_per_subject: history,
         storage: StorageType::File,
         discard: DiscardPolicy::New,
         allow_direct: true,
@@ -133,4 +141,53 @@ fn seen() -> Config {
         deny_delete: true,
         ..Config::default()
     }
+}
+
+/// Files of cues. What has been written stays as it is: the engine takes no second message of one place.
+fn cues() -> Config {
+    Config {
+        name: fleet::CUES.to_owned(),
+        subjects: vec![fleet::chunk_of("*", "*")],
+        max_messages_per_subject: 1,
+        storage: StorageType::File,
+        discard: DiscardPolicy::New,
+        discard_new_per_subject: true,
+        allow_direct: true,
+        ..Config::default()
+    }
+}
+
+/// The last message that a stream has of a subject; `None` if it has none.
+pub(super) async fn last_of(
+    kept: &Context,
+    stream: &str,
+    subject: &str,
+) -> anyhow::Result<Option<StreamMessage>> {
+    let stream = kept.get_stream_no_info(stream).await?;
+    match stream.direct_get_last_for_subject(subject).await {
+        Ok(message) => Ok(Some(message)),
+        Err(error) if error.kind() == DirectGetErrorKind::NotFound => Ok(None),
+        Err(error) => {
+            Err(error).context("the engine does not say what it has; `kinocue fleet status` prepares it")
+        }
+    }
+}
+
+/// True of a message that the engine itself has written, as it answers to whatever subject it is asked to answer to: for a member that may
+/// not write there.
+pub(super) fn is_answered(message: &StreamMessage) -> bool {
+    message.headers.get_all(header::NATS_SUBJECT).count() > 1
+}
+
+/// How long ago the engine took a message, by its clock and ours.
+pub(super) fn age_of(message: &StreamMessage) -> Duration {
+    let at = u64::try_from(message.time.unix_timestamp_nanos()).unwrap_or(0);
+    Duration::from_nanos(wall_now_ns().saturating_sub(at))
+}
+
+/// Where the last value of a hall is in a bucket, and how it is written.
+pub(super) fn key_of(bucket: &str, hall: &str) -> (String, String) {
+    let key = format!("$KV.{bucket}.{hall}");
+    let written = format!("$JS.{}.API.{key}", fleet::DOMAIN);
+    (key, written)
 }

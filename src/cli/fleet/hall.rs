@@ -8,7 +8,7 @@ use async_nats::Client;
 use async_nats::connection::State;
 use http_body_util::Full;
 use hyper::Method;
-use hyper::body::Bytes;
+use hyper::body::{Body, Bytes};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
@@ -58,6 +58,23 @@ impl Link {
         patience: Duration,
     ) -> anyhow::Result<HttpReply> {
         let request = http::request(Method::POST, path, Some("application/json"), Full::new(body));
+        let reply = async { http::exchange(&self.socket, request?, patience).await };
+        reply.await.map_err(|failure| failure.error)
+    }
+
+    /// Hands something over that may come again.
+    pub(super) async fn put(&self, path: &str, body: Full<Bytes>) -> anyhow::Result<HttpReply> {
+        self.give(path, body, LOOKED_UP).await
+    }
+
+    /// The same of a file, which the hall takes its time for.
+    pub(super) async fn give<B>(&self, path: &str, body: B, patience: Duration) -> anyhow::Result<HttpReply>
+    where
+        B: Body + Send + 'static,
+        B::Data: Send,
+        B::Error: Into<Box<dyn std::error::Error + Send + Sync>>,
+    {
+        let request = http::request(Method::PUT, path, Some("application/octet-stream"), body);
         let reply = async { http::exchange(&self.socket, request?, patience).await };
         reply.await.map_err(|failure| failure.error)
     }

@@ -13,7 +13,7 @@ use super::engine::inbox;
 use super::settings::is_loopback;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::is_fleet_id;
-use crate::fleet::{self, DOMAIN, LOG, SEEN};
+use crate::fleet::{self, CUES, DOMAIN, HAVE, LOG, SEEN, WANT};
 
 /// Makes keys and configurations of a fleet in a new folder.
 ///
@@ -120,7 +120,7 @@ fn hall_table(plan: &Plan<'_>, hall: &str, desk: &KeyPair) -> String {
     let (site, name, public) = (plan.site, plan.desk, desk.public_key());
     format!(
         "# Add this to kinocue.toml, and restart the service. A stop is always taken; name in allow what else the desk may ask:\n\
-         # pause, park, disarm, load, levels, trim.\n\
+         # pause, park, disarm, load, levels, trim, and cues, which puts cues into the library.\n\
          [fleet]\nname = \"{site}.{hall}\"\nallow = {}\n\n[[fleet.key]]\nname = \"{name}\"\nrole = \"operate\"\npublic = \"{public}\"\n",
         plan.allow
     )
@@ -163,31 +163,43 @@ fn api(what: &str) -> [String; 2] {
     [format!("$JS.{DOMAIN}.API.{what}"), own]
 }
 
-/// A desk asks under its own name, hears how halls are, and has the engine keep what a fleet needs, which it reads.
+/// A desk asks under its own name, hears how halls are, wishes for halls, and has the engine keep what a fleet needs, which it reads.
 fn of_desk(desk: &str) -> Rights {
-    let seen = format!("KV_{SEEN}");
-    let mut publish = vec![fleet::command_to("*.*", desk, "*"), fleet::stop_to("*.*", desk)];
-    for stream in [LOG, &seen] {
+    let [seen, want, have] = [SEEN, WANT, HAVE].map(|bucket| format!("KV_{bucket}"));
+    let chunks = fleet::chunk_of("*", "*");
+    let mut publish = vec![fleet::command_to("*.*", desk, "*"), fleet::stop_to("*.*", desk), chunks.clone()];
+    publish.extend(api(&format!("$KV.{WANT}.*.*")));
+    for stream in [LOG, CUES, &seen, &want, &have] {
         publish
             .extend(["INFO", "CREATE"].into_iter().flat_map(|what| api(&format!("STREAM.{what}.{stream}"))));
     }
-    publish.extend(api(&format!("DIRECT.GET.{seen}.$KV.{SEEN}.>")));
+    for (stream, subject) in [
+        (&*seen, format!("$KV.{SEEN}.>")),
+        (&*want, format!("$KV.{WANT}.>")),
+        (&*have, format!("$KV.{HAVE}.>")),
+        (CUES, chunks),
+    ] {
+        publish.extend(api(&format!("DIRECT.GET.{stream}.{subject}")));
+    }
     for what in [format!("CREATE.{LOG}"), format!("CREATE.{LOG}.>"), format!("MSG.NEXT.{LOG}.>")] {
         publish.extend(api(&format!("CONSUMER.{what}")));
     }
     Rights { publish, subscribe: vec![fleet::status_of("*.*"), format!("{}.>", inbox(desk))] }
 }
 
-/// A hall tells of itself alone, hears what it alone is asked, and answers whoever asked.
+/// A hall tells of itself alone, hears what it alone is asked, answers whoever asked, and looks up what it alone shall have and the files
+/// of that. No consumers: those send whatever they read to wherever their maker says.
 fn of_hall(site: &str, member: &str) -> Rights {
     let mut publish = vec![fleet::status_of(member), fleet::log_of(member)];
     publish.extend(api(&format!("DIRECT.GET.{LOG}.{}", fleet::log_of(member))));
-    publish.extend(api(&format!("$KV.{SEEN}.{member}")));
     // For its lease, where it has two show machines.
     publish.push(fleet::lease_of(member));
     let lease = fleet::lease_stream(member);
     publish
         .extend(["INFO", "CREATE", "MSG.GET"].iter().flat_map(|what| api(&format!("STREAM.{what}.{lease}"))));
+    publish.extend(api(&format!("DIRECT.GET.KV_{WANT}.$KV.{WANT}.{member}")));
+    publish.extend(api(&format!("DIRECT.GET.{CUES}.{}", fleet::chunk_of("*", "*"))));
+    publish.extend([SEEN, HAVE].iter().flat_map(|bucket| api(&format!("$KV.{bucket}.{member}"))));
     let all = fleet::stop_to(&format!("{site}.{}", fleet::ALL), "*");
     let inbox = format!("{}.>", inbox(member));
     let subscribe = vec![fleet::command_to(member, "*", "*"), fleet::stop_to(member, "*"), all, inbox];

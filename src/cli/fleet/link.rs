@@ -17,6 +17,7 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 use super::hall::Link;
 use super::log::LogTeller;
+use super::wishes::WishKeeper;
 use super::{engine, lease, settings};
 use crate::cli::{Exit, Failure, OrExit as _, places, print};
 use crate::fleet::{self, BriefStatus};
@@ -52,6 +53,9 @@ pub(super) struct Args {
     /// The fleet socket of the hall [default: fleet.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     socket: Option<PathBuf>,
+    /// Where cues lie while they are fetched [default: what the service manager says, or a folder of the user's].
+    #[arg(long, value_name = "DIR")]
+    state: Option<PathBuf>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
@@ -61,12 +65,14 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         let mut ends = signal(SignalKind::terminate()).context("signals cannot be handled").or_system()?;
         let client = engine::connect_link(&settings.access, &settings.hall).await?;
         let link = Arc::new(Link { hall: settings.hall, client, socket });
+        let parts = args.state.clone().unwrap_or_else(places::link_state);
         print::tell(&format!("carries {} by {}", link.hall, link.socket.display()));
         let (tell, told) = watch::channel(None);
         let work = async {
             tokio::join!(
                 link.tell(&tell),
-                link.keep(told),
+                link.keep(told.clone()),
+                link.keep_wishes(parts, told),
                 link.hear_stops(),
                 link.hear_orders(),
                 link.tell_log(),
@@ -228,6 +234,22 @@ impl Link {
                     trouble.tell("the log", &why);
                     sleep(AGAIN).await;
                 }
+            }
+        }
+    }
+
+    /// Keeps the library as it is wished.
+    async fn keep_wishes(&self, parts: PathBuf, told: watch::Receiver<Option<BriefStatus>>) {
+        let mut wishes = WishKeeper::new(self, parts, told);
+        let mut trouble = Trouble::default();
+        loop {
+            let more = wishes.step().await;
+            match &more {
+                Ok(_) => trouble.over("cues"),
+                Err(why) => trouble.tell("cues", why),
+            }
+            if !more.unwrap_or(false) {
+                sleep(AGAIN).await;
             }
         }
     }

@@ -10,13 +10,18 @@ mod demo;
 mod desk;
 mod engine;
 mod hall;
+mod have;
 mod init;
 mod lease;
 mod link;
 mod log;
+mod object;
 mod page;
+mod part;
+mod push;
 mod report;
 mod settings;
+mod wishes;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -30,6 +35,8 @@ Examples:
   kinocue fleet stop berlin.h2
   kinocue fleet level 60% 'berlin.*'
   kinocue fleet report --day yesterday
+  kinocue fleet push cues/storm.mcap --to 'berlin.*'     tomorrow's cue into all halls, and where not, and why
+  kinocue fleet have
 
 Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 75 a hall did not answer, 78 bad settings";
 
@@ -59,6 +66,8 @@ enum FleetCommand {
     Level(act::LevelArgs),
     Load(act::LoadArgs),
     Report(report::Args),
+    Push(push::Args),
+    Have(have::Args),
 }
 
 // Who asks. No documentation: clap would show it as the help of commands.
@@ -84,5 +93,7 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Level(args) => act::level(args),
         FleetCommand::Load(args) => act::load(args),
         FleetCommand::Report(args) => report::run(args),
+        FleetCommand::Push(args) => push::run(args),
+        FleetCommand::Have(args) => have::run(args),
     }
 }

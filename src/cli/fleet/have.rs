@@ -1,0 +1,237 @@
+//! `kinocue fleet have`: which hall has what it shall have, which lags, and why.
+
+use std::time::Duration;
+
+use async_nats::jetstream::context::Context;
+use futures_util::future::try_join_all;
+use serde::Serialize;
+
+use super::act::chosen;
+use super::desk::{age, said};
+use super::{DeskArgs, engine, settings};
+use crate::cli::{Exit, Failure, OrExit as _, print, table};
+use crate::fleet::{self, HadState, HaveReport, Letter, Wish, WishedCue};
+
+/// A hall tells what it has each minute; after so long without a word it is not heard.
+const UNHEARD: Duration = Duration::from_secs(150);
+
+/// Shows which hall has what was wished for it, which lags, and why.
+///
+/// A hall has a cue once it is in its library and proved for its seats. With the version of its program and the digest of its configuration.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Exit codes: 0 all halls have all of it, 1 a hall refuses a cue, 69 the engine does not answer, 75 a hall lags or is not heard"
+)]
+pub(super) struct Args {
+    #[command(flatten)]
+    desk: DeskArgs,
+    /// Halls: SITE.HALL, SITE.*, or all.
+    #[arg(value_name = "HALL", default_value = "all")]
+    halls: Vec<String>,
+    /// Print JSON: an array with an object for each hall.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What the engine knows of a hall's library.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct HallHas {
+    /// `SITE.HALL`.
+    name: String,
+    /// How old what the hall told is, s; null if it told nothing.
+    age_s: Option<f64>,
+    /// What the hall told.
+    report: Option<HaveReport>,
+    /// What was wished for it, and by which message of the engine.
+    #[serde(skip)]
+    wished: Option<(u64, Wish)>,
+    /// True if the engine has something as its wish that is none for it.
+    is_foreign: bool,
+}
+
+/// How a hall stands to one cue.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct CueStands {
+    pub(super) hall: String,
+    pub(super) id: String,
+    pub(super) state: HadState,
+    /// It in words.
+    text: String,
+    /// Every fault that stands against it.
+    faults: Vec<String>,
+    percent: Option<u8>,
+}
+
+/// What is told of a hall with `--json`.
+#[derive(Serialize)]
+struct HallRow<'h> {
+    #[serde(flatten)]
+    hall: &'h HallHas,
+    wished_rev: Option<u64>,
+    cues: Vec<CueStands>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let settings = settings::desk(&args.desk.desk)?;
+    let halls = chosen(&settings.halls, &args.halls)?;
+    let halls = engine::block_on(async {
+        let client = engine::connect_desk(&settings.access, &settings.name).await?;
+        let kept = engine::kept(&client);
+        engine::prepare(&kept).await?;
+        try_join_all(halls.iter().map(|hall| HallHas::look_up(&kept, hall))).await.or_exit(Exit::Unavailable)
+    })?;
+    let stand: Vec<_> = halls.iter().flat_map(HallHas::all).collect();
+    if args.json {
+        let rows: Vec<_> = halls.iter().map(HallHas::row).collect();
+        print::json(&rows)?;
+    } else {
+        print::out(&drawn(&halls, &stand))?;
+    }
+    let lags = halls.iter().any(|hall| hall.is_foreign || hall.is_unheard());
+    let exit = exit_of(&stand);
+    Ok(if lags && exit == Exit::Done { Exit::TryAgain } else { exit })
+}
+
+/// How it ends: what only waits ends well by itself, and what is refused does not.
+pub(super) fn exit_of(stand: &[CueStands]) -> Exit {
+    let any = |state| stand.iter().any(|one| one.state == state);
+    if any(HadState::Refused) {
+        Exit::CheckFailed
+    } else if stand.iter().any(|one| one.state != HadState::Ready) {
+        Exit::TryAgain
+    } else {
+        Exit::Done
+    }
+}
+
+impl HallHas {
+    /// Of a hall of which nothing can be looked up now.
+    pub(super) fn unknown(hall: &str) -> Self {
+        Self { name: hall.to_owned(), ..Self::default() }
+    }
+
+    /// What the engine has of it.
+    pub(super) async fn look_up(kept: &Context, hall: &str) -> anyhow::Result<Self> {
+        let last = async |bucket: &str| {
+            let (key, _) = engine::key_of(bucket, hall);
+            engine::last_of(kept, &format!("KV_{bucket}"), &key).await
+        };
+        let want = last(fleet::WANT).await?;
+        let have = last(fleet::HAVE).await?.filter(|message| !engine::is_answered(message));
+        let is_wished = want.is_some();
+        let wished = want.and_then(|message| {
+            let letter: Letter = serde_json::from_slice(&message.payload).ok()?;
+            let wish = Wish::of(&letter).ok().filter(|wish| wish.to == hall && letter.is_signed())?;
+            Some((message.sequence, wish))
+        });
+        Ok(Self {
+            name: hall.to_owned(),
+            age_s: have.as_ref().map(|message| engine::age_of(message).as_secs_f64()),
+            report: have.and_then(|message| serde_json::from_slice(&message.payload).ok()),
+            is_foreign: is_wished && wished.is_none(),
+            wished,
+        })
+    }
+
+    /// How it stands to a cue that it was wished by that message of the engine.
+    pub(super) fn stands(&self, id: &str, cue: &WishedCue, seq: u64) -> CueStands {
+        let stands = |state, text: String| {
+            let (hall, id) = (self.name.clone(), id.to_owned());
+            CueStands { hall, id, state, text, faults: Vec::new(), percent: None }
+        };
+        let open = |text: &str| stands(HadState::Waiting, format!("waiting: {text}"));
+        let Some(report) = &self.report else {
+            return open(
+                "the hall told nothing yet; check its link, and that its service is of this version",
+            );
+        };
+        let had = report.cues.get(id).filter(|had| had.sha256 == cue.sha256);
+        if let Some(had) = had.filter(|had| had.state == HadState::Ready || report.seen >= seq) {
+            let text =
+                if self.is_unheard() { format!("{}, as it was heard last", had.said()) } else { had.said() };
+            return CueStands { faults: had.faults.clone(), percent: had.percent, ..stands(had.state, text) };
+        }
+        match &report.refused {
+            _ if report.seen < seq && self.is_unheard() => {
+                open("the hall is not heard; it fetches it once it is back")
+            }
+            _ if report.seen < seq => open("the hall has not looked up the wish yet"),
+            Some(why) => stands(HadState::Refused, format!("refused: {why}")),
+            None => stands(HadState::Refused, "refused: it is wished no more".to_owned()),
+        }
+    }
+
+    fn all(&self) -> Vec<CueStands> {
+        let Some((seq, wish)) = &self.wished else { return Vec::new() };
+        wish.cues.iter().map(|(id, cue)| self.stands(id, cue, *seq)).collect()
+    }
+
+    /// True if what it told is old.
+    fn is_unheard(&self) -> bool {
+        self.age_s.is_none_or(|age_s| age_s > UNHEARD.as_secs_f64())
+    }
+
+    fn row(&self) -> HallRow<'_> {
+        HallRow { hall: self, wished_rev: self.wished.as_ref().map(|(_, wish)| wish.rev), cues: self.all() }
+    }
+}
+
+impl CueStands {
+    /// True if nothing more comes of it by itself.
+    pub(super) fn is_settled(&self) -> bool {
+        matches!(self.state, HadState::Ready | HadState::Refused)
+    }
+
+    /// It in a line.
+    pub(super) fn said(&self) -> String {
+        said(&format!("{}: {}: {}", self.hall, self.id, self.text))
+    }
+
+    /// The same without what changes all the time.
+    pub(super) fn said_coarsely(&self) -> String {
+        match self.percent {
+            Some(..100) => said(&format!("{}: {}: fetching", self.hall, self.id)),
+            _ => self.said(),
+        }
+    }
+
+    /// The same with every fault, a line each.
+    pub(super) fn whole(&self) -> String {
+        let mut text = self.said() + "\n";
+        for fault in &self.faults {
+            text.push_str(&format!("  {}\n", said(fault)));
+        }
+        text
+    }
+}
+
+/// The table as people read it, and below it what is not there.
+fn drawn(halls: &[HallHas], stand: &[CueStands]) -> String {
+    let header = ["hall", "has", "version", "configuration", "told", "what to know"];
+    let mut text = table::table(header, halls.iter().map(|hall| line(hall, stand)));
+    for one in stand.iter().filter(|one| one.state != HadState::Ready) {
+        text.push_str(&one.whole());
+    }
+    text
+}
+
+fn line(hall: &HallHas, stand: &[CueStands]) -> [String; 6] {
+    let own = || stand.iter().filter(|one| one.hall == hall.name);
+    let ready = own().filter(|one| one.state == HadState::Ready).count();
+    let know = match (&hall.report, &hall.wished) {
+        _ if hall.is_foreign => "what the engine has as its wish is none; push again with --only",
+        (None, _) => "it told nothing yet",
+        _ if hall.is_unheard() => "it is not heard now",
+        (Some(report), _) if report.refused.is_some() => "it does not take what the engine has as its wish",
+        (_, None) => "nothing was wished for it",
+        _ if ready < own().count() => "see below",
+        _ => "",
+    };
+    let (version, config) = hall
+        .report
+        .as_ref()
+        .map_or(("-", ""), |report| (report.version.as_str(), report.config.get(..8).unwrap_or_default()));
+    let told = hall.age_s.map_or_else(|| "-".to_owned(), |age_s| age(age_s) + " ago");
+    let has = format!("{ready} of {}", own().count());
+    [&hall.name, &has, version, config, &told, know].map(said)
+}

@@ -1,0 +1,250 @@
+//! What a hall shall have in its library, as a desk wishes it, and what it has, as the hall says it.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::Letter;
+
+/// The longest wish as it is sent, signature and all, bytes.
+pub(crate) const LONGEST_WISH: usize = 256 << 10;
+/// Bytes of a cue in a message of the engine.
+pub(crate) const CHUNK: u64 = 128 << 10;
+/// Digits of a SHA-256.
+const DIGITS: usize = 64;
+
+/// What a hall shall have: the text of a letter. It names all of it, each time.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Wish {
+    /// The hall that it is for, `SITE.HALL`.
+    pub(crate) to: String,
+    /// Rises with each wish for a hall: Unix milliseconds, or one more than the one before.
+    pub(crate) rev: u64,
+    /// Cues by their ids.
+    pub(crate) cues: BTreeMap<String, WishedCue>,
+}
+
+/// The file of a cue.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct WishedCue {
+    /// Its SHA-256, hexadecimal, small letters; the name of it at the engine.
+    pub(crate) sha256: String,
+    /// How long it is.
+    pub(crate) bytes: u64,
+}
+
+/// What a hall has of what was wished: its key of `kc_have`.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct HaveReport {
+    /// When it was so, RFC 3339, by the clock of the hall.
+    pub(crate) at: String,
+    /// The version of its program.
+    pub(crate) version: String,
+    /// SHA-256 of the file of its configuration, hexadecimal.
+    pub(crate) config: String,
+    /// The wish that it keeps; 0 if there is none.
+    pub(crate) rev: u64,
+    /// Which message of the engine it was shown last as its wish; 0 if none.
+    pub(crate) seen: u64,
+    /// Why it does not take what the engine has as its wish; null if it does.
+    pub(crate) refused: Option<String>,
+    /// What it has of its wish, by the ids of cues.
+    pub(crate) cues: BTreeMap<String, CueHad>,
+}
+
+/// What a hall has of one cue.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct CueHad {
+    /// The file that is wished, its SHA-256.
+    pub(crate) sha256: String,
+    /// How long that is.
+    pub(crate) bytes: u64,
+    /// How far it is.
+    pub(crate) state: HadState,
+    /// How much of it was fetched, while it is.
+    pub(crate) percent: Option<u8>,
+    /// Why it waits, or is refused.
+    pub(crate) why: Option<String>,
+    /// Every fault that stands against it, with its place.
+    pub(crate) faults: Vec<String>,
+}
+
+/// How far a wished cue is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum HadState {
+    /// It is in the library, and proved for the seats of the hall.
+    Ready,
+    /// It is to be fetched, and nothing stands against that.
+    Missing,
+    /// It is being fetched.
+    Fetching,
+    /// The hall does not take it.
+    Refused,
+    /// It has to wait; what is unknown to this program counts as that.
+    #[default]
+    #[serde(other)]
+    Waiting,
+}
+
+impl Wish {
+    /// The wish of a letter, whoever has signed that; why it is none.
+    pub(crate) fn of(letter: &Letter) -> Result<Self, String> {
+        let wish: Self = serde_json::from_str(&letter.body).map_err(|error| error.to_string())?;
+        let small = |digit: u8| digit.is_ascii_digit() || (b'a'..=b'f').contains(&digit);
+        for (id, WishedCue { sha256, bytes }) in &wish.cues {
+            if sha256.len() != DIGITS || !sha256.bytes().all(small) {
+                return Err(format!("{sha256:?}, of {id:?}, is not {DIGITS} small hexadecimal digits"));
+            }
+            if *bytes == 0 {
+                return Err(format!("{id:?} is empty"));
+            }
+        }
+        Ok(wish)
+    }
+}
+
+impl WishedCue {
+    /// How many messages of the engine have it.
+    #[must_use]
+    pub(crate) fn chunks(&self) -> u64 {
+        self.bytes.div_ceil(CHUNK)
+    }
+
+    /// How long the message of that number is, from 0.
+    #[must_use]
+    pub(crate) fn chunk_len(&self, n: u64) -> u64 {
+        CHUNK.min(self.bytes.saturating_sub(n.saturating_mul(CHUNK)))
+    }
+}
+
+impl CueHad {
+    /// Of that cue.
+    #[must_use]
+    pub(crate) fn new(cue: &WishedCue, state: HadState, why: Option<String>) -> Self {
+        let WishedCue { sha256, bytes } = cue.clone();
+        Self { sha256, bytes, state, percent: None, why, faults: Vec::new() }
+    }
+
+    /// It in words: `ready`, `fetching 61 %`, `waiting: the hall is armed`.
+    #[must_use]
+    pub(crate) fn said(&self) -> String {
+        let why = self.why.as_deref().unwrap_or("it does not say why");
+        match self.state {
+            HadState::Ready => "ready".to_owned(),
+            HadState::Missing => "not fetched yet".to_owned(),
+            HadState::Fetching if self.percent.is_some_and(|percent| percent >= 100) => {
+                "fetched, and being proved".to_owned()
+            }
+            HadState::Fetching => format!("fetching {} %", self.percent.unwrap_or(0)),
+            HadState::Waiting => format!("waiting: {why}"),
+            HadState::Refused => format!("refused: {why}"),
+        }
+    }
+}
+
+impl HaveReport {
+    /// As it is sent, with as many faults of each cue as fit into so many bytes.
+    #[must_use]
+    pub(crate) fn text_within(&self, most: usize) -> String {
+        let text = |report: &Self| serde_json::to_string(report).expect("text and numbers are written");
+        let (mut report, mut kept) = (self.clone(), 32);
+        while text(&report).len() > most && kept > 0 {
+            kept /= 2;
+            for cue in report.cues.values_mut().filter(|cue| cue.faults.len() > kept) {
+                cue.faults.truncate(kept);
+            }
+        }
+        text(&report)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nkeys::KeyPair;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn wish(cues: &str) -> Result<Wish, String> {
+        let body = format!("{{\"to\":\"berlin.h3\",\"rev\":7,\"cues\":{cues}}}");
+        Wish::of(&Letter::sign(&KeyPair::new_user(), body).unwrap())
+    }
+
+    #[test]
+    fn a_wish_names_files_by_their_digests_and_nothing_that_nobody_knows() {
+        let sha256 = "0123456789abcdef".repeat(4);
+        let one =
+            |sha256: &str, more: &str| format!("{{\"storm\":{{\"sha256\":\"{sha256}\",\"bytes\":3{more}}}}}");
+        let cue = &wish(&one(&sha256, "")).unwrap().cues["storm"];
+        assert_eq!((cue.sha256.as_str(), cue.bytes, cue.chunks()), (sha256.as_str(), 3, 1));
+        for wrong in [
+            one(&sha256.to_uppercase(), ""),
+            one(&sha256[1..], ""),
+            one("../../etc/passwd", ""),
+            one(&sha256, ",\"to\":\"/\""),
+            one(&sha256, "").replace(":3", ":0"),
+            one(&sha256, "").replace(":3", ":-3"),
+            "[]".to_owned(),
+            "{},\"levels\":{}".to_owned(),
+        ] {
+            assert!(wish(&wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn an_order_is_no_wish_and_a_wish_is_no_order() {
+        let pair = KeyPair::new_user();
+        let order = r#"{"id":"1","to":"a.b","word":"load","args":{},"sent_ms":5}"#;
+        assert!(Wish::of(&Letter::sign(&pair, order.to_owned()).unwrap()).is_err());
+        let wish = r#"{"to":"a.b","rev":5,"cues":{}}"#;
+        assert!(super::super::Order::of(&Letter::sign(&pair, wish.to_owned()).unwrap()).is_err());
+    }
+
+    #[test]
+    fn the_last_message_of_a_cue_is_as_long_as_what_is_left() {
+        let of = |bytes| WishedCue { sha256: String::new(), bytes };
+        assert_eq!([1, CHUNK, CHUNK + 1].map(|bytes| of(bytes).chunks()), [1, 1, 2]);
+        assert_eq!([0, 1, 2].map(|n| of(CHUNK + 5).chunk_len(n)), [CHUNK, 5, 0]);
+        assert_eq!(of(u64::MAX).chunk_len(u64::MAX), 0);
+    }
+
+    #[test]
+    fn a_report_that_is_too_long_loses_faults_and_no_cue() {
+        let mut report = HaveReport::default();
+        for id in 0..100 {
+            let cue = WishedCue { sha256: "0".repeat(DIGITS), bytes: 1 };
+            let mut had = CueHad::new(&cue, HadState::Refused, Some("it does not pass".to_owned()));
+            had.faults = vec!["a1 moves 260 mm/s, limit 240".to_owned(); 21];
+            report.cues.insert(id.to_string(), had);
+        }
+        assert_eq!(serde_json::from_str::<HaveReport>(&report.text_within(1 << 20)).unwrap(), report);
+        let text = report.text_within(30_000);
+        let short: HaveReport = serde_json::from_str(&text).unwrap();
+        assert!(
+            text.len() <= 30_000 && short.cues.len() == 100 && !short.cues["7"].faults.is_empty(),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn what_a_newer_hall_says_is_read_as_far_as_it_is_known() {
+        let report = r#"{"rev":5,"cues":{"a":{"state":"dreaming","percent":255},"b":{"state":"fetching","percent":61},"c":{"state":"fetching","percent":200}},"x":1}"#;
+        let report: HaveReport = serde_json::from_str(report).unwrap();
+        assert_eq!(report.cues["a"].said(), "waiting: it does not say why");
+        assert_eq!(report.cues["b"].said(), "fetching 61 %");
+        assert_eq!(report.cues["c"].said(), "fetched, and being proved");
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_comes_for_a_wish_is_no_reason_to_end(body in ".{0,200}") {
+            let letter = Letter { key: String::new(), sig: String::new(), body };
+            let _ = Wish::of(&letter);
+        }
+    }
+}
