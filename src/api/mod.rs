@@ -55,6 +55,8 @@ mod stop;
 mod streams;
 mod tries;
 
+#[cfg(test)]
+pub(crate) use fleet::Letterbox;
 #[cfg(feature = "harness")]
 pub(crate) use fleet::try_letter;
 pub(crate) use serving::ServingThread;

@@ -46,6 +46,7 @@ pub const DOORS: &[Door] = &[
     ("osc", osc::try_datagram),
     ("text", text_port::try_line),
     ("buttons", app::buttons::try_records),
+    ("ntp", crate::fleet::try_ntp),
     ("letter", |octets| with_text(octets, api::try_letter)),
     ("ltc", ltc),
     ("mtc", mtc),

@@ -29,4 +29,5 @@ mod fleet;
 mod log;
 mod rights;
 mod socket;
+mod start;
 mod trouble;

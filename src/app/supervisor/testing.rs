@@ -37,7 +37,7 @@ use crate::settings::SettingsFile;
 use crate::state::{Event, Finding, Machine, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::RealTime;
-use crate::time::{Clock as _, MonoTime};
+use crate::time::{Clock as _, MonoTime, Rate, TickGrid};
 use crate::timeline::Timeline;
 use crate::tracker::Counts;
 
@@ -220,6 +220,7 @@ fn runtime(config: &Arc<Config>) -> (RuntimeHandle, Consumer<TickCommand>, NewsO
         news: news_end,
         orders: RingBuffer::new(16).0,
         links: Vec::new(),
+        grid: TickGrid::new(MonoTime::default(), Rate::from_hz(config.show.rate_hz)),
         granted: RealTime::NOTHING,
         crowding: None,
     };

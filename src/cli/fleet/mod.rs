@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::{Exit, Failure};
 
 mod act;
+mod clock;
 mod demo;
 mod desk;
 mod engine;
@@ -15,6 +16,7 @@ mod link;
 mod log;
 mod report;
 mod settings;
+mod start;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,6 +28,7 @@ Examples:
   kinocue fleet stop
   kinocue fleet stop berlin.h2
   kinocue fleet level 60% 'berlin.*'
+  kinocue fleet start --group trio --at +10s
   kinocue fleet report --day yesterday
 
 Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 75 a hall did not answer, 78 bad settings";
@@ -33,7 +36,7 @@ Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 7
 /// Shows and leads many halls from one desk.
 ///
 /// Each hall plays alone, whatever becomes of the network and of the engine. Halls may be stopped from a desk; all else they have to
-/// allow, and nothing from a desk ever homes, arms, clears or starts one.
+/// allow. Nothing from a desk ever homes, arms or clears one, and it starts only what a person there has armed for that.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
@@ -54,6 +57,7 @@ enum FleetCommand {
     Disarm(act::DisarmArgs),
     Level(act::LevelArgs),
     Load(act::LoadArgs),
+    Start(start::Args),
     Report(report::Args),
 }
 
@@ -78,6 +82,7 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Disarm(args) => act::disarm(args),
         FleetCommand::Level(args) => act::level(args),
         FleetCommand::Load(args) => act::load(args),
+        FleetCommand::Start(args) => start::run(args),
         FleetCommand::Report(args) => report::run(args),
     }
 }
