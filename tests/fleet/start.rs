@@ -140,6 +140,7 @@ fn three_halls_start_at_one_instant_and_no_seat_can_tell_which_was_first() {
         HALLS.iter().zip(&halls).map(|(name, hall)| link(&engine, name, hall, &server)).collect();
     halls.iter().for_each(knows_its_clock);
     engine.hears_all();
+    // Processes of the tests live for a minute, in which five starts have room.
     let rounds = env::var("KINOCUE_STARTS").map_or(2, |count| count.parse().unwrap());
     let (mut skews, mut offs) = (Vec::new(), Vec::new());
     for round in 0..rounds {
