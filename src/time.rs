@@ -58,6 +58,27 @@ impl Add<Duration> for MonoTime {
     }
 }
 
+/// What the wall clock shows at an instant of the machine's clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct WallAt {
+    /// The instant.
+    pub(crate) at: MonoTime,
+    /// Nanoseconds since 1970.
+    pub(crate) wall_ns: u64,
+}
+
+impl WallAt {
+    /// What it shows at the zero of the machine's clock, ns since 1970; the same until somebody sets it.
+    pub(crate) fn epoch_ns(&self) -> i128 {
+        i128::from(self.wall_ns) - i128::from(self.at.as_nanos())
+    }
+
+    /// The instant at which it shows that, as it is set now, ns since 1970; the clock's zero where that lies before it.
+    pub(crate) fn instant(&self, wall_ns: i128) -> MonoTime {
+        MonoTime(u64::try_from((wall_ns - self.epoch_ns()).max(0)).unwrap_or(u64::MAX))
+    }
+}
+
 /// A position in a cue, in nanoseconds from its first sample. Negative before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct ShowTime(i64);

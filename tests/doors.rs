@@ -73,6 +73,10 @@ fn beginnings(door: &str) -> Vec<Vec<u8>> {
             b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\0\x10/kinocue/stop\0\0\0".to_vec(),
         ],
         "text" => text(&["go", "level 60%", "seek 01:02:03", "stop"]),
+        "ntp" => {
+            let packet = |head: [u8; 4]| [&head[..], &[0; 20], &[7; 8], &[9; 16]].concat();
+            vec![packet([0x24, 2, 0, 0]), packet([0x24, 0, 0, 0]), packet([0xe4, 16, 0, 0])]
+        }
         "letter" => {
             let body = r#"{\"id\":\"1\",\"to\":\"a.b\",\"word\":\"levels\",\"args\":{\"motion\":0.5},\"sent_ms\":1}"#;
             vec![format!("{{\"key\":\"U\",\"sig\":\"AA==\",\"body\":\"{body}\"}}").into_bytes()]

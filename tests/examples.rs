@@ -13,8 +13,9 @@ use std::thread;
 use programs::is_installed;
 
 /// What only the reader has: devices, films, captures, a packaged service; programs of others.
-const YOURS: [&str; 23] = [
-    "offset=6", // controllers of six axes
+const YOURS: [&str; 24] = [
+    "arm --fleet", // a hall of a fleet
+    "offset=6",    // controllers of six axes
     "alsa:",
     "/dev/snd",
     "film.mkv",

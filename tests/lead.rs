@@ -35,6 +35,7 @@ fn refusal(news: &News) -> Option<Refusal> {
     match news {
         News::Refused(refusal) => Some(*refusal),
         News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,
+        News::Started | News::CalledOff(_) => None,
     }
 }
 
@@ -42,6 +43,7 @@ const fn unplanned(news: &News) -> Option<Unplanned> {
     match news {
         News::Unplanned(what) => Some(*what),
         News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Refused(_) => None,
+        News::Started | News::CalledOff(_) => None,
     }
 }
 

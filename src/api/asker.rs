@@ -76,7 +76,7 @@ impl Asker {
     /// Over TCP arming needs an engineer: whoever arms sees the seats.
     fn allow(&self, ask: &Command) -> Result<(), Problem> {
         let local = self.who.surface == Surface::Socket;
-        let arms = matches!(ask, Command::Arm { .. });
+        let arms = matches!(ask, Command::Arm { .. } | Command::ArmFor(_));
         if arms && !local { self.least(Role::Engineer, "arming over TCP") } else { Ok(()) }
     }
 

@@ -4,9 +4,11 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Json as JsonReply;
 use axum::extract::State;
+use axum::response::{IntoResponse as _, Response};
 use jiff::Zoned;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -19,14 +21,60 @@ use super::shared::{Shared, turn};
 use super::show::Load;
 use super::status::check_pulse;
 use crate::config;
-use crate::control::{Code, Command, HallFacts, LevelsChange, Problem};
+use crate::control::{ClockReading, Code, Command, HallFacts, LevelsChange, Problem, StartOrder};
 use crate::fleet::{BriefStatus, Letter, Order};
 use crate::journal::{self, JournalPart, stamp};
-use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::sys::clock::{Monotonic, wall_at, wall_now_ns};
 use crate::time::Clock as _;
 
 /// Records of the journal in a reply.
 const RECORDS: usize = 100;
+
+/// The longest ticket of a start.
+const LONGEST_TICKET: usize = 64;
+
+/// What a letter asks.
+#[derive(Debug, PartialEq)]
+enum FleetAsk {
+    /// How the hall is, for a start; nothing is done for that.
+    Ready,
+    /// Something that is done.
+    Of(Command),
+}
+
+fn asks(order: &Order) -> Result<FleetAsk, Problem> {
+    if order.word == "ready" {
+        return args::<Nothing>(order).map(|_| FleetAsk::Ready);
+    }
+    command(order).map(FleetAsk::Of)
+}
+
+/// A start of several halls.
+fn start(order: &Order) -> Result<Command, Problem> {
+    let start: StartOrder = args(order)?;
+    let is_digest = start.sha256.len() == 64 && start.sha256.bytes().all(|octet| octet.is_ascii_hexdigit());
+    if !config::is_fleet_id(&start.group) || !is_digest {
+        let detail = format!("{:?} with {:?} is no group and no SHA-256", start.group, start.sha256);
+        return Err(bad_value(detail, "docs/fleet.md has what belongs to each word"));
+    }
+    check_ticket(&start.ticket)?;
+    Ok(Command::StartAt(start))
+}
+
+fn check_ticket(ticket: &str) -> Result<(), Problem> {
+    if ticket.is_empty() || ticket.len() > LONGEST_TICKET || !ticket.bytes().all(|c| c.is_ascii_graphic()) {
+        let detail = format!("{ticket:?} is no ticket of 1 to {LONGEST_TICKET} characters of ASCII");
+        return Err(bad_value(detail, "give another"));
+    }
+    Ok(())
+}
+
+/// Which start is to come.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Commit {
+    ticket: String,
+}
 
 /// What an order asks. Of the words of the hall those that the fleet may ever ask are read; which of them it may, is asked where
 /// the state is known.
@@ -43,10 +91,18 @@ fn command(order: &Order) -> Result<Command, Problem> {
             Command::Levels(change)
         }
         "trim" => args::<Trim>(order)?.command()?,
+        "start" => start(order)?,
+        "commit" => {
+            let Commit { ticket } = args(order)?;
+            check_ticket(&ticket)?;
+            Command::Commit { ticket }
+        }
         word => {
             let asked = config::FleetWord::ALL.iter().filter(|(_, word)| *word != config::FleetWord::Cues);
             let words = asked.map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
-            let detail = format!("the fleet may not {word:?}; it may ask {words}, and a stop by its own way");
+            let detail = format!(
+                "the fleet may not {word:?}; it may ask {words}, ready, start and commit, and a stop by its own way"
+            );
             return Err(Problem::new(Code::Role, detail, "ask somebody in the hall"));
         }
     })
@@ -69,7 +125,29 @@ fn args<T: DeserializeOwned>(order: &Order) -> Result<T, Problem> {
 pub(crate) fn try_letter(text: &str) {
     if let Ok(letter) = serde_json::from_str::<Letter>(text) {
         let order = Order::of(&letter);
-        drop(std::hint::black_box((letter.is_signed(), order.map(|order| command(&order)))));
+        drop(std::hint::black_box((letter.is_signed(), order.map(|order| asks(&order)))));
+    }
+}
+
+/// What comes of letters in a hall, one after the other.
+#[cfg(test)]
+pub(crate) struct Letterbox(super::fleet_access::FleetAccess);
+
+#[cfg(test)]
+impl Letterbox {
+    /// Of that fleet.
+    pub(crate) fn of(fleet: &config::Fleet) -> Self {
+        Self(super::fleet_access::FleetAccess::of(Some(fleet)))
+    }
+
+    /// Who asks what by it; nothing by one that only looks.
+    pub(crate) fn open(
+        &self,
+        letter: &Letter,
+        now: &crate::time::WallAt,
+    ) -> Result<(crate::control::Who, Option<Command>), Problem> {
+        let (who, ask, _) = self.0.open(letter, asks, now.wall_ns, now.at)?;
+        Ok((who, if let FleetAsk::Of(ask) = ask { Some(ask) } else { None }))
     }
 }
 
@@ -83,7 +161,13 @@ pub(crate) fn try_order(text: &str) {
         role: config::Role::Operate,
         public: pair.public_key(),
     };
-    let fleet = config::Fleet { name: "berlin.h3".to_owned(), allow: Vec::new(), keys: vec![key] };
+    let fleet = config::Fleet {
+        name: "berlin.h3".to_owned(),
+        allow: Vec::new(),
+        start: false,
+        start_bound: std::time::Duration::from_millis(2),
+        keys: vec![key],
+    };
     let access = super::FleetAccess::of(Some(&fleet));
     let letter = Letter::sign(&pair, text.to_owned()).expect("the key has both halves");
     assert!(letter.is_signed());
@@ -103,14 +187,38 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<JsonRepl
     Ok(JsonReply(BriefStatus::of(&shared.handle.status(), stamp(&Zoned::now()))))
 }
 
-/// Takes a signed order, and replies with the state that it led to.
+/// Takes a signed order, and replies with the state that it led to; `ready` with the brief status.
 pub(super) async fn order(
     State(shared): State<Arc<Shared>>,
     Json(letter): Json<Letter>,
-) -> Result<JsonReply<HallFacts>, Problem> {
-    let (who, ask, asked_at) = shared.fleet.open(&letter, command, wall_now_ns(), Monotonic.now())?;
+) -> Result<Response, Problem> {
+    let (who, ask, asked_at) = shared.fleet.open(&letter, asks, wall_now_ns(), Monotonic.now())?;
+    let FleetAsk::Of(ask) = ask else { return status(State(shared)).await.map(JsonReply::into_response) };
     let status = shared.handle.post_asked(who, ask, asked_at)?.answer().await?;
-    Ok(JsonReply(HallFacts::from(&*status)))
+    Ok(JsonReply(HallFacts::from(&*status)).into_response())
+}
+
+/// How far the wall clock of this machine was found ahead of a time server's.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Clock {
+    server: String,
+    offset_ns: i64,
+    trip_ns: u64,
+    /// How long ago.
+    age_ms: u64,
+}
+
+/// Takes what the link has measured. It is believed as the link is: who has taken that over can only have films begin apart.
+pub(super) async fn clock(
+    State(shared): State<Arc<Shared>>,
+    Json(Clock { server, offset_ns, trip_ns, age_ms }): Json<Clock>,
+) -> Result<JsonReply<Value>, Problem> {
+    let age = Duration::from_millis(age_ms);
+    let reading = ClockReading::of(server, offset_ns, trip_ns, age, &wall_at());
+    let reading = reading.map_err(|why| bad_value(why, "measure it anew"))?;
+    shared.handle.clock().set(reading);
+    Ok(JsonReply(Value::Object(Default::default())))
 }
 
 /// How much of the journal was told.
@@ -154,6 +262,25 @@ mod tests {
         let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
         assert_eq!(ask("levels", "{\"motion\":0.5}"), Ok(Command::Levels(half)));
         assert_eq!(ask("park", "null"), Ok(Command::Park));
+        let digest = "0f".repeat(32);
+        let start = |group: &str, sha256: &str, ticket: &str| {
+            format!("{{\"ticket\":\"{ticket}\",\"group\":\"{group}\",\"sha256\":\"{sha256}\",\"at_ms\":5}}")
+        };
+        let (group, sha256, ticket) = ("trio".to_owned(), digest.clone(), "t1".to_owned());
+        let order = StartOrder { ticket, group, sha256, at_ms: 5 };
+        assert_eq!(ask("start", &start("trio", &digest, "t1")), Ok(Command::StartAt(order)));
+        assert_eq!(ask("commit", "{\"ticket\":\"t1\"}"), Ok(Command::Commit { ticket: "t1".to_owned() }));
+        for args in [
+            start("Trio", &digest, "t1"),
+            start("trio", &digest[1..], "t1"),
+            start("trio", &digest.replace('f', "g"), "t1"),
+            start("trio", &digest, ""),
+            start("trio", &digest, "a b"),
+            "{}".to_owned(),
+        ] {
+            assert_eq!(ask("start", &args), Err(Code::Value), "{args}");
+        }
+        assert_eq!(ask("commit", "{\"ticket\":\"\"}"), Err(Code::Value));
         for (word, args) in [
             ("load", "{}"),
             ("load", "{\"cue\":\"../x\"}"),

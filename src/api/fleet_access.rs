@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::problem::bad_value;
 use crate::config::{self, FleetKey, FleetWord, Role};
-use crate::control::{self, Code, Command, FRESH, Problem, Surface, Who};
+use crate::control::{self, Code, FRESH, Problem, Surface, Who};
 use crate::fleet::{Letter, Order, Wish};
 use crate::time::MonoTime;
 
@@ -34,7 +34,7 @@ struct AskedOrder {
 const AHEAD: Duration = Duration::from_secs(86_400);
 
 /// What a letter asks, for whom, and when it was asked.
-type Opened = (Who, Command, MonoTime);
+type Opened<T> = (Who, T, MonoTime);
 
 impl FleetAccess {
     /// Of that fleet.
@@ -49,14 +49,14 @@ impl FleetAccess {
         *self.fleet.write().unwrap_or_else(PoisonError::into_inner) = fleet.cloned();
     }
 
-    /// What a letter asks, as `command` reads its order, where one of the keys has signed it, for this hall, just now, and for the first time.
-    pub(super) fn open(
+    /// What a letter asks, as `read` reads its order, where one of the keys has signed it, for this hall, just now, and for the first time.
+    pub(super) fn open<T>(
         &self,
         letter: &Letter,
-        command: impl FnOnce(&Order) -> Result<Command, Problem>,
+        read: impl FnOnce(&Order) -> Result<T, Problem>,
         wall_ns: u64,
         now: MonoTime,
-    ) -> Result<Opened, Problem> {
+    ) -> Result<Opened<T>, Problem> {
         let (who, name) = self.sender(letter)?;
         let order = Order::of(letter).map_err(|why| bad_value(format!("no order: {why}"), "send one"))?;
         if order.to != name {
@@ -64,7 +64,7 @@ impl FleetAccess {
             return Err(Problem::new(Code::Origin, detail, "ask the hall that is meant"));
         }
         let asked_at = asked_at(&order, wall_ns, now)?;
-        let ask = command(&order)?;
+        let ask = read(&order)?;
         self.first_time(letter, &order, now)?;
         Ok((who, ask, asked_at))
     }
@@ -159,17 +159,23 @@ mod tests {
 
     use super::*;
     use crate::config::Fleet;
+    use crate::control::Command;
 
     const NOW_MS: i64 = 1_795_306_800_123;
+
+    fn fleet(keys: Vec<FleetKey>) -> Fleet {
+        let (name, allow, start, start_bound) = ("berlin.h3".to_owned(), Vec::new(), false, Duration::ZERO);
+        Fleet { name, allow, start, start_bound, keys }
+    }
 
     fn access() -> (FleetAccess, KeyPair) {
         let pair = KeyPair::new_user();
         let key = FleetKey { name: "office".to_owned(), role: Role::Operate, public: pair.public_key() };
-        let fleet = Fleet { name: "berlin.h3".to_owned(), allow: Vec::new(), keys: vec![key] };
+        let fleet = fleet(vec![key]);
         (FleetAccess::of(Some(&fleet)), pair)
     }
 
-    fn open(access: &FleetAccess, letter: &Letter) -> Result<Opened, Code> {
+    fn open(access: &FleetAccess, letter: &Letter) -> Result<Opened<Command>, Code> {
         let wall_ns = u64::try_from(NOW_MS).unwrap() * 1_000_000;
         let now = MonoTime::from_nanos(0) + Duration::from_secs(1000);
         access.open(letter, |_| Ok(Command::Pause), wall_ns, now).map_err(|problem| problem.code)
@@ -203,7 +209,7 @@ mod tests {
         assert_eq!(open(&access, &stranger).err(), Some(Code::Token));
         let forged = Letter { key: pair.public_key(), ..stranger };
         assert_eq!(open(&access, &forged).err(), Some(Code::Token));
-        access.set(Some(&Fleet { name: "berlin.h3".to_owned(), allow: Vec::new(), keys: Vec::new() }));
+        access.set(Some(&fleet(Vec::new())));
         assert_eq!(open(&access, &pause("6", "berlin.h3", NOW_MS)).err(), Some(Code::Token), "revoked");
         access.set(None);
         assert_eq!(open(&access, &pause("7", "berlin.h3", NOW_MS)).err(), Some(Code::Off));
@@ -214,7 +220,13 @@ mod tests {
         let (access, pair) = access();
         let fleet = |role, allow: &[FleetWord]| {
             let key = FleetKey { name: "office".to_owned(), role, public: pair.public_key() };
-            Some(Fleet { name: "berlin.h3".to_owned(), allow: allow.to_vec(), keys: vec![key] })
+            Some(Fleet {
+                name: "berlin.h3".to_owned(),
+                allow: allow.to_vec(),
+                start: false,
+                start_bound: Duration::from_millis(2),
+                keys: vec![key],
+            })
         };
         let wall_ns = u64::try_from(NOW_MS).unwrap() * 1_000_000;
         let open = |pair: &KeyPair, to: &str, rev: i64| {

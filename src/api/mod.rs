@@ -58,6 +58,8 @@ mod streams;
 mod tries;
 
 pub(crate) use doors::serve_behind_doors;
+#[cfg(test)]
+pub(crate) use fleet::Letterbox;
 #[cfg(feature = "harness")]
 pub(crate) use fleet::{try_letter, try_order};
 #[cfg(feature = "harness")]

@@ -90,6 +90,7 @@ pub(super) fn of_fleet() -> axum::Router<Arc<Shared>> {
     axum::Router::new()
         .route("/api/v1/fleet/status", get(fleet::status))
         .route("/api/v1/fleet/order", post(fleet::order))
+        .route("/api/v1/fleet/clock", post(fleet::clock))
         .route("/api/v1/fleet/journal", post(fleet::journal))
         .route("/api/v1/fleet/wish", get(fleet_cues::kept).put(fleet_cues::wish))
         .route("/api/v1/fleet/cues/{id}", put(fleet_cues::take))

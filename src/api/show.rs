@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use super::asker::{Asker, StatusReply};
 use super::input::{Json, Nothing, OrNothing, id};
 use super::problem::bad_value;
+use crate::config;
 use crate::control::{Command, Problem, Status};
 use crate::time::ShowTime;
 
@@ -29,6 +30,9 @@ pub(super) struct Arm {
     /// Nobody sits on the seats and nothing lies on or under them. Where a position is unknown arming homes the seats first,
     /// and is refused without this; for engineers.
     seats_empty: bool,
+    /// A group of halls: the fleet may start what is loaded, once, together with those. Only where `[fleet] start = true`, and not with
+    /// `seats_empty`.
+    fleet: Option<String>,
 }
 
 /// From where on.
@@ -67,8 +71,17 @@ pub(super) async fn load(asker: Asker, Json(load): Json<Load>) -> Reply {
 #[utoipa::path(
     post, path = "/api/v1/show/arm", tag = "show", request_body = Option<Arm>, responses((status = 200, body = Status))
 )]
-pub(super) async fn arm(asker: Asker, OrNothing(Arm { seats_empty }): OrNothing<Arm>) -> Reply {
-    asker.ask(Command::Arm { seats_empty }).await
+pub(super) async fn arm(asker: Asker, OrNothing(Arm { seats_empty, fleet }): OrNothing<Arm>) -> Reply {
+    let Some(group) = fleet else { return asker.ask(Command::Arm { seats_empty }).await };
+    if !config::is_fleet_id(&group) {
+        let detail = format!("fleet: {group:?} is no group of halls");
+        return Err(bad_value(detail, "write a to z, 0 to 9, - and _, at most 32 of them"));
+    }
+    if seats_empty {
+        let detail = "seats that home first are not armed for a start of the fleet";
+        return Err(bad_value(detail.to_owned(), "home them, then arm for the group"));
+    }
+    asker.ask(Command::ArmFor(group)).await
 }
 
 /// Stands down.

@@ -1,5 +1,7 @@
 //! `[fleet]`: what other houses may ask of this hall by the fleet, and whose signatures are taken; without the table there is no fleet.
 
+use std::time::Duration;
+
 use nkeys::{KeyPair, KeyPairType};
 
 use super::Role;
@@ -7,6 +9,8 @@ use super::fault::Faults;
 use super::section::{Entry, Section, did_you_mean};
 use crate::plain;
 
+/// How far the clock may be off in a start, where nothing is said, ms; and the most that can be said.
+const START_BOUND_MS: (f64, f64) = (2.0, 100.0);
 /// The longest part of a name in the fleet.
 const LONGEST_NAME: usize = 32;
 
@@ -17,6 +21,10 @@ pub(crate) struct Fleet {
     pub(crate) name: String,
     /// What may be asked beside a stop; nothing by default.
     pub(crate) allow: Vec<FleetWord>,
+    /// True if the fleet may start what a person here has armed for that.
+    pub(crate) start: bool,
+    /// How far the wall clock may be off in such a start.
+    pub(crate) start_bound: Duration,
     /// Whose signatures are taken.
     pub(crate) keys: Vec<FleetKey>,
 }
@@ -50,10 +58,12 @@ pub(crate) enum FleetWord {
     Trim,
     /// To put cues into the library, while parked; loads none of them.
     Cues,
+    /// To start at an instant what a person in the hall has armed for that; by a key of its own, not by `allow`.
+    Start,
 }
 
 impl FleetWord {
-    /// All of them, by the words of the configuration.
+    /// Those of `allow`, by the words of the configuration.
     pub(crate) const ALL: [(&'static str, Self); 7] = [
         ("pause", Self::Pause),
         ("park", Self::Park),
@@ -78,7 +88,16 @@ plain::displayed!(FleetWord {
     Self::Levels => "levels",
     Self::Trim => "trim",
     Self::Cues => "cues",
+    Self::Start => "start",
 });
+
+impl Fleet {
+    /// True if the configuration allows it.
+    #[must_use]
+    pub(crate) fn allows(&self, word: FleetWord) -> bool {
+        if word == FleetWord::Start { self.start } else { self.allow.contains(&word) }
+    }
+}
 
 /// Reads the table.
 pub(super) fn fleet(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Fleet> {
@@ -87,12 +106,13 @@ pub(super) fn fleet(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Fleet> 
     let name = section.get("name").and_then(|entry| name(entry, section.faults));
     let words = section.get("allow").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
     let allow = words.into_iter().filter_map(|entry| word(entry, section.faults)).collect();
-    for later in ["start", "start_bound_ms"] {
-        section.refuse(later, "this version has no starts by the fleet; remove it");
-    }
+    let start = section.get("start").and_then(|entry| entry.switch(section.faults)).unwrap_or(false);
+    let (usual, most) = START_BOUND_MS;
+    let bound_ms = section.number_in("start_bound_ms", 0.01..=most).unwrap_or(usual);
+    let start_bound = Duration::from_secs_f64(bound_ms / 1e3);
     let keys = keys(&mut section);
     section.finish();
-    Some(Fleet { name: name?, allow, keys })
+    Some(Fleet { name: name?, allow, start, start_bound, keys })
 }
 
 /// `berlin.h3`.
@@ -196,7 +216,12 @@ mod tests {
     #[test]
     fn a_hall_is_in_a_fleet_only_where_its_configuration_says_so_and_allows_nothing_by_itself() {
         assert_eq!(hall_with("").fleet, None);
+        let starts =
+            hall_with("[fleet]\nname = \"berlin.h3\"\nstart = true\nstart_bound_ms = 0.5\n").fleet.unwrap();
+        assert!(starts.start && starts.start_bound == Duration::from_micros(500));
+        assert!(starts.allows(FleetWord::Start) && !starts.allows(FleetWord::Pause));
         let alone = hall_with("[fleet]\nname = \"berlin.h3\"\n").fleet.unwrap();
+        assert_eq!((alone.start, alone.start_bound), (false, Duration::from_millis(2)));
         assert_eq!((alone.name.as_str(), alone.allow, alone.keys), ("berlin.h3", vec![], vec![]));
         let public = KeyPair::new_user().public_key();
         let fleet = hall_with(&format!(
@@ -222,8 +247,10 @@ mod tests {
             ("name = \"berlin.h3.x\"".to_owned(), "is not SITE.HALL"),
             ("name = \"Berlin.*\"".to_owned(), "is not SITE.HALL"),
             (named("allow = [\"pauze\"]"), "did you mean pause?"),
-            (named("start = true"), "this version has no starts by the fleet"),
-            (named("start_bound_ms = 2"), "this version has no starts by the fleet"),
+            (named("start = 1"), "start"),
+            (named("start_bound_ms = 0"), "start_bound_ms"),
+            (named("start_bound_ms = 101"), "start_bound_ms"),
+            (named("allow = [\"start\"]"), "\"start\" is not one of"),
             (named("keys = []"), "unknown key in [fleet]; did you mean key?"),
             (named(&key("office", "engineer", &public)), "\"engineer\" is not one of view, operate"),
             (named(&key("of.fice", "view", &public)), "\"of.fice\" is not a name here"),

@@ -36,6 +36,15 @@ pub enum Command {
         /// refused then.
         seats_empty: bool,
     },
+    /// Get ready for a start of that group of halls by the fleet, once.
+    ArmFor(String),
+    /// Start what is loaded at an instant, together with other halls: of the fleet alone, and only where a person armed for that.
+    StartAt(StartOrder),
+    /// That start is to come: all that were asked have it.
+    Commit {
+        /// Its ticket.
+        ticket: String,
+    },
     /// Stand down.
     Disarm,
     /// Start what is loaded.
@@ -91,6 +100,20 @@ pub enum Command {
     Dump,
 }
 
+/// A start of several halls at one instant.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartOrder {
+    /// Like no other: a start is asked once.
+    pub(crate) ticket: String,
+    /// The group of halls.
+    pub(crate) group: String,
+    /// SHA-256 of the cue that is meant, hexadecimal.
+    pub(crate) sha256: String,
+    /// When the film is at its beginning, Unix milliseconds.
+    pub(crate) at_ms: i64,
+}
+
 /// How much of a cue the seats make.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
@@ -141,6 +164,9 @@ impl Command {
             Self::Select { .. } => ("select", Operate, LASTS, None, None),
             Self::Arm { seats_empty: false } => ("arm", Operate, STALE, None, None),
             Self::Arm { seats_empty: true } => ("arm", Engineer, STALE, None, None),
+            Self::ArmFor(_) => ("arm", Operate, STALE, None, None),
+            Self::StartAt(_) => ("start", Operate, STALE, None, Some(Fleet::Start)),
+            Self::Commit { .. } => ("commit", Operate, STALE, None, Some(Fleet::Start)),
             Self::Disarm => ("disarm", Operate, LASTS, None, Some(Fleet::Disarm)),
             Self::Go => ("go", Operate, STALE, Some(GearWord::Go), None),
             Self::GoFrom(_) => ("go", Operate, STALE, None, None),
@@ -199,6 +225,15 @@ impl Command {
     }
 }
 
+impl StartOrder {
+    /// When the film is at its beginning, RFC 3339 to the millisecond.
+    #[must_use]
+    pub(crate) fn at(&self) -> String {
+        jiff::Timestamp::from_millisecond(self.at_ms)
+            .map_or_else(|_| format!("{} ms", self.at_ms), |at| format!("{at:.3}"))
+    }
+}
+
 impl From<&Preset> for LevelsChange {
     fn from(preset: &Preset) -> Self {
         let Preset { motion, vibration, effects, .. } = preset;
@@ -227,6 +262,9 @@ impl fmt::Display for Command {
             Self::Disable { name, why: Some(why) } => write!(f, " {name}: {}", why.escape_debug()),
             Self::Mark { text: Some(text) } => write!(f, " {}", text.escape_debug()),
             Self::Arm { seats_empty: true } => f.write_str(" with empty seats"),
+            Self::ArmFor(group) => write!(f, " for {group}"),
+            Self::StartAt(start) => write!(f, " {} at {}, ticket {}", start.group, start.at(), start.ticket),
+            Self::Commit { ticket } => write!(f, " ticket {ticket}"),
             Self::Test { rows } if rows.is_empty() => f.write_str(" all rows"),
             Self::Test { rows } => write!(f, " rows {}", rows.join(", ")),
             _ => Ok(()),

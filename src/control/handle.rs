@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use tokio::sync::{oneshot, watch};
 
-use super::{Code, Command, Problem, Status, Who};
+use super::{Code, Command, Problem, SharedClock, Status, Who};
 use crate::rt::Desk;
 use crate::state::State;
 use crate::sys::clock::Monotonic;
@@ -96,6 +96,7 @@ struct Led {
     desk: Arc<Desk>,
     /// Who is woken by each ask; `None` before it runs.
     supervisor: Option<Thread>,
+    clock: SharedClock,
 }
 
 impl StatusSource {
@@ -107,6 +108,11 @@ impl StatusSource {
     /// From now on that thread is woken by each ask. What was asked before is there to be taken.
     pub(crate) fn wakes(&self, supervisor: Thread) {
         self.1.write().unwrap_or_else(PoisonError::into_inner).supervisor = Some(supervisor);
+    }
+
+    /// How far the wall clock may be off, as surfaces are told.
+    pub(crate) fn clock(&self) -> SharedClock {
+        self.1.read().unwrap_or_else(PoisonError::into_inner).clock.clone()
     }
 
     /// Makes a status known to all who watch.
@@ -128,11 +134,16 @@ pub struct Handle {
 pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
     let (asks, inbox) = mpsc::sync_channel(ASKS);
     let (source, status) = watch::channel(Arc::new(first));
-    let led = Arc::new(RwLock::new(Led { desk, supervisor: None }));
+    let led = Arc::new(RwLock::new(Led { desk, supervisor: None, clock: SharedClock::default() }));
     (Handle { asks, status, led: Arc::clone(&led) }, Inbox(inbox), StatusSource(source, led))
 }
 
 impl Handle {
+    /// Where it is put how far the wall clock may be off.
+    pub(crate) fn clock(&self) -> SharedClock {
+        self.led.read().unwrap_or_else(PoisonError::into_inner).clock.clone()
+    }
+
     /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
     pub(crate) fn stop(&self) {
         self.led.read().unwrap_or_else(PoisonError::into_inner).desk.stop();

@@ -3,6 +3,7 @@
 //! touches the tick thread but by [`Handle::stop`], which sets a flag that is read every tick.
 
 mod ask;
+mod clock;
 mod handle;
 mod links;
 pub(crate) mod model;
@@ -14,7 +15,9 @@ mod who;
 
 pub use crate::config::Role;
 pub(crate) use ask::Levels;
+pub use ask::StartOrder;
 pub use ask::{Command, LevelsChange};
+pub(crate) use clock::{ClockReading, SharedClock};
 pub(crate) use handle::{Asked, FRESH, Posted, asked_at, overtaken};
 pub use handle::{Desired, Handle, Inbox, StatusSource, handle};
 pub(crate) use links::{LinkAxisStatus, LinkStatus};
@@ -26,9 +29,10 @@ pub(crate) use problem::NEEDS_ENGINEER;
 pub use problem::{Code, Problem};
 pub(crate) use recordings::is_recording;
 pub(crate) use status::{
-    ButtonsStatus, EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus, FilmStatus, HallFacts, MarginOf,
-    MarginStatus, NotifyStatus, PlaylistStatus, PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus,
-    TestRow, TestStatus, Warning,
+    ArmedForStatus, ButtonsStatus, ClockStatus, EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus,
+    FilmStatus, FleetStatus, HallFacts, MarginOf, MarginStatus, NotifyStatus, PlaylistStatus,
+    PreflightStatus, RealTimeStatus, RecordStatus, ShowStatus, StartPhase, StartStatus, TestRow, TestStatus,
+    Warning,
 };
 pub use status::{ControllerStatus, JournalLine, Status};
 pub use who::{Surface, Who};

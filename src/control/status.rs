@@ -6,10 +6,14 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+mod facts;
 mod film;
+mod fleet;
 mod margin;
 
+pub(crate) use facts::HallFacts;
 pub(crate) use film::{FilmDisagreement, FilmSourceStatus, FilmStatus};
+pub(crate) use fleet::{ArmedForStatus, ClockStatus, FleetStatus, StartPhase, StartStatus};
 pub(crate) use margin::{MarginOf, MarginStatus};
 
 use super::Levels;
@@ -72,6 +76,9 @@ pub struct Status {
     /// The ways of `[notify]`; left out where there is none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notify: Vec<NotifyStatus>,
+    /// What the fleet may start here; left out in a hall of no fleet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fleet: Option<FleetStatus>,
     /// How much later than the film the motion is, ms.
     pub trim_ms: i32,
     /// Levels and effects as they are set.
@@ -160,32 +167,6 @@ pub struct NotifyStatus {
     pub lost: u64,
     /// Why the last one was not sent, and what to do.
     pub trouble: Option<String>,
-}
-
-/// How the hall is, in short.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(default)]
-pub(crate) struct HallFacts {
-    /// The state, one word.
-    #[schema(value_type = String)]
-    pub(crate) state: Word<State>,
-    /// Why it is in that state.
-    pub(crate) cause: String,
-    /// What a person does next.
-    pub(crate) next: String,
-    /// Where in the cue the film is, s; null if none is loaded.
-    pub(crate) position_s: Option<f64>,
-}
-
-impl From<&Status> for HallFacts {
-    fn from(status: &Status) -> Self {
-        Self {
-            state: status.state.clone(),
-            cause: status.cause.clone(),
-            next: status.next.clone(),
-            position_s: status.show.as_ref().map(|show| show.position_s),
-        }
-    }
 }
 
 /// What is recorded, since the hall was opened with its configuration.

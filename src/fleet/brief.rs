@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::control::model::Word;
-use crate::control::{FORMAT, Health, Status, Warning};
+use crate::control::{FORMAT, FleetStatus, Health, Status, Warning};
 use crate::state::State;
 
 /// Warnings that are told; the gravest.
@@ -43,6 +43,8 @@ pub(crate) struct BriefStatus {
     pub(crate) warnings: Vec<Warning>,
     /// How many there are in all.
     pub(crate) warnings_total: usize,
+    /// What the fleet may start there, and how far its clock may be off.
+    pub(crate) fleet: Option<FleetStatus>,
 }
 
 /// What is loaded, in short.
@@ -57,6 +59,8 @@ pub(crate) struct BriefShow {
     pub(crate) length_s: f64,
     /// Where the film is in it, s.
     pub(crate) position_s: f64,
+    /// How long the seats take onto it after its start, s.
+    pub(crate) join_s: f64,
 }
 
 /// The seats of a hall by their controllers.
@@ -79,6 +83,7 @@ impl BriefStatus {
             sha256: show.sha256.clone(),
             length_s: show.length_s,
             position_s: show.position_s,
+            join_s: show.join_s,
         });
         Self {
             format: FORMAT,
@@ -96,6 +101,7 @@ impl BriefStatus {
             seats: SeatCounts::of(status),
             warnings: status.warnings.iter().take(WARNINGS).cloned().collect(),
             warnings_total: status.warnings.len(),
+            fleet: status.fleet.clone(),
         }
     }
 
@@ -106,6 +112,14 @@ impl BriefStatus {
         let mut now = Self { at: at.clone(), seq: *seq, since_s: *since_s, ..self.clone() };
         if let (Some(show), Some(before)) = (&mut now.show, show) {
             show.position_s = before.position_s;
+        }
+        if let (Some(fleet), Some(before)) = (&mut now.fleet, &before.fleet) {
+            if fleet.clock.is_some() && before.clock.is_some() {
+                fleet.clock.clone_from(&before.clock);
+            }
+            if let (Some(armed), Some(before)) = (&mut fleet.armed_for, &before.armed_for) {
+                armed.lapses_s = before.lapses_s;
+            }
         }
         now != *before
     }

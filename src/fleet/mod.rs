@@ -4,11 +4,15 @@
 
 mod brief;
 mod letter;
+mod ntp;
 mod proof;
 mod wish;
 
 pub(crate) use brief::BriefStatus;
 pub(crate) use letter::{Letter, Order};
+#[cfg(feature = "harness")]
+pub(crate) use ntp::try_answer as try_ntp;
+pub(crate) use ntp::{ClockSample, LEN as NTP_LEN, answer as ntp_answer, question as ntp_question};
 pub(crate) use proof::LogRecord;
 pub(crate) use wish::{CHUNK, CueHad, HadState, HaveReport, LONGEST_WISH, Wish, WishedCue};
 

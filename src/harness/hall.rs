@@ -47,6 +47,10 @@ pub enum Event {
     Ask(Transition),
     /// Somebody seeks.
     Seek(ShowTime),
+    /// What is loaded is to start with its film at its beginning at that instant.
+    StartAt(MonoTime),
+    /// It is not.
+    CallOff,
     /// Something is seen of a controller.
     Alarm(Alarm),
     /// A controller takes part again: its seat was read at rest in that pose.
@@ -80,6 +84,8 @@ pub struct Virtual {
     pub level: f64,
     /// True if it chases a film, of which nobody has heard before the first [`Event::Film`].
     pub chases: bool,
+    /// True if the hall is armed, and starts by what it is asked; else it goes at once.
+    pub armed: bool,
     /// Whoever tells of it, where it is not the script.
     pub film: Option<ShownFilm>,
     /// What happens at the wake-up of that number, counted from 0.
@@ -101,6 +107,7 @@ impl Virtual {
             plays: 1,
             level: 1.0,
             chases: false,
+            armed: false,
             film: None,
             script: Vec::new(),
             at_most: 1_000_000,
@@ -151,7 +158,7 @@ impl Virtual {
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - staged.show.start.as_nanos());
         let desk = staged.desk();
         let (mut engine, lanes, planner, timeline) = staged.split();
-        if self.chases {
+        if self.chases || self.armed {
             engine = engine.waiting();
         }
         let live = Arc::new(Live::new(lanes.len()));
@@ -178,7 +185,11 @@ impl Virtual {
         let film = self.chases.then(|| FilmLead::new(Arc::clone(&hands.film), rules, ORIGIN));
         let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
-        let conductor = Conductor::of_a_play(clock.now(), true).chasing(film);
+        let conductor = if self.armed {
+            Conductor::of_an_armed_hall(clock.now())
+        } else {
+            Conductor::of_a_play(clock.now(), true).chasing(film)
+        };
         let sink = Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new() };
         let (places, clock) = (Places::new(&lanes, rate), &clock);
         let (desk, leave) = (&desk, &leave);
@@ -312,6 +323,8 @@ impl<'a> Stage<'a> {
             Event::Leave => self.hands.leave.store(true, Ordering::Relaxed),
             Event::Stop => self.hands.desk.stop(),
             Event::Ask(request) => self.hands.command(Command::Request(*request)),
+            Event::StartAt(film_zero) => self.hands.command(Command::StartAt(*film_zero)),
+            Event::CallOff => self.hands.command(Command::CallOff),
             Event::Seek(film) => self.hands.command(Command::Seek(*film)),
             Event::Alarm(alarm) => {
                 self.hands.alarms.borrow_mut().push(*alarm).expect("there is room");

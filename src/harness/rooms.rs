@@ -24,7 +24,7 @@ pub mod config {
 pub mod control {
     pub use crate::control::{
         Code, Command, ControllerStatus, Desired, Handle, Health, Inbox, JournalLine, LevelsChange, Problem,
-        Role, Status, StatusSource, Surface, Who, handle,
+        Role, StartOrder, Status, StatusSource, Surface, Who, handle,
     };
     pub mod model {
         pub use crate::control::model::{Ending, FrameCounts, Percentiles};

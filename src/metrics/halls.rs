@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn each_hall_has_its_age_and_only_one_that_is_heard_has_a_state() {
-        let mut status = BriefStatus { state: State::Playing.into(), ..BriefStatus::default() };
+        let mut status = BriefStatus { state: State::Parked.into(), ..BriefStatus::default() };
         (status.seats.total, status.seats.lost, status.warnings_total) = (8, 1, 3);
         let hall = |name: &str, age_s: Option<f64>, status: Option<BriefStatus>| HallFigures {
             name: name.to_owned(),
@@ -132,7 +132,7 @@ mod tests {
             "kinocue_fleet_hall_silent{hall=\"a.h1\"} 0.0",
             "kinocue_fleet_hall_silent{hall=\"a.h3\"} 1.0",
             "kinocue_fleet_status_age_seconds{hall=\"a.h2\"} 60.0",
-            "kinocue_fleet_hall_state{hall=\"a.h1\",state=\"playing\"} 1.0",
+            "kinocue_fleet_hall_state{hall=\"a.h1\",state=\"parked\"} 1.0",
             "kinocue_fleet_seats{hall=\"a.h1\",kind=\"lost\"} 1.0",
             "kinocue_fleet_warnings{hall=\"a.h1\"} 3.0",
             "kinocue_fleet_stops_total{result=\"done\"} 2",

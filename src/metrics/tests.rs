@@ -134,6 +134,7 @@ fn playing() -> Status {
             margins: vec![],
         }),
         playlist: None,
+        fleet: None,
         trim_ms: -80,
         levels: Levels {
             motion: 0.6,

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::film::{FilmLead, FilmStart};
 use super::mail::{Alarm, News};
+use super::timed::{StartOff, StartTurn, TimedStart};
 use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, PlayProgress, Rest};
 use crate::film::chase::{FilmLeave, ParkCause};
 use crate::net::Lead;
@@ -40,6 +41,8 @@ pub struct Conductor {
     film_error_ns: Option<i64>,
     /// Until when this machine leads the hall; none where it is the only one.
     lead: Option<Arc<Lead>>,
+    /// What starts by itself at its instant.
+    start: TimedStart,
 }
 
 /// A signal goes to whoever leads the hall as well, who knows more: this long it is left to them.
@@ -69,6 +72,7 @@ impl Conductor {
             film_is_over: false,
             film_error_ns: None,
             lead: None,
+            start: TimedStart::NONE,
         }
     }
 
@@ -138,14 +142,36 @@ impl Conductor {
     /// before the first tick. Where it is not `attended`, a stop or a fault is the end of it.
     #[must_use]
     pub fn of_a_play(now: MonoTime, attended: bool) -> Self {
-        let mut machine = Machine::new(now);
-        machine.event(Event::Identified(Finding { homed: true, at_park: true, crashed: false }), now);
-        machine.event(Event::Readiness(Readiness::Ready), now);
-        for request in [Transition::Arm, Transition::Go] {
-            // Neither is refused to a parked hall that is ready.
-            let _ = machine.request(request, now);
-        }
+        let mut machine = armed(now);
+        let _ = machine.request(Transition::Go, now);
         Self::new(machine, attended)
+    }
+
+    /// One of a hall that a person has armed; it ends where somebody wants that.
+    #[must_use]
+    #[cfg(feature = "harness")]
+    pub(crate) fn of_an_armed_hall(now: MonoTime) -> Self {
+        Self::new(armed(now), true)
+    }
+
+    /// Holds a start until its instant.
+    pub(super) const fn hold_start(&mut self, film_zero: MonoTime) {
+        self.start.hold(film_zero);
+    }
+
+    /// Drops it; says whether there was one.
+    pub(super) const fn call_off_start(&mut self) -> bool {
+        self.start.call_off()
+    }
+
+    /// What becomes of it, which may be a GO as a person asks it; to be told every tick, after all that is asked.
+    pub(super) fn mind_start(&mut self, tick: &Tick, engine: &mut Engine, now: MonoTime) -> StartTurn {
+        let is_armed = self.machine.state() == State::Armed && self.film().is_none() && !self.left;
+        let turn = self.start.turn(tick, engine.playhead().film(), is_armed);
+        if turn == StartTurn::Due && self.request(Transition::Go, engine, now).is_err() {
+            return StartTurn::Off(StartOff::NotArmed);
+        }
+        turn
     }
 
     /// The same of a show that chases a film.
@@ -385,6 +411,16 @@ impl Conductor {
             _ => Ending::Fault,
         }
     }
+}
+
+/// A hall that is parked, ready and armed.
+fn armed(now: MonoTime) -> Machine {
+    let mut machine = Machine::new(now);
+    machine.event(Event::Identified(Finding { homed: true, at_park: true, crashed: false }), now);
+    machine.event(Event::Readiness(Readiness::Ready), now);
+    // It is not refused to a parked hall that is ready.
+    let _ = machine.request(Transition::Arm, now);
+    machine
 }
 
 #[cfg(test)]

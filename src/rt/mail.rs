@@ -7,6 +7,7 @@ use rtrb::{Consumer, PopError, Producer, RingBuffer};
 
 use super::film::FilmStart;
 use super::live::Live;
+use super::timed::StartOff;
 use crate::belief::Fall;
 use crate::belief::LaneEvidence;
 use crate::drive::Lane;
@@ -95,6 +96,11 @@ pub enum Command {
     Seek(ShowTime),
     /// Something that the control plane has found out: the hall is ready, the seats are home.
     Event(Event),
+    /// What is loaded starts by itself, with the film at its beginning at that instant, where the hall is armed until then. The news is
+    /// either [`News::Started`] or [`News::CalledOff`], once. One that is held is replaced.
+    StartAt(MonoTime),
+    /// It does not.
+    CallOff,
     /// The show that is next. Not taken while the seats move.
     Load(Box<Loaded>),
     /// One slow frame that leads a seat of which nobody has told where it is to park, from wherever it may be. Taken only before the
@@ -177,6 +183,10 @@ pub enum News {
     NotLoaded(State),
     /// No move was found for something that the show goes on without.
     Unplanned(Unplanned),
+    /// What was to start at its instant has.
+    Started,
+    /// It has not, and will not.
+    CalledOff(StartOff),
 }
 
 /// The number of a command, from 0 in the order in which they are given. It needs no place beside the command: the mailbox keeps

@@ -18,6 +18,7 @@ mod planning;
 mod spin;
 mod standby;
 mod table;
+mod timed;
 mod watch;
 mod withdrawn;
 
@@ -45,6 +46,7 @@ pub(crate) use spin::Spun;
 pub use standby::Order;
 pub(crate) use standby::Standby;
 pub(crate) use table::Row;
+pub(crate) use timed::StartOff;
 pub(crate) use watch::Watch;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -58,6 +60,7 @@ use crate::record::{Asked, TickHead};
 use crate::state::{Refusal, State, Transition, Why};
 use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};
 use crate::wire::MAX_LEN;
+use timed::StartTurn;
 
 /// Where the frames of a tick go.
 pub trait FrameSink {
@@ -145,11 +148,12 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let tick = self.grid.take(now);
         self.conductor.mind_gap(tick.missed, &mut self.engine, now);
         self.take_mail(now);
+        let soon = self.mind_start(&tick, now);
         let film = self.conductor.mind_film(&tick, &mut self.engine, self.desk.trim_ms(), now);
         // In a pause nothing is sent: what follows begins as any motion does.
         let moving = self.conductor.machine().may_send_motion() && !self.engine.waits();
         self.places.look(&mut self.engine, &self.mail, now, moving);
-        let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving);
+        let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving, soon);
         let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
         let late_ns = match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
@@ -168,6 +172,19 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         self.mail.beat();
         // A hall goes on when its show is over; one that is told to leave has ended its engine once nothing moves.
         step != Step::Over || (self.conductor.stays() && !self.conductor.is_left())
+    }
+
+    /// Begins what is to begin at this tick; true where it does, or will soon.
+    fn mind_start(&mut self, tick: &Tick, now: MonoTime) -> bool {
+        let news = match self.conductor.mind_start(tick, &mut self.engine, now) {
+            StartTurn::Waits => return false,
+            StartTurn::Near => return true,
+            StartTurn::Due => News::Started,
+            StartTurn::Off(why) => News::CalledOff(why),
+        };
+        tell_state(&mut self.conductor, &mut self.mail);
+        self.mail.tell(news);
+        news == News::Started
     }
 
     /// Bounded: so many commands and alarms a tick, and the planner answers one request at a time. The stop waits for none of
@@ -230,6 +247,16 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             Command::Seek(film) => told(conductor.seek(film, engine, now)),
             Command::Event(event) => {
                 conductor.event(event, engine, now);
+                News::Taken
+            }
+            Command::StartAt(film_zero) => {
+                conductor.hold_start(film_zero);
+                News::Taken
+            }
+            Command::CallOff => {
+                if conductor.call_off_start() {
+                    mail.tell(News::CalledOff(StartOff::Asked));
+                }
                 News::Taken
             }
             Command::ParkSlowly { lane, time_ms } => told(self.park_slowly(usize::from(lane), time_ms)),

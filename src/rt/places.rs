@@ -128,22 +128,25 @@ impl Places {
     }
 
     /// Whether a motion may go on. One that begins waits until all seats were read since it was asked for, some milliseconds, and goes on
-    /// reading them until its way is planned and its first frame leaves; a seat that moves meanwhile, or does not answer, is left out.
+    /// reading them until its way is planned and its first frame leaves; a seat that moves meanwhile, or does not answer, is left out. For
+    /// one that begins `soon`, at an instant, all of that is done before, and at the instant nothing waits.
     pub(super) fn may_go_on(
         &mut self,
         engine: &mut Engine,
         mail: &Mail,
         now: MonoTime,
         moving: bool,
+        soon: bool,
     ) -> bool {
         let moved = std::mem::replace(&mut self.moved, moving);
         // Whoever parks may rest until one comes back that is waited for, and go on then.
         let rests = self.waits.is_none() && engine.sends_nothing();
-        if moving && (!moved || rests) && mail.live().has_reader() {
+        let begins = if soon { self.waits.is_none() } else { moving && (!moved || rests) };
+        if begins && mail.live().has_reader() {
             self.wait(mail, now, true);
         }
-        let Some(mut wait) = self.waits.take().filter(|_| moving) else { return true };
-        let is_over = now.since(wait.met) >= WAITS_FOR;
+        let Some(mut wait) = self.waits.take().filter(|_| moving || soon) else { return true };
+        let is_over = moving && (soon || now.since(wait.met) >= WAITS_FOR);
         let mut goes_on = true;
         for lane in 0..self.lanes.len() {
             let is_open = self.is_open(lane, &wait, engine, now);
@@ -161,7 +164,7 @@ impl Places {
         }
         // One that begins is over with the first frame.
         self.waits = Some(wait).filter(|wait| wait.begins || !goes_on);
-        goes_on || !wait.begins
+        goes_on || !wait.begins || !moving
     }
 
     /// Whether a lane's seat is still to be read.

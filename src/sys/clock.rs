@@ -8,7 +8,7 @@ use rustix::io::Errno;
 use rustix::thread::clock_nanosleep_absolute;
 use rustix::time::{ClockId, Timespec, clock_gettime};
 
-use crate::time::{Clock, MonoTime};
+use crate::time::{Clock, MonoTime, WallAt};
 
 const NANOS_PER_SECOND: u64 = 1_000_000_000;
 
@@ -34,6 +34,20 @@ impl Clock for Monotonic {
 #[must_use]
 pub fn wall_now_ns() -> u64 {
     read(ClockId::Realtime)
+}
+
+/// Readings of both clocks of which the best is taken.
+const READINGS: usize = 5;
+
+/// What the wall clock shows now: of some readings between two of the machine's clock the one with the least time between.
+#[must_use]
+pub(crate) fn wall_at() -> WallAt {
+    let readings = (0..READINGS).map(|_| {
+        let (before, wall_ns, after) = (Monotonic.now(), wall_now_ns(), Monotonic.now());
+        let width = after.since(before);
+        (width, WallAt { at: before + width / 2, wall_ns })
+    });
+    readings.min_by_key(|(width, _)| *width).map(|(_, reading)| reading).unwrap_or_default()
 }
 
 /// The wall clock in the machine's time zone, for people: schedules, journals, reports. It may step at any time.
@@ -78,6 +92,14 @@ mod tests {
         assert!(Monotonic.now().since(start) >= Duration::from_millis(2));
         Monotonic.sleep_until(MonoTime::from_nanos(0));
         Monotonic.sleep_until(start);
+    }
+
+    #[test]
+    fn both_clocks_are_read_together() {
+        let (before, reading, after) = (Monotonic.now(), wall_at(), Monotonic.now());
+        assert!((before..=after).contains(&reading.at) && reading.wall_ns > 0);
+        assert_eq!(reading.instant(i128::from(reading.wall_ns) + 7), reading.at + Duration::from_nanos(7));
+        assert_eq!(reading.instant(-1), MonoTime::from_nanos(0), "before the machine was started");
     }
 
     #[test]

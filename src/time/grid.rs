@@ -112,6 +112,15 @@ impl TickGrid {
         self.origin + self.rate.offset(self.next)
     }
 
+    /// The first tick that is due at that instant or later, and when: its index, its deadline.
+    #[must_use]
+    pub(crate) fn first_from(&self, at: MonoTime) -> (u64, MonoTime) {
+        let newest = self.rate.periods_in(at.since(self.origin));
+        let due = |index: u64| self.origin + self.rate.offset(index);
+        let index = if due(newest) < at { newest + 1 } else { newest };
+        (index, due(index))
+    }
+
     /// The newest tick due at `now`, which is not before [`Self::next_deadline`]; those slept through are counted, never
     /// served.
     pub(crate) fn take(&mut self, now: MonoTime) -> Tick {
@@ -137,6 +146,20 @@ mod tests {
         assert_eq!(grid.take(us(10)).index, 0);
         let tick = grid.take(us(3500)); // slept through 1 and 2
         assert_eq!((tick.index, tick.missed, tick.late), (3, 2, Duration::from_micros(500)));
+    }
+
+    #[test]
+    fn the_first_tick_from_an_instant_on_is_the_one_that_is_due_there_or_the_next() {
+        for hz in [1.0, 3.0, 23.976, 60.0, 999.999, 1000.0] {
+            let grid = TickGrid::new(us(77), Rate::from_hz(hz));
+            for index in [0, 1, 2, 1_000, 3_153_600_000] {
+                let due = us(77) + grid.rate().offset(index);
+                assert_eq!(grid.first_from(due), (index, due), "{hz} Hz");
+                let next = us(77) + grid.rate().offset(index + 1);
+                assert_eq!(grid.first_from(due + Duration::from_nanos(1)), (index + 1, next), "{hz} Hz");
+            }
+            assert_eq!(grid.first_from(us(3)), (0, us(77)));
+        }
     }
 
     #[test]

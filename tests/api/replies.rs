@@ -32,6 +32,7 @@ fn every_change_reaches_the_hall_as_it_was_asked() {
         (plain("/api/v1/show/arm"), Command::Arm { seats_empty: false }),
         (post("/api/v1/show/arm", "{}"), Command::Arm { seats_empty: false }),
         (post("/api/v1/show/arm", r#"{"seats_empty":true}"#), Command::Arm { seats_empty: true }),
+        (post("/api/v1/show/arm", r#"{"fleet":"trio"}"#), Command::ArmFor("trio".to_owned())),
         (plain("/api/v1/show/go"), Command::Go),
         (post("/api/v1/show/go", r#"{"from_s":12.5}"#), Command::GoFrom(ShowTime::from_millis(12_500))),
         (post("/api/v1/show/pause", "{}"), Command::Pause),

@@ -11,6 +11,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::{Clock as _, MonoTime};
 use kinocue::wire::MotionRequest;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde_json::Value;
@@ -300,7 +302,7 @@ impl Row {
 /// Stands between kinocue and a controller, shows each motion frame that goes by, and has a plug to pull.
 pub(crate) struct Relay {
     socket: UdpSocket,
-    frames: Receiver<(SocketAddr, MotionRequest)>,
+    frames: Receiver<(SocketAddr, MonoTime, MotionRequest)>,
     pulled: Arc<AtomicBool>,
     done: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -327,7 +329,7 @@ impl Relay {
     /// Waits for a frame, and says where it came from.
     pub(crate) fn wait_for(&self, mut wanted: impl FnMut(&MotionRequest) -> bool) -> SocketAddr {
         loop {
-            let (from, frame) = self.frames.recv_timeout(PATIENCE).expect("frames go by");
+            let (from, _, frame) = self.frames.recv_timeout(PATIENCE).expect("frames go by");
             if wanted(&frame) {
                 return from;
             }
@@ -337,6 +339,11 @@ impl Relay {
     /// How many frames have gone by since that was asked last.
     pub(crate) fn count(&self) -> usize {
         self.frames.try_iter().count()
+    }
+
+    /// The frames that have gone by since that was asked last, and when each did.
+    pub(crate) fn seen(&self) -> Vec<(MonoTime, MotionRequest)> {
+        self.frames.try_iter().map(|(_, at, frame)| (at, frame)).collect()
     }
 
     /// Pulls the plug of the controller: nothing goes by any more.
@@ -367,12 +374,13 @@ fn relay(
     socket: &UdpSocket,
     controller: SocketAddr,
     (pulled, over): (&AtomicBool, &AtomicBool),
-    seen: &Sender<(SocketAddr, MotionRequest)>,
+    seen: &Sender<(SocketAddr, MonoTime, MotionRequest)>,
 ) {
     let mut host = None;
     let mut bytes = [0; 2048];
     while !over.load(Ordering::Acquire) {
         let Ok((len, from)) = socket.recv_from(&mut bytes) else { continue };
+        let at = Monotonic.now();
         if pulled.load(Ordering::Acquire) {
             continue;
         }
@@ -385,7 +393,7 @@ fn relay(
             let _ = socket.send_to(&bytes[..len], to); // who is gone is gone
         }
         if let (false, Ok(frame)) = (answer, MotionRequest::parse(&bytes[..len])) {
-            let _ = seen.send((from, frame)); // nobody may be looking any more
+            let _ = seen.send((from, at, frame)); // nobody may be looking any more
         }
     }
 }

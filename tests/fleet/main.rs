@@ -37,4 +37,5 @@ mod page;
 mod relay;
 mod rights;
 mod socket;
+mod start;
 mod trouble;

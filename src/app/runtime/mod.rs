@@ -143,6 +143,8 @@ pub struct RuntimeHandle {
     pub orders: Producer<Order>,
     /// The serial links that have seats.
     pub(crate) links: Vec<LinkEnd>,
+    /// When ticks are due.
+    pub(crate) grid: TickGrid,
     /// What the system granted the tick thread.
     pub(crate) granted: RealTime,
     /// What to do where frames take too much of the time between ticks, as was measured when it opened.
@@ -252,6 +254,7 @@ impl Runtime {
             news,
             orders,
             links,
+            grid: TickGrid::new(MonoTime::default(), rate),
             granted,
             crowding: None,
         };
@@ -337,7 +340,7 @@ impl Runtime {
         let granted = realtime::request();
         self.handle.granted = granted.clone();
         let (config, control, silent) = (Arc::clone(self.config()), self.control(), self.silent);
-        let (runtime, line, Parts { acks, plans, links, mut ticks }) = self.part();
+        let (mut runtime, line, Parts { acks, plans, links, mut ticks }) = self.part();
         let rate = Rate::from_hz(config.show.rate_hz);
         let spin = Duration::from_micros(u64::from(config.show.spin_us));
         let over = AtomicBool::new(false);
@@ -349,7 +352,8 @@ impl Runtime {
                 .map_err(RuntimeError::Thread)?;
             ticks.mail.wakes(helpers.planner());
             let clock = Spinning::new(&Monotonic, spin, rate.period());
-            let mut ticks = ticks.on(&clock, TickGrid::new(origin, rate), &control);
+            runtime.grid = TickGrid::new(origin, rate);
+            let mut ticks = ticks.on(&clock, runtime.grid.clone(), &control);
             ticks.mail.wakes_leader(lead(runtime, line));
             let ended = ticks.run();
             control.live.close();
@@ -367,9 +371,10 @@ impl Runtime {
         drive: impl FnOnce(RuntimeHandle, Line, &mut Loops<'_, C>) -> T,
     ) -> (T, Numbers) {
         let (config, control) = (Arc::clone(self.config()), self.control());
-        let (runtime, line, Parts { acks, plans, links, ticks }) = self.part();
-        let grid = TickGrid::new(origin, Rate::from_hz(config.show.rate_hz));
-        let mut loops = Loops { ticks: ticks.on(clock, grid, &control), acks, plans, links };
+        let (mut runtime, line, Parts { acks, plans, links, ticks }) = self.part();
+        runtime.grid = TickGrid::new(origin, Rate::from_hz(config.show.rate_hz));
+        let ticks = ticks.on(clock, runtime.grid.clone(), &control);
+        let mut loops = Loops { ticks, acks, plans, links };
         let outcome = drive(runtime, line, &mut loops);
         (outcome, next_numbers(&config, &loops.ticks.lanes))
     }

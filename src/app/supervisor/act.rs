@@ -68,6 +68,12 @@ pub(super) enum Act {
         /// By which surface.
         surface: Surface,
     },
+    /// The hall is armed for a start of that group by the fleet.
+    ArmedFor(String),
+    /// A start could not be given to the tick thread.
+    DropStart,
+    /// Has what is loaded begin at its beginning again, where it does not play.
+    RewindStart,
     /// The show goes.
     Begin(Box<ShowBegun>),
     /// Tells the tick thread whether a show can be armed, where that has changed.

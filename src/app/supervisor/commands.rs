@@ -12,6 +12,7 @@ use super::player;
 use super::recorded;
 use super::seat_testing::SeatTesting;
 use super::show::no_cue;
+use super::starts::FleetStarts;
 use crate::control::{Asked, Code, Command, LevelsChange, Problem, Who, overtaken};
 use crate::rt::Command as TickCommand;
 use crate::settings::{LONGEST_WHY, Out};
@@ -39,6 +40,9 @@ impl Features {
             Command::Home => request_when_free(Transition::Home, hall),
             Command::Arm { seats_empty: true } => request_when_free(Transition::HomeAndArm, hall),
             Command::Arm { seats_empty: false } => request_when_free(Transition::Arm, hall),
+            Command::ArmFor(group) => FleetStarts::arm(group, hall),
+            Command::StartAt(order) => self.starts.ask(order, who, hall),
+            Command::Commit { ticket } => self.starts.commit(ticket, who, hall),
             Command::Disarm => request(Transition::Disarm),
             Command::Go => belts::check(hall).map(|()| vec![go(who)]),
             Command::GoFrom(film) => go_from(*film, who, hall),

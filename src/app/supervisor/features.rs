@@ -1,7 +1,7 @@
 //! The features of the supervisor: each is told what happens, and all together know what is to be done with the result of a
 //! job and at the end of a show.
 
-use super::act::{Act, Feature, SupervisorEvent};
+use super::act::{Act, Feature, ShowBegun, SupervisorEvent};
 use super::figures::Figures;
 use super::fleet;
 use super::gear::GearLimits;
@@ -15,7 +15,9 @@ use super::readiness::ReadinessCheck;
 use super::record::ShowRecords;
 use super::recorded::HallTeller;
 use super::seat_testing::SeatTesting;
-use crate::control::{Desired, Problem};
+use super::starts::FleetStarts;
+use crate::control::{Desired, Problem, Surface};
+use crate::rt::News;
 use crate::time::ShowTime;
 
 /// All of them.
@@ -27,6 +29,7 @@ pub(super) struct Features {
     pub(super) readiness: ReadinessCheck,
     pub(super) lasting: Lasting,
     pub(super) gear: GearLimits,
+    pub(super) starts: FleetStarts,
     pub(super) records: ShowRecords,
     pub(super) figures: Figures,
     pub(super) shown: FilmShown,
@@ -43,6 +46,7 @@ impl Features {
             readiness: ReadinessCheck::default(),
             lasting,
             gear: GearLimits::default(),
+            starts: FleetStarts::default(),
             records,
             figures: Figures::default(),
             shown: FilmShown::default(),
@@ -52,10 +56,21 @@ impl Features {
 
     /// Tells all of them what happens; gives what is to be done for it.
     pub(super) fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext) -> Vec<Act> {
-        let Self { onward, homing, seats, lasting, gear, records, figures, shown, teller, readiness: _ } =
-            self;
-        let all: [&mut dyn Feature; 9] =
-            [onward, homing, seats, lasting, gear, records, figures, shown, teller];
+        let Self {
+            onward,
+            homing,
+            seats,
+            lasting,
+            gear,
+            starts,
+            records,
+            figures,
+            shown,
+            teller,
+            readiness: _,
+        } = self;
+        let all: [&mut dyn Feature; 10] =
+            [onward, homing, seats, lasting, gear, starts, records, figures, shown, teller];
         let mut out = Vec::new();
         all.into_iter().for_each(|feature| feature.on(event, hall, &mut out));
         out
@@ -114,6 +129,19 @@ impl Features {
             Err(problem) => Act::Fail(problem),
         });
         acts
+    }
+
+    /// What is to be done for news of the tick thread about a start at an instant.
+    pub(super) fn on_news(&mut self, news: News, hall: &HallContext) -> Vec<Act> {
+        match news {
+            News::Started => {
+                let (who, counted) = self.starts.begun(hall);
+                let place = self.onward.place(hall);
+                vec![Act::Begin(Box::new(ShowBegun { who, surface: Surface::Fleet, counted, place }))]
+            }
+            News::CalledOff(why) => self.starts.called_off(why, hall),
+            _ => Vec::new(),
+        }
     }
 
     /// The engine is done, or rests for good: the next show needs another.

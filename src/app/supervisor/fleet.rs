@@ -3,6 +3,7 @@
 //! armed; no level goes above what a person here has set (`gear::levels`).
 
 use super::hall::HallContext;
+use crate::config::FleetWord;
 use crate::control::{Code, Command, Desired, Problem, Surface};
 use crate::state::State;
 
@@ -22,11 +23,13 @@ pub(super) fn may_ask(desired: &Desired, hall: &HallContext) -> Result<(), Probl
     let Some(word) = ask.fleet_word() else {
         return refused("whoever asks it has to see the seats".to_owned(), "ask somebody in the hall");
     };
-    if !hall.config.fleet.as_ref().is_some_and(|fleet| fleet.allow.contains(&word)) {
-        return refused(
-            "allow of [fleet] does not name it".to_owned(),
-            "ask somebody in the hall, or add it there and reload",
-        );
+    if !hall.config.fleet.as_ref().is_some_and(|fleet| fleet.allows(word)) {
+        let why = if word == FleetWord::Start {
+            "start of [fleet] is not true"
+        } else {
+            "allow of [fleet] does not name it"
+        };
+        return refused(why.to_owned(), "ask somebody in the hall, or add it there and reload");
     }
     let state = hall.mirror.state;
     match ask {
@@ -34,6 +37,11 @@ pub(super) fn may_ask(desired: &Desired, hall: &HallContext) -> Result<(), Probl
         Command::Load { .. } if state != State::Parked => {
             refused(format!("the hall is {state}, not parked"), "try again when it is parked")
         }
+        // Whoever armed it saw the seats; for what it was armed is known to `starts`.
+        Command::StartAt(_) | Command::Commit { .. } if state != State::Armed => refused(
+            format!("the hall is {state}, and nobody has armed it"),
+            "ask somebody there to arm it with --fleet",
+        ),
         // Somebody may stand beside a seat that is off park.
         Command::Park if !hall.is_on_cue() && !matches!(state, State::Armed | State::Parking) => refused(
             format!("nobody has armed the seats that this may move while {state}"),
@@ -49,8 +57,8 @@ mod tests {
 
     use super::*;
     use crate::app::supervisor::testing::{Rig, desired, hall};
-    use crate::config::{Fleet, FleetWord};
-    use crate::control::LevelsChange;
+    use crate::config::Fleet;
+    use crate::control::{LevelsChange, StartOrder};
     use crate::time::ShowTime;
 
     /// One of each; the match has to name a new one.
@@ -63,6 +71,9 @@ mod tests {
             Command::Select { entry: 0 },
             Command::Arm { seats_empty: false },
             Command::Arm { seats_empty: true },
+            Command::ArmFor(name()),
+            Command::StartAt(StartOrder { ticket: name(), group: name(), sha256: name(), at_ms: 0 }),
+            Command::Commit { ticket: name() },
             Command::Disarm,
             Command::Go,
             Command::GoFrom(ShowTime::ZERO),
@@ -89,6 +100,7 @@ mod tests {
             match one {
                 Command::Home | Command::Load { .. } | Command::Playlist { .. } | Command::Select { .. } => {}
                 Command::Arm { .. } | Command::Disarm | Command::Go | Command::GoFrom(_) => {}
+                Command::ArmFor(_) | Command::StartAt(_) | Command::Commit { .. } => {}
                 Command::Pause | Command::Resume | Command::Seek(_) | Command::Stop | Command::Park => {}
                 Command::Clear | Command::Trim(_) | Command::Nudge(_) | Command::Source(_) => {}
                 Command::Levels(_) | Command::Preset(_) | Command::Enable(_) | Command::Disable { .. } => {}
@@ -100,8 +112,14 @@ mod tests {
     }
 
     fn member(hall: &mut HallContext, allow: &[FleetWord]) {
-        let fleet = Fleet { name: "berlin.h3".to_owned(), allow: allow.to_vec(), keys: Vec::new() };
+        let start = allow.contains(&FleetWord::Start);
+        let (name, start_bound) = ("berlin.h3".to_owned(), std::time::Duration::from_millis(2));
+        let fleet = Fleet { name, allow: allow.to_vec(), start, start_bound, keys: Vec::new() };
         Arc::make_mut(&mut hall.config).fleet = Some(fleet);
+    }
+
+    fn every_word() -> Vec<FleetWord> {
+        FleetWord::ALL.iter().map(|(_, word)| *word).chain([FleetWord::Start]).collect()
     }
 
     /// The words that the fleet may say in a state, where all are allowed to it; written down apart from the code.
@@ -114,9 +132,11 @@ mod tests {
             | State::Stopped
             | State::Fault => &["disarm", "levels", "pause", "stop", "trim"],
             State::Parked => &["disarm", "levels", "load", "pause", "stop", "trim"],
-            State::Armed | State::Playing(_) | State::Paused | State::Parking => {
+            State::Playing(_) | State::Paused | State::Parking => {
                 &["disarm", "levels", "park", "pause", "stop", "trim"]
             }
+            // For what it was armed is asked by `starts`.
+            State::Armed => &["commit", "disarm", "levels", "park", "pause", "start", "stop", "trim"],
         }
     }
 
@@ -124,7 +144,7 @@ mod tests {
     fn in_each_state_the_fleet_may_say_the_words_of_the_table_and_no_others() {
         for state in State::ALL {
             let mut hall = hall(state, "one");
-            member(&mut hall, &FleetWord::ALL.map(|(_, word)| word));
+            member(&mut hall, &every_word());
             let may = |ask: &Command| may_ask(&desired(Surface::Fleet, ask.clone()), &hall);
             let mut said: Vec<_> = all().iter().filter(|ask| may(ask).is_ok()).map(Command::word).collect();
             said.sort_unstable();
@@ -148,11 +168,12 @@ mod tests {
                 let asked = may_ask(&desired(Surface::Fleet, ask.clone()), &hall);
                 assert_eq!(asked.is_ok(), ask == Command::Stop, "{state}: {ask}");
             }
-            for (name, word) in FleetWord::ALL {
+            for word in every_word() {
                 member(&mut hall, &[word]);
                 for ask in all() {
                     let asked = may_ask(&desired(Surface::Fleet, ask.clone()), &hall);
-                    assert!(asked.is_err() || ask == Command::Stop || ask.word() == name, "{state}: {ask}");
+                    let is_it = ask == Command::Stop || ask.fleet_word() == Some(word);
+                    assert!(asked.is_err() || is_it, "{state}: {ask}");
                 }
             }
         }

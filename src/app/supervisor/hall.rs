@@ -16,14 +16,14 @@ use crate::app::player::PlayerLink;
 use crate::app::recorder::RecordLink;
 use crate::app::runtime::RuntimeHandle;
 use crate::config::Config;
-use crate::control::{Code, Problem};
+use crate::control::{Code, Problem, SharedClock};
 use crate::engine::Unplanned;
 use crate::health::Groups;
 use crate::osc::Counts;
 use crate::rt::{Desk, LinkEnd, Live, Loaded, Row, Times};
 use crate::state::{Cause, State, Whose};
 use crate::sys::realtime::RealTime;
-use crate::time::{MonoTime, ShowTime};
+use crate::time::{MonoTime, ShowTime, TickGrid, WallAt};
 
 /// A show that was left sooner after its beginning is begun anew, not gone on with.
 const WORTH_IT: ShowTime = ShowTime::from_millis(1_000);
@@ -69,6 +69,12 @@ pub(super) struct HallContext {
     /// The slow work that is under way.
     pub(super) job: Option<&'static str>,
     pub(super) now: MonoTime,
+    /// What the wall clock showed just now.
+    pub(super) wall: WallAt,
+    /// How far that may be off, where somebody measures it.
+    pub(super) clock: SharedClock,
+    /// When ticks are due.
+    pub(super) grid: TickGrid,
 }
 
 /// What was loaded before a test of the seats, if anything was.
@@ -142,6 +148,9 @@ impl HallContext {
             links: runtime.links.clone(),
             job: None,
             now,
+            wall: WallAt::default(),
+            clock: SharedClock::default(),
+            grid: runtime.grid.clone(),
         }
     }
 

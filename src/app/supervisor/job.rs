@@ -191,3 +191,14 @@ fn no_thread(cause: &std::io::Error) -> Problem {
         "allow more with TasksMax= in the unit, or `ulimit -u`",
     )
 }
+
+/// Has every cue of the library checked that nobody has checked for this hall, one after the other, by processes of the lowest
+/// priority.
+pub(super) fn examine(library: Library) {
+    let thread = thread::Builder::new().name("library".to_owned());
+    // Where there is no thread for it, each cue is checked when it is asked for.
+    let _ = thread.spawn(move || {
+        let _ = crate::sys::realtime::normal_priority();
+        library.examine_all();
+    });
+}

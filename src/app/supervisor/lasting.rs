@@ -114,7 +114,9 @@ impl Feature for Lasting {
         match event {
             // A show begins: what was before is over.
             SupervisorEvent::Begun(_) => self.came_back = None,
-            SupervisorEvent::Done(Desired { ask: Command::Arm { .. }, .. }) if self.unsaid => {
+            SupervisorEvent::Done(Desired { ask: Command::Arm { .. } | Command::ArmFor(_), .. })
+                if self.unsaid =>
+            {
                 self.unsaid = false;
                 self.say(hall, out);
             }

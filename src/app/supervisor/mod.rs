@@ -35,6 +35,7 @@ mod seat_testing;
 mod service_log;
 mod shared_link;
 mod show;
+mod starts;
 mod state_mirror;
 mod status;
 mod strangers;
@@ -73,7 +74,7 @@ use crate::record::{LogNote, Note};
 use crate::rt::{News, Ticket};
 use crate::settings::{Settings, SettingsFile};
 use crate::state::State;
-use crate::sys::clock::Monotonic;
+use crate::sys::clock::{Monotonic, wall_at};
 use crate::time::{Clock as _, MonoTime};
 use act::{Act, SupervisorEvent};
 use features::Features;
@@ -179,11 +180,12 @@ impl Supervisor {
         let carryover = std::mem::take(&mut ports.carryover);
         let settings = carryover.settings(&runtime.config);
         ports.source.lead(Arc::clone(&runtime.desk));
-        examine(library.clone());
+        job::examine(library.clone());
         let mut hall = HallContext::new(&runtime, settings, now);
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
         (hall.buttons, hall.recorder) = (ports.buttons.clone(), ports.recorder.clone());
         (hall.pair, hall.notify) = (ports.pair.clone(), ports.service_log.notify_table());
+        hall.clock = ports.source.clock();
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,
@@ -236,7 +238,7 @@ impl Supervisor {
     /// Does all that there is to do now, but for no more than one ask; says whether there is nothing more before somebody has
     /// something or a time is there.
     fn turn(&mut self) -> bool {
-        self.hall.now = Monotonic.now();
+        (self.hall.now, self.hall.wall) = (Monotonic.now(), wall_at());
         self.take_news();
         self.heed_signals();
         self.go_on();
@@ -274,6 +276,8 @@ impl Supervisor {
         if let News::Unplanned(what) = news {
             self.note(self.hall.name_unplanned(what));
         }
+        let acts = self.features.on_news(news, &self.hall);
+        self.add(acts);
         let Some((from, to)) = self.hall.mirror.hear(news) else { return };
         self.hall.note_place(from, to);
         if matches!(to, State::Parking | State::Stopping) {
@@ -289,6 +293,10 @@ impl Supervisor {
     /// Tells all features of it, and has done what they say.
     fn happens(&mut self, event: &SupervisorEvent<'_>) {
         let acts = self.features.on(event, &self.hall);
+        self.add(acts);
+    }
+
+    fn add(&mut self, acts: Vec<Act>) {
         if !acts.is_empty() {
             self.procedures.add(acts);
         }
@@ -328,6 +336,8 @@ impl Supervisor {
         if self.features.onward.list.is_some() {
             self.happens(&SupervisorEvent::Clock(&Zoned::now()));
         }
+        let due = self.features.starts.due(&self.hall);
+        self.add(due);
         let now = self.hall.now;
         if now.since(self.told) < TELL {
             return;
@@ -455,15 +465,4 @@ impl Supervisor {
         let journal = self.features.records.into_journal();
         SupervisorEnd { ports: self.ports, closed, reload: self.reload, ended, journal }
     }
-}
-
-/// Has every cue of the library checked that nobody has checked for this hall, one after the other, by processes of the lowest
-/// priority.
-fn examine(library: Library) {
-    let thread = thread::Builder::new().name("library".to_owned());
-    // Where there is no thread for it, each cue is checked when it is asked for.
-    let _ = thread.spawn(move || {
-        let _ = crate::sys::realtime::normal_priority();
-        library.examine_all();
-    });
 }

@@ -10,6 +10,7 @@ use super::{Supervisor, belts, player};
 use crate::control::{Problem, Surface};
 use crate::rt::Command as TickCommand;
 use crate::state::{Event, Transition};
+use crate::time::ShowTime;
 
 impl Supervisor {
     /// Does what is to be done, up to what has to be waited for.
@@ -61,6 +62,13 @@ impl Supervisor {
             Act::Fail(problem) => return Err(problem),
             Act::CheckBelts => return belts::check(&self.hall),
             Act::Go { who, surface } => self.let_go(who, surface)?,
+            Act::ArmedFor(group) => self.features.starts.armed(group, &self.hall),
+            Act::DropStart => {
+                let acts = self.features.starts.drop_given();
+                self.procedures.first().go_on_with(acts);
+            }
+            Act::RewindStart if self.hall.mirror.state.may_send_motion() => {}
+            Act::RewindStart => self.stage(ShowChange::Start(ShowTime::ZERO)),
             Act::Begin(begun) => {
                 self.hall.forget_place();
                 self.happens(&SupervisorEvent::Begun(&begun));

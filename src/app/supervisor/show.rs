@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::hall_settings::HallSettings;
 use super::margins;
@@ -41,6 +42,8 @@ pub(super) struct ProvedShow {
     pub(super) left_at: Option<ShowTime>,
     /// How long the first move onto it takes, seconds.
     pub(super) join_s: f64,
+    /// How long before its film the first frame leaves: as long as the seat that is led furthest ahead needs.
+    pub(super) lead: Duration,
     /// How it follows the film of the hall, if it does.
     pub(super) film: Option<FilmStart>,
     /// The film that is shown with it from here.
@@ -107,6 +110,7 @@ impl ProvedShow {
             start: ShowTime::ZERO,
             left_at: None,
             join_s: 0.0,
+            lead: Duration::ZERO,
             film,
             movie: None,
             margins: margins::least(&proof),
@@ -154,6 +158,8 @@ impl ProvedShow {
         self.join_s = course.settled().as_secs_f64() - course.start.as_secs_f64();
         let mut loaded = staged.loaded();
         loaded.engine.begin_trimmed(settings.trim_ms);
+        let first = loaded.engine.playhead().film();
+        self.lead = Duration::from_nanos(self.start.since(first).as_nanos().unsigned_abs());
         loaded.film = self.film;
         Ok(loaded)
     }

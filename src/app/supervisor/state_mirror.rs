@@ -51,7 +51,7 @@ pub(super) fn answer(news: News) -> Option<Result<(), Problem>> {
         News::Taken => Some(Ok(())),
         News::Refused(refusal) => Some(Err(refusal.into())),
         News::NotLoaded(state) => Some(Err(not_loaded(state))),
-        News::Entered { .. } | News::Unplanned(_) => None,
+        News::Entered { .. } | News::Unplanned(_) | News::Started | News::CalledOff(_) => None,
     }
 }
 

@@ -89,6 +89,7 @@ impl StatusParts<'_> {
             osc: hall.osc.as_ref().map(|counts| counts.by_word()),
             buttons: hall.buttons.as_ref().map(PadTable::status).unwrap_or_default(),
             notify: hall.notify.as_ref().map(NotifyTable::status).unwrap_or_default(),
+            fleet: features.starts.status(hall),
             trim_ms: hall.settings.trim_ms,
             levels: hall.settings.levels.clone(),
             presets: hall.config.presets.iter().map(|preset| preset.name.clone()).collect(),

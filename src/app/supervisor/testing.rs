@@ -32,12 +32,12 @@ use crate::library::{self, Library};
 use crate::log::Log;
 use crate::net::Ports;
 use crate::observe::ControllerState;
-use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Row, Ticket, line};
+use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Row, StartOff, Ticket, line};
 use crate::settings::SettingsFile;
 use crate::state::{Event, Finding, Machine, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::RealTime;
-use crate::time::{Clock as _, MonoTime};
+use crate::time::{Clock as _, MonoTime, Rate, TickGrid};
 use crate::timeline::Timeline;
 use crate::tracker::Counts;
 
@@ -71,6 +71,8 @@ struct Ticks {
     taken: Ticket,
     news: NewsOut,
     told: Option<News>,
+    /// What is to start by itself, and when.
+    start: Option<MonoTime>,
     supervisor: Thread,
 }
 
@@ -91,6 +93,12 @@ impl Ticks {
         }
         machine.tick(now);
         self.tell(&machine);
+        if self.start.take_if(|film_zero| now >= *film_zero).is_some() {
+            let went = machine.request(crate::state::Transition::Go, now);
+            self.tell(&machine);
+            let news = went.map_or(News::CalledOff(StartOff::NotArmed), |()| News::Started);
+            self.news.push((None, news)).unwrap();
+        }
         while let Ok(command) = self.commands.pop() {
             let ticket = Some(self.taken);
             self.taken += 1;
@@ -106,6 +114,15 @@ impl Ticks {
                     continue;
                 }
                 TickCommand::Load(_) => Ok(()),
+                TickCommand::StartAt(film_zero) => {
+                    self.start = Some(film_zero);
+                    Ok(())
+                }
+                TickCommand::CallOff => {
+                    let off = self.start.take().map(|_| News::CalledOff(StartOff::Asked));
+                    off.into_iter().for_each(|news| self.news.push((None, news)).unwrap());
+                    Ok(())
+                }
                 TickCommand::ParkSlowly { .. } => panic!("a hall parks its seats by limiter and engine"),
             };
             self.tell(&machine);
@@ -203,6 +220,7 @@ fn runtime(config: &Arc<Config>) -> (RuntimeHandle, Consumer<TickCommand>, NewsO
         news: news_end,
         orders: RingBuffer::new(16).0,
         links: Vec::new(),
+        grid: TickGrid::new(MonoTime::default(), Rate::from_hz(config.show.rate_hz)),
         granted: RealTime::NOTHING,
         crowding: None,
     };
@@ -392,6 +410,7 @@ impl Double {
             taken: 0,
             news,
             told: None,
+            start: None,
             supervisor: thread::current(),
         };
         let thread = Some(thread::spawn(|| ticks.run()));

@@ -21,6 +21,7 @@ pub(in crate::cli) enum ShowCommand {
 Examples:
   kinocue load bench-ride && kinocue arm
   kinocue arm --seats-empty              if a controller does not know its position
+  kinocue arm --fleet trio               the desk of the fleet may start it, once, with the other halls of trio
   kinocue arm --json
 
 If a position is unknown, as after a controller reboots, the seats have to home first. They then move by themselves over
@@ -80,6 +81,9 @@ pub(in crate::cli) struct ArmArgs {
     /// Confirm that nobody sits on the seats and nothing lies on or under them: they may home first.
     #[arg(long)]
     seats_empty: bool,
+    /// Let the fleet start the show, once, together with the other halls of that group; lapses as arming does.
+    #[arg(long, value_name = "GROUP", conflicts_with = "seats_empty")]
+    fleet: Option<String>,
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -106,8 +110,12 @@ pub(in crate::cli) struct SeekArgs {
 
 pub(super) fn run(command: &ShowCommand) -> Result<Exit, Failure> {
     let (word, server) = match command {
-        ShowCommand::Arm(ArmArgs { seats_empty, server }) => {
-            let body = if *seats_empty { json!({ "seats_empty": true }) } else { json!({}) };
+        ShowCommand::Arm(ArmArgs { seats_empty, fleet, server }) => {
+            let body = match fleet {
+                Some(group) => json!({ "fleet": group }),
+                None if *seats_empty => json!({ "seats_empty": true }),
+                None => json!({}),
+            };
             let status = server.post("/api/v1/show/arm", &body)?;
             // Whoever arms hears who is out, and what is as it was before the service started.
             let lasts = status.warnings.iter().filter(|one| ["seat-out", "kept"].contains(&one.id.as_str()));

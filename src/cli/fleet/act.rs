@@ -98,9 +98,9 @@ pub(super) struct LoadArgs {
 
 /// What is asked of halls.
 pub(super) struct Asked {
-    word: &'static str,
-    args: Value,
-    patience: Duration,
+    pub(super) word: &'static str,
+    pub(super) args: Value,
+    pub(super) patience: Duration,
 }
 
 /// A stop.
@@ -108,9 +108,9 @@ pub(super) const STOP: Asked = Asked { word: "stop", args: Value::Null, patience
 
 /// What a hall's link answers.
 #[derive(Debug, Deserialize)]
-struct LinkReply {
+pub(super) struct LinkReply {
     status: u16,
-    reply: Value,
+    pub(super) reply: Value,
 }
 
 /// Why a hall did not do it, as it writes it.
@@ -126,6 +126,8 @@ struct HallProblem {
 pub(super) enum Answer {
     Done(String),
     Refused(String),
+    /// It did not come to that, in words.
+    Left(String),
     /// Nobody answered, in words.
     Silent(String),
 }
@@ -179,10 +181,10 @@ fn ask_all(settings: &DeskSettings, halls: &[String], asked: &Asked, json: bool)
 }
 
 /// How it ends: what is most to worry about decides.
-fn exit<'a>(answers: impl Iterator<Item = &'a Answer> + Clone) -> Exit {
+pub(super) fn exit<'a>(answers: impl Iterator<Item = &'a Answer> + Clone) -> Exit {
     if answers.clone().any(|answer| matches!(answer, Answer::Silent(_))) {
         Exit::TryAgain
-    } else if answers.clone().any(|answer| matches!(answer, Answer::Refused(_))) {
+    } else if answers.clone().any(|answer| matches!(answer, Answer::Refused(_) | Answer::Left(_))) {
         Exit::CheckFailed
     } else {
         Exit::Done
@@ -212,16 +214,33 @@ pub(super) fn chosen(all: &[String], meant: &[String]) -> Result<Vec<String>, Fa
 }
 
 pub(super) async fn ask_one(settings: &DeskSettings, client: &Client, hall: &str, asked: &Asked) -> Answer {
+    match request(settings, client, hall, asked).await {
+        Ok(_) if asked.word == "stop" => Answer::Done("stopping".to_owned()),
+        Ok(LinkReply { reply, .. }) => {
+            let facts: HallFacts = serde_json::from_value(reply).unwrap_or_default();
+            Answer::Done(facts.line(None))
+        }
+        Err(answer) => answer,
+    }
+}
+
+/// What a hall replies where it does it; else why not.
+pub(super) async fn request(
+    settings: &DeskSettings,
+    client: &Client,
+    hall: &str,
+    asked: &Asked,
+) -> Result<LinkReply, Answer> {
     let (subject, letter) = match asked.word {
         "stop" => (fleet::stop_to(hall, &settings.name), String::new()),
         word => match letter(settings, hall, asked) {
             Some(letter) => (fleet::command_to(hall, &settings.name, word), letter),
-            None => return Answer::Refused("the key of this desk cannot sign".to_owned()),
+            None => return Err(Answer::Refused("the key of this desk cannot sign".to_owned())),
         },
     };
     let request = Request::new().payload(letter.into()).timeout(Some(asked.patience));
-    match client.send_request(subject, request).await {
-        Ok(message) => Answer::of(&message.payload, asked.word),
+    Err(match client.send_request(subject, request).await {
+        Ok(message) => return Answer::of(&message.payload),
         Err(error) if error.kind() == RequestErrorKind::NoResponders => {
             Answer::Silent("nobody hears it there: its link or its network is down".to_owned())
         }
@@ -230,7 +249,7 @@ pub(super) async fn ask_one(settings: &DeskSettings, client: &Client, hall: &str
             asked.patience.as_secs()
         )),
         Err(error) => Answer::Silent(format!("not asked: {error}")),
-    }
+    })
 }
 
 /// What is asked, signed now for that hall.
@@ -247,7 +266,7 @@ fn letter(settings: &DeskSettings, hall: &str, asked: &Asked) -> Option<String> 
 }
 
 /// Like no other: a key that nobody has.
-fn id() -> String {
+pub(super) fn id() -> String {
     nkeys::KeyPair::new_user().public_key()
 }
 
@@ -257,27 +276,28 @@ impl Answer {
         match self {
             Self::Done(_) => "done",
             Self::Refused(_) => "refused",
+            Self::Left(_) => "left",
             Self::Silent(_) => "silent",
         }
     }
 
-    fn of(payload: &[u8], word: &str) -> Self {
-        let Ok(LinkReply { status, reply }) = serde_json::from_slice(payload) else {
-            return Self::Refused("what answers there is no link of ours".to_owned());
+    /// What a link's answer says, where the hall did it.
+    fn of(payload: &[u8]) -> Result<LinkReply, Self> {
+        let Ok(answer) = serde_json::from_slice::<LinkReply>(payload) else {
+            return Err(Self::Refused("what answers there is no link of ours".to_owned()));
         };
-        if status == 200 {
-            let facts: HallFacts = serde_json::from_value(reply).unwrap_or_default();
-            return Self::Done(if word == "stop" { "stopping".to_owned() } else { facts.line(None) });
+        if answer.status == 200 {
+            return Ok(answer);
         }
-        let problem: HallProblem = serde_json::from_value(reply).unwrap_or_default();
+        let problem: HallProblem = serde_json::from_value(answer.reply).unwrap_or_default();
         let text = format!("{}; {}", problem.detail, problem.remedy);
         // The link is there, and the hall behind it did not answer.
-        if status == 503 { Self::Silent(text) } else { Self::Refused(text) }
+        Err(if answer.status == 503 { Self::Silent(text) } else { Self::Refused(text) })
     }
 
-    fn line(&self) -> String {
+    pub(super) fn line(&self) -> String {
         match self {
-            Self::Done(line) | Self::Silent(line) => line.clone(),
+            Self::Done(line) | Self::Left(line) | Self::Silent(line) => line.clone(),
             Self::Refused(why) => format!("refused: {why}"),
         }
     }
@@ -310,8 +330,9 @@ mod tests {
     #[test]
     fn who_did_not_answer_decides_how_it_ends() {
         let answer = |status: u16| {
-            let reply = json!({ "hall": "a.b", "status": status, "reply": { "detail": "x", "remedy": "y", "state": "parked" } });
-            Answer::of(reply.to_string().as_bytes(), "pause")
+            let reply = json!({ "hall": "a.b", "status": status, "reply": { "detail": "x", "remedy": "y" } });
+            let done = |_| Answer::Done("parked".to_owned());
+            Answer::of(reply.to_string().as_bytes()).map_or_else(|answer| answer, done)
         };
         let of = |all: &[u16]| exit(all.iter().map(|&status| answer(status)).collect::<Vec<_>>().iter());
         assert_eq!(of(&[200, 200]), Exit::Done);
@@ -319,6 +340,6 @@ mod tests {
         assert_eq!(of(&[403, 503, 200]), Exit::TryAgain);
         assert_eq!(answer(403).line(), "refused: x; y");
         assert_eq!(answer(200).line(), "parked");
-        assert!(matches!(Answer::of(b"hello", "pause"), Answer::Refused(_)));
+        assert!(matches!(Answer::of(b"hello"), Err(Answer::Refused(_))));
     }
 }

@@ -101,7 +101,12 @@ pub(super) fn make(plan: &Plan<'_>, folder: &Path) -> Result<(), Failure> {
     let of_desk = folder.join(plan.desk);
     let names: Vec<_> = halls.iter().map(|(hall, _)| format!("\"{}.{hall}\"", plan.site)).collect();
     put(&of_desk.join("desk.nk"), &seed(&desk)?, 0o600)?;
-    let settings = format!("{}name = \"{}\"\nhalls = [{}]\n", access("desk.nk"), plan.desk, names.join(", "));
+    let names = names.join(", ");
+    // Which of them start together the site knows.
+    let groups = format!(
+        "\n# Halls that start together, as `kinocue fleet start --group house`:\n# [groups]\n# house = [{names}]\n"
+    );
+    let settings = format!("{}name = \"{}\"\nhalls = [{names}]\n{groups}", access("desk.nk"), plan.desk);
     put(&of_desk.join("desk.toml"), &(settings + PAGE), 0o644)
 }
 
@@ -120,7 +125,8 @@ fn hall_table(plan: &Plan<'_>, hall: &str, desk: &KeyPair) -> String {
     let (site, name, public) = (plan.site, plan.desk, desk.public_key());
     format!(
         "# Add this to kinocue.toml, and restart the service. A stop is always taken; name in allow what else the desk may ask:\n\
-         # pause, park, disarm, load, levels, trim, and cues, which puts cues into the library.\n\
+         # pause, park, disarm, load, levels, trim, and cues, which puts cues into the library. With start = true it may also start\n\
+         # what somebody here has armed with --fleet.\n\
          [fleet]\nname = \"{site}.{hall}\"\nallow = {}\n\n[[fleet.key]]\nname = \"{name}\"\nrole = \"operate\"\npublic = \"{public}\"\n",
         plan.allow
     )

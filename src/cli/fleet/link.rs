@@ -15,10 +15,11 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
+use super::clock::Rounds;
 use super::hall::Link;
 use super::log::LogTeller;
 use super::wishes::WishKeeper;
-use super::{engine, lease, settings};
+use super::{clock, engine, lease, settings};
 use crate::cli::{Exit, Failure, OrExit as _, places, print};
 use crate::fleet::{self, BriefStatus};
 use crate::sys::clock::Monotonic;
@@ -66,6 +67,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         let client = engine::connect_link(&settings.access, &settings.hall).await?;
         let link = Arc::new(Link { hall: settings.hall, client, socket });
         let parts = args.state.clone().unwrap_or_else(places::link_state);
+        let clock = settings.time_server.as_deref().map(|server| (server, clock::watch_server(server)));
         print::tell(&format!("carries {} by {}", link.hall, link.socket.display()));
         let (tell, told) = watch::channel(None);
         let work = async {
@@ -76,7 +78,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
                 link.hear_stops(),
                 link.hear_orders(),
                 link.tell_log(),
-                lease::carry(&link)
+                lease::carry(&link),
+                link.tell_clock(clock)
             );
         };
         tokio::select! {
@@ -250,6 +253,31 @@ impl Link {
             }
             if !more.unwrap_or(false) {
                 sleep(AGAIN).await;
+            }
+        }
+    }
+
+    /// Tells the hall how far its clock is off, as often as that was measured.
+    async fn tell_clock(&self, clock: Option<(&str, anyhow::Result<Rounds>)>) {
+        let mut trouble = Trouble::default();
+        let Some((server, rounds)) = clock else { return };
+        let mut rounds = match rounds {
+            Ok(rounds) => rounds,
+            Err(why) => return trouble.tell("the time server", &why),
+        };
+        while rounds.changed().await.is_ok() {
+            let round = rounds.borrow_and_update().clone();
+            let told = match round {
+                Some(Ok(measured)) => {
+                    let body = clock::told(server, &measured);
+                    self.look_up_by::<Value>("/api/v1/fleet/clock", &body).await.map(drop)
+                }
+                Some(Err(why)) => Err(anyhow!(why)),
+                None => continue,
+            };
+            match told {
+                Ok(()) => trouble.over("the time server"),
+                Err(why) => trouble.tell("the time server", &why),
             }
         }
     }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::{Exit, Failure};
 
 mod act;
+mod clock;
 mod demo;
 mod desk;
 mod engine;
@@ -21,6 +22,7 @@ mod part;
 mod push;
 mod report;
 mod settings;
+mod start;
 mod wishes;
 
 const EXAMPLES: &str = "\
@@ -34,6 +36,7 @@ Examples:
   kinocue fleet stop
   kinocue fleet stop berlin.h2
   kinocue fleet level 60% 'berlin.*'
+  kinocue fleet start --group trio --at +10s
   kinocue fleet report --day yesterday
   kinocue fleet push cues/storm.mcap --to 'berlin.*'     tomorrow's cue into all halls, and where not, and why
   kinocue fleet have
@@ -43,7 +46,7 @@ Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 7
 /// Shows and leads many halls from one desk.
 ///
 /// Each hall plays alone, whatever becomes of the network and of the engine. Halls may be stopped from a desk; all else they have to
-/// allow, and nothing from a desk ever homes, arms, clears or starts one.
+/// allow. Nothing from a desk ever homes, arms or clears one, and it starts only what a person there has armed for that.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
@@ -65,6 +68,7 @@ enum FleetCommand {
     Disarm(act::DisarmArgs),
     Level(act::LevelArgs),
     Load(act::LoadArgs),
+    Start(start::Args),
     Report(report::Args),
     Push(push::Args),
     Have(have::Args),
@@ -92,6 +96,7 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Disarm(args) => act::disarm(args),
         FleetCommand::Level(args) => act::level(args),
         FleetCommand::Load(args) => act::load(args),
+        FleetCommand::Start(args) => start::run(args),
         FleetCommand::Report(args) => report::run(args),
         FleetCommand::Push(args) => push::run(args),
         FleetCommand::Have(args) => have::run(args),

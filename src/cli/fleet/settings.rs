@@ -32,6 +32,8 @@ pub(super) struct LinkSettings {
     pub(super) access: Access,
     /// `SITE.HALL`.
     pub(super) hall: String,
+    /// The time server that all halls of the site ask.
+    pub(super) time_server: Option<String>,
 }
 
 /// Of a desk.
@@ -42,6 +44,8 @@ pub(super) struct DeskSettings {
     pub(super) name: String,
     /// The halls that there are, `SITE.HALL` each.
     pub(super) halls: Vec<String>,
+    /// Those that are started together, by the name of the group.
+    pub(super) groups: BTreeMap<String, Vec<String>>,
     /// Where its page is served, and to whom.
     pub(super) api: Option<config::Api>,
     /// Where the consoles of halls are.
@@ -54,8 +58,9 @@ pub(super) fn link(path: &Path) -> Result<LinkSettings, Failure> {
         let access = access(section, path);
         let site = section.get("site").and_then(|entry| id(entry, section.faults));
         let hall = section.get("hall").and_then(|entry| id(entry, section.faults));
+        let time_server = section.text("time_server");
         section.require(&["site", "hall"]);
-        Some(LinkSettings { hall: format!("{}.{}", site?, hall?), access: access? })
+        Some(LinkSettings { hall: format!("{}.{}", site?, hall?), access: access?, time_server })
     })
 }
 
@@ -66,12 +71,34 @@ pub(super) fn desk(path: &Path) -> Result<DeskSettings, Failure> {
         let name = section.get("name").and_then(|entry| id(entry, section.faults));
         let halls = section.get("halls").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
         let halls = halls.into_iter().filter_map(|entry| member(entry, section.faults)).collect();
+        let groups = groups(section);
         let api = section.get("api").and_then(|entry| config::api(entry, section.faults));
         let consoles =
             section.get("consoles").map(|entry| consoles(entry, section.faults)).unwrap_or_default();
         section.require(&["name", "halls"]);
-        Some(DeskSettings { access: access?, name: name?, halls, api, consoles })
+        Some(DeskSettings { access: access?, name: name?, halls, groups, api, consoles })
     })
+}
+
+/// `trio = ["berlin.h1", …]`, in any number.
+fn groups(section: &mut Section<'_, '_, '_>) -> BTreeMap<String, Vec<String>> {
+    let Some(table) = section.get("groups").and_then(|entry| entry.table(section.faults)) else {
+        return BTreeMap::new();
+    };
+    let mut groups = BTreeMap::new();
+    for (name, value) in table {
+        let entry = Entry::new(name.get_ref(), value);
+        if !is_fleet_id(name.get_ref()) {
+            entry.fault(section.faults, "a group is named by a to z, 0 to 9, - and _");
+        }
+        let halls = entry.array(section.faults).unwrap_or_default();
+        let halls: Vec<_> = halls.into_iter().filter_map(|entry| member(entry, section.faults)).collect();
+        if halls.is_empty() {
+            entry.fault(section.faults, "a group has at least one hall");
+        }
+        groups.insert(name.get_ref().to_string(), halls);
+    }
+    groups
 }
 
 fn read<T>(path: &Path, take: impl FnOnce(&mut Section<'_, '_, '_>) -> Option<T>) -> Result<T, Failure> {
@@ -197,6 +224,31 @@ mod tests {
         fs::set_permissions(&key, fs::Permissions::from_mode(mode)).unwrap();
         fs::write(&file, text).unwrap();
         link(&file).map_err(|failure| failure.to_string())
+    }
+
+    #[test]
+    fn a_desk_knows_which_halls_are_started_together() {
+        let dir = tempfile::tempdir().unwrap();
+        let (file, key) = (dir.path().join("desk.toml"), dir.path().join("desk.nk"));
+        fs::write(&key, KeyPair::new_user().seed().unwrap()).unwrap();
+        fs::set_permissions(&key, fs::Permissions::from_mode(0o600)).unwrap();
+        let of = |groups: &str| {
+            let access = "engine = [\"nats://127.0.0.1:4222\"]\nseed = \"desk.nk\"\n";
+            let text = format!("{access}name = \"office\"\nhalls = [\"berlin.h1\", \"berlin.h2\"]\n{groups}");
+            fs::write(&file, text).unwrap();
+            desk(&file).map(|settings| settings.groups).map_err(|failure| failure.to_string())
+        };
+        assert!(of("").unwrap().is_empty());
+        let trio = of("[groups]\ntrio = [\"berlin.h1\", \"berlin.h2\"]\n").unwrap();
+        assert_eq!(trio["trio"], ["berlin.h1", "berlin.h2"]);
+        for (groups, says) in [
+            ("[groups]\nTrio = [\"berlin.h1\"]\n", "a group is named by"),
+            ("[groups]\ntrio = []\n", "a group has at least one hall"),
+            ("[groups]\ntrio = [\"h1\"]\n", "is not SITE.HALL"),
+        ] {
+            let fault = of(groups).unwrap_err();
+            assert!(fault.contains(says), "{fault}");
+        }
     }
 
     const SOUND: &str =

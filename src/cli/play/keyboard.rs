@@ -210,7 +210,11 @@ mod tests {
         let command = |command| match command {
             Command::Request(request) => Ok(request),
             Command::Seek(film) => Err(film),
-            Command::Event(_) | Command::Load(_) | Command::ParkSlowly { .. } => {
+            Command::Event(_)
+            | Command::Load(_)
+            | Command::ParkSlowly { .. }
+            | Command::StartAt(_)
+            | Command::CallOff => {
                 panic!("no key asks for {command:?}")
             }
         };

@@ -55,7 +55,7 @@ impl Messages {
             News::Entered { state, cause, next, .. } => (state, cause, next),
             News::Refused(refusal) => return Some(refusal.by_keys()),
             News::Unplanned(what) => return Some(self.unplanned(what)),
-            News::Taken | News::NotLoaded(_) => return None,
+            News::Taken | News::NotLoaded(_) | News::Started | News::CalledOff(_) => return None,
         };
         let mut text = match (state, cause) {
             // A play goes as soon as it is armed, and one that chases a film waits for that.
