@@ -135,7 +135,7 @@ impl Leader {
         self.ask(Transition::Resume);
         self.wait_until("the refusal", |leader| match leader.handle.news.pop().ok()? {
             News::Refused(refusal) => Some(refusal.why),
-            News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,
+            _ => None,
         })
     }
 }

@@ -249,7 +249,7 @@ impl Hall<'_, '_> {
                 }
                 News::Taken => drop(self.open.pop_front()),
                 News::Unplanned(what) => self.note(|| format!("unplanned: {what:?}")),
-                News::Entered { .. } => {}
+                News::Entered { .. } | News::Started | News::CalledOff(_) => {}
             }
         }
         self.see_who_asks();

@@ -133,14 +133,14 @@ fn a_show_that_chases_a_film_neither_allocates_nor_frees_on_the_tick_thread() {
 fn entered(news: &News) -> Option<State> {
     match news {
         News::Entered { state, .. } => Some(*state),
-        News::Taken | News::NotLoaded(_) | News::Refused(_) | News::Unplanned(_) => None,
+        _ => None,
     }
 }
 
 fn refusal(news: &News) -> Option<Why> {
     match news {
-        News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,
         News::Refused(refusal) => Some(refusal.why),
+        _ => None,
     }
 }
 

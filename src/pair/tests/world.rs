@@ -387,7 +387,7 @@ impl World {
     fn trouble(&mut self) {
         let Faults { halts, loses, forgets } = self.faults;
         let number = usize::from(self.below(2) == 0);
-        let long = [100, 700, 1_500, 5_000][self.below(4) as usize] * MS;
+        let long = [100, 700, 1_500, 5_000][usize::try_from(self.below(4)).expect("below 4")] * MS;
         let until = self.now + self.below(long);
         match self.below(8) {
             0 if halts => self.machines[number].halted[0] = until,
