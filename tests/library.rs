@@ -264,6 +264,65 @@ fn the_check_lowers_itself_before_it_reads() {
     child.wait().unwrap();
 }
 
+/// How many filters of system calls a process is under; `None` where it has ended.
+fn filters(process: &str) -> Option<u32> {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let of = |name: &str| status.lines().find_map(|line| line.strip_prefix(name)).map(str::trim);
+    if of("State:")?.starts_with('Z') { None } else { of("Seccomp_filters:")?.parse().ok() }
+}
+
+/// What it may do then is tried in `sys::confined`, by threads that are confined in the same way.
+#[test]
+fn what_takes_a_file_from_outside_apart_is_confined_before_it_has_read_an_octet() {
+    let doctor = assert_cmd::Command::new(env!("CARGO_BIN_EXE_kinocue"))
+        .args(["doctor", "--seconds", "0", "--json"])
+        .output()
+        .unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&doctor.stdout).unwrap();
+    let lines = report["lines"].as_array().unwrap();
+    let is_seen = |line: &serde_json::Value| line["id"] == "confinement" && line["verdict"] == "ok";
+    let own = filters("self").filter(|_| lines.iter().any(is_seen));
+    let Some(own) = own else {
+        let words = b"skipped: the kernel takes no filter of system calls, or does not count them\n";
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), words);
+        return;
+    };
+    let fixture = Fixture::new();
+    let hall = fixture.dir.path().join("hall.toml");
+    let pipe = fixture.dir.path().join("pipe.csv");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let hall = hall.to_str().unwrap();
+    for command in [
+        &["prove", "--json", "--config", hall][..],
+        &["prove", "--config", hall, "--curve", "10"],
+        &["draw-recording"],
+    ] {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_kinocue"))
+            .args(command)
+            .arg(&pipe)
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Nothing is written to the pipe yet, so nothing was read.
+        let mut feed = fs::OpenOptions::new().write(true).open(&pipe).unwrap();
+        let id = child.id().to_string();
+        let mut are = filters(&id);
+        while are == Some(own) {
+            std::thread::yield_now();
+            are = filters(&id);
+        }
+        assert_eq!(are, Some(own + 1), "{command:?}");
+        std::io::Write::write_all(&mut feed, GOOD.as_bytes()).unwrap();
+        drop(feed);
+        assert!(child.wait().unwrap().code().is_some(), "{command:?}: ended by a signal");
+        let mut told = String::new();
+        std::io::Read::read_to_string(child.stdout.as_mut().unwrap(), &mut told).unwrap();
+        let told: serde_json::Value =
+            serde_json::from_str(&told).unwrap_or_else(|_| panic!("{command:?}: {told}"));
+        assert!(told.is_object(), "{told}");
+    }
+}
+
 #[test]
 fn a_playlist_of_proved_cues_has_no_faults_and_unknown_ones_are_proved_when_it_is_loaded() {
     let fixture = Fixture::new();

@@ -154,6 +154,16 @@ fn the_units_let_nothing_run_with_rights() {
 }
 
 #[test]
+fn no_unit_lets_a_program_be_made_in_memory_where_no_mount_forbids_it_to_run() {
+    for name in ["kinocue", "kinocue-sync", "kinocue-buttons", "kinocue-link"] {
+        let unit = text(&format!("systemd/{name}.service"));
+        let mut refused = unit.lines().filter_map(|line| line.strip_prefix("SystemCallFilter=~"));
+        assert!(refused.any(|calls| calls.split(' ').any(|call| call == "memfd_create")), "{name}");
+        assert!(unit.lines().any(|line| line == "MemoryDenyWriteExecute=yes"), "{name}");
+    }
+}
+
+#[test]
 fn who_reads_devices_has_no_network_and_who_moves_seats_no_device() {
     let hall = text("systemd/kinocue.service");
     let has = |unit: &str, line: &str| unit.lines().any(|found| found == line);

@@ -3,6 +3,7 @@
 use anyhow::Context as _;
 
 use super::{Failure, OrExit as _};
+use crate::sys::confined;
 use crate::sys::humble::{self, ProcessBounds};
 
 #[derive(Debug, clap::Args)]
@@ -22,4 +23,10 @@ impl BoundsArgs {
             ProcessBounds { memory: self.memory_mib.saturating_mul(1 << 20), cpu_s: self.seconds.max(1) };
         humble::lower(bounds).with_context(|| format!("cannot bound {what}")).or_system()
     }
+}
+
+/// Leaves this process nothing but what it has open, before it takes apart what comes from outside. Where the kernel has no way to do that,
+/// which `kinocue doctor` says, its bounds are all that holds it.
+pub(super) fn confine() {
+    let _ = confined::confine();
 }

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::bounds::BoundsArgs;
+use super::bounds::{BoundsArgs, confine};
 use super::plot::RECORDING_COLUMNS;
-use super::plot_recording::{Asked, picture};
+use super::plot_recording::{Asked, OpenRecording, picture};
 use super::{Exit, Failure, print};
 use crate::library::{RecordingPicture, Sketch};
 use crate::plot::{self, Theme};
@@ -22,8 +22,14 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     args.bounds.lower("the drawing")?;
+    let opened = OpenRecording::open(&args.recording);
+    confine();
+    let file = match opened {
+        Ok(file) => file,
+        Err(failure) => return print::json(&Sketch::Fault(failure.to_string())).map(|()| Exit::Done),
+    };
     let asked = Asked {
-        file: &args.recording,
+        file: &file,
         other: None,
         seat: args.seat.as_deref(),
         from: None,

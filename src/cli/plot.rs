@@ -99,9 +99,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             return Err(error).or_exit(Exit::Usage);
         }
         let (from, until) = args.stretch();
+        let recorded = plot_recording::OpenRecording::open(&recording)?;
+        let other = args.other.as_deref().map(plot_recording::OpenRecording::open).transpose()?;
         let asked = plot_recording::Asked {
-            file: &recording,
-            other: args.other.as_deref(),
+            file: &recorded,
+            other: other.as_ref(),
             seat: args.seat.seat.as_deref(),
             from,
             until,

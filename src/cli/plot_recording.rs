@@ -1,7 +1,8 @@
 //! `kinocue plot` of a recording.
 
 use std::cmp::Reverse;
-use std::fs;
+use std::fs::{self, File};
+use std::io::{BufReader, Seek as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -15,10 +16,10 @@ use crate::time::ShowTime;
 
 /// What is drawn of a recording.
 pub(super) struct Asked<'a> {
-    /// The file, or `last`.
-    pub(super) file: &'a Path,
+    /// The file.
+    pub(super) file: &'a OpenRecording<'a>,
     /// Another, whose sent positions are laid over it.
-    pub(super) other: Option<&'a Path>,
+    pub(super) other: Option<&'a OpenRecording<'a>>,
     /// The seat; by itself one that a mark names, that fell out, or that was held back farthest.
     pub(super) seat: Option<&'a str>,
     /// The stretch of show time.
@@ -29,6 +30,28 @@ pub(super) struct Asked<'a> {
     pub(super) columns: usize,
     /// For a file, not a terminal.
     pub(super) is_detailed: bool,
+}
+
+/// A recording that is open, to be read more than once.
+pub(super) struct OpenRecording<'a> {
+    path: &'a Path,
+    file: File,
+}
+
+impl<'a> OpenRecording<'a> {
+    pub(super) fn open(path: &'a Path) -> Result<Self, Failure> {
+        Ok(Self { path, file: open(path)?.into_inner() })
+    }
+
+    /// All of it, from its beginning; a pipe has none to go back to, and nothing more is in it the second time.
+    fn input(&self) -> BufReader<&File> {
+        let _ = (&self.file).rewind();
+        BufReader::new(&self.file)
+    }
+
+    fn summarized(&self) -> Result<(Contents, Summary), Failure> {
+        summarize(self.input()).map_err(|error| unread(error, self.path))
+    }
 }
 
 /// The recording that a path means: `last` is the newest of the folder here. `None` where it is something else.
@@ -55,7 +78,7 @@ fn newest(dir: &Path) -> Result<PathBuf, Failure> {
 
 /// The picture, the seat that is drawn, and all that there are.
 pub(super) fn picture(asked: &Asked<'_>) -> Result<(Picture, String, Vec<String>), Failure> {
-    let (contents, summary) = summarize(open(asked.file)?).map_err(|error| unread(error, asked.file))?;
+    let (contents, summary) = asked.file.summarized()?;
     let lane = lane(asked, &contents, &summary)?;
     let seats: Vec<String> = contents.seats.iter().map(|seat| seat.name.clone()).collect();
     let axis = axis(asked, &summary)?;
@@ -63,25 +86,25 @@ pub(super) fn picture(asked: &Asked<'_>) -> Result<(Picture, String, Vec<String>
     let look = Look { lane, axis, is_detailed: asked.is_detailed };
     let gathered = gathered(asked.file, look, &contents)?;
     let other = match asked.other {
-        Some(path) => {
-            let (contents, _) = summarize(open(path)?).map_err(|error| unread(error, path))?;
+        Some(other) => {
+            let (contents, _) = other.summarized()?;
             let name = &summary.seats[lane].name;
             let lane = seat_in(&contents, name)?;
             let look = Look { lane, axis: other_axis, is_detailed: asked.is_detailed };
-            Some(self::gathered(path, look, &contents)?)
+            Some(self::gathered(other, look, &contents)?)
         }
         None => None,
     };
     Ok((plot::of_recording(&contents, &summary, gathered, other), seats[lane].clone(), seats))
 }
 
-fn gathered(path: &Path, look: Look, contents: &Contents) -> Result<Gathered, Failure> {
+fn gathered(file: &OpenRecording<'_>, look: Look, contents: &Contents) -> Result<Gathered, Failure> {
     let seat = contents.seats[look.lane].name.as_str();
     let is_whole = contents.messages.contains_key("/full/sent");
     let mut gathered = Gathered::new(contents, look, is_whole);
     let wanted = Wanted { seat: Some(seat), ..Wanted::ALL };
-    read(open(path)?, wanted, &mut |contents, at, told| gathered.take(contents, at, told))
-        .map_err(|error| unread(error, path))?;
+    read(file.input(), wanted, &mut |contents, at, told| gathered.take(contents, at, told))
+        .map_err(|error| unread(error, file.path))?;
     Ok(gathered)
 }
 
@@ -102,7 +125,7 @@ fn lane(asked: &Asked<'_>, contents: &Contents, summary: &Summary) -> Result<usi
     });
     gravest
         .map(|(lane, _)| lane)
-        .ok_or_else(|| anyhow!("{}: it has no samples", asked.file.display()))
+        .ok_or_else(|| anyhow!("{}: it has no samples", asked.file.path.display()))
         .or_exit(Exit::BadCue)
 }
 

@@ -3,10 +3,11 @@
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::Context as _;
 
-use super::bounds::BoundsArgs;
+use super::bounds::{BoundsArgs, confine};
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::app::StagedShow;
 use crate::app::staged::at_any_pace;
@@ -38,12 +39,17 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     args.bounds.lower("the check")?;
+    let config = load::config(&args.config);
+    let open = || File::open(&args.cue).context("cannot read the cue").or_exit(Exit::Io);
     if let Some(points) = args.curve {
-        print::json(&draw_curves(&args.cue, &args.config, points)?)?;
+        let file = open()?;
+        confine();
+        print::json(&draw_curves(&args.cue, file, config, points)?)?;
         return Ok(Exit::Done);
     }
-    let config = load::config(&args.config)?;
-    let verdict = judge(&args.cue, config).context("cannot read the cue").or_exit(Exit::Io)?;
+    let (config, file) = (config?, open()?);
+    confine();
+    let verdict = judge(&args.cue, file, config).context("cannot read the cue").or_exit(Exit::Io)?;
     if args.json {
         print::json(&verdict)?;
     } else {
@@ -62,20 +68,25 @@ fn parse_points(text: &str) -> Result<usize, String> {
 }
 
 /// The curves of a cue; the hall is looked at for those in mm or pulses alone.
-fn draw_curves(path: &Path, config: &Path, points: usize) -> Result<Drawing, Failure> {
-    let file = File::open(path).context("cannot read the cue").or_exit(Exit::Io)?;
+fn draw_curves(
+    path: &Path,
+    file: File,
+    config: Result<Config, Failure>,
+    points: usize,
+) -> Result<Drawing, Failure> {
     let cue = match cue::read(path, file, &Source::Native) {
         Ok(cue) => cue,
         Err(faults) => return Ok(Drawing::Faults(faults.to_string().lines().map(str::to_owned).collect())),
     };
     let timeline = Timeline::new(cue);
-    let hall = needs_hall(&timeline).then(|| load::config(config)).transpose()?;
+    let hall = needs_hall(&timeline).then_some(config).transpose()?;
     Ok(Drawing::Curve(draw(&timeline, hall.as_ref(), points)))
 }
 
 /// Reads a cue and proves it for all seats of a hall, at full level, as `play` does before it starts.
-fn judge(path: &Path, config: Config) -> io::Result<Verdict> {
-    let mut input = Hashed::new(File::open(path)?);
+fn judge(path: &Path, file: File, config: Config) -> io::Result<Verdict> {
+    let file = Arc::new(file);
+    let mut input = Hashed::new(&*file);
     let cue = cue::read(path, &mut input, &Source::Native);
     let mcap = cue::is_mcap(input.front());
     let sha256 = input.finish()?; // reading ends at the first fault of some kinds
@@ -94,7 +105,7 @@ fn judge(path: &Path, config: Config) -> io::Result<Verdict> {
         mcap,
     };
     match cue {
-        Ok(cue) => of_cue(cue, config, &mut verdict),
+        Ok(cue) => of_cue(cue.keeping(file), config, &mut verdict),
         Err(faults) => note(&faults, &mut verdict),
     }
     verdict.passed = verdict.faults.is_empty();

@@ -64,7 +64,7 @@ impl CueBuilder {
     pub(crate) fn build(self) -> Result<Cue, CueFaults> {
         let Self { mut cue, effects: names, steps } = self;
         if names.len() > MAX_EFFECTS {
-            return Err(CueFaults::one(&cue.path, Problem::TooManyEffects));
+            return Err(CueFaults::one(cue.path(), Problem::TooManyEffects));
         }
         if !names.is_empty() {
             cue.effects = Effects::Named { names, steps };

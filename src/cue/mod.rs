@@ -3,7 +3,8 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::Arc;
 
 mod builder;
 mod bytes;
@@ -35,7 +36,7 @@ pub(crate) use fault::{Collector, FAULTS_TOLD, Fault, FaultClass, Place};
 pub use mcap::recover;
 pub use mcap::write as write_mcap;
 use other_kind::other_kind;
-use place::Origin;
+use place::{CueFile, Origin};
 pub(crate) use problem::Problem;
 pub(crate) use splice::Splice;
 pub(crate) use steps::Steps;
@@ -101,7 +102,7 @@ pub struct Marker {
 /// A cue in memory: at least two rows of positions, the first at show time 0, and what goes with them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cue {
-    path: PathBuf,
+    file: CueFile,
     title: Option<String>,
     units: Units,
     interpolation: Interpolation,
@@ -118,7 +119,7 @@ impl Cue {
     /// A cue with nothing in it yet.
     fn blank(path: &Path) -> Self {
         Self {
-            path: path.to_owned(),
+            file: CueFile { path: path.to_owned(), kept: None },
             title: None,
             units: Units::default(),
             interpolation: Interpolation::default(),
@@ -135,7 +136,7 @@ impl Cue {
     /// The file it was read from.
     #[must_use]
     pub fn path(&self) -> &Path {
-        &self.path
+        &self.file.path
     }
 
     /// Its title, where it has one.
@@ -234,6 +235,12 @@ impl Cue {
         &self.markers
     }
 
+    /// The same with its file as it was opened, for whoever may open nothing any more once a place in it is asked for.
+    pub(crate) fn keeping(mut self, file: Arc<File>) -> Self {
+        self.file.kept = Some(file);
+        self
+    }
+
     /// The line a row came from, or the number of its message or byte row, from 1.
     #[must_use]
     pub(crate) fn line(&self, row: usize) -> u64 {
@@ -245,7 +252,7 @@ impl Cue {
     #[must_use]
     pub(crate) fn place(&self, row: usize, axis: usize) -> Place {
         let time = self.times.get(row).copied().unwrap_or_default();
-        self.origin.place(&self.path, row, axis, time)
+        self.origin.place(&self.file, row, axis, time)
     }
 
     /// Where the header of its file names a column, or where that column has what holds from `at` on; the file as a whole where
@@ -253,7 +260,7 @@ impl Cue {
     #[must_use]
     pub(crate) fn column_place(&self, column: &str, at: Option<ShowTime>) -> Place {
         let row = at.map(|at| self.times.partition_point(|time| *time <= at).saturating_sub(1));
-        self.origin.column_place(&self.path, column, row)
+        self.origin.column_place(&self.file, column, row)
     }
 
     /// The same cue with other rows. What has a place in it is then placed by the number of its row.
@@ -269,7 +276,7 @@ impl Cue {
     ) -> Self {
         assert_eq!(positions.len(), times.len() * self.axes, "each row has a position for each axis");
         Self {
-            path: self.path.clone(),
+            file: self.file.clone(),
             title: self.title.clone(),
             origin: Origin::Messages,
             tracks: self.tracks.clone(),

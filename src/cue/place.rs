@@ -1,6 +1,10 @@
 //! Where the rows of a cue came from, kept small: a line number is stored only where the count of lines jumps.
 
-use std::path::Path;
+use std::fs::File;
+use std::io::{self, Read};
+use std::os::unix::fs::FileExt as _;
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::fault::Place;
 use super::table::{Lines, Splitter, column_of};
@@ -22,6 +26,45 @@ pub(super) enum Origin {
     Messages,
     /// Bytes, so many a row.
     Bytes(usize),
+}
+
+/// The file of a cue, which is read again where somebody asks for a place in it.
+#[derive(Debug, Clone)]
+pub(super) struct CueFile {
+    pub(super) path: PathBuf,
+    /// It as it was opened: for whoever may open nothing any more.
+    pub(super) kept: Option<Arc<File>>,
+}
+
+impl PartialEq for CueFile {
+    fn eq(&self, other: &Self) -> bool {
+        self.path == other.path
+    }
+}
+
+impl CueFile {
+    /// Its text from the begin; what is kept of it stays where it was read to.
+    fn lines(&self) -> Option<Lines<Box<dyn Read + '_>>> {
+        let input: Box<dyn Read + '_> = match &self.kept {
+            Some(file) => Box::new(FromStart { file, at: 0 }),
+            None => Box::new(sys::file::open(&self.path).ok()?),
+        };
+        Some(Lines::new(input))
+    }
+}
+
+/// An open file from its begin.
+struct FromStart<'f> {
+    file: &'f File,
+    at: u64,
+}
+
+impl Read for FromStart<'_> {
+    fn read(&mut self, buf: &mut [u8]) -> io::Result<usize> {
+        let len = self.file.read_at(buf, self.at)?;
+        self.at += len as u64;
+        Ok(len)
+    }
 }
 
 impl Default for Origin {
@@ -53,12 +96,12 @@ impl Origin {
         }
     }
 
-    pub(super) fn place(&self, path: &Path, row: usize, axis: usize, time: ShowTime) -> Place {
+    pub(super) fn place(&self, file: &CueFile, row: usize, axis: usize, time: ShowTime) -> Place {
         match self {
             Self::Text { cells, .. } => {
                 let line = self.line(row);
                 let cell = cells.get(axis).copied().unwrap_or(0);
-                Place::Text { line, column: column_in_file(path, line, cell).unwrap_or(1) }
+                Place::Text { line, column: column_in_file(file, line, cell).unwrap_or(1) }
             }
             Self::Messages => Place::Message {
                 topic: "/cue/axes",
@@ -70,17 +113,17 @@ impl Origin {
     }
 
     /// Where the header names a column, or its cell in a row; the file as a whole where there is no such header.
-    pub(super) fn column_place(&self, path: &Path, column: &str, row: Option<usize>) -> Place {
+    pub(super) fn column_place(&self, file: &CueFile, column: &str, row: Option<usize>) -> Place {
         let Self::Text { .. } = self else { return Place::File };
-        let Some((header, cell)) = column_in_header(path, column) else { return Place::File };
+        let Some((header, cell)) = column_in_header(file, column) else { return Place::File };
         let line = row.map_or(header, |row| self.line(row));
-        column_in_file(path, line, cell).map_or(Place::File, |column| Place::Text { line, column })
+        column_in_file(file, line, cell).map_or(Place::File, |column| Place::Text { line, column })
     }
 }
 
 /// The line of the header, and which of its cells names a column.
-fn column_in_header(path: &Path, column: &str) -> Option<(u64, usize)> {
-    let mut lines = Lines::new(sys::file::open(path).ok()?);
+fn column_in_header(file: &CueFile, column: &str) -> Option<(u64, usize)> {
+    let mut lines = file.lines()?;
     loop {
         let (number, text) = lines.next().ok()??;
         if text.trim_start().starts_with('#') {
@@ -92,8 +135,8 @@ fn column_in_header(path: &Path, column: &str) -> Option<(u64, usize)> {
     }
 }
 
-fn column_in_file(path: &Path, line: u64, cell: usize) -> Option<u64> {
-    let mut lines = Lines::new(sys::file::open(path).ok()?);
+fn column_in_file(file: &CueFile, line: u64, cell: usize) -> Option<u64> {
+    let mut lines = file.lines()?;
     loop {
         let (number, text) = lines.next().ok()??;
         if number >= line {

@@ -17,7 +17,7 @@ impl Splice {
             Effects::Words(_) => Effects::Words(Steps::default()),
         };
         Self(Cue {
-            path: like.path.clone(),
+            file: like.file.clone(),
             title: like.title.clone(),
             units: like.units.picked(axes),
             interpolation: like.interpolation,

@@ -14,6 +14,7 @@ use super::scheduling::{FifoTrial, Group, RealTimeRefusal, Scheduling, Throttle}
 use super::{Facts, Seen, text};
 use crate::net::SendCost;
 use crate::sys::clock::Monotonic;
+use crate::sys::confined::try_confinement;
 use crate::sys::machine as sys;
 use crate::sys::realtime::PRIORITY;
 
@@ -32,6 +33,8 @@ pub(crate) fn facts() -> Facts {
             preemption: preemption(&config),
             slack: trial.as_ref().map_err(Clone::clone).and_then(slack),
             others: realtime_threads(),
+            confinement: try_confinement()
+                .map_err(|error| format!("the kernel takes no filter of system calls ({error})")),
         },
         scheduling: Scheduling {
             trial: trial.map(tried),

@@ -1,4 +1,5 @@
-//! The kernel: how readily it lets go of a processor, how punctually it wakes, and whom else it serves first.
+//! The kernel: how readily it lets go of a processor, how punctually it wakes, whom else it serves first, and whether it can confine what
+//! takes cues apart.
 
 use super::text::{boot_option, bracketed, option_set};
 use super::{FindingLine, Seen, count, some_of};
@@ -13,6 +14,8 @@ pub(crate) struct Kernel {
     pub(crate) slack: Seen<Slack>,
     /// Threads with a real-time priority of at least [`PRIORITY`], ours left out.
     pub(crate) others: Seen<RealTimeThreads>,
+    /// True if a thread could be left nothing but what it has open.
+    pub(crate) confinement: Seen<()>,
 }
 
 /// The kernel's preemption model.
@@ -125,7 +128,7 @@ impl Kernel {
     /// One line for each; `granted` where a play would be real-time.
     #[must_use]
     pub(crate) fn judge(&self, granted: bool) -> Vec<FindingLine> {
-        vec![self.model(), self.timer_slack(granted), self.other_threads()]
+        vec![self.model(), self.timer_slack(granted), self.other_threads(), self.confinement()]
     }
 
     fn model(&self) -> FindingLine {
@@ -161,6 +164,21 @@ impl Kernel {
                 ID,
                 format!("{} ns, and setting 1 ns was refused: every wake-up is that late", slack.default_ns),
                 "allow prctl(PR_SET_TIMERSLACK) in the container's seccomp profile, or see realtime_policy",
+            ),
+        }
+    }
+
+    fn confinement(&self) -> FindingLine {
+        const ID: &str = "confinement";
+        match &self.confinement {
+            Ok(()) => FindingLine::ok(
+                ID,
+                "what checks cues and draws recordings can open, send and start nothing (seccomp)",
+            ),
+            Err(why) => FindingLine::warn(
+                ID,
+                format!("{why}: a cue that takes its checking over may do what the service's user may"),
+                "run a kernel with CONFIG_SECCOMP_FILTER, or allow prctl(PR_SET_SECCOMP) in the container's seccomp profile",
             ),
         }
     }

@@ -42,6 +42,7 @@ fn good() -> Facts {
             preemption: Ok(Preemption::Full),
             slack: Ok(Slack { default_ns: 50_000, settable: true }),
             others: Ok(RealTimeThreads { of_programs: Vec::new(), of_kernel: 9, whole: true }),
+            confinement: Ok(()),
         },
         memory: MemoryFacts { locked: Ok(()), limit: NO_LIMIT, swaps: Ok(Vec::new()) },
         processor: Processor {
@@ -115,7 +116,8 @@ fn whatever_is_not_ok_says_what_to_do() {
     refuse(&mut facts, true);
     facts.scheduling.limit = at_most(0);
     facts.memory = MemoryFacts { locked: not_seen(), limit: at_most(65_536), swaps: not_seen() };
-    facts.kernel = Kernel { preemption: not_seen(), slack: not_seen(), others: not_seen() };
+    facts.kernel =
+        Kernel { preemption: not_seen(), slack: not_seen(), others: not_seen(), confinement: not_seen() };
     facts.clocks = Clocks { source: not_seen(), resolution_ns: 4_000_000, sync: not_seen() };
     facts.network.neighbours = not_seen();
     facts.network.receive_max = not_seen();
@@ -233,6 +235,17 @@ fn timer_slack_matters_only_without_real_time_and_where_it_cannot_be_set() {
     assert_eq!(verdict(&facts, "timer_slack"), Verdict::Ok);
     refuse(&mut facts, true);
     assert_eq!(verdict(&facts, "timer_slack"), Verdict::Warn);
+}
+
+#[test]
+fn a_kernel_that_confines_nothing_plays_all_the_same_and_is_worth_a_warning() {
+    let mut facts = good();
+    assert!(line(&facts, "confinement").found.contains("seccomp"));
+    facts.kernel.confinement =
+        Err("the kernel takes no filter of system calls (Invalid argument)".to_owned());
+    let found = line(&facts, "confinement");
+    assert_eq!(found.verdict, Verdict::Warn);
+    assert!(found.found.starts_with("the kernel takes no filter") && ready(&judge(&facts, one())));
 }
 
 #[test]

@@ -7,6 +7,7 @@ pub(crate) mod batch;
 pub(crate) mod can;
 pub(crate) mod child;
 pub(crate) mod clock;
+pub(crate) mod confined;
 pub(crate) mod evdev;
 pub(crate) mod file;
 pub(crate) mod folder;
