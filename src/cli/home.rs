@@ -82,15 +82,22 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut talk = if targets.controllers.is_empty() { None } else { Some(targets.open()?) };
     let mut results = talk.as_mut().map_or_else(Vec::new, |talk| explain(talk, &targets, &mut troubles));
     let mut on_links = drives::explain(&driven, &mut troubles);
+    // Before anything moves: a hall whose links another program has is led by that.
+    let lines = drives::open_all(&driven, &mut on_links, &mut troubles)?;
     let ready: Vec<usize> = (0..results.len()).filter(|lane| results[*lane].is_ok()).collect();
     let names: Vec<&str> = ready_names(&targets.controllers, &results)
         .chain(ready_names(&driven.controllers, &on_links))
         .collect();
     let mut is_ended = false;
     if !names.is_empty() {
+        refuse_company(talk.as_mut(), &targets, &ready)?;
         if !agreed(&question(&names), args.seats_empty, "--seats-empty")? {
             print::tell("nothing was moved");
             return Ok(Exit::Done);
+        }
+        // Whoever was asked may have taken a while to answer.
+        if !args.seats_empty {
+            refuse_company(talk.as_mut(), &targets, &ready)?;
         }
         let timeout = Duration::from_secs(args.timeout);
         let moved = talk.as_mut().map(|talk| move_home(talk, &targets, &ready, timeout));
@@ -100,12 +107,20 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             }
             results[*lane] = result.map_err(|error| error.to_string());
         }
-        is_ended = drives::home_all(&driven, &mut on_links, &mut troubles)?;
+        is_ended = drives::home_all((&driven, lines), &mut on_links, &mut troubles)?;
     }
     if args.server.json {
         print::json(&HomingReport::new((&targets, &results), (&driven, &on_links)))?;
     }
     Ok(if is_ended { Exit::Interrupted } else { troubles.exit() })
+}
+
+/// Ends with 79 where somebody else leads one of those that would home.
+fn refuse_company(talk: Option<&mut Talk>, targets: &Targets, ready: &[usize]) -> Result<(), Failure> {
+    match talk {
+        Some(talk) if !ready.is_empty() => targets.refuse_company(talk, ready),
+        _ => Ok(()),
+    }
 }
 
 /// The names of those that can be homed.
