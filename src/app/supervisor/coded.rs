@@ -187,7 +187,7 @@ mod tests {
             Acked, AcksOff, AcksMissing(0), Silent(0), NotSeenYet, SeenAgain, Moved(0), Unsure(0), CutShort(0), Astray(0), Unsteady(0),
             Unread(0), Ambiguous(0), Outside { controller: 0, axis: 1, pulses: Pulses(2) },
             Pushed { controller: 0, pushed: PushedAxis { axis: 1, at: 1_400, held: 0 } }, EmergencyStop(0), HeldUntilReset(0),
-            Error { controller: 0, error: 21 }, Drive { controller: 0, axis: 1, error: 2 },
+            Error { controller: 0, error: 21 }, Drive { controller: 0, axis: 1, error: 2 }, Killed { controller: 0, axis: 1, cause: 256 },
             Alarm { controller: 0, register: 0x30, value: 1 }, Refuses(0), Wide(0), OtherAxes { controller: 0, drives: 6 },
             Rebooted(0), OtherMaster(0), NotHome(0), Other(0), Gap(0), Unproved(0),
         });

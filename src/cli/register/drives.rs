@@ -14,7 +14,7 @@ use crate::config::{Controller, Drives, Link};
 use crate::drive::link::{LinkLine, TalkTerms};
 use crate::drive::{silvermax, sixpack2};
 use crate::wire::silvermax::register;
-use crate::wire::silvermax::{Internal, StatusWord as _};
+use crate::wire::silvermax::{Internal, StatusWord as _, kill_names};
 
 /// Registers that homing writes and that stay as they are: what is kept and compared.
 const SETTINGS: [u8; 6] = [
@@ -266,7 +266,7 @@ fn of_unit(controller: &Controller, unit: u8, number: u8, value: i32) -> DriveVa
         register::ERRORS => Some(format!("greatest {high}, now {low} counts")),
         register::TORQUE_CLOSED | register::TORQUE_OPEN => Some(format!("hold {high}, moving {low}")),
         register::ERROR_LIMITS => Some(format!("moving {high}, holding {low} counts")),
-        register::KILL_CAUSE if value != 0 => Some(silvermax::kill_names(value)),
+        register::KILL_CAUSE if value != 0 => Some(kill_names(value)),
         register::CANARY if value == 0 => Some("not home, or restarted since".to_owned()),
         _ => None,
     };
