@@ -11,7 +11,7 @@ use super::client;
 use super::targets::{DrivenTargets, TargetArgs, Targets, Troubles, state};
 use super::{Exit, Failure, print};
 use crate::config::Controller;
-use crate::device::home::{HomeError, PA0E, Progress, hindrance, home};
+use crate::device::home::{HomeError, PA0E, Progress, UNTURN, hindrance, home, turns};
 use crate::device::{Patience, Request, RequestOutcome, Talk, table};
 
 mod drives;
@@ -140,6 +140,7 @@ fn question(names: &[&str]) -> String {
 
 /// Asks each controller what its reset does, and says so; an error for each that cannot home, of which it has told.
 fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<HomingResult> {
+    let turns = turns(talk, &targets.controllers);
     let one = |outcome: RequestOutcome| {
         let (lane, name) = (outcome.lane, targets.name(outcome.lane));
         let (_, answer) = troubles.sort(targets, outcome)?;
@@ -149,9 +150,20 @@ fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<H
             table().get(PA0E).and_then(|register| register.says(value)).unwrap_or("not in the manuals");
         let state = state(controller, &answer).map_or_else(String::new, |state| format!("; now {state}"));
         print::tell(&format!("{name}: PA0e = {value}: {meaning}{state}"));
+        let turn = turns.iter().find(|turn| turn.lane == lane);
+        if let Some(turn) = turn.filter(|turn| turn.winds_up()) {
+            let why = format!(
+                "axis {} is read at {:.1} deg; this would become its 0: {UNTURN}",
+                turn.axis + 1,
+                turn.at
+            );
+            troubles.refuse(name, &why);
+            return Err(why);
+        }
         if let Some(axis) = controller.seat.rotary_axis() {
+            let read = turn.map_or_else(String::new, |turn| format!(", read at {:.1} deg,", turn.at));
             print::tell(&format!(
-                "{name}: axis {} has no search for its zero: its position now becomes 0",
+                "{name}: axis {} has no search for its zero: its position now{read} becomes 0",
                 axis + 1
             ));
         }
