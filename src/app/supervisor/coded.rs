@@ -23,6 +23,10 @@ words! {
         NotPolled = "not-polled",
         /// The configuration has it out.
         ConfiguredOut = "configured-out",
+        /// Another controller of its seat stands so.
+        Beside = "beside",
+        /// Its drives are not where they were led.
+        OffCourse = "off-course",
     }
 }
 
@@ -230,7 +234,9 @@ mod tests {
             add("standing", why.code(), why.figures().len());
             why.next().iter().for_each(|_| add("remedy", why.code(), 0));
         }
-        StandingCode::ALL.iter().for_each(|code| add("standing", code.word(), 0));
+        StandingCode::ALL.iter().for_each(|code| {
+            add("standing", code.word(), usize::from(*code == StandingCode::Beside));
+        });
         let warned = health().into_iter().filter(|standing| *standing != HealthState::Ok);
         warned.for_each(|standing| add("remedy", &standing.to_string(), 0));
         RemedyCode::ALL.iter().for_each(|code| add("remedy", code.word(), 0));
