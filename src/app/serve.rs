@@ -284,11 +284,12 @@ fn reopen(
     // The seats are parked or at rest, so nothing tells of a crash.
     let mut open = |config: &Arc<Config>| open(config, false, numbers, leave, film);
     match open(&next) {
-        Ok(runtime) => Ok((runtime, next)),
+        Ok(runtime) => {
+            carryover.forget_refusals();
+            Ok((runtime, next))
+        }
         Err(error) => {
-            carryover.refuse(format!(
-                "the hall does not open with the new configuration, and has the old one: {error}"
-            ));
+            carryover.refuse(&error.to_string());
             Ok((open(&before)?, before))
         }
     }

@@ -132,6 +132,9 @@ impl StatusParts<'_> {
             return outside
                 .map_or(cause.clone(), |side| format!("{cause}: {side}; kinocue sync shows where"));
         }
+        if hall.mirror.state == State::Parked && hall.lanes_on().next().is_none() {
+            return format!("{cause}; no seat takes part");
+        }
         if hall.mirror.state == State::Parked {
             let away: Vec<String> = hall.lanes_on().filter_map(|lane| off_park(hall, table, lane)).collect();
             let more = if away.len() > FEW { " ..." } else { "" };
@@ -221,9 +224,6 @@ impl StatusParts<'_> {
     }
 }
 
-/// Where the seat of a lane was read whose drives or controller tell that it is not at park.
-fn off_park(hall: &HallContext, table: &[Row], lane: usize) -> Option<String> {
-    let (controller, row) = (&hall.config.controllers[lane], table.get(lane)?);
 /// Why a controller stands so. Of a rigid seat all controllers stand as one of them does: that one is named.
 pub(super) fn standing_words(hall: &HallContext, index: usize, why: Why) -> (String, Coded) {
     let whose = why.controller().unwrap_or(index);
@@ -244,6 +244,9 @@ pub(super) fn standing_words(hall: &HallContext, index: usize, why: Why) -> (Str
     }
 }
 
+/// Where the seat of a lane was read whose drives or controller tell that it is not at park.
+fn off_park(hall: &HallContext, table: &[Row], lane: usize) -> Option<String> {
+    let (controller, row) = (&hall.config.controllers[lane], table.get(lane)?);
     let SeatPlaces { positions_mm, measured, .. } = SeatPlaces::of(controller, &row.state);
     let read = positions_mm.filter(|_| measured.is_some() && row.homed == Some(true))?;
     let mut axes = controller.seat.own().iter().zip(read).enumerate();
