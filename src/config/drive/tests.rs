@@ -318,6 +318,17 @@ fn a_link_is_a_line_of_its_own_by_its_whole_path() {
     let twin = LINK.replace("stalls", "circle");
     let fault = only(silver(&twin));
     assert!(fault.starts_with("hall.toml:21:8: port: [link.stalls] uses it already"), "{fault}");
+    let folder = tempfile::tempdir().unwrap();
+    let (device, name) = (folder.path().join("ttyUSB0"), folder.path().join("by-id"));
+    std::fs::write(&device, "").unwrap();
+    std::os::unix::fs::symlink(&device, &name).unwrap();
+    let spelled = device.display().to_string().replace("/ttyUSB0", "/.//ttyUSB0");
+    for (one, other) in [("/dev/ttyUSB0", "//dev/./ttyUSB0"), (&spelled, name.to_str().unwrap())] {
+        let link = |link: &str, port: &str| format!("[link.{link}]\nport = \"{port}\"\n");
+        let fault =
+            only(parse(&format!("{}{}{SEAT}{DRIVE}{A1}", link("stalls", one), link("circle", other))));
+        assert!(fault.contains("port: [link.stalls] uses it already"), "{fault}");
+    }
 }
 
 #[test]
