@@ -61,6 +61,8 @@ struct Look {
     values: Values,
     /// Datagrams that went out for it, at most.
     sent: u16,
+    /// Those among them that asked for the count, before all else.
+    counting: u16,
 }
 
 impl Look {
@@ -69,8 +71,8 @@ impl Look {
         let Some(grown) = first.zip(second).map(|(first, second)| second.wrapping_sub(first)) else {
             return 0;
         };
-        // The count is asked for first, so it has counted that question.
-        let ours = (self.sent + later.sent).saturating_sub(1);
+        // The first count has counted what asked for it, the later one nothing of what came after it.
+        let ours = self.sent.saturating_add(later.counting).saturating_sub(1);
         if grown > ours.saturating_add(TOLERATED) { grown - ours } else { 0 }
     }
 
@@ -106,7 +108,11 @@ fn look<L: Link, C: Clock>(
             Err(Fault::Silent { tries, .. }) => *tries,
             Err(_) => 1,
         };
-        found[lane].sent = found[lane].sent.saturating_add(u16::try_from(tries).unwrap_or(u16::MAX));
+        let tries = u16::try_from(tries).unwrap_or(u16::MAX);
+        found[lane].sent = found[lane].sent.saturating_add(tries);
+        if request == Request::read(PACKETS) {
+            found[lane].counting = tries;
+        }
         if let Ok(answer) = result {
             found[lane].values.extend(told(&request, &answer));
         }
