@@ -4,6 +4,8 @@
 mod said;
 
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
@@ -287,4 +289,44 @@ fn homing_as_json_tells_of_each_seat() {
         json["controllers"][1]["fault"].as_str().is_some_and(|line| line.contains("no answer")),
         "{json}"
     );
+}
+
+/// Asks a controller something every few milliseconds, as whoever plays to it sends, until this is dropped.
+struct OtherMaster(Option<(Sender<()>, JoinHandle<()>)>);
+
+impl OtherMaster {
+    fn of(farm: &Farm) -> Self {
+        let (end, ended) = channel::<()>();
+        let mut talk = Talk::open(LOOPBACK, &controllers(farm)).expect("a free port");
+        let question = reads(&[Address::Pa(0x95)]).remove(0);
+        let sending = move || {
+            while ended.recv_timeout(Duration::from_millis(10)) == Err(RecvTimeoutError::Timeout) {
+                talk.ask(vec![(0, question.clone())], Patience::default());
+            }
+        };
+        Self(Some((end, thread::spawn(sending))))
+    }
+}
+
+impl Drop for OtherMaster {
+    fn drop(&mut self) {
+        if let Some((end, sending)) = self.0.take() {
+            drop(end);
+            sending.join().expect("it ends");
+        }
+    }
+}
+
+#[test]
+fn seats_that_another_machine_plays_to_are_neither_homed_nor_written_to() {
+    let farm = farm(vec![Setup::default()]);
+    let master = OtherMaster::of(&farm);
+    for args in [&["home", "--seats-empty"][..], &["register", "write", "PA95=6", "--yes"], &["latency"]] {
+        let said = run(&farm, args);
+        assert_eq!(said.exit, 79, "{args:?}: {}", said.err);
+        assert!(said.err.contains("datagrams (DP34) that were not sent from here"), "{}", said.err);
+        assert!(!said.err.contains("has begun"), "{}", said.err);
+    }
+    drop(master);
+    assert_eq!(run(&farm, &["home", "--seats-empty"]).exit, 0, "it is alone now");
 }

@@ -458,6 +458,30 @@ fn a_port_that_another_program_has_is_named_with_what_to_do_before_registers_are
     sim.finish();
 }
 
+#[test]
+fn where_another_program_has_a_link_no_seat_of_the_hall_is_homed() {
+    let Bench { hall, sim, folder } = Bench::of("silvermax");
+    let controller = Sim::one(&[]);
+    let mut homing = Guarded::start(&["home", "--config", &hall, "--seats-empty"]);
+    let mut said = homing.stderr().lines().map(|line| line.expect("text"));
+    assert!(said.any(|line| line == "A1: axis 1 searches for its zero"));
+    let text = fs::read_to_string(&hall).expect("it was written");
+    let seat = format!(
+        "\n[[controller]]\nname = \"A3\"\nseat = \"of_A1\"\naddress = \"{}\"\n",
+        controller.addresses[0]
+    );
+    let both = write(folder.path(), &(text + &seat));
+    let run = kinocue(&["home", "--config", &both, "--seats-empty"]);
+    assert_eq!(run.code, Some(75), "{}", run.stderr);
+    assert!(run.stderr.contains("another program has it"), "{}", run.stderr);
+    assert!(!run.stderr.contains("A3: has begun"), "{}", run.stderr);
+    homing.signal(Signal::INT);
+    assert!(said.any(|line| line.ends_with("the seat is not home")));
+    homing.finish();
+    sim.signal(Signal::TERM);
+    sim.finish();
+}
+
 /// Two seats that are set alike, and whose units have the same numbers.
 #[test]
 fn where_two_adapters_have_changed_places_no_seat_is_led_or_homed_as_the_other() {

@@ -79,6 +79,22 @@ fn amplitude_is_lowered_just_as_far_as_needed_and_the_outcome_passes_check() {
 }
 
 #[test]
+fn a_cue_of_four_strokes_keeps_a_quarter_of_its_amplitude() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "# kinocue-csv: 1\n# units: mm\ntime_ms,a1\n".to_owned();
+    for row in 0..=600_u32 {
+        let up = 300.0 * (1.0 - (std::f64::consts::TAU * f64::from(row) / 600.0).cos());
+        text += &format!("{},{up:.3}\n", 100 * row);
+    }
+    let cue = write(folder.path(), "far.csv", text);
+    let out = path(folder.path(), "out.csv");
+    let report = fit(&[&cue, "-o", &out]);
+    let factor = report["factors"][0].as_f64().unwrap();
+    assert!((factor - 0.25).abs() < 0.001, "{report}");
+    assert_passes(&[&out]);
+}
+
+#[test]
 fn a_cue_that_is_fitted_for_a_film_has_room_for_the_paces_that_one_may_ask_for_and_check_knows() {
     let folder = tempfile::tempdir().unwrap();
     let cue = write(folder.path(), "ride.csv", ride(0.35));

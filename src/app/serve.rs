@@ -323,11 +323,12 @@ impl Opening<'_> {
     ) -> Result<(Runtime, Arc<Config>), RuntimeError> {
         // The seats are parked or at rest, so nothing tells of a crash.
         match self.open(&next, false, numbers, film) {
-            Ok(runtime) => Ok((runtime, next)),
+            Ok(runtime) => {
+                carryover.forget_refusals();
+                Ok((runtime, next))
+            }
             Err(error) => {
-                carryover.refuse(format!(
-                    "the hall does not open with the new configuration, and has the old one: {error}"
-                ));
+                carryover.refuse(&error.to_string());
                 Ok((self.open(&before, false, numbers, film)?, before))
             }
         }

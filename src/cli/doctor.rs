@@ -17,7 +17,7 @@ use crate::control::model::{InMicros, Percentiles};
 use crate::doctor::chart::{buckets, draw};
 use crate::doctor::lateness::{LatenessRun, MachineLoad, RATE_HZ};
 use crate::doctor::measure::measure;
-use crate::doctor::{FindingLine, Hall, Verdict, facts, judge, ready};
+use crate::doctor::{FindingLine, Hall, Verdict, facts, judge, ports, ready};
 use crate::sys::realtime::normal_priority;
 use crate::time::Rate;
 
@@ -70,13 +70,13 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let hall = match &args.config {
-        Some(path) => hall(&load::config(path)?),
-        None => {
-            Hall { controllers: args.controllers, neighbours: args.controllers, rate: Rate::from_hz(RATE_HZ) }
-        }
-    };
+    let config = args.config.as_deref().map(load::config).transpose()?;
+    let hall = config.as_ref().map_or_else(
+        || Hall { controllers: args.controllers, neighbours: args.controllers, rate: Rate::from_hz(RATE_HZ) },
+        hall,
+    );
     let mut lines = judge(&facts(), hall);
+    lines.extend(ports::of(config.as_ref().map_or(&[], |config| &config.links)));
     let loads: &[MachineLoad] = match (args.seconds, args.load) {
         (0, _) => &[],
         (_, false) => &[MachineLoad::Idle],

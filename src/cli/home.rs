@@ -11,7 +11,7 @@ use super::client;
 use super::targets::{DrivenTargets, TargetArgs, Targets, Troubles, state};
 use super::{Exit, Failure, print};
 use crate::config::Controller;
-use crate::device::home::{HomeError, PA0E, Progress, hindrance, home};
+use crate::device::home::{HomeError, PA0E, Progress, UNTURN, hindrance, home, turns};
 use crate::device::{Patience, Request, RequestOutcome, Talk, table};
 
 mod drives;
@@ -82,15 +82,22 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut talk = if targets.controllers.is_empty() { None } else { Some(targets.open()?) };
     let mut results = talk.as_mut().map_or_else(Vec::new, |talk| explain(talk, &targets, &mut troubles));
     let mut on_links = drives::explain(&driven, &mut troubles);
+    // Before anything moves: a hall whose links another program has is led by that.
+    let lines = drives::open_all(&driven, &mut on_links, &mut troubles)?;
     let ready: Vec<usize> = (0..results.len()).filter(|lane| results[*lane].is_ok()).collect();
     let names: Vec<&str> = ready_names(&targets.controllers, &results)
         .chain(ready_names(&driven.controllers, &on_links))
         .collect();
     let mut is_ended = false;
     if !names.is_empty() {
+        refuse_company(talk.as_mut(), &targets, &ready)?;
         if !agreed(&question(&names), args.seats_empty, "--seats-empty")? {
             print::tell("nothing was moved");
             return Ok(Exit::Done);
+        }
+        // Whoever was asked may have taken a while to answer.
+        if !args.seats_empty {
+            refuse_company(talk.as_mut(), &targets, &ready)?;
         }
         let timeout = Duration::from_secs(args.timeout);
         let moved = talk.as_mut().map(|talk| move_home(talk, &targets, &ready, timeout));
@@ -100,12 +107,20 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             }
             results[*lane] = result.map_err(|error| error.to_string());
         }
-        is_ended = drives::home_all(&driven, &mut on_links, &mut troubles)?;
+        is_ended = drives::home_all((&driven, lines), &mut on_links, &mut troubles)?;
     }
     if args.server.json {
         print::json(&HomingReport::new((&targets, &results), (&driven, &on_links)))?;
     }
     Ok(if is_ended { Exit::Interrupted } else { troubles.exit() })
+}
+
+/// Ends with 79 where somebody else leads one of those that would home.
+fn refuse_company(talk: Option<&mut Talk>, targets: &Targets, ready: &[usize]) -> Result<(), Failure> {
+    match talk {
+        Some(talk) if !ready.is_empty() => targets.refuse_company(talk, ready),
+        _ => Ok(()),
+    }
 }
 
 /// The names of those that can be homed.
@@ -125,6 +140,7 @@ fn question(names: &[&str]) -> String {
 
 /// Asks each controller what its reset does, and says so; an error for each that cannot home, of which it has told.
 fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<HomingResult> {
+    let turns = turns(talk, &targets.controllers);
     let one = |outcome: RequestOutcome| {
         let (lane, name) = (outcome.lane, targets.name(outcome.lane));
         let (_, answer) = troubles.sort(targets, outcome)?;
@@ -134,9 +150,20 @@ fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<H
             table().get(PA0E).and_then(|register| register.says(value)).unwrap_or("not in the manuals");
         let state = state(controller, &answer).map_or_else(String::new, |state| format!("; now {state}"));
         print::tell(&format!("{name}: PA0e = {value}: {meaning}{state}"));
+        let turn = turns.iter().find(|turn| turn.lane == lane);
+        if let Some(turn) = turn.filter(|turn| turn.winds_up()) {
+            let why = format!(
+                "axis {} is read at {:.1} deg; this would become its 0: {UNTURN}",
+                turn.axis + 1,
+                turn.at
+            );
+            troubles.refuse(name, &why);
+            return Err(why);
+        }
         if let Some(axis) = controller.seat.rotary_axis() {
+            let read = turn.map_or_else(String::new, |turn| format!(", read at {:.1} deg,", turn.at));
             print::tell(&format!(
-                "{name}: axis {} has no search for its zero: its position now becomes 0",
+                "{name}: axis {} has no search for its zero: its position now{read} becomes 0",
                 axis + 1
             ));
         }

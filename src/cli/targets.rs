@@ -9,10 +9,14 @@ use std::time::Duration;
 use anyhow::{Context as _, anyhow};
 
 use super::{Exit, Failure, OrExit as _, exit, load, names, print};
+use crate::app::PlayError;
 use crate::config::{Config, Controller, Link, Show, Station, from_to_args};
+use crate::device::company::{Company, company};
 use crate::device::{Fault, RegisterAnswer, Request, RequestOutcome, Talk, refusal};
+use crate::drive::link::LinkLine;
 use crate::drive::rates::LinkLoad;
 use crate::motion::MAX_AXES;
+use crate::sys::serial::{CanError, SerialError};
 use crate::wire::ReplyCode;
 
 /// Which controllers are meant.
@@ -169,6 +173,27 @@ impl Targets {
         })
     }
 
+    /// Ends with 79 where somebody else sends to one of `lanes`.
+    pub(super) fn refuse_others(&self, talk: &mut Talk, lanes: &[usize]) -> Result<Vec<Company>, Failure> {
+        let found = company(talk, &self.controllers, lanes);
+        let others: Vec<_> = (found.iter().filter(|one| one.packets > 0))
+            .map(|one| (self.name(one.lane).to_owned(), one.packets))
+            .collect();
+        if others.is_empty() {
+            Ok(found)
+        } else {
+            Err(PlayError::OtherMaster(others)).or_exit(Exit::OtherMaster)
+        }
+    }
+
+    /// The same, and where one moves: a controller that counts nothing is led by somebody else all the same.
+    pub(super) fn refuse_company(&self, talk: &mut Talk, lanes: &[usize]) -> Result<(), Failure> {
+        let found = self.refuse_others(talk, lanes)?;
+        let moving: Vec<_> =
+            found.iter().filter(|one| one.moves).map(|one| self.name(one.lane).to_owned()).collect();
+        if moving.is_empty() { Ok(()) } else { Err(PlayError::Moving(moving)).or_exit(Exit::OtherMaster) }
+    }
+
     /// The name of a controller by its place.
     pub(super) fn name(&self, lane: usize) -> &str {
         &self.controllers[lane].name
@@ -179,6 +204,24 @@ impl Targets {
         let lanes = 0..self.controllers.len();
         lanes.flat_map(|lane| requests.iter().map(move |request| (lane, request.clone()))).collect()
     }
+}
+
+/// Why a link cannot be had.
+pub(super) enum PortRefused {
+    /// Another program has it, and may lead what is on it.
+    Taken(anyhow::Error),
+    Other(String),
+}
+
+/// Opens a link, which is ours alone until it is dropped.
+pub(super) fn open_link(link: &Link) -> Result<LinkLine, PortRefused> {
+    LinkLine::open(link).map_err(|error| match error {
+        SerialError::Taken(_) | SerialError::Can(CanError::Taken(_)) => PortRefused::Taken(anyhow!(
+            "{error}. If that is the service, stop it first (`systemctl stop kinocue`); `kinocue preflight` without --config reads them \
+             through the service, `kinocue home` homes them by it"
+        )),
+        _ => PortRefused::Other(error.to_string()),
+    })
 }
 
 /// What went wrong with some controllers, told as it is noted; decides how the program ends.

@@ -3,7 +3,7 @@
 
 use super::fault::Faults;
 use super::section::{Entry, Section};
-use crate::motion::{AxisGeometry, AxisUnit, MAX_AXES};
+use crate::motion::{AxisGeometry, AxisUnit, MAX_AXES, PARKS_WITHIN_S};
 
 /// The tables of axes.
 pub(super) const TABLES: [&str; MAX_AXES] = [
@@ -186,6 +186,7 @@ pub(super) fn own_axis(
     let ends = range(&mut section, unit);
     let axis = AxisKeys { ends: ends.unwrap_or(said.ends), ..said }.axis(unit);
     let [park, neutral] = ["park", "neutral"].map(|key| place(&mut section, key, axis.as_ref()));
+    refuse_turned_park(&mut section, axis.as_ref(), park);
     section.finish();
     Some(OwnAxis { axis: axis?, park, neutral })
 }
@@ -238,6 +239,34 @@ fn place(section: &mut Section<'_, '_, '_>, key: &'static str, axis: Option<&Axi
     Some((place - low) / (high - low))
 }
 
+/// Notes a park place of a rotary axis that is not its 0: homed there, as seats are that are parked, it would turn as far again.
+fn refuse_turned_park(section: &mut Section<'_, '_, '_>, axis: Option<&AxisGeometry>, park: Option<f64>) {
+    let (Some(axis), Some(park), Some(entry)) = (axis, park, section.get("park")) else { return };
+    if axis.unit == AxisUnit::Degree && axis.place(park).abs() > 1e-9 {
+        let at = axis.place(park);
+        let message = format!(
+            "{at} deg: a rotary axis parks at 0, as where it stands when it is homed becomes its 0; omit it, and turn the mechanics, so that \
+             the seat faces there at 0"
+        );
+        entry.fault(section.faults, &message);
+    }
+}
+
+/// Notes an axis that takes longer to park than the hall waits for.
+pub(super) fn refuse_far_park(at: Entry<'_>, axis: &AxisGeometry, faults: &mut Faults<'_>) {
+    let seconds = axis.longest_park();
+    // One of more pulses than there are is told of that.
+    if seconds > PARKS_WITHIN_S && axis.stroke_pulses() < f64::from(i32::MAX) {
+        let (AxisGeometry { low, high, max_velocity, .. }, unit) = (*axis, axis.unit.name());
+        let speed = max_velocity.min(axis.unit.park_velocity());
+        let message = format!(
+            "from the farther end of {low} to {high} {unit} it parks in {seconds:.0} s, at {speed} {unit}/s, over {PARKS_WITHIN_S}; narrow \
+             its range, or raise its greatest speed where that is lower"
+        );
+        at.fault(faults, &message);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::tests::{faults_of, hall_with};
@@ -259,13 +288,13 @@ mod tests {
 
     #[test]
     fn a_turntable_stands_beside_cylinders_with_a_range_and_limits_of_its_own() {
-        let seat = hall_with(&turntable("range = [-180, 90]\npark = -90\n")).seats.remove(0);
+        let seat = hall_with(&turntable("range = [-180, 90]\npark = 0\nneutral = -90\n")).seats.remove(0);
         let [three @ .., turns] = &seat.own()[..4] else { panic!("six axes") };
         assert!(three.iter().all(|axis| *axis == AxisGeometry::BENCH));
         assert_eq!((turns.unit, turns.low, turns.high), (AxisUnit::Degree, -180.0, 90.0));
         assert_eq!((turns.max_velocity, turns.max_acceleration, turns.max_jerk), (60.0, 120.0, 600.0));
-        assert_eq!((turns.pulses(0.0), turns.pulses(turns.park)), (Pulses(-18_000), Pulses(-9_000)));
-        assert_eq!((turns.neutral, turns.max_rpm), (turns.park, None));
+        assert_eq!((turns.pulses(0.0), turns.pulses(turns.park)), (Pulses(-18_000), Pulses(0)));
+        assert_eq!((turns.place(turns.neutral), turns.max_rpm), (-90.0, None));
         assert_eq!(seat.each[6].pulses(seat.each[6].park), Pulses(0), "what pads a frame");
     }
 
@@ -300,6 +329,16 @@ mod tests {
                 "range = [-90, 90]\npark = 91\n",
                 20,
                 "park: 91 deg is outside the range of the axis, -90 to 90 deg",
+            ),
+            (
+                "range = [-90, 90]\npark = 45\n",
+                20,
+                "park: 45 deg: a rotary axis parks at 0, as where it stands when it is homed becomes its 0",
+            ),
+            (
+                "range = [-3600, 3600]\n",
+                13,
+                "axis4: from the farther end of -3600 to 3600 deg it parks in 360 s, at 10 deg/s, over 100; narrow its range",
             ),
             (
                 "range = [-90, 90]\nlead_mm = 5\n",

@@ -1,7 +1,8 @@
 //! `[link.NAME]`: the serial lines, and CAN buses, that drives share. What a link must be for its drives is judged with them, in
 //! `drive_controller`.
 
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use super::drive::DriveFamily;
 use super::fault::Faults;
@@ -84,7 +85,8 @@ pub(super) fn links<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Vec<LinkEn
     let links: Vec<_> = entries.filter_map(|entry| link(entry, faults)).collect();
     for link in &links {
         let is_twin = |other: &&LinkEntry<'_>| {
-            link.port.is_some() && other.port == link.port && other.port_at < link.port_at
+            let ports = link.port.as_deref().zip(other.port.as_deref());
+            other.port_at < link.port_at && ports.is_some_and(|(one, other)| is_same_port(one, other))
         };
         if let Some(twin) = links.iter().find(is_twin) {
             let message = format!("port: [link.{}] uses it already; one line is one link", twin.name);
@@ -92,6 +94,12 @@ pub(super) fn links<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Vec<LinkEn
         }
     }
     links
+}
+
+/// True if both names are of one line, however they are spelled; where one is another name of the other, this machine has to have it.
+fn is_same_port(one: &str, other: &str) -> bool {
+    let real = |port: &str| port.contains('/').then(|| fs::canonicalize(port).ok()).flatten();
+    Path::new(one) == Path::new(other) || real(one).is_some_and(|one| Some(one) == real(other))
 }
 
 fn link<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Option<LinkEntry<'t>> {
@@ -203,6 +211,9 @@ fn silvermax_baud(asked: u32) -> Result<u32, String> {
 /// The rate next to the one asked for: 1,250,000 divided by a whole number.
 fn sixpack2_baud(asked: u32) -> Result<u32, String> {
     let (least, most) = (SIXPACK2_BAUDS.start(), SIXPACK2_BAUDS.end());
+    if !SIXPACK2_BAUDS.contains(&asked) {
+        return Err(format!("{asked} is outside {least}..={most}, the baud rates of a SIXpack 2"));
+    }
     let near = ((BAUD_CLOCK + asked / 2) / asked.max(1)).max(1);
     let made = (BAUD_CLOCK + near / 2) / near;
     if f64::from(made.abs_diff(asked)) > TOLERANCE * f64::from(asked) {
@@ -210,8 +221,5 @@ fn sixpack2_baud(asked: u32) -> Result<u32, String> {
             "{asked} cannot be made: a SIXpack 2 divides 1,250,000 by a whole number, and the nearest is {made}"
         ));
     }
-    if SIXPACK2_BAUDS.contains(&made) {
-        return Ok(made);
-    }
-    Err(format!("{asked} is outside {least}..={most}, the baud rates of a SIXpack 2"))
+    Ok(made)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::axis::{AxisKeys, NEEDED, OwnAxis, TABLES, leaves_to_seat, own_axis};
+use super::axis::{AxisKeys, NEEDED, OwnAxis, TABLES, leaves_to_seat, own_axis, refuse_far_park};
 use super::fault::Faults;
 use super::section::{Entry, Section};
 use crate::motion::{AxisGeometry, AxisUnit, FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
@@ -49,7 +49,9 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
         refuse_pulses(*own, Some(axis), faults);
         let park = own_park.or_else(|| park.of(index, &axis, faults)).unwrap_or(axis.park);
         let neutral = own_neutral.or_else(|| neutral.of(index, &axis, faults)).unwrap_or(park);
-        each.push(AxisGeometry { park, neutral, ..axis });
+        let axis = AxisGeometry { park, neutral, ..axis };
+        refuse_far_park(own.unwrap_or(entry), &axis, faults);
+        each.push(axis);
     }
     let padding = each.first().filter(|_| each.len() == axes)?.padding();
     refuse_second_rotary(&each, own, faults);

@@ -3,10 +3,16 @@
 
 use std::time::Duration;
 
+use super::settings::Values;
+use super::survey::told;
 use super::talk::Link;
-use super::{Address, Fault, Patience, RegisterAnswer, Request, Talk, refusal};
+use super::{
+    Address, Fault, Patience, RegisterAnswer, Request, RequestOutcome, Talk, places, position_words_of,
+    reads, refusal,
+};
+use crate::config::{Controller, Station};
 use crate::time::{Clock, MonoTime};
-use crate::wire::{DeviceError, Dialect, ReplyCode};
+use crate::wire::{DeviceError, Dialect, ReplyCode, position};
 
 /// The control register that resets, and tells when it is done.
 pub(crate) const DPF0: Address = Address::Dp(0xf0);
@@ -18,6 +24,11 @@ pub(crate) const TIMEOUT: Duration = Duration::from_secs(60);
 /// What is written to DPF0, and what it reads when homing is complete.
 const START: u16 = 0;
 const COMPLETE: u16 = 2;
+/// An axis that turns is at its 0 within so much: what its motor holds.
+pub(crate) const AT_ZERO_DEG: f64 = 0.2;
+/// What a person does where homing would wind up a turntable.
+pub(crate) const UNTURN: &str = "park first, or turn it by hand until it is read at 0; if its 0 is wrong, turn it to where that is to be, \
+                                 and switch its controller off and on";
 /// From one look at DPF0 to the next.
 const POLL: Duration = Duration::from_millis(200);
 /// A look is not repeated: the next one comes soon.
@@ -140,6 +151,51 @@ pub(crate) fn unsearched<L: Link, C: Clock>(
         Some((outcome.lane, HomeError::Unsearched(value(outcome.result.as_ref().ok()?)?)))
     })
     .collect()
+}
+
+/// Where axes that turn are read, and whether their controllers say that they know their zero: homing makes that place their 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Turn {
+    /// The controller's place in the conversation.
+    pub(crate) lane: usize,
+    /// The axis, from 0.
+    pub(crate) axis: usize,
+    /// Where it is read, deg.
+    pub(crate) at: f64,
+    /// It is home, so that the place is believed.
+    pub(crate) homed: bool,
+}
+
+impl Turn {
+    /// True if homing would wind it up: its 0 would be elsewhere than it is known to be.
+    pub(crate) fn winds_up(&self) -> bool {
+        self.homed && self.at.abs() > AT_ZERO_DEG
+    }
+}
+
+/// Asks where the axes of `controllers` that turn are. One that does not tell is not among them.
+pub(crate) fn turns<L: Link, C: Clock>(
+    talk: &mut Talk<L, C>,
+    controllers: &[Controller<Station>],
+) -> Vec<Turn> {
+    let turning = || controllers.iter().enumerate().filter(|(_, one)| one.seat.rotary_axis().is_some());
+    let wanted = |one: &Controller<Station>| places(one.seat.axes).chain([DPF0]).collect::<Vec<_>>();
+    let requests =
+        turning().flat_map(|(lane, one)| reads(&wanted(one)).into_iter().map(move |read| (lane, read)));
+    let mut found = vec![Values::new(); controllers.len()];
+    for RequestOutcome { lane, request, result } in talk.ask(requests.collect(), Patience::default()) {
+        if let Ok(answer) = result {
+            found[lane].extend(told(&request, &answer));
+        }
+    }
+    let of = |(lane, one): (usize, &Controller<Station>)| {
+        let axis = one.seat.rotary_axis()?;
+        let words = *position_words_of(&found[lane], one.seat.axes)?.get(axis)?;
+        let geometry = &one.seat.each[axis];
+        let at = geometry.place(geometry.fraction(position(words, one.connection.dialect)));
+        Some(Turn { lane, axis, at, homed: found[lane].get(&DPF0) == Some(&COMPLETE) })
+    };
+    turning().filter_map(of).collect()
 }
 
 fn start<L: Link, C: Clock>(

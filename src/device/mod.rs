@@ -6,6 +6,7 @@
 //!                        table: what is it? --+                   |
 //!        change: may it be written?   settings: a file, compared  +--> Answer, Fault          in words
 //!                                     home: reset, and wait
+//!                                     company: whether somebody else sends to it
 //!                                     survey: all that preflight judges
 //!                                     stand: whether a seat may be held where it is
 //! ```
@@ -15,6 +16,7 @@
 
 mod address;
 pub(crate) mod change;
+pub(crate) mod company;
 mod exchange;
 mod fault;
 pub(crate) mod home;

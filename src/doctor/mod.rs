@@ -13,6 +13,7 @@ pub(crate) mod lateness;
 pub(crate) mod measure;
 pub(crate) mod memory;
 pub(crate) mod network;
+pub(crate) mod ports;
 pub(crate) mod processor;
 pub(crate) mod scheduling;
 pub(crate) mod text;

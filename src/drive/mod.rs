@@ -101,11 +101,11 @@ pub(crate) enum Evidence {
     /// What all of a look says of an emergency stop.
     Stop(Look),
     /// A drive let go of its motor: the axis, from 1, and by what.
-    Drive {
+    Killed {
         /// The axis, from 1.
         axis: usize,
         /// The bits of what killed.
-        error: u16,
+        cause: u16,
     },
     /// It has restarted, or let go of its seat: it does not know its zero any more.
     LostZero,

@@ -32,7 +32,7 @@ impl StreamTerms {
         if lead > most {
             let Lead { periods, ticks } = Lead::of(load.family);
             let least_hz = f64::from(periods) / most.saturating_sub(ticks * terms.tick).as_secs_f64();
-            let (lead, most, remedy) = (lead.as_millis(), most.as_millis(), load.remedy(least_hz));
+            let (lead, most, remedy) = (lead.as_millis(), most.as_millis(), quicker(&load, least_hz));
             return Err(fault(format!("its seats would follow {lead} ms ahead, over {most} ms; {remedy}")));
         }
         Ok(Some(terms))
@@ -41,6 +41,16 @@ impl StreamTerms {
     /// How long before a seat is there its poses have to come.
     pub(crate) fn lead(self, family: DriveFamily) -> Duration {
         Lead::of(family).over(self)
+    }
+}
+
+/// What to do for so many times a second: where the link carries them, it is `rate_hz` that keeps it from them.
+fn quicker(load: &LinkLoad, least_hz: f64) -> String {
+    let whole = least_hz.ceil();
+    match load.rate_hz() {
+        most if most >= whole => format!("raise rate_hz to {whole} or more, or omit it"),
+        most if most >= least_hz => "omit rate_hz".to_owned(),
+        _ => load.remedy(least_hz),
     }
 }
 

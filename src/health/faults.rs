@@ -72,6 +72,16 @@ impl FaultLatch {
         }
     }
 
+    /// A drive let go of its motor. It tells no end of that, and its motor is held again once it is homed: that is all that ends it.
+    pub(super) fn on_killed(&mut self, axis: usize, cause: u16) {
+        self.on_fault(Why::Killed { controller: self.controller, axis, cause });
+    }
+
+    /// It was homed: its drives hold their motors.
+    pub(super) fn on_homed(&mut self) {
+        self.first.take_if(|why| matches!(why, Why::Killed { .. }));
+    }
+
     /// The first that went wrong counts; but that frames are refused is soon explained by what is read.
     fn on_fault(&mut self, why: Why) {
         if self.first.is_none_or(|before| matches!(before, Why::Refuses(_))) {

@@ -128,6 +128,15 @@ pub enum Why {
         /// The number.
         error: u16,
     },
+    /// A drive of this controller let go of its motor.
+    Killed {
+        /// Which.
+        controller: usize,
+        /// Its axis, from 1.
+        axis: usize,
+        /// The bits of what killed, of register 211 of a SilverMax.
+        cause: u16,
+    },
     /// This controller reports an alarm (MBOX): of its drives where the register is DPFE.
     Alarm {
         /// Which.
@@ -183,6 +192,7 @@ impl Why {
             | Self::HeldUntilReset(controller)
             | Self::Error { controller, .. }
             | Self::Drive { controller, .. }
+            | Self::Killed { controller, .. }
             | Self::Alarm { controller, .. }
             | Self::Refuses(controller)
             | Self::Wide(controller)

@@ -26,8 +26,8 @@ pub(crate) enum HealthInput {
     BeatKept(usize, MonoTime),
     /// [`HealthTable::on_zero`].
     Zero(usize, bool),
-    /// [`HealthTable::on_drive`]: the axis, from 1, and by what.
-    Drive(usize, usize, u16),
+    /// [`HealthTable::on_killed`]: the axis, from 1, and by what.
+    Killed(usize, usize, u16),
     /// [`HealthTable::on_lost_zero`].
     LostZero(usize),
     /// [`HealthTable::on_wide_registers`].
@@ -70,7 +70,7 @@ impl HealthInput {
             | Self::BeatSent(of, _)
             | Self::BeatKept(of, _)
             | Self::Zero(of, _)
-            | Self::Drive(of, ..)
+            | Self::Killed(of, ..)
             | Self::LostZero(of)
             | Self::Wide(of)
             | Self::Seen(of, ..)
@@ -99,7 +99,7 @@ impl HealthTable {
             HealthInput::BeatSent(controller, at) => self.on_beat_sent(controller, at),
             HealthInput::BeatKept(controller, at) => self.on_beat_kept(controller, at),
             HealthInput::Zero(controller, homed) => self.on_zero(controller, homed),
-            HealthInput::Drive(controller, axis, error) => self.on_drive(controller, axis, error),
+            HealthInput::Killed(controller, axis, cause) => self.on_killed(controller, axis, cause),
             HealthInput::LostZero(controller) => self.on_lost_zero(controller),
             HealthInput::Wide(controller) => self.on_wide_registers(controller),
             HealthInput::Seen(controller, sighting, at) => self.on_sighting(controller, &sighting, at),

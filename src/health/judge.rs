@@ -157,7 +157,7 @@ impl HealthTable {
 impl Why {
     /// True if drives may hold their seat no more.
     const fn is_of_drives(self) -> bool {
-        matches!(self, Self::Drive { .. } | Self::Alarm { register: DPFE, .. })
+        matches!(self, Self::Drive { .. } | Self::Killed { .. } | Self::Alarm { register: DPFE, .. })
     }
 
     /// Why a group that was out for this joins again. That somebody moved it goes on to be worth a word.

@@ -294,6 +294,7 @@ impl Member {
     /// It was homed: its position is known, and what it counts from here on is the new measure.
     pub(super) fn on_homed(&mut self) {
         self.must_rehome = None;
+        self.faults.on_homed();
         self.identity = KnownBy::Trusted;
         self.seen = None;
         self.replies.on_homed();

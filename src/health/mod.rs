@@ -179,9 +179,9 @@ impl HealthTable {
         self.members[controller].on_zero(homed);
     }
 
-    /// A drive of a controller has let go of its motor: its axis, from 1, and by what.
-    pub(crate) fn on_drive(&mut self, controller: usize, axis: usize, error: u16) {
-        self.members[controller].faults.on_drive(axis, error);
+    /// A drive of a controller has let go of its motor: its axis, from 1, and the bits of what killed.
+    pub(crate) fn on_killed(&mut self, controller: usize, axis: usize, cause: u16) {
+        self.members[controller].faults.on_killed(axis, cause);
     }
 
     /// It has restarted, or let go of its seat: it does not know its zero.
@@ -251,6 +251,10 @@ impl HealthTable {
     /// out for, the group is looked at next.
     pub(crate) fn on_homed(&mut self, controller: usize) {
         self.members[controller].on_homed();
+        let place = &mut self.places[self.groups.group_of(controller)];
+        if matches!(place.why, Why::Killed { controller: killed, .. } if killed == controller) {
+            (place.standing, place.why) = (HealthState::Lost, Why::NotSeenYet);
+        }
     }
 
     /// All lanes of a group are on the cue, or at park: a group that rejoined is well.

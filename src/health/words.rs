@@ -5,6 +5,7 @@ use std::fmt;
 use super::{Change, HealthState, Why};
 use crate::plain;
 use crate::wire::DPFE;
+use crate::wire::silvermax::conditions;
 
 /// In place of the words of what is worded with its figures.
 const ITSELF: &str = "it reports this itself";
@@ -74,6 +75,9 @@ impl Why {
             Self::Unsteady(_) => Some(
                 "mend what keeps frames, acks or the seat; then, with the seats parked or stopped, clear the hall",
             ),
+            Self::Killed { .. } => {
+                Some("find out what blocks or heats it; then home it with nobody on the seat")
+            }
             Self::CutShort(_) => Some("wait until its position has been read"),
             Self::OtherAxes { .. } => Some(
                 "set PA02 to the axes of the seat, or give the seat a type with as many; with the seats parked or stopped, clear",
@@ -104,6 +108,9 @@ impl fmt::Display for Why {
             }
             Self::Error { error, .. } => write!(f, "{}", crate::wire::DeviceError(*error)),
             Self::Drive { axis, error, .. } => write!(f, "drive of axis {axis}: error {error}"),
+            Self::Killed { axis, cause, .. } => {
+                write!(f, "the drive of its axis {axis} was killed by {} (register 211)", conditions(*cause))
+            }
             Self::Alarm { register: DPFE, value, .. } => {
                 write!(f, "alarm of the servo drives, kind {value} (DPFE)")
             }
@@ -178,6 +185,7 @@ impl Why {
             Self::Pushed { .. } => ("pushed", ITSELF),
             Self::Error { .. } => ("error", ITSELF),
             Self::Drive { .. } => ("drive", ITSELF),
+            Self::Killed { .. } => ("killed", ITSELF),
             Self::Alarm { register: DPFE, .. } => ("drive-alarm", ITSELF),
             Self::Alarm { .. } => ("alarm", ITSELF),
             Self::OtherAxes { .. } => ("other-axes", ITSELF),
@@ -199,6 +207,7 @@ impl Why {
             }
             Self::Error { error, .. } => vec![crate::wire::DeviceError(error).to_string()],
             Self::Drive { axis, error, .. } => vec![axis.to_string(), error.to_string()],
+            Self::Killed { axis, cause, .. } => vec![axis.to_string(), conditions(cause)],
             Self::Alarm { register: DPFE, value, .. } => vec![value.to_string()],
             Self::Alarm { register, value, .. } => vec![format!("DP{register:02x}"), value.to_string()],
             Self::OtherAxes { drives, .. } => vec![drives.to_string()],

@@ -105,6 +105,16 @@ fn figure(count: usize) -> f64 {
     u32::try_from(count).map_or(f64::INFINITY, f64::from)
 }
 
+/// Those of a desk that hears a hall, and knows of another.
+#[cfg(test)]
+pub(super) fn of_two_halls() -> super::tests::strict::Page {
+    let status = BriefStatus { state: crate::state::State::Parked.into(), ..BriefStatus::default() };
+    let one = HallFigures { name: "a.h1".to_owned(), age_s: Some(0.25), silent: false, status: Some(status) };
+    let two = HallFigures { name: "a.h2".to_owned(), age_s: None, silent: true, status: None };
+    let figures = FleetFigures { engine: true, halls: vec![one, two], stops: BTreeMap::from([("done", 1)]) };
+    super::tests::strict::check(&figures.render()).expect("it is what the format asks for")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

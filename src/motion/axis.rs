@@ -13,6 +13,9 @@ const PARK_VELOCITY_MM_S: f64 = 50.0;
 /// How fast a rotary axis parks, deg/s: at half a metre from the middle not twice as fast as a cylinder.
 const PARK_VELOCITY_DEG_S: f64 = 10.0;
 
+/// How long an axis may take to park, seconds: the hall gives up after two minutes.
+pub(crate) const PARKS_WITHIN_S: f64 = 100.0;
+
 /// What the places of an axis are told in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum AxisUnit {
@@ -103,6 +106,13 @@ impl AxisGeometry {
     #[must_use]
     pub fn stroke(&self) -> f64 {
         self.high - self.low
+    }
+
+    /// How long it takes to park from where that is farthest, seconds.
+    #[must_use]
+    pub(crate) fn longest_park(&self) -> f64 {
+        let farthest = self.stroke() * self.park.max(1.0 - self.park);
+        farthest / self.max_velocity.min(self.unit.park_velocity())
     }
 
     /// Pulses over the whole range.

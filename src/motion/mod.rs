@@ -9,7 +9,7 @@ mod seat;
 mod window;
 
 pub use axis::AxisGeometry;
-pub(crate) use axis::AxisUnit;
+pub(crate) use axis::{AxisUnit, PARKS_WITHIN_S};
 pub(crate) use brake::{AxisState, Brake};
 pub(crate) use halt::{Begun, Halt, Means};
 #[cfg(test)]

@@ -8,10 +8,10 @@ use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Link};
 use crate::drive::link::{AT_PARK, HomedAs, LinkPort, LinkTalk as _, STANDS_MM, TalkCounts};
 use crate::drive::rates::{LinkLoad, short};
-use crate::drive::silvermax::{TalkFault, UnitFacts, UnitSettings, kill_names};
+use crate::drive::silvermax::{TalkFault, UnitFacts, UnitSettings};
 use crate::drive::{motors_of, silvermax, sixpack2, units_of};
 use crate::sys::serial::{CanError, SerialError};
-use crate::wire::silvermax::{Poll, StatusWord as _};
+use crate::wire::silvermax::{Poll, StatusWord as _, kill_names};
 
 /// Answers that begin so late are held back by an adapter, no unit waits so long.
 const HELD_BACK: Duration = Duration::from_millis(12);
@@ -350,7 +350,8 @@ fn off_park(subject: &DriveSubject<'_>, axis: usize, [at, held]: [f64; 2], notes
 /// What a unit says is wrong.
 fn trouble(facts: &UnitFacts, notes: &mut Notes) {
     let unit = facts.unit;
-    if facts.poll.has(Poll::KILLED) {
+    // Whoever led it then has cleared its events, and taken back what it was home by.
+    if facts.poll.has(Poll::KILLED) || (facts.kill_cause != 0 && facts.canary == 0) {
         let cause = kill_names(facts.kill_cause);
         let found = format!("unit {unit} was killed by {cause} (register 211)");
         notes.add(Check::Killed, found, "find out what blocks or heats it, then home");

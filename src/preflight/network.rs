@@ -33,7 +33,12 @@ pub(super) fn judge_replies(subject: &Subject<'_>, terms: &ShowTerms, notes: &mu
     match terms.frame_port {
         0 => {
             let found = format!("PA24 = {port}, but bind has port 0: another frame port at every start");
-            notes.add(Check::FramePortFree, found, format!("set port {port} in bind"));
+            let remedy = if port == 0 {
+                "set PA24 and the port of bind to the same number, such as 8410".to_owned()
+            } else {
+                format!("set port {port} in bind")
+            };
+            notes.add(Check::FramePortFree, found, remedy);
         }
         own if own != port => {
             let found = format!("PA24 = {port}, but the frame port is {own}");

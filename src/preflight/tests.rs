@@ -324,6 +324,10 @@ fn the_frame_port_cannot_be_compared_where_it_is_another_each_time() {
     case.terms.frame_port = 0;
     assert_eq!(check(&case), None);
     assert!(case.findings().iter().any(|finding| finding.check == Check::FramePortFree));
+    case.survey.values.insert(Address::Pa(0x24), 0);
+    let findings = case.findings();
+    let free = findings.iter().find(|finding| finding.check == Check::FramePortFree).unwrap();
+    assert_eq!(free.remedy, "set PA24 and the port of bind to the same number, such as 8410", "{free:?}");
 }
 
 #[test]

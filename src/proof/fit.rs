@@ -217,16 +217,20 @@ fn amplitude(original: &Timeline, cue: Cue, terms: &Terms, per_axis: bool) -> Op
 fn needed(timeline: &Timeline, terms: &Terms) -> Vec<f64> {
     let motion = Terms { effects: Vec::new(), ..terms.clone() };
     let mut factors = vec![1.0_f64; timeline.axes()];
-    for axis in prove(timeline, motion).axes {
+    for subject in subjects(timeline, terms) {
+        factors[subject.axis] = factors[subject.axis].min(within_stroke(&subject));
+    }
+    // What leaves the stroke is held at its end, with corners that it has no more once it stays inside: its figures say nothing yet.
+    let is_held: Vec<bool> = factors.iter().map(|factor| *factor < 1.0).collect();
+    for axis in prove(timeline, motion).axes.into_iter().filter(|axis| !is_held[axis.axis]) {
         let worst = axis.worst().into_iter().map(|(_, worst)| worst);
         let over = worst.filter(|worst| worst.value > worst.limit * SLACK);
         let factor = over.map(|worst| ROUNDING * worst.limit / worst.value).fold(1.0, f64::min);
         factors[axis.axis] = factors[axis.axis].min(factor);
     }
     let stencils = Stencils::at(terms.rate);
-    for subject in subjects(timeline, terms) {
-        let least = within_stroke(&subject).min(able_to_rest(&subject, terms, &stencils));
-        factors[subject.axis] = factors[subject.axis].min(least);
+    for subject in subjects(timeline, terms).iter().filter(|subject| !is_held[subject.axis]) {
+        factors[subject.axis] = factors[subject.axis].min(able_to_rest(subject, terms, &stencils));
     }
     factors
 }

@@ -3,7 +3,7 @@
 use super::ack_words::{FALLS, of, place};
 use super::cursor::Cursor;
 use crate::health::HealthInput::{
-    self, Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew,
+    self, Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, FellOut, Homed, Joined, Killed, LookAnew,
     LostZero, Moved, OtherAxes, OtherSent, Outside, Part, Pushed, ReadSent, Refused, Seen, Wide, Zero,
 };
 use crate::health::{self, Continuity, Identity, Sighting};
@@ -28,8 +28,8 @@ pub(super) fn write_input(out: &mut Vec<u8>, input: HealthInput) {
         OtherSent(controller, datagrams) => put(37, controller, &datagrams.to_le_bytes()),
         BeatSent(controller, at) => put(38, controller, &at.as_nanos().to_le_bytes()),
         Zero(controller, homed) => put(39, controller, &[homed.into()]),
-        Drive(controller, axis, error) => {
-            let [low, high] = error.to_le_bytes();
+        Killed(controller, axis, cause) => {
+            let [low, high] = cause.to_le_bytes();
             put(40, controller, &[octet(axis), low, high]);
         }
         LostZero(controller) => put(41, controller, &[]),
@@ -70,7 +70,7 @@ pub(super) fn read_input(kind: u8, of: usize, from: &mut Cursor<'_>) -> Option<H
         37 => OtherSent(of, from.u32()?),
         38 => BeatSent(of, from.time()?),
         39 => Zero(of, from.u8()? != 0),
-        40 => Drive(of, from.u8()?.into(), from.u16()?),
+        40 => Killed(of, from.u8()?.into(), from.u16()?),
         41 => LostZero(of),
         42 => Wide(of),
         43 => Seen(of, sighting(from)?, from.time()?),

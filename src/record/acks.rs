@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn what_health_was_told_reads_as_it_was() {
         use HealthInput::{
-            Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, Drive, FellOut, Homed, Joined, LookAnew,
+            Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, FellOut, Homed, Joined, Killed, LookAnew,
             LostZero, Moved, OtherAxes, OtherSent, Outside, Part, Pushed, ReadSent, Refused, Seen, Wide,
             Zero,
         };
@@ -213,7 +213,7 @@ mod tests {
             BeatSent(2, AT),
             BeatKept(2, AT),
             Zero(1, false),
-            Drive(1, 3, 513),
+            Killed(1, 3, 513),
             LostZero(2),
             Wide(0),
             Seen(1, sighting(Continuity::Packets(65_535)), AT),

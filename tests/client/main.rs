@@ -274,6 +274,18 @@ fn preflight_says_what_several_have_in_common_once_and_where_to_find_one_that_fa
     assert!(run.stdout.contains("A1, B1") && !run.stdout.contains("10.0.0.1"), "{}", run.stdout);
 }
 
+#[test]
+fn what_all_of_a_hall_have_in_common_is_no_list_of_names() {
+    let mut status = hall("parked");
+    let names: Vec<_> = (0..64).map(|n| format!("S{n}")).collect();
+    status["controllers"] = names.iter().map(|name| json!({"name": name, "address": "10.0.0.1:7408"})).collect();
+    let finding = |name| json!({"id": "speed-too-low", "severity": "error", "controller": name, "text": "as it is", "remedy": "set it"});
+    let findings: Vec<_> = names.iter().map(finding).collect();
+    status["preflight"] = json!({"passed": false, "answered": 64, "findings": findings});
+    let run = Daemon::with(status).run(&["preflight"]);
+    assert!(run.stdout.contains("all 64") && !run.stdout.contains("S17"), "{}", run.stdout);
+}
+
 /// A thread that takes one connection to the stop socket, and answers its line.
 fn stop_socket(daemon: &Daemon, answer: &'static str) -> thread::JoinHandle<String> {
     let listener = UnixListener::bind(daemon.socket("stop.sock")).expect("a socket");

@@ -1,7 +1,8 @@
 //! A seat on serial drives beside two on the network, in one hall.
 
-use std::io::BufRead as _;
-use std::path::Path;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
 
 use rustix::process::Signal;
 use serde_json::Value;
@@ -53,12 +54,29 @@ dialect = "{dialect}"
 fn units(port: &Path, dialect: &str) -> Guarded {
     let tty = port.to_str().expect("text");
     let numbers = if dialect == "silvermax" { "16,17,18" } else { "1" };
+    let control = control_of(port);
+    let control = control.to_str().expect("text");
     let args = ["sim", "--dialect", dialect, "--tty", tty, "--units", numbers, "--seed", "1", "--json"];
+    let args = [&args[..], &["--control", control]].concat();
     let mut sim = Guarded::start(&args);
     let mut ready = String::new();
     sim.stderr().read_line(&mut ready).expect("text");
     assert_eq!(ready, format!("ready {tty}\n"));
     sim
+}
+
+/// Where units take commands that are at the end of that line.
+fn control_of(port: &Path) -> PathBuf {
+    port.with_extension("control")
+}
+
+/// Has the units at the end of a line obey a command.
+fn tell_units(port: &Path, command: &str) {
+    let mut socket = UnixStream::connect(control_of(port)).expect("the sim listens");
+    socket.write_all(format!("{command}\n").as_bytes()).expect("it is taken");
+    let mut answer = String::new();
+    BufReader::new(socket).read_line(&mut answer).expect("it answers");
+    assert_eq!(answer, "ok\n", "{command}");
 }
 
 fn of_lift(status: &Value) -> &Value {
@@ -130,6 +148,49 @@ fn evening(dialect: &str) -> Vec<Value> {
     assert_eq!((&outcome["acked"], &outcome["lost"]), (&outcome["asked"], &0.into()), "{outcome}");
     hall.end();
     executed(sim)
+}
+
+/// Plays until a unit is blocked, and the drive lets go of its motor.
+fn is_killed_in_a_show(hall: &mut Hall, port: &Path) {
+    hall.play("night");
+    hall.wait(|status| of_lift(status)["positions_mm"][0].as_f64() > Some(5.0));
+    tell_units(port, "16@blocked=1");
+    let killed = hall.wait(|status| of_lift(status)["health"] == "error");
+    let lift = of_lift(&killed);
+    assert!(
+        lift["why"].as_str().is_some_and(|why| why.contains("its axis 1 was killed by moving error")),
+        "{lift}"
+    );
+    tell_units(port, "16@blocked=0");
+}
+
+#[test]
+fn a_seat_whose_drive_let_go_of_its_motor_is_home_again_once_it_was_homed_in_this_run_or_the_next() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let port = folder.path().join("stalls");
+    let sim = units(&port, "silvermax");
+    let mut hall = Hall::closed(&[], |config| with_drives(&config, &port, "silvermax"));
+    hall.serve();
+    hall.comes_to("recovering");
+    hall.done(&["home", "--seats-empty"]);
+    hall.comes_to("parked");
+    for restarts in [false, true] {
+        is_killed_in_a_show(&mut hall, &port);
+        hall.done(&["stop"]);
+        hall.comes_to("stopped");
+        if restarts {
+            hall.close();
+            hall.serve();
+        } else {
+            hall.done(&["clear"]);
+        }
+        hall.wait(|status| status["state"] == "recovering" && of_lift(status)["homed"] == false);
+        hall.done(&["home", "--seats-empty"]);
+        hall.comes_to("parked");
+        hall.wait(|status| of_lift(status)["health"] == "ok");
+    }
+    hall.end();
+    drop(sim);
 }
 
 #[test]

@@ -23,6 +23,10 @@ words! {
         NotPolled = "not-polled",
         /// The configuration has it out.
         ConfiguredOut = "configured-out",
+        /// Another controller of its seat stands so.
+        Beside = "beside",
+        /// Its drives are not where they were led.
+        OffCourse = "off-course",
     }
 }
 
@@ -188,7 +192,7 @@ mod tests {
             Acked, AcksOff, AcksMissing(0), Silent(0), NotSeenYet, SeenAgain, Moved(0), Unsure(0), CutShort(0), Astray(0), Unsteady(0),
             Unread(0), Ambiguous(0), Outside { controller: 0, axis: 1, pulses: Pulses(2) },
             Pushed { controller: 0, pushed: PushedAxis { axis: 1, at: 1_400, held: 0 } }, EmergencyStop(0), HeldUntilReset(0),
-            Error { controller: 0, error: 21 }, Drive { controller: 0, axis: 1, error: 2 },
+            Error { controller: 0, error: 21 }, Drive { controller: 0, axis: 1, error: 2 }, Killed { controller: 0, axis: 1, cause: 256 },
             Alarm { controller: 0, register: 0x30, value: 1 }, Refuses(0), Wide(0), OtherAxes { controller: 0, drives: 6 },
             Rebooted(0), OtherMaster(0), NotHome(0), Other(0), Gap(0), Unproved(0),
         });
@@ -231,7 +235,9 @@ mod tests {
             add("standing", why.code(), why.figures().len());
             why.next().iter().for_each(|_| add("remedy", why.code(), 0));
         }
-        StandingCode::ALL.iter().for_each(|code| add("standing", code.word(), 0));
+        StandingCode::ALL.iter().for_each(|code| {
+            add("standing", code.word(), usize::from(*code == StandingCode::Beside));
+        });
         let warned = health().into_iter().filter(|standing| *standing != HealthState::Ok);
         warned.for_each(|standing| add("remedy", &standing.to_string(), 0));
         RemedyCode::ALL.iter().for_each(|code| add("remedy", code.word(), 0));

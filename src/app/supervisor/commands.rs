@@ -7,6 +7,7 @@ use super::film;
 use super::gear;
 use super::hall::{HallContext, ShowChange};
 use super::hall_settings::HallSettings;
+use super::homing::refuse_winding;
 use super::job::Job;
 use super::player;
 use super::recorded;
@@ -16,7 +17,7 @@ use super::starts::FleetStarts;
 use crate::control::{Asked, Code, Command, LevelsChange, Problem, Who, overtaken};
 use crate::rt::Command as TickCommand;
 use crate::settings::{LONGEST_WHY, Out};
-use crate::state::{State, Transition};
+use crate::state::{Next, State, Transition};
 use crate::time::{ShowTime, TRIM_MS};
 
 impl Features {
@@ -37,8 +38,9 @@ impl Features {
             Command::Test { rows } => SeatTesting::make(rows, hall),
             // An armed hall may go at any moment, and then frames come between.
             Command::Preflight => free_for("preflight", hall).map(|()| vec![Act::Start(Job::Preflight)]),
-            Command::Home => request_when_free(Transition::Home, hall),
-            Command::Arm { seats_empty: true } => request_when_free(Transition::HomeAndArm, hall),
+            Command::Home => refuse_winding(hall, &hall.live.table())
+                .and_then(|()| request_when_free(Transition::Home, hall)),
+            Command::Arm { seats_empty: true } => home_and_arm(hall),
             Command::Arm { seats_empty: false } => request_when_free(Transition::Arm, hall),
             Command::ArmFor(group) => FleetStarts::arm(group, hall),
             Command::StartAt(order) => self.starts.ask(order, who, hall),
@@ -115,6 +117,14 @@ fn request(request: Transition) -> Result<Vec<Act>, Problem> {
 /// What needs the line, or a show that nobody is about to replace.
 fn request_when_free(wanted: Transition, hall: &HallContext) -> Result<Vec<Act>, Problem> {
     hall.is_free().and_then(|()| request(wanted))
+}
+
+/// Arms, and homes first where a position is unknown.
+fn home_and_arm(hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    if hall.mirror.next == Next::ArmAndHome {
+        refuse_winding(hall, &hall.live.table())?;
+    }
+    request_when_free(Transition::HomeAndArm, hall)
 }
 
 fn go(who: &Who) -> Act {

@@ -8,7 +8,12 @@ use std::time::Duration;
 use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::HallContext;
 use super::job::Job;
+use super::seat_places::SeatPlaces;
 use crate::app::runtime::Finding;
+use crate::config::Controller;
+use crate::control::{Code, Problem};
+use crate::device::home::{AT_ZERO_DEG, UNTURN};
+use crate::health::HealthState;
 use crate::rt::{Command as TickCommand, Order, Row};
 use crate::state::{Event, State, Trouble};
 use crate::time::MonoTime;
@@ -111,14 +116,44 @@ impl Feature for Homing {
 
 /// What a person has to know of axes that search no zero (PA03): nobody puts them where they ought to be.
 fn new_zeros(hall: &HallContext) -> impl Iterator<Item = Act> {
-    hall.lanes_on().filter_map(|lane| {
+    let table = hall.live.table();
+    hall.lanes_on().filter_map(move |lane| {
         let controller = &hall.config.controllers[lane];
-        let (name, axis) = (&controller.name, controller.seat.rotary_axis()? + 1);
+        let (name, axis) = (&controller.name, controller.seat.rotary_axis()?);
+        let read = table.get(lane).and_then(|row| angle(controller, row, axis));
+        let read = read.map_or_else(String::new, |at| format!(", read at {at:.1} deg,"));
         Some(Act::Note(format!(
-            "{name}: axis {axis} has no search for its zero: its position now becomes 0; if that is wrong, stop, turn it, and home \
-             again"
+            "{name}: axis {} has no search for its zero: its position now{read} becomes 0; if that is wrong, stop, turn it, switch its \
+             controller off and on, and home again",
+            axis + 1
         )))
     })
+}
+
+/// Where an axis that turns was measured, deg.
+fn angle(controller: &Controller, row: &Row, axis: usize) -> Option<f64> {
+    let SeatPlaces { positions_mm, measured, .. } = SeatPlaces::of(controller, &row.state);
+    positions_mm.filter(|_| measured.is_some())?.get(axis).copied()
+}
+
+/// Homing makes the place of an axis that turns its 0: elsewhere than at the 0 that is known it would wind up, home by home.
+///
+/// # Errors
+/// The first that would.
+pub(super) fn refuse_winding(hall: &HallContext, table: &[Row]) -> Result<(), Problem> {
+    let of = |lane: usize| {
+        let (controller, row) = (&hall.config.controllers[lane], table.get(lane)?);
+        // One that is out until it was homed has no 0 that is known.
+        let is_known = row.homed == Some(true) && row.standing != HealthState::Excluded;
+        let axis = controller.seat.rotary_axis().filter(|_| is_known)?;
+        let at = angle(controller, row, axis).filter(|at| at.abs() > AT_ZERO_DEG)?;
+        Some(format!(
+            "cannot home: axis {} of {} is read at {at:.1} deg, which would become its 0",
+            axis + 1,
+            controller.name
+        ))
+    };
+    hall.lanes_on().find_map(of).map_or(Ok(()), |detail| Err(Problem::new(Code::State, detail, UNTURN)))
 }
 
 const fn tell(event: Event) -> Act {
@@ -130,6 +165,8 @@ mod tests {
     use super::*;
     use crate::app::supervisor::testing::{hall, row, told};
     use crate::motion::AxisUnit;
+    use crate::observe::Heard;
+    use crate::wire::PerAxis;
 
     /// One under way, and the flag that calls it off.
     fn begun(hall: &mut HallContext) -> (Homing, Arc<AtomicBool>) {
@@ -213,6 +250,40 @@ mod tests {
         let acts = told(&mut homing, &SupervisorEvent::Entered(State::Homing), &hall);
         let [Act::Note(note), Act::Start(_)] = &acts[..] else { panic!("{acts:?}") };
         assert!(note.starts_with("B1: axis 1 has no search for its zero: its position now"), "{note}");
+    }
+
+    #[test]
+    fn a_turntable_that_is_home_elsewhere_than_at_its_0_is_not_homed_there() {
+        let mut hall = hall(State::Parked, "one");
+        let config = Arc::make_mut(&mut hall.config);
+        let seat = Arc::make_mut(&mut config.controllers[1].seat);
+        (seat.each[0].unit, seat.each[0].low, seat.each[0].high) = (AxisUnit::Degree, -180.0, 180.0);
+        let axis = seat.each[0];
+        let read_at = |deg: f64| {
+            let pulses = axis.pulses((deg + 180.0) / 360.0);
+            let mut row = row(hall.now);
+            row.state.measured = Some(Heard { value: PerAxis::new(&[pulses]), at: hall.now });
+            row
+        };
+        for (deg, homed, standing, refused) in [
+            (169.5, Some(true), HealthState::Ok, true),
+            (-90.0, Some(true), HealthState::Lost, true),
+            (0.1, Some(true), HealthState::Ok, false),
+            (169.5, Some(false), HealthState::Ok, false),
+            (169.5, None, HealthState::Lost, false),
+            (169.5, Some(true), HealthState::Excluded, false),
+        ] {
+            let table = [row(hall.now), Row { homed, standing, ..read_at(deg) }];
+            let refusal = refuse_winding(&hall, &table);
+            assert_eq!(refusal.is_err(), refused, "{deg} {homed:?} {standing:?}");
+            if let Err(problem) = refusal {
+                let words = format!("axis 1 of B1 is read at {deg:.1} deg, which would become its 0");
+                assert!(
+                    problem.detail.contains(&words) && problem.remedy.contains("park first"),
+                    "{problem:?}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::HallContext;
+use super::status::standing_words;
 use crate::app::recorder::{RecordAsk, ShowStart};
 use crate::control::{Code, Desired, Problem, Who};
 use crate::film::point::FilmState;
@@ -46,7 +47,7 @@ impl HallTeller {
                 continue;
             }
             let seat = hall.config.controllers.get(lane).map(|one| one.name.clone()).unwrap_or_default();
-            let text = format!("{}: {}", row.standing, row.why);
+            let text = format!("{}: {}", row.standing, standing_words(hall, lane, row.why).0);
             hall.recorder.keep(Note::Event(EventNote { kind: "standing", seat, text }));
         }
         self.standings = table.iter().map(|row| row.standing).collect();

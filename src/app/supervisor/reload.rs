@@ -15,6 +15,9 @@ use crate::rt::Desk;
 use crate::settings::{Kept, Settings};
 use crate::state::State;
 
+/// How the note of a configuration begins that the hall did not open with.
+const NOT_OPENED: &str = "the hall does not open with the new configuration, and has the old one";
+
 /// What goes over from a hall to the one that is opened with another configuration, or comes from before the start.
 #[derive(Debug, Default)]
 pub(crate) struct Carryover {
@@ -55,8 +58,14 @@ impl Carryover {
         self.untold.extend(text);
     }
 
-    /// Another configuration was not taken: a person should know that, whoever asked for it first.
-    pub(crate) fn refuse(&mut self, why: String) {
+    /// Another configuration was taken: what is said of those before that were not is over.
+    pub(crate) fn forget_refusals(&mut self) {
+        self.notes.retain(|note| !note.starts_with(NOT_OPENED));
+    }
+
+    /// The hall did not open with another configuration: a person should know that, whoever asked for it first.
+    pub(crate) fn refuse(&mut self, why: &str) {
+        let why = format!("{NOT_OPENED}: {why}");
         if let Some((_, result)) = &mut self.reloading {
             *result = Err(Problem::new(Code::Check, why.clone(), "correct it, and reload again"));
         }

@@ -18,11 +18,16 @@ use crate::control::{
     Times, Warning,
 };
 use crate::drive::link::AT_PARK;
+use crate::health::Why;
 use crate::motion::AxisGeometry;
 use crate::rt::Row;
 use crate::state::{Next, PlayMode, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker;
+
+/// Of a seat on drives that is not where it was led.
+const OFF_COURSE: &str = "its drives are not where they were led: something blocks or pushes them, their load is too much for the motors, \
+                          or what was sent to them was damaged on the way";
 
 /// The least and the greatest bound of the buckets, µs.
 const BOUNDS_US: [f64; 16] = [
@@ -128,6 +133,9 @@ impl StatusParts<'_> {
             return outside
                 .map_or(cause.clone(), |side| format!("{cause}: {side}; kinocue sync shows where"));
         }
+        if hall.mirror.state == State::Parked && hall.lanes_on().next().is_none() {
+            return format!("{cause}; no seat takes part");
+        }
         if hall.mirror.state == State::Parked {
             let away: Vec<String> = hall.lanes_on().filter_map(|lane| off_park(hall, table, lane)).collect();
             let more = if away.len() > FEW { " ..." } else { "" };
@@ -182,7 +190,10 @@ impl StatusParts<'_> {
         let counts = row.map(|row| row.counts).unwrap_or_default();
         let state = row.map(|row| row.state).unwrap_or_default();
         let ack = row.and_then(|row| row.ack_ns);
-        let why = row.map_or_else(|| "not polled yet".to_owned(), |row| row.why.to_string());
+        let (why, why_coded) = row.map_or_else(
+            || ("not polled yet".to_owned(), Coded::new(StandingCode::NotPolled.word(), [])),
+            |row| standing_words(hall, index, row.why),
+        );
         let SeatPlaces { positions_mm, commanded, measured } = SeatPlaces::of(controller, &state);
         ControllerStatus {
             enabled: hall.settings.is_on(index),
@@ -191,10 +202,7 @@ impl StatusParts<'_> {
                 Some(out) => format!("{}; {why}", out.words(&Zoned::now())),
                 None => why,
             },
-            why_coded: row.map_or_else(
-                || Coded::new(StandingCode::NotPolled.word(), []),
-                |row| Coded::new(row.why.code(), row.why.figures()),
-            ),
+            why_coded,
             heard_s: state.heard_at.map(|at| now.since(at).as_secs_f64()),
             ack_rate: features.figures.rates.of(index),
             ack_p50_us: ack.map(|ack| us(ack.p50)),
@@ -214,6 +222,26 @@ impl StatusParts<'_> {
             measured,
             ..nameplate(controller)
         }
+    }
+}
+
+/// Why a controller stands so. Of a rigid seat all controllers stand as one of them does: that one is named.
+pub(super) fn standing_words(hall: &HallContext, index: usize, why: Why) -> (String, Coded) {
+    let whose = why.controller().unwrap_or(index);
+    let of = hall.config.controllers.get(whose);
+    let (words, coded) = match why {
+        // Drives have neither a PA96 nor filters.
+        Why::Astray(_) if of.is_some_and(|one| one.drives().is_some()) => {
+            (OFF_COURSE.to_owned(), Coded::new(StandingCode::OffCourse.word(), []))
+        }
+        _ => (why.to_string(), Coded::new(why.code(), why.figures())),
+    };
+    match of.filter(|_| whose != index) {
+        Some(other) => (
+            format!("{}: {words}", other.name),
+            Coded::new(StandingCode::Beside.word(), [other.name.clone()]),
+        ),
+        None => (words, coded),
     }
 }
 

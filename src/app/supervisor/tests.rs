@@ -20,6 +20,8 @@ use crate::state::{Event, Next, PlayMode, Trouble};
 use crate::time::ShowTime;
 use crate::wire::PerAxis;
 
+mod told;
+
 const ARM: Command = Command::Arm { seats_empty: false };
 
 fn out(name: &str) -> Command {

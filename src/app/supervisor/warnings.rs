@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::coded::{RemedyCode, WarningCode};
 use super::readiness::CORRECT;
-use super::status::StatusParts;
+use super::status::{StatusParts, standing_words};
 use super::{belts, player, recorded};
 use crate::app::links;
 use crate::app::notify::NotifyTable;
@@ -101,6 +101,10 @@ impl StatusParts<'_> {
     /// A hall may play and park with all its seats out; what its state says is true of none of them then.
     fn of_nobody(&self, table: &[Row]) -> Option<Warning> {
         let (settings, state) = (&self.hall.settings, self.hall.mirror.state);
+        // Nobody takes part in anything while seats home, and that ends with a word of its own.
+        if state == State::Homing {
+            return None;
+        }
         let is_early = self.has_begun() || state == State::Boot;
         let is_looked_for = |row: &Row| is_early && row.why == Why::NotSeenYet;
         let takes_part = |(lane, row): (usize, &Row)| settings.is_on(lane) && row.standing.may_move();
@@ -121,14 +125,15 @@ impl StatusParts<'_> {
     fn of_controllers(&self, table: &[Row]) -> impl Iterator<Item = Warning> {
         let hall = self.hall;
         let controllers = hall.config.controllers.iter().zip(table).enumerate();
-        let has_begun = self.has_begun();
+        let (has_begun, homes) = (self.has_begun(), hall.mirror.state == State::Homing);
         let of = |(lane, (controller, row)): (usize, (&crate::config::Controller, &Row))| {
             let severity = match row.standing {
                 HealthState::Rejoining if matches!(row.why, Why::Moved(_)) => Severity::Error,
                 HealthState::Rejoining if hall.mirror.next == Next::ParkOrStart => Severity::Warning,
                 // While a show runs it joins by itself.
                 HealthState::Ok | HealthState::Rejoining => return None,
-                HealthState::Lost if has_begun && row.why == Why::NotSeenYet => return None,
+                // So is each that has just come home.
+                HealthState::Lost if (has_begun || homes) && row.why == Why::NotSeenYet => return None,
                 HealthState::Degraded | HealthState::Unwatched => Severity::Warning,
                 _ if !hall.settings.is_on(lane) => Severity::Info,
                 _ => Severity::Error,
@@ -137,12 +142,13 @@ impl StatusParts<'_> {
                 Some(remedy) => (row.why.code().to_owned(), remedy),
                 None => (row.standing.to_string(), row.standing.next()),
             };
+            let (why, coded) = standing_words(hall, lane, row.why);
             Some(Warning {
                 id: format!("controller-{}", Health::from(row.standing)),
                 severity,
                 controller: Some(controller.name.clone()),
-                text: format!("{}: {}", row.standing, row.why),
-                coded: Some(Coded::new(row.why.code(), row.why.figures())),
+                text: format!("{}: {why}", row.standing),
+                coded: Some(coded),
                 remedy: remedy.to_owned(),
                 remedy_code: Some(code),
             })

@@ -191,7 +191,7 @@ fn findings(status: &Status, all: &[Warning]) -> String {
         let Warning { severity, id, text, remedy, .. } = one;
         let of = match of.len() {
             1 => who(status, one),
-            all if all == status.controllers.len() => format!("all {all}"),
+            FEW.. if of.len() == status.controllers.len() => format!("all {}", of.len()),
             FEW.. if *severity != Severity::Error => format!("{} controllers", of.len()),
             _ => of.join(", "),
         };

@@ -8,8 +8,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::super::play::leave_on_signals;
-use super::super::targets::{DrivenTargets, Troubles};
-use super::super::{Failure, OrExit as _, print};
+use super::super::targets::{DrivenTargets, PortRefused, Troubles, open_link};
+use super::super::{Exit, Failure, OrExit as _, print};
 use crate::config::drive::DriveFamily;
 use crate::config::drive::homing::{DriveHoming, HomeWay, Side};
 use crate::config::drive_controller::Motors;
@@ -69,26 +69,54 @@ fn way(homing: &DriveHoming) -> String {
     format!("{by}, {toward}, at {speed} mm/s over at most {travel} mm, and go to park")
 }
 
-/// Homes those of the seats that can be; the results take the place of theirs. Says whether somebody ended it.
-pub(super) fn home_all(
+/// Opens the links of those seats that can be homed; an error for each whose link cannot be had, of which it has told. 75 where another
+/// program has one of them.
+pub(super) fn open_all(
     driven: &DrivenTargets,
+    results: &mut [HomingResult],
+    troubles: &mut Troubles,
+) -> Result<Vec<Option<LinkLine>>, Failure> {
+    let mut lines = Vec::new();
+    for link in &driven.links {
+        let seats = ready_on(link, driven, results);
+        let line = (!seats.is_empty()).then(|| open_link(link)).transpose();
+        lines.push(match line {
+            Ok(line) => line,
+            Err(PortRefused::Taken(error)) => return Err(error).or_exit(Exit::TryAgain),
+            Err(PortRefused::Other(why)) => {
+                for index in seats {
+                    troubles.miss(&driven.controllers[index].name, &why);
+                    results[index] = Err(why.clone());
+                }
+                None
+            }
+        });
+    }
+    Ok(lines)
+}
+
+/// The seats of a link that can be homed, each by its place.
+fn ready_on(link: &Link, driven: &DrivenTargets, results: &[HomingResult]) -> Vec<usize> {
+    let is_on = |index: &usize| driven.controllers[*index].drives().is_some_and(|it| it.link == link.name);
+    (0..results.len()).filter(|index| results[*index].is_ok()).filter(is_on).collect()
+}
+
+/// Homes those of the seats that can be, over links that are open; the results take the place of theirs. Says whether somebody
+/// ended it.
+pub(super) fn home_all(
+    (driven, lines): (&DrivenTargets, Vec<Option<LinkLine>>),
     results: &mut [HomingResult],
     troubles: &mut Troubles,
 ) -> Result<bool, Failure> {
     let abort = Arc::new(AtomicBool::new(false));
     leave_on_signals(&abort).or_system()?;
-    let ready: Vec<usize> = (0..results.len()).filter(|index| results[*index].is_ok()).collect();
-    let on = |link: &Link| -> Vec<usize> {
-        let is_on =
-            |index: &usize| driven.controllers[*index].drives().is_some_and(|it| it.link == link.name);
-        ready.iter().copied().filter(is_on).collect()
-    };
     thread::scope(|scope| {
         let (tell, told) = channel();
-        for (link, period) in driven.links.iter().zip(&driven.periods) {
-            let (seats, tell, abort) = (on(link), tell.clone(), &*abort);
-            if !seats.is_empty() {
-                scope.spawn(move || home_link((link, *period), driven, &seats, abort, &tell));
+        for ((link, period), line) in driven.links.iter().zip(&driven.periods).zip(lines) {
+            let (seats, tell, abort) = (ready_on(link, driven, results), tell.clone(), &*abort);
+            if let Some(line) = line {
+                let talk = LinkTalk::over(line, link, *period);
+                scope.spawn(move || home_link(talk, driven, &seats, abort, &tell));
             }
         }
         drop(tell);
@@ -140,9 +168,9 @@ fn words(step: Step) -> String {
     }
 }
 
-/// Homes the seats of a link, which tells each axis something new each period.
+/// Homes the seats of a link.
 fn home_link(
-    (link, period): (&Link, Duration),
+    mut talk: LinkTalk,
     driven: &DrivenTargets,
     seats: &[usize],
     abort: &AtomicBool,
@@ -150,14 +178,6 @@ fn home_link(
 ) {
     // Whoever shows it listens until all have told.
     let over = |index, result| drop(tell.send(HomingTold::Over(index, result)));
-    let line = match LinkLine::open(link) {
-        Ok(line) => line,
-        Err(error) => {
-            seats.iter().for_each(|index| over(*index, Err(HomingFault::Silent(error.to_string()))));
-            return;
-        }
-    };
-    let mut talk = LinkTalk::over(line, link, period);
     for &index in seats {
         let step = &mut |step| drop(tell.send(HomingTold::Step(index, step)));
         over(index, talk.home(&driven.controllers[index], abort, step));

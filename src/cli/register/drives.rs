@@ -6,16 +6,15 @@ use std::collections::BTreeMap;
 use anyhow::{anyhow, bail};
 use serde::Serialize;
 
-use crate::cli::targets::{DrivenTargets, Troubles};
+use crate::cli::targets::{DrivenTargets, PortRefused, Troubles, open_link};
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::config::drive::DriveFamily;
 use crate::config::drive_controller::Motors;
 use crate::config::{Controller, Drives, Link};
 use crate::drive::link::{LinkLine, TalkTerms};
 use crate::drive::{silvermax, sixpack2};
-use crate::sys::serial::{CanError, SerialError};
 use crate::wire::silvermax::register;
-use crate::wire::silvermax::{Internal, StatusWord as _};
+use crate::wire::silvermax::{Internal, StatusWord as _, kill_names};
 
 /// Registers that homing writes and that stay as they are: what is kept and compared.
 const SETTINGS: [u8; 6] = [
@@ -185,7 +184,7 @@ pub(super) fn read(
         if on_it.is_empty() {
             continue;
         }
-        let mut line = match open(link) {
+        let mut line = match open_link(link) {
             Ok(line) => RegisterReader::over(line, link),
             Err(PortRefused::Taken(error)) => return Err(error).or_exit(Exit::TryAgain),
             Err(PortRefused::Other(why)) => {
@@ -203,21 +202,6 @@ pub(super) fn read(
         }
     }
     Ok(found)
-}
-
-enum PortRefused {
-    Taken(anyhow::Error),
-    Other(String),
-}
-
-fn open(link: &Link) -> Result<LinkLine, PortRefused> {
-    LinkLine::open(link).map_err(|error| match error {
-        SerialError::Taken(_) | SerialError::Can(CanError::Taken(_)) => PortRefused::Taken(anyhow!(
-            "{error}. If that is the service, stop it first (`systemctl stop kinocue`); `kinocue preflight` without --config reads them \
-             through the service"
-        )),
-        _ => PortRefused::Other(error.to_string()),
-    })
 }
 
 /// The conversation with the drives of a link.
@@ -282,7 +266,7 @@ fn of_unit(controller: &Controller, unit: u8, number: u8, value: i32) -> DriveVa
         register::ERRORS => Some(format!("greatest {high}, now {low} counts")),
         register::TORQUE_CLOSED | register::TORQUE_OPEN => Some(format!("hold {high}, moving {low}")),
         register::ERROR_LIMITS => Some(format!("moving {high}, holding {low} counts")),
-        register::KILL_CAUSE if value != 0 => Some(silvermax::kill_names(value)),
+        register::KILL_CAUSE if value != 0 => Some(kill_names(value)),
         register::CANARY if value == 0 => Some("not home, or restarted since".to_owned()),
         _ => None,
     };

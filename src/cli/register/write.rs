@@ -90,6 +90,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let wanted = wanted(args, &targets)?;
     let mut talk = targets.open()?;
     let mut changes = changes(&mut talk, &targets, &wanted)?;
+    let all: Vec<usize> = (0..targets.controllers.len()).collect();
+    targets.refuse_others(&mut talk, &all)?;
     if changes.is_empty() {
         print::tell("nothing to change: all registers already have these values");
         if !args.keep {

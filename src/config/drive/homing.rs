@@ -166,6 +166,10 @@ impl DriveHoming {
             Side::Up => self.zero_mm - axis.low,
         };
         let needed = axes.iter().map(need).fold(0.0, f64::max);
+        // A zero on the wrong side is told itself, and no travel mends that.
+        if needed <= 0.0 {
+            return;
+        }
         let (travel, most) = (self.travel_mm, LONGEST_TRAVEL * needed);
         if travel < needed {
             let message =

@@ -114,7 +114,7 @@ fn a_drive_moves_one_axis() {
     assert!(fault.contains(&format!("on line {}", CONTROLLER_LINE + 5)), "{fault}");
     assert!(only(instead("[16, 17, 18]", "[16, 17, 16]")).contains("unit 16 of link stalls"));
     let fault = only(six(&SIX.replace("[0, 1, 2]", "[0, 1, 1]"), ""));
-    assert!(fault.contains("units: motor 1 of unit 1 of link stalls moves another axis"), "{fault}");
+    assert!(fault.contains("motors: motor 1 of unit 1 of link stalls moves another axis"), "{fault}");
     let other_motors = SIX.replace("B1", "B2").replace("[0, 1, 2]", "[3, 4, 5]");
     assert!(six(&format!("{SIX}{other_motors}"), "").is_ok());
 }
@@ -176,7 +176,10 @@ fn a_baud_rate_that_cannot_be_made_is_refused_with_the_nearest() {
         fault.contains("baud: 230400 cannot be made") && fault.contains("the nearest is 250000"),
         "{fault}"
     );
-    assert!(only(six(SIX, "baud = 625000\n")).contains("625000 is outside 9600..=250000"));
+    for baud in [625_000, 1_000_000, 9_500] {
+        let fault = only(six(SIX, &format!("baud = {baud}\n")));
+        assert!(fault.contains(&format!("{baud} is outside 9600..=250000")), "{fault}");
+    }
 }
 
 #[test]
@@ -201,6 +204,14 @@ fn what_drives_do_not_have_is_refused_by_name() {
         assert!(fault.contains(why), "{more}: {fault}");
     }
     assert!(silver("fan_out = \"slice\"\neffects = []\n").is_ok());
+}
+
+#[test]
+fn a_zero_on_the_wrong_side_is_told_and_no_travel_for_it() {
+    let drive = "[seat.s.drive]\ntorque = { hold = \"60%\", move = 1.0, full = 20000 }\n[seat.s.drive.home]\nway = \"switch\"\n\
+        input = 1\ntoward = \"up\"\ntravel_mm = 165\nzero_mm = -2\n";
+    let fault = only(parse(&format!("{LINK}{SEAT}{drive}{A1}")));
+    assert!(fault.contains("zero_mm: -2 mm is below 150 mm, the upper end"), "{fault}");
 }
 
 #[test]
@@ -307,6 +318,17 @@ fn a_link_is_a_line_of_its_own_by_its_whole_path() {
     let twin = LINK.replace("stalls", "circle");
     let fault = only(silver(&twin));
     assert!(fault.starts_with("hall.toml:21:8: port: [link.stalls] uses it already"), "{fault}");
+    let folder = tempfile::tempdir().unwrap();
+    let (device, name) = (folder.path().join("ttyUSB0"), folder.path().join("by-id"));
+    std::fs::write(&device, "").unwrap();
+    std::os::unix::fs::symlink(&device, &name).unwrap();
+    let spelled = device.display().to_string().replace("/ttyUSB0", "/.//ttyUSB0");
+    for (one, other) in [("/dev/ttyUSB0", "//dev/./ttyUSB0"), (&spelled, name.to_str().unwrap())] {
+        let link = |link: &str, port: &str| format!("[link.{link}]\nport = \"{port}\"\n");
+        let fault =
+            only(parse(&format!("{}{}{SEAT}{DRIVE}{A1}", link("stalls", one), link("circle", other))));
+        assert!(fault.contains("port: [link.stalls] uses it already"), "{fault}");
+    }
 }
 
 #[test]

@@ -57,8 +57,9 @@ fn refuse_twins(on_it: &[&Placed], faults: &mut Faults<'_>) {
             };
             let line = faults.line(*first);
             let (link, what) = (&one.link, motor.map_or(String::new(), |m| format!("motor {m} of ")));
+            let key = if motor.is_some() { "motors" } else { "units" };
             let message = format!(
-                "units: {what}unit {unit} of link {link} moves another axis already, on line {line}; one motor moves one axis"
+                "{key}: {what}unit {unit} of link {link} moves another axis already, on line {line}; one motor moves one axis"
             );
             faults.note(at, message);
         }

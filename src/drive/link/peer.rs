@@ -13,6 +13,7 @@ use crate::health::{Continuity, Identity, Pushed, Sighting};
 use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
 use crate::time::MonoTime;
 use crate::wire::PerAxis;
+use crate::wire::silvermax::kill_bits;
 
 /// Two places of an axis are the same, strokes: a servo that holds its place wanders by so much.
 const STILL: f64 = 0.000_5;
@@ -140,9 +141,7 @@ impl LinkPeer {
             }
             StreamEvent::Restarted { .. } => self.lose_zero(out),
             StreamEvent::Killed { axis, cause, .. } => {
-                // The bits of register 211 stand in its upper word.
-                let error = u16::try_from(cause.cast_unsigned() >> 16).unwrap_or(u16::MAX);
-                out.push(Evidence::Drive { axis: usize::from(axis) + 1, error });
+                out.push(Evidence::Killed { axis: usize::from(axis) + 1, cause: kill_bits(cause) });
                 self.lose_zero(out);
             }
             StreamEvent::Braked { why: BrakeReason::Stopped, .. } => {}

@@ -19,6 +19,6 @@ mod tests;
 
 pub(crate) use home::{Homing, home};
 pub(crate) use look::{UnitFacts, look};
-pub(crate) use set_up::{HomeError, SeatUnits, UnitSettings, kill_names};
+pub(crate) use set_up::{HomeError, SeatUnits, UnitSettings};
 pub(crate) use stream::SilverMax;
 pub(crate) use talk::{Talk, TalkFault};

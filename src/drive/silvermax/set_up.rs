@@ -11,7 +11,7 @@ use crate::wire::silvermax::register::{
     self, CANARY, DRY_BRAKE, ERROR_LIMITS, KILL_CAUSE, MARK, QUEUE_SOURCE, SOFT_LIMIT_HIGH, SOFT_LIMIT_LOW,
     TORQUE_CLOSED, TORQUE_OPEN,
 };
-use crate::wire::silvermax::{Io, NakReason, Poll, Request, StatusWord, command};
+use crate::wire::silvermax::{Io, NakReason, Poll, Request, StatusWord, command, kill_names};
 
 /// Bits of a canary that are a sum of settings.
 pub(super) const HALF: i32 = 0xffff;
@@ -450,13 +450,6 @@ impl UnitAxis<'_> {
         let [moving, holding] = self.error_counts();
         two_words(moving, holding)
     }
-}
-
-/// The conditions of register 211 by name: the bits that killed stand in its upper word.
-pub(crate) fn kill_names(register: i32) -> String {
-    let bits = u16::try_from(register.cast_unsigned() >> 16).unwrap_or_default();
-    let names: Vec<_> = Io(bits).names().map(|name| if name == "not hot" { "heat" } else { name }).collect();
-    if names.is_empty() { "what it does not say".to_owned() } else { names.join(", ") }
 }
 
 fn two_words(high: u16, low: u16) -> i32 {

@@ -314,7 +314,7 @@ impl WatchedSeats {
             6 => HealthInput::BeatSent(of, now),
             7 => HealthInput::BeatKept(of, now),
             8 => HealthInput::Zero(of, script.flag()?),
-            9 => HealthInput::Drive(of, 1 + script.below(6)?, script.octet()?.into()),
+            9 => HealthInput::Killed(of, 1 + script.below(6)?, script.octet()?.into()),
             10 => HealthInput::LostZero(of),
             11 => HealthInput::Wide(of),
             12 => HealthInput::OtherAxes(of, script.octet()?.into()),

@@ -118,6 +118,31 @@ fn a_seat_that_falls_out_and_back_three_times_in_a_minute_stays_out_and_one_that
 }
 
 #[test]
+fn a_drive_that_let_go_of_its_motor_is_told_until_its_seat_was_homed_and_holds_up_no_clear() {
+    let cause = 0x0100; // a moving error
+    for clears in [false, true] {
+        let mut hall = Hall::new(LossPolicy::Continue);
+        hall.run(30);
+        hall.health.on_killed(2, 1, cause);
+        hall.health.on_lost_zero(2);
+        hall.run(2);
+        let why = hall.health.why(1);
+        assert_eq!((hall.health.standing(1), why.code()), (HealthState::Error, "killed"));
+        assert_eq!(why.to_string(), "the drive of its axis 1 was killed by moving error (register 211)");
+        assert!(why.next().is_some_and(|next| next.contains("then home")));
+        assert!(hall.told_hall().contains(&Event::Latched(Latch::Over)), "{:?}", hall.told_hall());
+        if clears {
+            hall.health.look_anew(1);
+            hall.run(30);
+            assert_eq!(hall.health.standing(1), HealthState::Excluded, "clearing does not home");
+        }
+        hall.health.on_homed(2);
+        hall.run(30);
+        assert_eq!(hall.health.standing(1), HealthState::Rejoining, "{clears}: {:?}", hall.changes());
+    }
+}
+
+#[test]
 fn a_controller_that_refuses_frames_is_in_error_until_a_read_finds_none() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.run(10);

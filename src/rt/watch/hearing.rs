@@ -80,7 +80,7 @@ impl Watch {
                     records.look(controller, look, at);
                 }
             }
-            Evidence::Drive { axis, error } => self.judge(HealthInput::Drive(controller, axis, error)),
+            Evidence::Killed { axis, cause } => self.judge(HealthInput::Killed(controller, axis, cause)),
             Evidence::LostZero => self.judge(HealthInput::LostZero(controller)),
             // One that is out already is looked at anyway.
             Evidence::Fell(why) if self.stands(controller).may_move() => {

@@ -77,7 +77,7 @@ pub(crate) enum SerialError {
 }
 
 impl SerialError {
-    pub(super) fn of(path: &Path, errno: Errno) -> Self {
+    pub(crate) fn of(path: &Path, errno: Errno) -> Self {
         let path = path.to_owned();
         match errno {
             Errno::NOENT | Errno::NOTDIR => Self::Missing(path),

@@ -25,7 +25,7 @@ pub(crate) use line::{Collected, LineCollector, LineError, MAX_LINE};
 pub(crate) use nine_bit::NineBit;
 pub(crate) use reply::{NakReason, Reply, Words};
 pub(crate) use request::{AnyRequest, Request, StopOn};
-pub(crate) use status::{Internal, Io, Poll, StatusWord};
+pub(crate) use status::{Internal, Io, Poll, StatusWord, conditions, kill_bits, kill_names};
 
 /// All units at once; like a group they obey and never answer (command reference, IDT, page 54).
 pub(crate) const ALL_UNITS: u8 = 255;

@@ -44,6 +44,23 @@ pub(crate) trait StatusWord: Copy {
     }
 }
 
+/// The conditions of register 211 by name: the bits that killed stand in its upper word.
+pub(crate) fn kill_names(register: i32) -> String {
+    conditions(kill_bits(register))
+}
+
+/// The bits of register 211 that killed.
+pub(crate) const fn kill_bits(register: i32) -> u16 {
+    let [.., low, high] = register.to_le_bytes();
+    u16::from_le_bytes([low, high])
+}
+
+/// Conditions that killed, by name.
+pub(crate) fn conditions(bits: u16) -> String {
+    let names: Vec<_> = Io(bits).names().map(|name| if name == "not hot" { "heat" } else { name }).collect();
+    if names.is_empty() { "what it does not say".to_owned() } else { names.join(", ") }
+}
+
 /// What happened since it was told and cleared (POL, pages 17 to 19). Bits 7, 4, 2, 1 and 0 by a public program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Poll(pub(crate) u16);

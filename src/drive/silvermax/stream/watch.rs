@@ -132,8 +132,12 @@ impl<P: LinkPort> Stream<SilverMax, P> {
             self.heard(l, a, request, &answer);
             answer
         };
-        exchange(Request::ClearPoll { mask: word })?;
         let poll = Poll(word);
+        if poll.has(Poll::KILLED) {
+            // What it is home by is taken back first: whoever looks later, in another run, finds no trace in its events.
+            exchange(Request::WriteRegister { register: CANARY, value: 0 })?;
+        }
+        exchange(Request::ClearPoll { mask: word })?;
         if poll.has(Poll::KILLED) {
             let cause = match exchange(Request::ReadRegister { register: KILL_CAUSE })? {
                 Answer::Data(words) => words.value().unwrap_or_default(),

@@ -214,4 +214,7 @@ fn a_blocked_axis_is_killed_and_told_by_what() {
     play.play(2.0, 0);
     assert!(play.has("Killed { lane: 0, axis: 2, cause: "), "{:?}", play.rare());
     assert!((0..2).all(|axis| !play.unit(axis).is_moving()));
+    // Nor does another run take it for home, whose look finds that the event was told and cleared.
+    let facts = look(&mut play.stream.talk, 18).unwrap();
+    assert!(facts.kill_cause != 0 && facts.canary == 0, "{facts:?}");
 }
