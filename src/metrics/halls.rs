@@ -108,11 +108,12 @@ fn figure(count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::State;
+    use crate::state::{PlayMode, State};
 
     #[test]
     fn each_hall_has_its_age_and_only_one_that_is_heard_has_a_state() {
-        let mut status = BriefStatus { state: State::Playing.into(), ..BriefStatus::default() };
+        let mut status =
+            BriefStatus { state: State::Playing(PlayMode::Following).into(), ..BriefStatus::default() };
         (status.seats.total, status.seats.lost, status.warnings_total) = (8, 1, 3);
         let hall = |name: &str, age_s: Option<f64>, status: Option<BriefStatus>| HallFigures {
             name: name.to_owned(),
