@@ -24,7 +24,7 @@ mod tail;
 mod tests;
 mod writer;
 
-pub(crate) use fold::Folds;
+pub(crate) use fold::{FoldedAction, Folds};
 pub use record::{Action, FilmProof, Outcome, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
 pub(crate) use report::{
