@@ -101,6 +101,15 @@ impl Contents {
         self.begin.get(key).map_or("", String::as_str)
     }
 
+    /// What is missing in it or not as it was written, in words; empty where it is whole.
+    pub(crate) fn flaws(&self) -> Vec<String> {
+        let trouble = self.trouble.as_ref().map(|trouble| {
+            format!("the file {trouble}; only what precedes is shown; kinocue record recover saves it")
+        });
+        let faults = self.faults.iter().map(|fault| format!("not read: {fault}"));
+        trouble.into_iter().chain(faults).collect()
+    }
+
     /// The rate of its ticks, Hz.
     pub(crate) fn rate_hz(&self) -> f64 {
         self.entry("rate_hz").parse().unwrap_or(100.0)

@@ -142,7 +142,7 @@ fn a_cut_with_its_scene_has_a_cube_for_each_seat_once_and_where_it_is_twenty_tim
     let whole = recorded_as(Mode::Full, swing(300));
     let stretch = Stretch { from: ShowTime::ZERO, until: ShowTime::from_millis(1_999), seat: None };
     let manner = CutManner { scene: true, ..CutManner::default() };
-    let file = cut(whole.as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().into_inner();
+    let file = cut(whole.as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().0.into_inner();
     let all = |topic: &str| -> Vec<serde_json::Value> {
         let messages = mcap::MessageStream::new(&file).unwrap().map(Result::unwrap);
         let of_topic = messages.filter(|one| one.channel.topic == topic);

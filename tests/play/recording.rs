@@ -185,6 +185,52 @@ fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
 }
 
 #[test]
+fn what_is_made_of_a_recording_that_is_cut_short_or_damaged_is_said_to_be_less_and_no_recording_is_replaced()
+{
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let (path, _) = recorded_in_full(&folder, &sim.addresses[0], &[]);
+    drop(sim.end());
+    let whole = std::fs::read(&path).expect("it is there");
+    let last = Summary::read(&whole).expect("it is closed").expect("it has one").chunk_indexes.pop();
+    let place = last.expect("chunks").compressed_data_offset().expect("an offset") as usize;
+    let mut changed = whole.clone();
+    changed[place] ^= 4;
+    for (name, octets, says) in
+        [("half.mcap", &whole[..whole.len() / 2], "is cut short"), ("bit.mcap", &changed, "is damaged")]
+    {
+        let half = folder.path(name);
+        std::fs::write(&half, octets).expect("there is room");
+        let [cut, rows, pcap, cue] =
+            ["cut.mcap", "cut.csv", "cut.pcap", "cue.csv"].map(|one| folder.path(one));
+        for args in [
+            &["record", "cut", text(&half), "-o", text(&cut), "--force"][..],
+            &["record", "cut", text(&half), "--csv", "-o", text(&rows), "--force"],
+            &["record", "cut", text(&half), "--pcap", "-o", text(&pcap), "--force"],
+            &["convert", text(&half), text(&cue), "--seat", "F4", "--take", "sent", "--force"],
+            &["record", "compare", text(&path), text(&half)],
+            &["record", "compare", text(&half), text(&path), "--json"],
+        ] {
+            let run = kinocue(args);
+            assert_eq!(run.code, Some(1), "{args:?}: {run:?}");
+            assert!(run.stderr.contains(&format!("{name}: the file {says}")), "{args:?}: {run:?}");
+        }
+        assert!([cut, rows, pcap, cue].iter().all(|made| made.exists()), "what precedes is of use");
+    }
+    let link = folder.path("again.mcap");
+    std::os::unix::fs::symlink(&path, &link).expect("a link");
+    for args in [
+        &["record", "cut", text(&path), "--film", "0..0.5", "-o", text(&path), "--force"][..],
+        &["record", "cut", text(&path), "-o", text(&link), "--force"],
+        &["convert", text(&path), text(&path), "--seat", "F4", "--take", "sent", "--force"],
+        &["convert", text(&link), text(&path), "--recover", "--force"],
+    ] {
+        let run = kinocue(args);
+        assert!(run.code == Some(64) && run.stderr.contains("is the file that is read"), "{args:?}: {run:?}");
+    }
+    assert!(std::fs::read(&path).expect("it is there") == whole);
+}
+
+#[test]
 fn a_play_that_was_recorded_is_judged_again_as_its_report_says_and_so_is_a_cut_of_it_that_names_nobody() {
     let (folder, sim) = (Folder::new(), Sim::one(&["--loss", "0.05", "--seed", "7"]));
     let (path, report) = recorded_in_full(&folder, &sim.addresses[0], &[]);
