@@ -2,7 +2,7 @@
 //! are written anew with an index. Each is read back before it takes the place of the other.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Read};
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
@@ -142,8 +142,8 @@ fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
             RecoverError::Write(error) => error,
             RecoverError::Read(error) => io::Error::new(io::ErrorKind::InvalidData, error),
         })?;
-    if let Some(Trouble::Unread(why)) = recovered.trouble {
-        return Err(io::Error::other(why));
+    if let Some(Trouble::Unread(why)) = &recovered.trouble {
+        return Err(io::Error::other(why.clone()));
     }
     if recovered.messages.is_empty() {
         return Err(io::Error::new(io::ErrorKind::InvalidData, "it has no complete message"));
@@ -174,6 +174,12 @@ impl<F: Fn() -> bool> Read for Patient<'_, F> {
 #[cfg(test)]
 mod tests {
     use mcap::MessageStream;
+
+impl<F> Seek for Patient<'_, F> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
 
     use super::*;
     use crate::record::{About, EventNote, Message, Mode, Note};

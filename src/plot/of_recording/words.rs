@@ -145,6 +145,9 @@ fn passes(time: &TimeAxis) -> Option<String> {
     let told =
         told.map(|(pass, number)| format!("{number}: {} to {}", clock(pass.film_s), clock(pass.until_s)));
     let told = told.collect::<Vec<_>>().join(", ");
+    if let Some(why) = &contents.recovered {
+        facts.push(format!("Recovered from a file that {why}."));
+    }
     let more = passes.len().saturating_sub(TOLD);
     let more = if more > 0 { format!(", and {more} more") } else { String::new() };
     let count = passes.len();
