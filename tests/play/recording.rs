@@ -7,7 +7,7 @@ use std::process::Command;
 use mcap::{MessageStream, Summary};
 use serde_json::Value;
 
-use super::process::{Sim, kinocue, play};
+use super::process::{Playing, Sim, kinocue, play};
 use super::{Folder, STROKE, programs};
 
 /// All messages of a topic.
@@ -56,7 +56,7 @@ fn a_file_that_is_there_is_not_recorded_over_and_nothing_is_played() {
     let path = folder.write("yesterday.mcap", "yesterday");
     let run = play(&folder.nod(&[0.1]), &sim.to(), &["--record", path.to_str().expect("UTF-8")]);
     assert_eq!(run.code, Some(74), "{run:?}");
-    assert!(run.stderr.contains("yesterday.mcap"), "{}", run.stderr);
+    assert!(run.stderr.contains("yesterday.mcap: there is such a file"), "{}", run.stderr);
     assert_eq!(std::fs::read(&path).expect("it is there"), b"yesterday");
     assert!(sim.end().rows.is_empty());
 }
@@ -181,6 +181,20 @@ fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
     of(&["convert", text(&path), text(&again), "--seat", "F4", "--take", "sent"]);
     of(&["info", text(&again)]);
     assert_eq!(kinocue(&["plot", text(&path), "--seat", "nobody"]).code, Some(66));
+    drop(sim.end());
+}
+
+#[test]
+fn a_recording_that_finds_no_room_ends_early_and_the_report_says_so_also_to_programs() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let path = folder.path("nod.mcap");
+    let args = ["--json", "--record", text(&path), "--record-mode", "full"];
+    let report =
+        Playing::start_cramped(&folder.nod(&[0.1]), &sim.addresses[0], 16, &args).finish().report_of(0);
+    let trouble = report["recording_trouble"].as_str().expect("it says why");
+    assert!(trouble.contains("the recording ended early") && trouble.contains("nod.part.mcap"), "{trouble}");
+    assert_eq!(report["result"], "completed", "the play went on");
+    assert!(!path.exists() && folder.path("nod.part.mcap").exists());
     drop(sim.end());
 }
 

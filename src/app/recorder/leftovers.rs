@@ -117,12 +117,12 @@ fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     let whole = PathBuf::from(format!("{}.mcap", name.strip_suffix(PART).unwrap_or(&name)));
     let fresh = path.with_extension("recovering");
     if whole.try_exists()? {
-        return Err(io::ErrorKind::AlreadyExists.into());
+        return Err(taken(&whole));
     }
     let result = copy(path, &fresh, may).and_then(|()| {
         // It was closed after all: by a recorder whose disk stood still.
         if whole.try_exists()? {
-            return Err(io::ErrorKind::AlreadyExists.into());
+            return Err(taken(&whole));
         }
         fs::rename(&fresh, &whole)?;
         fs::remove_file(path)
@@ -132,6 +132,10 @@ fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
         let _ = fs::remove_file(&fresh);
     }
     result
+}
+
+fn taken(path: &Path) -> io::Error {
+    io::Error::new(io::ErrorKind::AlreadyExists, format!("{} is there already", path.display()))
 }
 
 /// Writes what is whole of it to another file, and reads that back.
@@ -171,15 +175,15 @@ impl<F: Fn() -> bool> Read for Patient<'_, F> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use mcap::MessageStream;
-
 impl<F> Seek for Patient<'_, F> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.file.seek(to)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mcap::MessageStream;
 
     use super::*;
     use crate::record::{About, EventNote, Message, Mode, Note};
