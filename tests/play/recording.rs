@@ -134,6 +134,9 @@ fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
     let layout: Value = serde_json::from_str(&of(&["record", "layout", "--seat", "F4"])).expect("JSON");
     let file = std::fs::read(&path).expect("it is there");
     let panels = layout["configById"].as_object().expect("panels").values();
+    let is_named =
+        |one: &Value| ["foxglovePanelTitle", "lichtblickPanelTitle"].iter().all(|key| one[key].is_string());
+    assert!(panels.clone().filter(|one| !one["xAxisVal"].is_null()).all(is_named), "{layout}");
     let paths: Vec<&str> = panels
         .flat_map(|one| one["paths"].as_array().expect("paths"))
         .filter_map(|one| one["value"].as_str())
@@ -204,6 +207,8 @@ fn what_is_made_of_a_recording_that_is_cut_short_or_damaged_is_said_to_be_less_a
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
     let (path, _) = recorded_in_full(&folder, &sim.addresses[0], &[]);
     drop(sim.end());
+    let list = kinocue(&["record", "list", text(path.parent().expect("a folder")), "--json"]).stdout;
+    assert_eq!(serde_json::from_str::<Value>(&list).expect("JSON")[0]["marks"], 0);
     let whole = std::fs::read(&path).expect("it is there");
     let last = Summary::read(&whole).expect("it is closed").expect("it has one").chunk_indexes.pop();
     let place = last.expect("chunks").compressed_data_offset().expect("an offset") as usize;
