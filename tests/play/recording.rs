@@ -211,7 +211,8 @@ fn what_is_made_of_a_recording_that_is_cut_short_or_damaged_is_said_to_be_less_a
     assert_eq!(serde_json::from_str::<Value>(&list).expect("JSON")[0]["marks"], 0);
     let whole = std::fs::read(&path).expect("it is there");
     let last = Summary::read(&whole).expect("it is closed").expect("it has one").chunk_indexes.pop();
-    let place = last.expect("chunks").compressed_data_offset().expect("an offset") as usize;
+    let place = last.expect("chunks").compressed_data_offset().expect("an offset");
+    let place = usize::try_from(place).expect("it is short");
     let mut changed = whole.clone();
     changed[place] ^= 4;
     for (name, octets, says) in
