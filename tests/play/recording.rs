@@ -234,6 +234,8 @@ fn what_is_made_of_a_recording_that_is_cut_short_or_damaged_is_said_to_be_less_a
             assert_eq!(run.code, Some(1), "{args:?}: {run:?}");
             assert!(run.stderr.contains(&format!("{name}: the file {says}")), "{args:?}: {run:?}");
         }
+        let drawn = kinocue(&["plot", text(&path), text(&half)]).stdout;
+        assert!(drawn.contains(&format!("The recording laid over it: the file {says}")), "{drawn}");
         assert!([cut, rows, pcap, cue].iter().all(|made| made.exists()), "what precedes is of use");
     }
     let link = folder.path("again.mcap");
