@@ -18,14 +18,14 @@ pub(crate) struct LostChunk {
 }
 
 /// Why reading ends within a chunk.
-enum Within<E> {
+enum WithinChunk<E> {
     /// It is damaged.
     Chunk(Trouble),
     /// Whoever takes its records will have no more.
     Taker(E),
 }
 
-impl<E> From<Trouble> for Within<E> {
+impl<E> From<Trouble> for WithinChunk<E> {
     fn from(trouble: Trouble) -> Self {
         Self::Chunk(trouble)
     }
@@ -53,13 +53,13 @@ pub(crate) fn each_saved<E: From<Trouble>>(
         let inside = each_sound(alone(body).as_slice(), most, |opcode, body| {
             unpacked += body.len() as u64;
             let is_of_chunk = !matches!(opcode, op::DATA_END | op::FOOTER);
-            if is_of_chunk { take(opcode, body).map_err(Within::Taker) } else { Ok(()) }
+            if is_of_chunk { take(opcode, body).map_err(WithinChunk::Taker) } else { Ok(()) }
         });
         match inside {
             Ok(()) if unpacked > most => Err(Trouble::TooLarge.into()),
             Ok(()) => Ok(()),
-            Err((_, Within::Taker(error))) => Err(error),
-            Err((_, Within::Chunk(trouble))) => {
+            Err((_, WithinChunk::Taker(error))) => Err(error),
+            Err((_, WithinChunk::Chunk(trouble))) => {
                 let at = |from: usize| body.get(from..).and_then(|rest| rest.first_chunk());
                 let ns = |from| at(from).map_or(0, |octets| u64::from_le_bytes(*octets));
                 lost(LostChunk { span: (ns(0), ns(8)), trouble });

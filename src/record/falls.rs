@@ -12,7 +12,7 @@ pub(crate) type FilmInstant = (MonoTime, f64);
 
 /// A fall of one seat.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Fall {
+pub(crate) struct SeatFall {
     /// The last sample before it in which the seat was sent somewhere: from then on it stood still, and that it is out was found later.
     /// `None` where it was not sent anywhere before.
     pub(crate) still: Option<FilmInstant>,
@@ -32,7 +32,7 @@ pub(crate) struct Falls {
     /// How often it fell out.
     pub(crate) count: u64,
     /// The first time.
-    pub(crate) first: Option<Fall>,
+    pub(crate) first: Option<SeatFall>,
     /// When it fell out last.
     last: MonoTime,
     /// The last sample in which it was sent somewhere.
@@ -56,7 +56,7 @@ impl Falls {
                     self.count += 1;
                     self.last = at;
                     let (still, back, moved) = (self.sent, None, None);
-                    self.first.get_or_insert(Fall { still, out: now, standing, back, moved });
+                    self.first.get_or_insert(SeatFall { still, out: now, standing, back, moved });
                 }
                 (Some(false), true) if self.count == 1 => {
                     self.first.iter_mut().for_each(|fall| fall.back = Some(now));

@@ -7,14 +7,14 @@ use super::film_axis::FilmAxis;
 use crate::plot::Flag;
 use crate::time::MonoTime;
 
-/// Flags of a picture; more are counted in one.
+/// SeatFlags of a picture; more are counted in one.
 const FLAGS: usize = 100;
 /// Samples of ticks that are held: what is told was no longer ago.
 const HELD: usize = 64;
 
 /// Those of a picture.
 #[derive(Debug, Default)]
-pub(super) struct Flags {
+pub(super) struct SeatFlags {
     flags: Vec<Flag>,
     /// How many have no flag.
     pub(super) more: u64,
@@ -39,7 +39,7 @@ pub(super) struct Noted {
     pub(super) is_mark: bool,
 }
 
-impl Flags {
+impl SeatFlags {
     /// Takes the next sample of the ticks.
     pub(super) fn tick(&mut self, axis: &FilmAxis, at: MonoTime, film_s: f64) {
         self.ticks.push_back((at, film_s));

@@ -6,9 +6,11 @@ use serde_json::Value;
 
 use super::Look;
 use super::film_axis::Moment;
-use super::flags::{Flags, Noted};
+use super::flags::{Noted, SeatFlags};
 use crate::plot::{Band, Shade, TimeAxis};
-use crate::record::{Contents, Fall, Falls, Margins, SeatSample, TickSample, Told, each_chunk, state_word};
+use crate::record::{
+    Contents, Falls, Margins, SeatFall, SeatSample, TickSample, Told, each_chunk, state_word,
+};
 use crate::time::{MonoTime, Rate, ShowTime};
 
 /// Asked and sent are apart where they differ by more, mm or degrees: more than pulses and rounding make.
@@ -96,7 +98,7 @@ pub(crate) struct Gathered {
     pub(super) lanes: Vec<CountedLane>,
     pub(super) state: Option<&'static str>,
     pub(super) states: Vec<(&'static str, Vec<Shade>)>,
-    pub(super) flags: Flags,
+    pub(super) flags: SeatFlags,
     /// What was said of how the seat stands: when, and in words.
     pub(super) said: Vec<(MonoTime, String)>,
     /// Ticks are taken from whole ones, and not from samples.
@@ -176,7 +178,7 @@ impl Gathered {
             lanes: ["held", "missed", "lost", "refused", "untaken", "gaps", "out"].map(lane).into(),
             state: None,
             states: Vec::new(),
-            flags: Flags::default(),
+            flags: SeatFlags::default(),
             said: Vec::new(),
             is_whole,
         }
@@ -218,7 +220,7 @@ impl Gathered {
     pub(super) fn why_fallen(&self) -> Option<&str> {
         /// The recorder is told of it a little later than it was found.
         const ABOUT: Duration = Duration::from_secs(1);
-        let Fall { out: (out, _), standing, .. } = self.falls.first?;
+        let SeatFall { out: (out, _), standing, .. } = self.falls.first?;
         let why = |text: &'_ str| text.strip_prefix(&format!("{standing}: ")).map(str::len);
         let apart = |at: MonoTime| at.since(out).max(out.since(at));
         let near = self.said.iter().filter(|(at, _)| apart(*at) <= ABOUT);

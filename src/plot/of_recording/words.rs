@@ -4,7 +4,7 @@ use super::gather::{APART, Gathered};
 use crate::plain::escaped;
 use crate::plot::text::number;
 use crate::plot::{Table, TimeAxis};
-use crate::record::{Contents, Fall, FilmInstant, Summary};
+use crate::record::{Contents, FilmInstant, SeatFall, Summary};
 use crate::time::ShowTime;
 
 /// A tick is late from here on, µs.
@@ -85,7 +85,7 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
 
 /// That a seat fell out, which is graver than all else, since when it stood still, when that was found and why; `None` where it did not.
 fn fallen(gathered: &Gathered) -> Option<String> {
-    let Fall { still, out, standing, back, moved } = gathered.falls.first?;
+    let SeatFall { still, out, standing, back, moved } = gathered.falls.first?;
     let axis = &gathered.look.axis;
     let place = |(at, film_s): FilmInstant| {
         let moment = axis.moment(at, film_s);
