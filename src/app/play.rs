@@ -167,7 +167,8 @@ impl Play {
         let mut played = self.run_through(lead);
         let trouble = recording.finish(played.as_ref().ok().map(|played| &played.report)).err();
         if let Ok(played) = &mut played {
-            played.notes.extend(trouble);
+            played.notes.extend(trouble.clone());
+            played.report.recording_trouble = trouble;
         }
         played
     }

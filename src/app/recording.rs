@@ -43,9 +43,15 @@ impl PlayRecording {
         rate: Rate,
     ) -> io::Result<(Taps, Self)> {
         if path.try_exists()? {
-            return Err(io::ErrorKind::AlreadyExists.into());
+            return Err(taken("there is such a file; give another name".to_owned()));
         }
         let part = path.with_extension("part.mcap");
+        if part.try_exists()? {
+            let part = part.display();
+            return Err(taken(format!(
+                "{part} is left of an earlier one; save it with kinocue record recover, or remove it"
+            )));
+        }
         let out = BufWriter::new(File::create_new(&part)?);
         let opening = Opening::new(about, &seats).judged(judging);
         let file =
@@ -78,6 +84,10 @@ impl PlayRecording {
             format!("the recording ended early: {error}; {part} has what was recorded until then")
         })
     }
+}
+
+fn taken(why: String) -> io::Error {
+    io::Error::new(io::ErrorKind::AlreadyExists, why)
 }
 
 pub(super) fn in_io(error: McapError) -> io::Error {

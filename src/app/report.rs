@@ -45,6 +45,9 @@ pub struct PlayReport {
     pub links: Vec<LinkStatus>,
     /// What happened to the controllers, oldest first.
     pub(crate) events: Vec<EventReport>,
+    /// Why its recording ended early, in a sentence; left out where it did not, or there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) recording_trouble: Option<String>,
 }
 
 /// Something that happened to a controller.

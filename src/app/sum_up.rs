@@ -100,6 +100,7 @@ pub(super) fn sum_up(about: SumUp, controllers: &[Controller], prepared: &Prepar
             .collect(),
         links: Vec::new(),
         events: events(controllers, run),
+        recording_trouble: None,
     };
     let tracker = run.accounts.books.tracker();
     let gone = |index: &usize| run.accounts.gone.contains(index) || tracker.lost_at_end(*index);

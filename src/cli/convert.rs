@@ -9,15 +9,17 @@ use anyhow::{Context as _, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::load::cue_exit;
-use super::record::{open, seat_in, unread};
+use super::record::{open, seat_in, tell_flaws, unread};
 use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, Problem, Source, limits};
-use crate::record::{FilmTracks, Places, RecordedAxis, tracks};
+use crate::record::{Contents, FilmTracks, Places, RecordedAxis, tracks};
 
 /// As many links are followed as the system follows.
 const MAX_LINKS: usize = 40;
 
 /// Converts cues between formats; makes a cue of a recording.
+///
+/// Exits with 1 if a recording is cut short or damaged: OUTPUT then has only what precedes that.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("\
 Examples:
@@ -86,8 +88,16 @@ pub(super) enum ConvertTarget {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let target = target(&args.output).or_exit(Exit::Usage)?;
     exit::refuse_to_replace(&args.output, args.force)?;
+    if args.take.is_some() || args.recover {
+        exit::refuse_same(&args.input, &args.output)?;
+    }
+    let mut flaws = Vec::new();
     let read = match (&args.seat, args.take) {
-        (Some(seat), Some(take)) => of_recording(&args.input, seat, take)?,
+        (Some(seat), Some(take)) => {
+            let (contents, cue) = of_recording(&args.input, seat, take)?;
+            flaws = contents.flaws();
+            cue.map(|cue| (cue, None))
+        }
         _ => read(args),
     };
     let mut cue = match read {
@@ -107,7 +117,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (rows, axes, length) = (cue.rows(), cue.axes(), cue.duration());
     let axes_in_words = if axes == 1 { "1 axis".to_owned() } else { format!("{axes} axes") };
     print::tell(&format!("{}: {rows} rows, {axes_in_words}, {length}", args.output.display()));
-    Ok(Exit::Done)
+    Ok(tell_flaws(&args.input, &flaws))
 }
 
 /// What the name of an output says that it is to be.
@@ -144,12 +154,8 @@ fn read(args: &Args) -> Result<(Cue, Option<Problem>), CueFaults> {
     cue
 }
 
-/// A seat of a recording as a cue from its first instant on, checked like any other.
-fn of_recording(
-    path: &Path,
-    name: &str,
-    take: Take,
-) -> Result<Result<(Cue, Option<Problem>), CueFaults>, Failure> {
+/// A seat of a recording as a cue from its first instant on, checked like any other; and what the recording says of itself.
+fn of_recording(path: &Path, name: &str, take: Take) -> Result<(Contents, Result<Cue, CueFaults>), Failure> {
     let from = if take == Take::Sent { Places::Sent } else { Places::Measured };
     let FilmTracks { contents, mut seats, .. } =
         tracks(open(path)?, from).map_err(|error| unread(error, path))?;
@@ -171,7 +177,7 @@ fn of_recording(
     }
     // As text it is, whatever the recording is called.
     let named = PathBuf::from(format!("{} of {}", name, path.display())).with_extension("csv");
-    Ok(cue::read(&named, text.as_bytes(), &Source::Native).map(|cue| (cue, None)))
+    Ok((contents, cue::read(&named, text.as_bytes(), &Source::Native)))
 }
 
 fn tell_lost(cue: &Cue, lost: Option<&Problem>) {

@@ -1,9 +1,10 @@
 //! Exit codes (sysexits) and the error that carries one.
 
 use std::error::Error;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
 use std::process::ExitCode;
-use std::{fmt, io, iter};
+use std::{fmt, fs, io, iter};
 
 use anyhow::{Context as _, anyhow};
 
@@ -122,6 +123,16 @@ pub(super) fn of_film(error: FilmError) -> Failure {
         | FilmError::Thread(_) => of_system(&error),
     };
     Failure { exit, error: error.into() }
+}
+
+/// A file is never written over what it is made of, by whatever name or link.
+pub(super) fn refuse_same(input: &Path, output: &Path) -> Result<(), Failure> {
+    let known = |path| fs::metadata(path).ok().map(|file| (file.dev(), file.ino()));
+    if known(input).is_some_and(|file| known(output) == Some(file)) {
+        let error = anyhow!("{} is the file that is read; give another name", output.display());
+        return Err(error).or_exit(Exit::Usage);
+    }
+    Ok(())
 }
 
 /// An output that exists is replaced only where that was asked for.

@@ -86,6 +86,12 @@ enum PlotFormat {
     Svg,
 }
 
+/// The console of a kernel has no braille, and draws a box for each.
+fn on_terminal(drawn: String) -> String {
+    let is_console = std::env::var_os("TERM").is_some_and(|term| term == "linux");
+    if is_console { plot::in_blocks(&drawn) } else { drawn }
+}
+
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let file = args.output.as_deref().map(|path| Ok::<_, Failure>((path, format(path)?))).transpose()?;
     if let Some((path, _)) = file {
@@ -148,7 +154,7 @@ pub(super) fn draw(timeline: &Timeline, judge: &Judge) -> Result<(), Failure> {
     let columns =
         Columns::over(ShowTime::ZERO, timeline.duration(), 2 * plot::cells(usize::from(width())) - 1);
     let subject = Subject { timeline, seats: &seats, rate: Rate::from_hz(judge.rate_hz), facts };
-    print::out(&plot::braille(&plot::of_cue(subject, columns)))
+    print::out(&on_terminal(plot::braille(&plot::of_cue(subject, columns))))
 }
 
 impl Args {
@@ -204,7 +210,7 @@ fn tell(picture: &Picture, file: Option<(&Path, PlotFormat)>, args: &Args) -> Re
             print::out(&format!("{}\n", picture.sentence))
         }
         None if args.json => print::json(picture),
-        None => print::out(&plot::braille(picture)),
+        None => print::out(&on_terminal(plot::braille(picture))),
     }
 }
 

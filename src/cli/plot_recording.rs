@@ -85,9 +85,11 @@ pub(super) fn picture(asked: &Asked<'_>) -> Result<(Picture, String, Vec<String>
     let other_axis = axis.plain();
     let look = Look { lane, axis, is_detailed: asked.is_detailed };
     let gathered = gathered(asked.file, look, &contents)?;
+    let mut flaws = Vec::new();
     let other = match asked.other {
         Some(other) => {
             let (contents, _) = other.summarized()?;
+            flaws = contents.flaws();
             let name = &summary.seats[lane].name;
             let lane = seat_in(&contents, name)?;
             let look = Look { lane, axis: other_axis, is_detailed: asked.is_detailed };
@@ -95,7 +97,9 @@ pub(super) fn picture(asked: &Asked<'_>) -> Result<(Picture, String, Vec<String>
         }
         None => None,
     };
-    Ok((plot::of_recording(&contents, &summary, gathered, other), seats[lane].clone(), seats))
+    let mut picture = plot::of_recording(&contents, &summary, gathered, other);
+    picture.facts.extend(flaws.iter().map(|flaw| format!("The recording laid over it: {flaw}.")));
+    Ok((picture, seats[lane].clone(), seats))
 }
 
 fn gathered(file: &OpenRecording<'_>, look: Look, contents: &Contents) -> Result<Gathered, Failure> {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use serde::Serialize;
 
-use super::record::{flaws, open, shown, wall};
+use super::record::{open, shown, wall};
 use super::{Exit, Failure, print};
 use crate::record::Contents;
 use crate::replay::{ReplayDifference, ReplayError, ReplayVerdict, replay};
@@ -45,7 +45,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     // A file in which nothing was judged does not pass for one that was judged well.
     let equal = verdict.differences.is_empty() && is_judged(&verdict);
     if args.json {
-        print::json(&ReplayTold { equal, flaws: flaws(&contents), verdict: &verdict })?;
+        print::json(&ReplayTold { equal, flaws: contents.flaws(), verdict: &verdict })?;
     } else {
         print::out(&text(&args.file, &contents, &verdict))?;
     }
@@ -99,7 +99,7 @@ fn text(path: &Path, contents: &Contents, verdict: &ReplayVerdict) -> String {
     if count > PRINTED as u64 {
         line(format_args!("and {} more; --json has the first hundred", count - PRINTED as u64));
     }
-    for flaw in flaws(contents) {
+    for flaw in contents.flaws() {
         line(format_args!("{flaw}"));
     }
     out

@@ -4,6 +4,7 @@
 //! The file is read by the `mcap` crate; the bodies of the few records that matter are taken apart here, because the crate
 //! reserves as much memory as a length in the file claims.
 
+mod saved;
 mod walk;
 mod zstd;
 
@@ -11,9 +12,11 @@ use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 
 use mcap::McapError;
+use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::plain::escaped;
+pub(crate) use saved::{LostChunk, each_outside, each_saved};
 use walk::Walk;
 use zstd::Zstd;
 
@@ -61,7 +64,7 @@ pub(crate) fn each<E: From<Trouble>>(
     most: u64,
     take: impl FnMut(u8, &[u8]) -> Result<(), E>,
 ) -> Result<(), (u64, E)> {
-    each_of(input, most, LinearReaderOptions::default().with_validate_chunk_crcs(true), take)
+    each_of(input, most, checked().with_validate_chunk_crcs(true), take)
 }
 
 /// The same for whoever uses what comes before the fault: nothing is handed out of a chunk before its sum is right. Chunks are held
@@ -74,7 +77,15 @@ pub(crate) fn each_sound<E: From<Trouble>>(
     most: u64,
     take: impl FnMut(u8, &[u8]) -> Result<(), E>,
 ) -> Result<(), (u64, E)> {
-    each_of(input, most, LinearReaderOptions::default().with_prevalidate_chunk_crcs(true), take)
+    each_of(input, most, checked().with_prevalidate_chunk_crcs(true), take)
+}
+
+/// All sums beside those of chunks are looked at.
+fn checked() -> LinearReaderOptions {
+    LinearReaderOptions::default()
+        .with_validate_data_section_crc(true)
+        .with_validate_summary_section_crc(true)
+        .with_check_finishes_after_end_magic(true)
 }
 
 fn each_of<E: From<Trouble>>(
@@ -94,12 +105,7 @@ fn walk_on<E: From<Trouble>>(
     chunks: LinearReaderOptions,
     mut take: impl FnMut(u8, &[u8]) -> Result<(), E>,
 ) -> Result<(), E> {
-    let options = chunks
-        .with_validate_data_section_crc(true)
-        .with_validate_summary_section_crc(true)
-        .with_check_finishes_after_end_magic(true)
-        .with_record_length_limit(MAX_RECORD);
-    let mut reader = LinearReader::new_with_options(options);
+    let mut reader = LinearReader::new_with_options(chunks.with_record_length_limit(MAX_RECORD));
     reader.add_decompressor(Zstd::new()).map_err(|error| trouble(&error, 0, false))?;
     // No byte is read before it is asked for, so that the walk is where the reader is.
     let mut input = BufReader::with_capacity(READ, input);
@@ -109,7 +115,7 @@ fn walk_on<E: From<Trouble>>(
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
                 let space = reader.insert(wanted.clamp(1, READ));
                 let bytes = input.read(space).map_err(|error| Trouble::Unread(error.to_string()))?;
-                walk.pass(&space[..bytes]).map_err(Trouble::Damaged)?;
+                walk.pass(&space[..bytes])?;
                 reader.notify_read(bytes);
             }
             Ok(LinearReadEvent::Record { data, opcode }) => {
@@ -130,6 +136,8 @@ fn trouble(error: &McapError, read: u64, begun: bool) -> Trouble {
     match error {
         McapError::UnexpectedEof if read == 0 => Trouble::Empty,
         McapError::UnexpectedEof => Trouble::CutShort,
+        // So writers begin a chunk, and say how long it is once it is over.
+        McapError::RecordTooLarge { opcode: op::CHUNK, len: u64::MAX } => Trouble::CutShort,
         McapError::BadMagic if !begun => Trouble::Foreign("it does not begin as MCAP files do".to_owned()),
         other => Trouble::Damaged(escaped(&other.to_string(), REASON_TOLD).into_owned()),
     }

@@ -3,7 +3,7 @@
 
 use mcap::records::op;
 
-use super::MAGIC;
+use super::{MAGIC, Trouble};
 
 /// What a chunk may unpack to beside so many times its packed size: repeated rows pack well, up to some 50 times.
 const SLACK: u64 = 16 << 20;
@@ -59,8 +59,8 @@ impl Walk {
     /// Goes by the next bytes.
     ///
     /// # Errors
-    /// What cannot be so, in words; [`Self::record`] is then where.
-    pub(super) fn pass(&mut self, mut bytes: &[u8]) -> Result<(), String> {
+    /// What cannot be so; [`Self::record`] is then where.
+    pub(super) fn pass(&mut self, mut bytes: &[u8]) -> Result<(), Trouble> {
         while !bytes.is_empty() && !self.over {
             let room = if self.left > 0 { self.left } else { (self.wanted() - self.head.len()) as u64 };
             let (taken, rest) = bytes.split_at(usize::try_from(room).unwrap_or(usize::MAX).min(bytes.len()));
@@ -77,7 +77,7 @@ impl Walk {
     }
 
     /// Keeps the next bytes of a record's head, and looks at it once it is all there.
-    fn keep(&mut self, bytes: &[u8]) -> Result<(), String> {
+    fn keep(&mut self, bytes: &[u8]) -> Result<(), Trouble> {
         if self.head.is_empty() {
             self.record = self.at;
         }
@@ -121,7 +121,7 @@ impl Walk {
     }
 
     /// What of a record cannot be so. One that is too short for what it should hold is left to the reader.
-    fn look(&mut self) -> Result<(), String> {
+    fn look(&mut self) -> Result<(), Trouble> {
         let body = usize::try_from(self.body()).unwrap_or(usize::MAX);
         match self.head[0] {
             op::CHUNK if body >= CHUNK + self.name_len() + 8 => self.look_at_chunk(),
@@ -133,36 +133,42 @@ impl Walk {
         }
     }
 
-    fn look_at_chunk(&mut self) -> Result<(), String> {
+    fn look_at_chunk(&mut self) -> Result<(), Trouble> {
         let name = self.name_len();
         let (unpacked, packed) = (self.u64(HEAD + 16), self.u64(HEAD + CHUNK + name));
+        if [self.body(), unpacked, packed] == [u64::MAX; 3] {
+            // So writers begin a chunk, and say how long it is once it is over.
+            return Err(Trouble::CutShort);
+        }
         let most = packed.saturating_mul(MAX_RATIO).saturating_add(SLACK).min(self.most);
         if unpacked > most {
-            return Err(format!("a chunk of {packed} bytes that unpacks to {unpacked}; the most is {most}"));
+            let what = format!("a chunk of {packed} bytes that unpacks to {unpacked}; the most is {most}");
+            return Err(Trouble::Damaged(what));
         }
         let [all_packed, all_unpacked] = &mut self.chunks;
         *all_packed = all_packed.saturating_add(packed);
         *all_unpacked = all_unpacked.saturating_add(unpacked);
         let most = all_packed.saturating_mul(MAX_RATIO).saturating_add(SLACK_OF_ALL);
         if *all_unpacked > most {
-            return Err(format!(
+            return Err(Trouble::Damaged(format!(
                 "a chunk with which {all_packed} bytes unpack to {all_unpacked} in all; the most is {most}"
-            ));
+            )));
         }
         if name == 0 && packed != unpacked {
-            return Err(format!("a chunk that is not packed, of {packed} bytes where it says {unpacked}"));
+            let what = format!("a chunk that is not packed, of {packed} bytes where it says {unpacked}");
+            return Err(Trouble::Damaged(what));
         }
         Ok(())
     }
 
     /// What the footer points to lies behind the messages and before itself.
-    fn look_at_footer(&self) -> Result<(), String> {
+    fn look_at_footer(&self) -> Result<(), Trouble> {
         for (what, at) in [("summary", self.u64(HEAD)), ("summary offsets", self.u64(HEAD + 8))] {
             if at != 0 && !(MAGIC.len() as u64..=self.record).contains(&at) {
                 let footer = self.record;
-                return Err(format!(
+                return Err(Trouble::Damaged(format!(
                     "a footer that looks for the {what} at byte {at}, and stands at {footer} itself"
-                ));
+                )));
             }
         }
         Ok(())
@@ -186,6 +192,10 @@ mod tests {
             walk.pass(&chunk).expect("64 MiB and what 200 times their size comes to");
         }
         let told = walk.pass(&chunk).expect_err("80 MiB of 5 kB");
-        assert!(told.starts_with("a chunk with which 5000 bytes unpack to 83886080 in all"), "{told}");
+        let told = told.to_string();
+        assert!(
+            told.starts_with("is damaged: a chunk with which 5000 bytes unpack to 83886080 in all"),
+            "{told}"
+        );
     }
 }

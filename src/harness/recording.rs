@@ -136,7 +136,8 @@ pub fn nameless(file: &[u8]) -> Vec<u8> {
     let [from, until] = [i64::MIN, i64::MAX].map(ShowTime::from_nanos);
     let manner = CutManner { anonymous: true, whole: true, ..CutManner::default() };
     let cut = record::cut(file, &Stretch { from, until, seat: None }, manner, Cursor::default());
-    cut.expect("a recording in full").into_inner()
+    let (out, _) = cut.expect("a recording in full");
+    out.into_inner()
 }
 
 /// What came of judging a recording again.

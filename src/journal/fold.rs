@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::record::Action;
 use crate::time::MonoTime;
 
-/// For how long the same is a repeat.
+/// For how long the same is a repeat in the journal.
 const WINDOW: Duration = Duration::from_secs(10);
 /// Kinds of asks that are folded at a time; of more the oldest is written out.
 const KINDS: usize = 64;
@@ -14,8 +14,20 @@ const KINDS: usize = 64;
 const KINDS_OF_ONE: usize = 16;
 
 /// What was asked of late.
-#[derive(Debug, Default)]
-pub(crate) struct Folds(Vec<Fold>);
+#[derive(Debug)]
+pub(crate) struct Folds {
+    window: Duration,
+    folds: Vec<Fold>,
+}
+
+/// What is to be written, and when it was asked; of repeats the last.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct FoldedAction {
+    /// When.
+    pub(crate) at: MonoTime,
+    /// What.
+    pub(crate) action: Action,
+}
 
 /// Asks of one kind.
 #[derive(Debug)]
@@ -23,7 +35,7 @@ struct Fold {
     kind: FoldKind,
     since: MonoTime,
     /// The repeats so far, as one.
-    repeats: Option<Action>,
+    repeats: Option<FoldedAction>,
 }
 
 /// What is a repeat of what: asked by the same person with the same word, done or refused alike, and where it was done, of the
@@ -48,40 +60,52 @@ impl FoldKind {
     }
 }
 
+impl Default for Folds {
+    fn default() -> Self {
+        Self::within(WINDOW)
+    }
+}
+
 impl Folds {
+    /// Some for which the same is a repeat for so long.
+    pub(crate) const fn within(window: Duration) -> Self {
+        Self { window, folds: Vec::new() }
+    }
+
     /// Takes what was asked with that word; gives what is to be written now.
     #[must_use]
-    pub(crate) fn take(&mut self, action: Action, word: &'static str, now: MonoTime) -> Vec<Action> {
+    pub(crate) fn take(&mut self, action: Action, word: &'static str, now: MonoTime) -> Vec<FoldedAction> {
         let mut written = self.due(now);
+        let folds = &mut self.folds;
         let mut kind = FoldKind::new(&action, word);
-        let of_one = self.0.iter().filter(|fold| fold.kind.who == kind.who).count();
-        if of_one >= KINDS_OF_ONE && self.0.iter().all(|fold| fold.kind != kind) {
+        let of_one = folds.iter().filter(|fold| fold.kind.who == kind.who).count();
+        if of_one >= KINDS_OF_ONE && folds.iter().all(|fold| fold.kind != kind) {
             kind.of = String::new();
         }
-        if let Some(fold) = self.0.iter_mut().find(|fold| fold.kind == kind) {
-            let times = action.times + fold.repeats.as_ref().map_or(0, |repeats| repeats.times);
-            fold.repeats = Some(Action { times, ..action });
+        if let Some(fold) = folds.iter_mut().find(|fold| fold.kind == kind) {
+            let times = action.times + fold.repeats.as_ref().map_or(0, |repeats| repeats.action.times);
+            fold.repeats = Some(FoldedAction { at: now, action: Action { times, ..action } });
             return written;
         }
-        if self.0.len() == KINDS {
-            written.extend(self.0.remove(0).repeats);
+        if folds.len() == KINDS {
+            written.extend(folds.remove(0).repeats);
         }
-        self.0.push(Fold { kind, since: now, repeats: None });
-        written.push(action);
+        folds.push(Fold { kind, since: now, repeats: None });
+        written.push(FoldedAction { at: now, action });
         written
     }
 
     /// The repeats whose time is over.
     #[must_use]
-    pub(crate) fn due(&mut self, now: MonoTime) -> Vec<Action> {
-        let over = |fold: &mut Fold| now.since(fold.since) >= WINDOW;
-        self.0.extract_if(.., over).filter_map(|fold| fold.repeats).collect()
+    pub(crate) fn due(&mut self, now: MonoTime) -> Vec<FoldedAction> {
+        let over = |fold: &mut Fold| now.since(fold.since) >= self.window;
+        self.folds.extract_if(.., over).filter_map(|fold| fold.repeats).collect()
     }
 
     /// All that is left.
     #[must_use]
-    pub(crate) fn rest(&mut self) -> Vec<Action> {
-        self.0.drain(..).filter_map(|fold| fold.repeats).collect()
+    pub(crate) fn rest(&mut self) -> Vec<FoldedAction> {
+        self.folds.drain(..).filter_map(|fold| fold.repeats).collect()
     }
 }
 
@@ -113,8 +137,10 @@ mod tests {
         written.extend(folds.take(action("ann", "levels row 7", "no such row"), "levels", at(3)));
         assert!(folds.due(at(10)).is_empty());
         written.extend(folds.due(at(11)));
-        let lines: Vec<_> =
-            written.iter().map(|one| (one.who.as_str(), one.what.as_str(), one.times)).collect();
+        let lines: Vec<_> = written
+            .iter()
+            .map(|FoldedAction { action: one, .. }| (one.who.as_str(), one.what.as_str(), one.times))
+            .collect();
         assert_eq!(
             lines,
             [
@@ -145,7 +171,7 @@ mod tests {
             written.extend(folds.take(action("ann", &what, "done"), "levels", at(0)));
         }
         written.extend(folds.rest());
-        let lines: Vec<_> = written.iter().map(|one| (one.what.as_str(), one.times)).collect();
+        let lines: Vec<_> = written.iter().map(|one| (one.action.what.as_str(), one.action.times)).collect();
         let each = [("disable A1", 1), ("disable A2", 1), ("disable A3", 1), ("levels motion 90 %", 1)];
         assert_eq!(lines, [&each[..], &[("disable A2", 1), ("levels motion 70 %", 2)]].concat());
         for n in 0..1000 {

@@ -26,7 +26,7 @@ mod tests;
 mod tried;
 mod writer;
 
-pub(crate) use fold::Folds;
+pub(crate) use fold::{FoldedAction, Folds};
 pub use record::{Action, FilmProof, Outcome, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
 pub(crate) use report::{

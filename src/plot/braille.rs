@@ -54,6 +54,21 @@ pub(crate) fn braille(picture: &Picture) -> String {
     lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
+/// The same in half blocks, two dots high, for a terminal that has no braille.
+#[must_use]
+pub(crate) fn in_blocks(drawn: &str) -> String {
+    let block = |c| match u32::from(c).checked_sub(0x2800) {
+        Some(dots) if dots < 0x100 => match (dots & 0b0001_1011 > 0, dots & 0b1110_0100 > 0) {
+            (true, true) => '█',
+            (true, false) => '▀',
+            (false, true) => '▄',
+            (false, false) => ' ',
+        },
+        _ => c,
+    };
+    drawn.chars().map(block).collect()
+}
+
 /// An axis of its own: two lines, as six axes have to fit on a screen.
 fn position(panel: &Panel, band: usize, cells: usize) -> Vec<String> {
     let band = &panel.bands[band];
@@ -176,4 +191,14 @@ impl Dots {
 )]
 fn dot(part: f64, count: usize) -> usize {
     ((part * (count - 1) as f64).round() as usize).min(count - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_stand_where_dots_do_and_words_stay() {
+        assert_eq!(in_blocks("a1 ⠁⠒⡀⢸⠀⣀ 50 %"), "a1 ▀▀▄█ ▄ 50 %");
+    }
 }

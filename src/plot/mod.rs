@@ -16,7 +16,7 @@ mod text;
 mod theme;
 mod time_axis;
 
-pub(crate) use braille::{braille, cells};
+pub(crate) use braille::{braille, cells, in_blocks};
 pub(crate) use of_cue::{Columns, Subject, of_cue};
 pub(crate) use of_recording::{FilmAxis, Gathered, Look, of_recording};
 pub(crate) use page::page;

@@ -56,6 +56,8 @@ pub(crate) struct Comparison {
     pub(crate) events: [Vec<FilmEvent>; 2],
     /// Whether both have every tick; else samples are compared, which are some of them.
     pub(crate) whole: bool,
+    /// What is missing in the first, and in the second: nothing was compared of that.
+    pub(crate) flaws: [Vec<String>; 2],
 }
 
 /// Where a seat was: show time in s, and its axes.
@@ -146,11 +148,7 @@ fn push(track: &mut Track, film_s: f64, places: &[f64]) {
 }
 
 /// Holds one recording against another.
-///
-/// # Errors
-/// Where either is none.
-pub(crate) fn compare(one: impl Read, other: impl Read) -> Result<Comparison, ReadError> {
-    let [one, other] = [tracks(one, Places::Sent)?, tracks(other, Places::Sent)?];
+pub(crate) fn compare(one: &FilmTracks, other: &FilmTracks) -> Comparison {
     let (ours, theirs) = (&one.seats, &other.seats);
     let mut axes = Vec::new();
     for (seat, track) in ours {
@@ -162,10 +160,10 @@ pub(crate) fn compare(one: impl Read, other: impl Read) -> Result<Comparison, Re
         from.keys().filter(|name| !in_.contains_key(*name)).cloned().collect::<Vec<_>>()
     };
     let alone = missing(ours, theirs).into_iter().chain(missing(theirs, ours)).collect();
-    let events =
-        [(&one, &other), (&other, &one)].map(|(of, against)| events_alone(&of.events, &against.events));
+    let events = [(one, other), (other, one)].map(|(of, against)| events_alone(&of.events, &against.events));
     let lag_ms = lag_ms(ours, theirs);
-    Ok(Comparison { axes, lag_ms, alone, events, whole: one.is_whole && other.is_whole })
+    let flaws = [one, other].map(|of| of.contents.flaws());
+    Comparison { axes, lag_ms, alone, events, whole: one.is_whole && other.is_whole, flaws }
 }
 
 /// Of these, what did not happen in the other at about the same show time, each as often as it did.

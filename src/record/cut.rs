@@ -161,7 +161,7 @@ fn each_drain(drains: &[u8], held: &mut HeldTicks, take: &mut dyn FnMut(Piece<'_
     }
 }
 
-/// Cuts a stretch out into a file of its own.
+/// Cuts a stretch out into a file of its own; gives what was written to, and what the recording says of itself.
 ///
 /// # Errors
 /// As [`each_tick`], and where writing fails.
@@ -170,11 +170,11 @@ pub(crate) fn cut<W: Write + Seek>(
     stretch: &Stretch,
     manner: CutManner,
     out: W,
-) -> Result<W, CutError> {
+) -> Result<(W, Contents), CutError> {
     let mut out = Some(out);
     let mut file: Option<Cutting<W>> = None;
     let mut result = Ok(());
-    each_tick(input, stretch, &mut |contents, piece| {
+    let contents = each_tick(input, stretch, &mut |contents, piece| {
         if result.is_err() {
             return;
         }
@@ -191,7 +191,7 @@ pub(crate) fn cut<W: Write + Seek>(
     result?;
     // There was a tick, or it had said so.
     let cutting = file.ok_or(CutError::Nothing(stretch.from, stretch.until))?;
-    Ok(cutting.finish()?)
+    Ok((cutting.finish()?, contents))
 }
 
 struct Cutting<W: Write + Seek> {

@@ -7,17 +7,36 @@ use super::sampled::SeatSample;
 use crate::health::HealthState;
 use crate::time::MonoTime;
 
+/// An instant, and its show time, s.
+pub(crate) type FilmInstant = (MonoTime, f64);
+
+/// A fall of one seat.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SeatFall {
+    /// The last sample before it in which the seat was sent somewhere: from then on it stood still, and that it is out was found later.
+    /// `None` where it was not sent anywhere before.
+    pub(crate) still: Option<FilmInstant>,
+    /// When its group was found to stand so that it may not move.
+    pub(crate) out: FilmInstant,
+    /// How it stood then.
+    pub(crate) standing: HealthState,
+    /// When it could move again.
+    pub(crate) back: Option<FilmInstant>,
+    /// The first sample after that in which it was sent somewhere.
+    pub(crate) moved: Option<FilmInstant>,
+}
+
 /// The falls of one seat.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Falls {
     /// How often it fell out.
     pub(crate) count: u64,
-    /// The first time: the show time, s, and how its group stood then.
-    pub(crate) first: Option<(f64, HealthState)>,
-    /// When it fell out first, and last.
-    pub(crate) at: Option<(MonoTime, MonoTime)>,
-    /// Show time at which it could move again after the last time, s; none while it is out.
-    pub(crate) back_s: Option<f64>,
+    /// The first time.
+    pub(crate) first: Option<SeatFall>,
+    /// When it fell out last.
+    last: MonoTime,
+    /// The last sample in which it was sent somewhere.
+    sent: Option<FilmInstant>,
     /// Whether it could move last; none before it is known.
     may_move: Option<bool>,
 }
@@ -25,23 +44,34 @@ pub(crate) struct Falls {
 impl Falls {
     /// Takes the next sample.
     pub(crate) fn take(&mut self, at: MonoTime, sample: &SeatSample) {
-        let Some(standing) = sample.standing.and_then(standing_of) else { return };
-        let before = self.may_move.replace(standing.may_move());
-        match (before, standing.may_move()) {
-            (Some(true), false) => {
-                self.count += 1;
-                self.first.get_or_insert((sample.film_s, standing));
-                self.at = Some((self.at.map_or(at, |(first, _)| first), at));
-                self.back_s = None;
+        let now = (at, sample.film_s);
+        let is_sent = sample.sent > 0 && !sample.asked_mm.is_empty();
+        if is_sent {
+            self.sent = Some(now);
+        }
+        if let Some(standing) = sample.standing.and_then(standing_of) {
+            let before = self.may_move.replace(standing.may_move());
+            match (before, standing.may_move()) {
+                (Some(true), false) => {
+                    self.count += 1;
+                    self.last = at;
+                    let (still, back, moved) = (self.sent, None, None);
+                    self.first.get_or_insert(SeatFall { still, out: now, standing, back, moved });
+                }
+                (Some(false), true) if self.count == 1 => {
+                    self.first.iter_mut().for_each(|fall| fall.back = Some(now));
+                }
+                _ => {}
             }
-            (Some(false), true) => self.back_s = Some(sample.film_s),
-            _ => {}
+        }
+        if let Some(fall) = self.first.as_mut().filter(|fall| is_sent && fall.back.is_some()) {
+            fall.moved.get_or_insert(now);
         }
     }
 
     /// How far from an instant the nearer of its first and its last fall is; `None` where it did not fall.
     pub(crate) fn distance(&self, at: MonoTime) -> Option<Duration> {
-        let (first, last) = self.at?;
+        let (first, last) = (self.first?.out.0, self.last);
         Some([first, last].map(|one| one.since(at).max(at.since(one))).into_iter().min().unwrap_or_default())
     }
 

@@ -52,7 +52,7 @@ pub use chunk::{Asked, TickHead};
 pub(crate) use chunk::{Handed, SentFrame};
 pub(crate) use compare::{Comparison, FilmTracks, Places, compare, tracks};
 pub(crate) use cut::{CutError, CutManner, Piece, Stretch, cut, each_tick};
-pub(crate) use falls::Falls;
+pub(crate) use falls::{Falls, FilmInstant, SeatFall};
 pub(crate) use flight::{Entry, Flight, read as read_flight};
 pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
 pub(crate) use intake::{Counts, Intake, Taps};

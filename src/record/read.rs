@@ -12,7 +12,7 @@ use super::ack_columns;
 use super::full;
 use super::judging::Judging;
 use super::margins::Margin;
-use super::recording::{ACKS, END, REPORT, SENT, VERSION};
+use super::recording::{ACKS, END, RECOVERED, REPORT, SENT, VERSION};
 use super::sampled::{SeatSample, TickSample};
 use super::seat::RecordedSeat;
 use crate::container::{self, ChannelRecord, Trouble};
@@ -92,6 +92,8 @@ pub(crate) struct Contents {
     pub(crate) faults: Vec<String>,
     /// Why there is no more than was read.
     pub(crate) trouble: Option<Trouble>,
+    /// What was wrong with the file from which it was recovered, if it was.
+    pub(crate) recovered: Option<String>,
     clocks: (u64, u64),
 }
 
@@ -99,6 +101,16 @@ impl Contents {
     /// An entry of the first metadata record; empty where there is none.
     pub(crate) fn entry(&self, key: &str) -> &str {
         self.begin.get(key).map_or("", String::as_str)
+    }
+
+    /// What is missing in it or not as it was written, in words; empty where it is whole.
+    pub(crate) fn flaws(&self) -> Vec<String> {
+        let trouble = self.trouble.as_ref().map(|trouble| {
+            format!("the file {trouble}; only what precedes is shown; kinocue record recover saves it")
+        });
+        let recovered = self.recovered.as_ref().map(|why| format!("recovered from a file that {why}"));
+        let faults = self.faults.iter().map(|fault| format!("not read: {fault}"));
+        trouble.into_iter().chain(recovered).chain(faults).collect()
     }
 
     /// The rate of its ticks, Hz.
@@ -260,6 +272,10 @@ impl Reading<'_, '_> {
             op::METADATA => match container::metadata(body) {
                 Some(("kinocue", entries)) if self.contents.begin.is_empty() => {
                     self.contents.begun(entries)?
+                }
+                Some((RECOVERED, entries)) => {
+                    let why = entries.get("why").filter(|why| !why.is_empty());
+                    self.contents.recovered = why.map(|why| escaped(why, 1_000).into_owned());
                 }
                 Some((END, entries)) if body.len() <= KEPT => self.contents.end = owned(entries),
                 _ => {}

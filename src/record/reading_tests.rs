@@ -125,7 +125,7 @@ fn of_a_cut_file_all_that_is_complete_is_written_anew_with_an_index() {
     let before = read(cut, Wanted::ALL, &mut |_, _, _| ()).unwrap();
     assert!(before.trouble.is_some() && before.messages["/tick"] > 10, "{:?}", before.messages);
     assert_eq!(mcap::Summary::read(cut).ok().flatten().map(|_| ()), None, "viewers have no index of it");
-    let (recovered, out) = recover(cut, Cursor::new(Vec::new())).unwrap();
+    let (recovered, out) = recover(Cursor::new(cut), Cursor::new(Vec::new())).unwrap();
     let saved = out.into_inner();
     let after = read(saved.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
     assert_eq!(
@@ -142,7 +142,7 @@ fn a_cut_with_its_scene_has_a_cube_for_each_seat_once_and_where_it_is_twenty_tim
     let whole = recorded_as(Mode::Full, swing(300));
     let stretch = Stretch { from: ShowTime::ZERO, until: ShowTime::from_millis(1_999), seat: None };
     let manner = CutManner { scene: true, ..CutManner::default() };
-    let file = cut(whole.as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().into_inner();
+    let file = cut(whole.as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().0.into_inner();
     let all = |topic: &str| -> Vec<serde_json::Value> {
         let messages = mcap::MessageStream::new(&file).unwrap().map(Result::unwrap);
         let of_topic = messages.filter(|one| one.channel.topic == topic);
@@ -262,6 +262,71 @@ proptest! {
         }
         let _ = summarize(file.as_slice());
         let _ = beginning(file.as_slice());
-        let _ = recover(file.as_slice(), Cursor::new(Vec::new()));
+        let _ = recover(Cursor::new(file.as_slice()), Cursor::new(Vec::new()));
     }
+}
+
+/// Where the chunks of a file are, and the log times of each.
+fn chunks(file: &[u8]) -> Vec<(std::ops::Range<usize>, (u64, u64))> {
+    let indexes = mcap::Summary::read(file).unwrap().unwrap().chunk_indexes;
+    let place = |octets: u64| usize::try_from(octets).unwrap();
+    let chunk = |one: &mcap::records::ChunkIndex| {
+        let begin = place(one.compressed_data_offset().unwrap());
+        (begin..begin + place(one.compressed_size), (one.message_start_time, one.message_end_time))
+    };
+    indexes.iter().map(chunk).collect()
+}
+
+#[test]
+fn of_a_file_with_one_chunk_damaged_all_others_are_saved_and_what_is_lost_is_said() {
+    let file = recorded_as(Mode::Full, swing(500));
+    let whole = read(file.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
+    let total: u64 = whole.messages.values().sum();
+    assert!(chunks(&file).len() >= 5, "{:?}", chunks(&file));
+    for (place, span) in chunks(&file) {
+        let mut changed = file.clone();
+        changed[place.start + place.len() / 2] ^= 4;
+        let (recovered, out) = recover(Cursor::new(&changed), Cursor::new(Vec::new())).unwrap();
+        assert!(recovered.trouble.is_none() && recovered.lost.len() == 1, "{recovered:?}");
+        assert_eq!(recovered.lost[0].span, span);
+        let saved = out.into_inner();
+        let after = read(saved.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
+        let count: u64 = after.messages.values().sum();
+        assert!(count < total && count * 4 > total * 3, "{count} of {total}, without {span:?}");
+        assert_eq!((&after.messages, &after.end), (&recovered.messages, &whole.end), "and what is behind it");
+        let flaws = after.flaws();
+        assert!(flaws[0].starts_with("recovered from a file that is damaged; lost are "), "{flaws:?}");
+    }
+}
+
+#[test]
+fn no_chunk_is_longer_than_a_second_even_where_all_is_written_at_once() {
+    let maker = EntryMaker::new(1, about().clocks);
+    let mut file =
+        Recording::open(Cursor::new(Vec::new()), &Opening::new(&about(), &[seat()]), maker).unwrap();
+    for ms in (0..60_000).step_by(50) {
+        let note = EventNote { kind: "standing", seat: "A1".to_owned(), text: ms.to_string() };
+        file.write(MonoTime::from_nanos(ms * MS), &Message::Note(Note::Event(note))).unwrap();
+    }
+    let file = file.finish(&[], None).unwrap().into_inner();
+    let chunks = chunks(&file);
+    assert!((60..70).contains(&chunks.len()), "{}", chunks.len());
+    assert!(chunks.iter().all(|(_, (from, until))| until - from < 1_000 * MS), "{chunks:?}");
+}
+
+#[test]
+fn a_file_whose_disk_was_full_in_the_middle_of_a_chunk_is_cut_short_and_not_damaged() {
+    let file = recorded_as(Mode::Full, swing(300));
+    let [.., (last, _)] = &chunks(&file)[..] else { panic!("it has chunks") };
+    // Up to its record: opcode and length, and a head of 40 octets and the name lz4.
+    let mut cut = file[..last.start - 9 - 40 - 3].to_vec();
+    cut.extend([[6, 255, 255, 255, 255, 255, 255, 255, 255].as_slice(), &[0; 16], &[255; 12]].concat());
+    cut.extend(
+        [[3, 0, 0, 0].as_slice(), b"lz4", &[255; 8], &file[last.start..last.end / 2 + last.start / 2]]
+            .concat(),
+    );
+    let contents = read(cut.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
+    assert_eq!(contents.trouble.map(|trouble| trouble.to_string()).as_deref(), Some("is cut short"));
+    let (recovered, _) = recover(Cursor::new(&cut), Cursor::new(Vec::new())).unwrap();
+    assert!(recovered.in_words() == "is cut short" && recovered.messages["/tick"] > 10, "{recovered:?}");
 }

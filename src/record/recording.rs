@@ -23,6 +23,8 @@ pub(super) const VERSION: &str = "2";
 pub(super) const SENT: &str = "/full/sent";
 /// That of what the ack thread took.
 pub(crate) const ACKS: &str = "/full/acks";
+/// The metadata record of a file that was recovered.
+pub(super) const RECOVERED: &str = "kinocue.recovered";
 /// The metadata record that a file ends with.
 pub(super) const END: &str = "kinocue.end";
 /// The attachment that has the report.
@@ -201,9 +203,34 @@ impl EntryMaker {
     }
 }
 
+/// Where one chunk of a file ends and the next begins, by log time: a damaged one costs as little as that. The first has one message
+/// alone, beside the channels of all others.
+#[derive(Debug, Default)]
+pub(super) struct ChunkTime {
+    since: Option<u64>,
+    messages: u64,
+}
+
+impl ChunkTime {
+    /// The longest, ns.
+    const LONGEST: u64 = 1_000_000_000;
+
+    /// True if a message of that time begins a chunk of its own.
+    pub(super) fn is_over(&mut self, log_time: u64) -> bool {
+        self.messages += 1;
+        let since = *self.since.get_or_insert(log_time);
+        let is_over = self.messages == 2 || log_time.saturating_sub(since) >= Self::LONGEST;
+        if is_over {
+            self.since = Some(log_time);
+        }
+        is_over
+    }
+}
+
 /// A file that is being written.
 pub(crate) struct Recording<W: Write + Seek> {
     writer: Writer<W>,
+    written: ChunkTime,
     channels: Vec<u16>,
     maker: EntryMaker,
     sequence: u32,
@@ -225,7 +252,7 @@ impl<W: Write + Seek> Recording<W> {
     /// # Errors
     /// Where writing fails, as all of these.
     pub(crate) fn open(out: W, opening: &Opening, maker: EntryMaker) -> McapResult<Self> {
-        // By time alone, so that of a file that is cut short no more than half a second is lost.
+        // By time alone, so that of a file that is cut short or damaged no more than a second is lost.
         let mut writer = options().chunk_size(None).create(out)?;
         write_metadata(&mut writer, "kinocue", opening.metadata.clone())?;
         let mut channels = Vec::new();
@@ -236,7 +263,7 @@ impl<W: Write + Seek> Recording<W> {
             };
             channels.push(writer.add_channel(schema, topic, encoding, &BTreeMap::new())?);
         }
-        Ok(Self { writer, channels, maker, sequence: 0, last: 0 })
+        Ok(Self { writer, written: ChunkTime::default(), channels, maker, sequence: 0, last: 0 })
     }
 
     /// Adds a message.
@@ -249,6 +276,9 @@ impl<W: Write + Seek> Recording<W> {
     pub(crate) fn put(&mut self, entry: &Entry) -> McapResult<()> {
         let Entry { channel, log_time, data } = entry;
         let Some(&channel_id) = self.channels.get(usize::from(*channel)) else { return Ok(()) };
+        if self.written.is_over(*log_time) {
+            self.flush()?;
+        }
         self.sequence = self.sequence.wrapping_add(1);
         self.last = self.last.max(*log_time);
         let (log_time, publish_time) = (*log_time, *log_time);

@@ -1,22 +1,52 @@
 //! A recording that its writer did not close, written anew: everything that is complete in it, with an index and a note.
 
 use std::collections::BTreeMap;
-use std::io::{self, Read, Seek, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 
+use jiff::Timestamp;
 use mcap::records::{MessageHeader, Metadata, op};
 use mcap::{Attachment, McapError, Writer};
 
 use super::read::ReadError;
-use super::recording::options;
-use crate::container::{self, ChannelRecord, Trouble};
+use super::recording::{ChunkTime, RECOVERED, options};
+use crate::container::{self, ChannelRecord, LostChunk, Trouble};
+
+/// Lost chunks that are kept account of.
+const LOST: usize = 10_000;
 
 /// What was saved.
 #[derive(Debug)]
 pub(crate) struct Recovered {
     /// Messages of each topic.
     pub(crate) messages: BTreeMap<String, u64>,
-    /// Why there are no more; nothing where the file was whole.
+    /// Why there are no more behind the last; nothing where the file has its end.
     pub(crate) trouble: Option<Trouble>,
+    /// What is missing between them.
+    pub(crate) lost: Vec<LostChunk>,
+}
+
+impl Recovered {
+    /// What was wrong with the file, and what is lost of it.
+    pub(crate) fn in_words(&self) -> String {
+        /// Chunks whose times are told.
+        const TOLD: usize = 8;
+        let mut words = match (&self.trouble, self.lost.len()) {
+            (Some(trouble), _) => trouble.to_string(),
+            (None, 0) => "was whole".to_owned(),
+            (None, _) => "is damaged".to_owned(),
+        };
+        for LostChunk { span: (from, until), trouble } in self.lost.iter().take(TOLD) {
+            #[expect(clippy::cast_precision_loss, reason = "to a tenth")]
+            let seconds = until.saturating_sub(*from) as f64 / 1e9;
+            let at = i64::try_from(*from).ok().and_then(|ns| Timestamp::from_nanosecond(ns.into()).ok());
+            let at = at.unwrap_or_default().strftime("%F %T%.3f UTC");
+            words += &format!("; lost are {seconds:.1} s from {at} on: a chunk that {trouble}");
+        }
+        if self.lost.len() > TOLD {
+            words += &format!("; and {} more chunks", self.lost.len() - TOLD);
+        }
+        words
+    }
 }
 
 /// Why nothing was saved.
@@ -45,36 +75,63 @@ impl From<McapError> for RecoverError {
     }
 }
 
-/// Copies what is complete.
+/// Copies what is complete; what is damaged in between is left out.
 ///
 /// # Errors
 /// Where the file is no recording, and where writing fails.
-pub(crate) fn recover<W: Write + Seek>(input: impl Read, out: W) -> Result<(Recovered, W), RecoverError> {
+pub(crate) fn recover<W: Write + Seek>(
+    mut input: impl Read + Seek,
+    out: W,
+) -> Result<(Recovered, W), RecoverError> {
     const MOST: u64 = 256 << 30;
     let mut copy = Copy {
-        writer: options().create(out)?,
+        writer: options().chunk_size(None).create(out)?,
+        written: ChunkTime::default(),
         schemas: BTreeMap::new(),
         channels: BTreeMap::new(),
         messages: BTreeMap::new(),
         is_recording: false,
     };
-    let trouble = match container::each_sound(input, MOST, |opcode, body| copy.record(opcode, body)) {
+    // What a chunk that is lost said first stands in the summary again.
+    let mut known = Ok(());
+    container::each_outside(&mut input, MOST, |opcode, body| {
+        if known.is_ok() && matches!(opcode, op::SCHEMA | op::CHANNEL) {
+            known = copy.record(opcode, body);
+        }
+    });
+    known?;
+    input.seek(SeekFrom::Start(0))?;
+    let mut lost = Vec::new();
+    let saved = container::each_saved(
+        input,
+        MOST,
+        |opcode, body| copy.record(opcode, body),
+        |chunk| {
+            if lost.len() < LOST {
+                lost.push(chunk);
+            }
+        },
+    );
+    let trouble = match saved {
         Ok(()) => None,
-        Err((_, RecoverError::Read(ReadError::File(trouble)))) if copy.is_recording => Some(trouble),
-        Err((_, error)) => return Err(error),
+        Err(RecoverError::Read(ReadError::File(trouble))) if copy.is_recording => Some(trouble),
+        Err(error) => return Err(error),
     };
     if !copy.is_recording {
         return Err(ReadError::Foreign.into());
     }
-    let why = trouble.as_ref().map_or_else(String::new, ToString::to_string);
+    let recovered = Recovered { messages: copy.messages, trouble, lost };
+    let is_whole = recovered.trouble.is_none() && recovered.lost.is_empty();
+    let why = if is_whole { String::new() } else { recovered.in_words() };
     let metadata = [("why".to_owned(), why)].into();
-    copy.writer.write_metadata(&Metadata { name: "kinocue.recovered".to_owned(), metadata })?;
+    copy.writer.write_metadata(&Metadata { name: RECOVERED.to_owned(), metadata })?;
     copy.writer.finish()?;
-    Ok((Recovered { messages: copy.messages, trouble }, copy.writer.into_inner()))
+    Ok((recovered, copy.writer.into_inner()))
 }
 
 struct Copy<W: Write + Seek> {
     writer: Writer<W>,
+    written: ChunkTime,
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
     messages: BTreeMap<String, u64>,
@@ -88,12 +145,16 @@ impl<W: Write + Seek> Copy<W> {
             op::METADATA => self.metadata(body),
             op::SCHEMA => {
                 let Some((id, name, encoding, data)) = container::schema_of(body) else { return Ok(()) };
+                // The writer has the same number for the same.
                 let new = self.writer.add_schema(name, encoding, data)?;
                 self.schemas.insert(id, new);
                 Ok(())
             }
             op::CHANNEL => {
                 let Some(channel) = ChannelRecord::parse(body) else { return Ok(()) };
+                if self.channels.get(&channel.id).is_some_and(|(_, topic)| topic == channel.topic) {
+                    return Ok(());
+                }
                 let schema = self.schemas.get(&channel.schema).copied().unwrap_or(0);
                 let new =
                     self.writer.add_channel(schema, channel.topic, channel.encoding, &BTreeMap::new())?;
@@ -122,6 +183,9 @@ impl<W: Write + Seek> Copy<W> {
     fn message(&mut self, body: &[u8]) -> Result<(), RecoverError> {
         let Some((channel, log_time, data)) = container::message(body) else { return Ok(()) };
         let Some((channel_id, topic)) = self.channels.get(&channel) else { return Ok(()) };
+        if self.written.is_over(log_time) {
+            self.writer.flush()?;
+        }
         let count = self.messages.entry(topic.clone()).or_default();
         *count += 1;
         let sequence = u32::try_from(*count).unwrap_or(u32::MAX);

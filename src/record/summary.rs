@@ -39,8 +39,10 @@ pub(crate) struct SeatTotals {
 /// A stretch of the film that ran without going back, as the samples tell it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FilmPass {
-    /// The last sample before it.
+    /// The last sample before it: of the first, where the film stood at its beginning, the last of these.
     pub(crate) begin: MonoTime,
+    /// Its last sample.
+    pub(crate) end: MonoTime,
     /// Show time of its first sample, s.
     pub(crate) from_s: f64,
     /// Show time of its last sample, s.
@@ -52,14 +54,15 @@ pub(crate) struct FilmPass {
 }
 
 impl FilmPass {
-    /// Adds the show time of a sample that is as long as that, s; where the film has gone back since the one before, which was `before`,
-    /// that begins the next pass.
-    fn take(passes: &mut Vec<Self>, before: MonoTime, film_s: f64, length_s: f64) {
+    /// Adds the show time of a sample that is as long as that, s; where the film has gone back since the one before, that begins the next
+    /// pass. The instants are those of both.
+    fn take(passes: &mut Vec<Self>, (before, at): (MonoTime, MonoTime), film_s: f64, length_s: f64) {
         /// What is no seek: a playhead that is led may go back a little.
         const BACK_S: f64 = 0.25;
         if let Some(pass) = passes.last_mut() {
             if film_s > pass.until_s - BACK_S {
                 pass.until_s = pass.until_s.max(film_s);
+                pass.end = at;
                 return;
             }
             // The ticks of the sample in which it went back are of either pass.
@@ -67,6 +70,7 @@ impl FilmPass {
         }
         passes.push(Self {
             begin: before,
+            end: at,
             from_s: film_s,
             until_s: film_s,
             before_s: length_s,
@@ -143,7 +147,11 @@ impl Summary {
         if last_film != Some(film_s) && film_s.is_finite() {
             let (first, last) = self.film.unwrap_or((film_s, film_s));
             self.film = Some((first.min(film_s), last.max(film_s)));
-            FilmPass::take(&mut self.passes, before, film_s, f64::from(sample.ticks) / rate_hz);
+            FilmPass::take(&mut self.passes, (before, at), film_s, f64::from(sample.ticks) / rate_hz);
+        } else if let [first] = self.passes.as_mut_slice()
+            && !first.has_run()
+        {
+            first.begin = at;
         }
     }
 

@@ -193,8 +193,10 @@ fn a_seat_that_falls_out_is_told_in_that_window_though_nothing_more_is_heard_of_
     }
     let mut falls = Falls::default();
     told.iter().for_each(|(at, sample)| falls.take(*at, sample));
-    let (film_s, standing) = falls.first.expect("it fell out");
+    let SeatFall { out: (_, film_s), standing, still, .. } = falls.first.expect("it fell out");
     assert!(standing == HealthState::Lost && (0.2..0.25).contains(&film_s), "{film_s}");
+    let (_, still_s) = still.expect("it was sent somewhere before");
+    assert!((0.15..0.18).contains(&still_s), "{still_s}: it stood still before it was found to be out");
     let [at, late] = [20 * 10, 500].map(|ms| MonoTime::from_nanos(ms * MS));
     assert!(falls.distance(at) < falls.distance(late), "it is nearer to when it did");
     assert_eq!(told.iter().filter(|(_, sample)| sample.sent == 0).count(), 1, "and once");

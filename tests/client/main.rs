@@ -278,7 +278,8 @@ fn preflight_says_what_several_have_in_common_once_and_where_to_find_one_that_fa
 fn what_all_of_a_hall_have_in_common_is_no_list_of_names() {
     let mut status = hall("parked");
     let names: Vec<_> = (0..64).map(|n| format!("S{n}")).collect();
-    status["controllers"] = names.iter().map(|name| json!({"name": name, "address": "10.0.0.1:7408"})).collect();
+    status["controllers"] =
+        names.iter().map(|name| json!({"name": name, "address": "10.0.0.1:7408"})).collect();
     let finding = |name| json!({"id": "speed-too-low", "severity": "error", "controller": name, "text": "as it is", "remedy": "set it"});
     let findings: Vec<_> = names.iter().map(finding).collect();
     status["preflight"] = json!({"passed": false, "answered": 64, "findings": findings});

@@ -152,6 +152,15 @@ impl Playing {
         Self(Guarded::start_with(&args, stdin, stderr))
     }
 
+    /// The same where no file can grow longer than so many blocks of 512 octets.
+    pub(crate) fn start_cramped(cue: &Path, to: &str, blocks: u32, more: &[&str]) -> Self {
+        let mut command = Command::new("sh");
+        command.args(["-c", "trap '' XFSZ; ulimit -f \"$0\"; exec \"$@\"", &blocks.to_string()]);
+        command.arg(env!("CARGO_BIN_EXE_kinocue")).arg("play").arg(cue);
+        command.args(["--bind", "127.0.0.1:0", "--to", to]).args(more);
+        Self(Guarded::spawn(&mut command, Stdio::null(), Stdio::piped()))
+    }
+
     /// The demo, with its temporary files in `folder`.
     pub(crate) fn demo(folder: &Path, args: &[&str], stdin: Stdio, stderr: Stdio) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));

@@ -178,7 +178,10 @@ fn the_picture_of_an_incident_is_of_the_seat_that_fell_out_and_says_so_in_one_se
     let picture = hall.socket().get(&at).value();
     let sentence = picture["sentence"].as_str().unwrap();
     assert_eq!(picture["seat"], "A2");
-    assert!(sentence.starts_with("A2 at 00:") && sentence.contains(": fell out (lost), "), "{sentence}");
+    assert!(
+        sentence.starts_with("A2 stood still from 00:") && sentence.contains(": judged lost at 00:"),
+        "{sentence}"
+    );
     assert_eq!(sentence.matches("A2").count(), 1, "one sentence: {sentence}");
 }
 

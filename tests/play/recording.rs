@@ -7,7 +7,7 @@ use std::process::Command;
 use mcap::{MessageStream, Summary};
 use serde_json::Value;
 
-use super::process::{Sim, kinocue, play};
+use super::process::{Playing, Sim, kinocue, play};
 use super::{Folder, STROKE, programs};
 
 /// All messages of a topic.
@@ -56,7 +56,7 @@ fn a_file_that_is_there_is_not_recorded_over_and_nothing_is_played() {
     let path = folder.write("yesterday.mcap", "yesterday");
     let run = play(&folder.nod(&[0.1]), &sim.to(), &["--record", path.to_str().expect("UTF-8")]);
     assert_eq!(run.code, Some(74), "{run:?}");
-    assert!(run.stderr.contains("yesterday.mcap"), "{}", run.stderr);
+    assert!(run.stderr.contains("yesterday.mcap: there is such a file"), "{}", run.stderr);
     assert_eq!(std::fs::read(&path).expect("it is there"), b"yesterday");
     assert!(sim.end().rows.is_empty());
 }
@@ -134,6 +134,9 @@ fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
     let layout: Value = serde_json::from_str(&of(&["record", "layout", "--seat", "F4"])).expect("JSON");
     let file = std::fs::read(&path).expect("it is there");
     let panels = layout["configById"].as_object().expect("panels").values();
+    let is_named =
+        |one: &Value| ["foxglovePanelTitle", "lichtblickPanelTitle"].iter().all(|key| one[key].is_string());
+    assert!(panels.clone().filter(|one| !one["xAxisVal"].is_null()).all(is_named), "{layout}");
     let paths: Vec<&str> = panels
         .flat_map(|one| one["paths"].as_array().expect("paths"))
         .filter_map(|one| one["value"].as_str())
@@ -182,6 +185,71 @@ fn a_recorded_play_is_told_cut_compared_drawn_and_made_a_cue_again() {
     of(&["info", text(&again)]);
     assert_eq!(kinocue(&["plot", text(&path), "--seat", "nobody"]).code, Some(66));
     drop(sim.end());
+}
+
+#[test]
+fn a_recording_that_finds_no_room_ends_early_and_the_report_says_so_also_to_programs() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let path = folder.path("nod.mcap");
+    let args = ["--json", "--record", text(&path), "--record-mode", "full"];
+    let report =
+        Playing::start_cramped(&folder.nod(&[0.1]), &sim.addresses[0], 16, &args).finish().report_of(0);
+    let trouble = report["recording_trouble"].as_str().expect("it says why");
+    assert!(trouble.contains("the recording ended early") && trouble.contains("nod.part.mcap"), "{trouble}");
+    assert_eq!(report["result"], "completed", "the play went on");
+    assert!(!path.exists() && folder.path("nod.part.mcap").exists());
+    drop(sim.end());
+}
+
+#[test]
+fn what_is_made_of_a_recording_that_is_cut_short_or_damaged_is_said_to_be_less_and_no_recording_is_replaced()
+{
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let (path, _) = recorded_in_full(&folder, &sim.addresses[0], &[]);
+    drop(sim.end());
+    let list = kinocue(&["record", "list", text(path.parent().expect("a folder")), "--json"]).stdout;
+    assert_eq!(serde_json::from_str::<Value>(&list).expect("JSON")[0]["marks"], 0);
+    let whole = std::fs::read(&path).expect("it is there");
+    let last = Summary::read(&whole).expect("it is closed").expect("it has one").chunk_indexes.pop();
+    let place = last.expect("chunks").compressed_data_offset().expect("an offset");
+    let place = usize::try_from(place).expect("it is short");
+    let mut changed = whole.clone();
+    changed[place] ^= 4;
+    for (name, octets, says) in
+        [("half.mcap", &whole[..whole.len() / 2], "is cut short"), ("bit.mcap", &changed, "is damaged")]
+    {
+        let half = folder.path(name);
+        std::fs::write(&half, octets).expect("there is room");
+        let [cut, rows, pcap, cue] =
+            ["cut.mcap", "cut.csv", "cut.pcap", "cue.csv"].map(|one| folder.path(one));
+        for args in [
+            &["record", "cut", text(&half), "-o", text(&cut), "--force"][..],
+            &["record", "cut", text(&half), "--csv", "-o", text(&rows), "--force"],
+            &["record", "cut", text(&half), "--pcap", "-o", text(&pcap), "--force"],
+            &["convert", text(&half), text(&cue), "--seat", "F4", "--take", "sent", "--force"],
+            &["record", "compare", text(&path), text(&half)],
+            &["record", "compare", text(&half), text(&path), "--json"],
+        ] {
+            let run = kinocue(args);
+            assert_eq!(run.code, Some(1), "{args:?}: {run:?}");
+            assert!(run.stderr.contains(&format!("{name}: the file {says}")), "{args:?}: {run:?}");
+        }
+        let drawn = kinocue(&["plot", text(&path), text(&half)]).stdout;
+        assert!(drawn.contains(&format!("The recording laid over it: the file {says}")), "{drawn}");
+        assert!([cut, rows, pcap, cue].iter().all(|made| made.exists()), "what precedes is of use");
+    }
+    let link = folder.path("again.mcap");
+    std::os::unix::fs::symlink(&path, &link).expect("a link");
+    for args in [
+        &["record", "cut", text(&path), "--film", "0..0.5", "-o", text(&path), "--force"][..],
+        &["record", "cut", text(&path), "-o", text(&link), "--force"],
+        &["convert", text(&path), text(&path), "--seat", "F4", "--take", "sent", "--force"],
+        &["convert", text(&link), text(&path), "--recover", "--force"],
+    ] {
+        let run = kinocue(args);
+        assert!(run.code == Some(64) && run.stderr.contains("is the file that is read"), "{args:?}: {run:?}");
+    }
+    assert!(std::fs::read(&path).expect("it is there") == whole);
 }
 
 #[test]

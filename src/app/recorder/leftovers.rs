@@ -2,7 +2,7 @@
 //! are written anew with an index. Each is read back before it takes the place of the other.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Read};
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
@@ -117,12 +117,12 @@ fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     let whole = PathBuf::from(format!("{}.mcap", name.strip_suffix(PART).unwrap_or(&name)));
     let fresh = path.with_extension("recovering");
     if whole.try_exists()? {
-        return Err(io::ErrorKind::AlreadyExists.into());
+        return Err(taken(&whole));
     }
     let result = copy(path, &fresh, may).and_then(|()| {
         // It was closed after all: by a recorder whose disk stood still.
         if whole.try_exists()? {
-            return Err(io::ErrorKind::AlreadyExists.into());
+            return Err(taken(&whole));
         }
         fs::rename(&fresh, &whole)?;
         fs::remove_file(path)
@@ -134,6 +134,10 @@ fn recover(path: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     result
 }
 
+fn taken(path: &Path) -> io::Error {
+    io::Error::new(io::ErrorKind::AlreadyExists, format!("{} is there already", path.display()))
+}
+
 /// Writes what is whole of it to another file, and reads that back.
 fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     let input = Patient { file: BufReader::new(File::open(from)?), may };
@@ -142,8 +146,8 @@ fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
             RecoverError::Write(error) => error,
             RecoverError::Read(error) => io::Error::new(io::ErrorKind::InvalidData, error),
         })?;
-    if let Some(Trouble::Unread(why)) = recovered.trouble {
-        return Err(io::Error::other(why));
+    if let Some(Trouble::Unread(why)) = &recovered.trouble {
+        return Err(io::Error::other(why.clone()));
     }
     if recovered.messages.is_empty() {
         return Err(io::Error::new(io::ErrorKind::InvalidData, "it has no complete message"));
@@ -168,6 +172,12 @@ impl<F: Fn() -> bool> Read for Patient<'_, F> {
     fn read(&mut self, octets: &mut [u8]) -> io::Result<usize> {
         wait_for(self.may);
         self.file.read(octets)
+    }
+}
+
+impl<F> Seek for Patient<'_, F> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
     }
 }
 

@@ -105,8 +105,12 @@ impl RecordLink {
 
     /// Tells the recorder, of now; where it does not keep up that is lost and counted.
     pub(crate) fn put(&self, ask: RecordAsk) {
+        self.put_of(Monotonic.now(), ask);
+    }
+
+    fn put_of(&self, at: MonoTime, ask: RecordAsk) {
         if let Some(asks) = &self.asks
-            && asks.try_send((Monotonic.now(), ask)).is_err()
+            && asks.try_send((at, ask)).is_err()
         {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
@@ -115,6 +119,11 @@ impl RecordLink {
     /// Has that kept.
     pub(crate) fn keep(&self, note: Note) {
         self.put(RecordAsk::Keep(note));
+    }
+
+    /// The same of what was a little before now.
+    pub(crate) fn keep_of(&self, at: MonoTime, note: Note) {
+        self.put_of(at, RecordAsk::Keep(note));
     }
 
     /// Has a moment marked.

@@ -12,7 +12,7 @@ use crate::app::recorder::RecordAsk;
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 use crate::control::{Desired, JournalLine, Problem, Surface};
 use crate::film::point::FilmState;
-use crate::journal::{Action, FilmProof, Folds, Journal, Outcome, ShowRecord, stamp};
+use crate::journal::{Action, FilmProof, FoldedAction, Folds, Journal, Outcome, ShowRecord, stamp};
 use crate::rt::Row;
 use crate::state::{Cause, State};
 use crate::time::MonoTime;
@@ -80,7 +80,7 @@ impl ShowRecords {
 
     /// The journal, for the next supervisor.
     pub(super) fn into_journal(mut self) -> Journal {
-        self.folds.rest().iter().for_each(|action| self.journal.note(action));
+        self.folds.rest().iter().for_each(|one| self.journal.note(&one.action));
         self.journal
     }
 
@@ -142,13 +142,17 @@ impl ShowRecords {
         let action = Action { at, who, what, result, state: state.to_string(), times: 1 }.shortened();
         self.show(&action);
         let due = self.folds.take(action, desired.ask.word(), now);
-        due.iter().for_each(|action| self.journal.note(action));
-        due
+        self.noted(due)
     }
 
     /// Writes down the repeats of what was asked, once their time is over; gives their lines.
     pub(super) fn settle_folds(&mut self, now: MonoTime) -> Vec<Action> {
         let due = self.folds.due(now);
+        self.noted(due)
+    }
+
+    fn noted(&mut self, due: Vec<FoldedAction>) -> Vec<Action> {
+        let due: Vec<Action> = due.into_iter().map(|one| one.action).collect();
         due.iter().for_each(|action| self.journal.note(action));
         due
     }

@@ -9,7 +9,7 @@ use crate::app::recorder::{RecordAsk, ShowStart};
 use crate::control::{Code, Desired, Problem, Who};
 use crate::film::point::FilmState;
 use crate::health::HealthState;
-use crate::journal::{Action, Folds};
+use crate::journal::{Action, FoldedAction, Folds};
 use crate::record::{
     ActionNote, EventNote, HallNote, IncidentCause, MarkNote, MarkRefusal, Note, TimecodeNote, state_number,
 };
@@ -136,10 +136,19 @@ fn tell_film(hall: &HallContext) {
     }));
 }
 
-/// What the recorder is told of what is asked: of repeats once in ten seconds, as in the journal, so that no flood of them takes the
+/// For how long the same is a repeat in recordings: what was asked is told while the incident that it belongs to is written.
+const REPEATS: Duration = Duration::from_secs(1);
+
+/// What the recorder is told of what is asked, each with its own instant: of repeats once a second, so that no flood of them takes the
 /// room of what happened.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct AsksTold(Folds);
+
+impl Default for AsksTold {
+    fn default() -> Self {
+        Self(Folds::within(REPEATS))
+    }
+}
 
 impl AsksTold {
     pub(super) fn take(&mut self, desired: &Desired, result: &Result<(), Problem>, hall: &HallContext) {
@@ -160,10 +169,10 @@ impl AsksTold {
     }
 }
 
-fn tell_asks(due: Vec<Action>, hall: &HallContext) {
-    for Action { who, what, result, state, times, .. } in due {
+fn tell_asks(due: Vec<FoldedAction>, hall: &HallContext) {
+    for FoldedAction { at, action: Action { who, what, result, state, times, .. } } in due {
         let result = if times > 1 { format!("{result}, {times} times") } else { result };
-        hall.recorder.keep(Note::Action(ActionNote { who, what, result, state }));
+        hall.recorder.keep_of(at, Note::Action(ActionNote { who, what, result, state }));
     }
 }
 
@@ -280,6 +289,28 @@ mod tests {
         let RecordAsk::Keep(Note::Action(last)) = &told[3] else { panic!("{told:?}") };
         assert!(last.result.ends_with(", 998 times"), "{last:?}");
         assert_eq!(hall.recorder.status_at(hall.now).more_marks, 999);
+    }
+
+    #[test]
+    fn what_is_asked_twice_within_a_moment_is_recorded_as_of_when_it_was_asked() {
+        let mut hall = hall(State::Playing(crate::state::PlayMode::Following), "one");
+        let (link, told_asks) = crate::app::recorder::RecordLink::new();
+        hall.recorder = link;
+        let begin = hall.now;
+        let mut asks = AsksTold::default();
+        let desired = crate::app::supervisor::testing::desired(
+            crate::control::Surface::Http,
+            crate::control::Command::Pause,
+        );
+        for ms in [0, 20] {
+            hall.now = begin + Duration::from_millis(ms);
+            asks.take(&desired, &Ok(()), &hall);
+        }
+        hall.now = begin + REPEATS;
+        asks.settle(&hall);
+        let told: Vec<_> = told_asks.try_iter().collect();
+        let after: Vec<_> = told.iter().map(|(at, _)| at.since(begin).as_millis()).collect();
+        assert_eq!(after, [0, 20], "{told:?}");
     }
 
     #[test]

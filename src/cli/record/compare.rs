@@ -1,11 +1,11 @@
 //! `kinocue record compare`.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::super::{Exit, Failure, print};
-use super::{open, shown, unread};
-use crate::record::{Comparison, compare};
+use super::{open, shown, tell_flaws, unread};
+use crate::record::{Comparison, Places, compare, tracks};
 use crate::time::ShowTime;
 
 /// Events of each that are printed.
@@ -14,7 +14,8 @@ const PRINTED: usize = 20;
 /// Compares two recordings by show time: how far the sent positions differ, for each axis of each seat, how much later the second was, and
 /// what happened in one alone.
 ///
-/// Exits with 1 if an axis differs by more than the tolerance, a seat is in one alone, or nothing could be compared.
+/// Exits with 1 if an axis differs by more than the tolerance, a seat is in one alone, either is cut short or damaged, or nothing could be
+/// compared.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue record compare before.mcap ride.mcap --tolerance 0.1mm")]
 pub(in super::super) struct Args {
@@ -37,8 +38,8 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let (one, other) = (open(&args.one)?, open(&args.other)?);
-    let comparison = compare(one, other).map_err(|error| unread(error, &args.one))?;
+    let read = |path: &Path| tracks(open(path)?, Places::Sent).map_err(|error| unread(error, path));
+    let comparison = compare(&read(&args.one)?, &read(&args.other)?);
     if args.json {
         print::json(&comparison)?;
     } else {
@@ -46,7 +47,10 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let is_over = comparison.axes.iter().any(|axis| axis.greatest > args.tolerance);
     let nothing = comparison.axes.iter().all(|axis| axis.compared == 0);
-    Ok(if is_over || nothing || !comparison.alone.is_empty() { Exit::CheckFailed } else { Exit::Done })
+    let [one, other] = &comparison.flaws;
+    let read = [tell_flaws(&args.one, one), tell_flaws(&args.other, other)];
+    let is_sound = read == [Exit::Done; 2] && !is_over && !nothing && comparison.alone.is_empty();
+    Ok(if is_sound { Exit::Done } else { Exit::CheckFailed })
 }
 
 fn text(comparison: &Comparison) -> String {

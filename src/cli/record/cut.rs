@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, anyhow};
 
 use super::super::{Exit, Failure, OrExit as _, exit, print};
-use super::open;
+use super::{open, tell_flaws};
 use crate::record::{Chunk, Contents, CutError, CutManner, Piece, RecordedSeat, Stretch, cut, each_tick};
 use crate::time::{ShowTime, parse_time};
 
 /// Cuts a stretch out of a full recording, with every tick as plain topics that any viewer can draw.
+///
+/// Exits with 1 if the recording is cut short or damaged: OUT then has only what precedes that.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   kinocue record cut ride.mcap --film 0:02..0:06 --seat c1 -o jerk.mcap
@@ -52,6 +54,7 @@ fn stretch(text: &str) -> Result<(ShowTime, ShowTime), String> {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     exit::refuse_to_replace(&args.output, args.force)?;
+    exit::refuse_same(&args.file, &args.output)?;
     let (from, until) = args.film.unwrap_or((ShowTime::from_nanos(i64::MIN), ShowTime::from_nanos(i64::MAX)));
     let stretch = Stretch { from, until, seat: args.seat.clone() };
     let part = args.output.with_extension("cutting");
@@ -67,17 +70,18 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             cut(input, &stretch, args.manner, out).map_err(|error| failure(error, &args.file))
         })
     };
-    let written = result.and_then(|out| {
+    let written = result.and_then(|(out, contents)| {
         let file = out.into_inner().map_err(std::io::IntoInnerError::into_error).or_exit(Exit::Io)?;
         file.sync_all().or_exit(Exit::Io)?;
-        std::fs::rename(&part, &args.output).or_exit(Exit::Io)
+        std::fs::rename(&part, &args.output).or_exit(Exit::Io)?;
+        Ok(contents)
     });
     if written.is_err() {
         let _ = std::fs::remove_file(&part); // why there is no more is told
     }
-    written?;
+    let contents = written?;
     print::tell(&format!("{}", args.output.display()));
-    Ok(Exit::Done)
+    Ok(tell_flaws(&args.file, &contents.flaws()))
 }
 
 fn failure(error: CutError, path: &Path) -> Failure {
@@ -96,9 +100,9 @@ fn each<W: Write>(
     stretch: &Stretch,
     mut out: W,
     mut row: impl FnMut(&mut W, &Contents, &Chunk<'_>) -> std::io::Result<()>,
-) -> Result<W, Failure> {
+) -> Result<(W, Contents), Failure> {
     let mut result = Ok(());
-    each_tick(open(path)?, stretch, &mut |contents, piece| {
+    let contents = each_tick(open(path)?, stretch, &mut |contents, piece| {
         let Piece::Tick(chunk) = piece else { return };
         let chunk = &chunk;
         if result.is_ok() {
@@ -107,10 +111,10 @@ fn each<W: Write>(
     })
     .map_err(|error| failure(error, path))?;
     result.or_exit(Exit::Io)?;
-    Ok(out)
+    Ok((out, contents))
 }
 
-fn csv<W: Write>(path: &Path, stretch: &Stretch, mut out: W) -> Result<W, Failure> {
+fn csv<W: Write>(path: &Path, stretch: &Stretch, mut out: W) -> Result<(W, Contents), Failure> {
     let mut columns = None;
     out.write_all(b"film_s,deadline_ns,late_us,seat,handed_us").or_exit(Exit::Io)?;
     each(path, stretch, out, |out, Contents { seats, .. }, chunk| {
@@ -157,7 +161,7 @@ fn columns_of(out: &mut impl Write, seats: &[RecordedSeat], stretch: &Stretch) -
 }
 
 /// Datagrams as a capture of raw IPv4 (draft-ietf-opsawg-pcap, link type 101), times to the nanosecond.
-fn pcap<W: Write>(path: &Path, stretch: &Stretch, mut out: W) -> Result<W, Failure> {
+fn pcap<W: Write>(path: &Path, stretch: &Stretch, mut out: W) -> Result<(W, Contents), Failure> {
     let head = [0xa1b2_3c4d_u32, 0x0004_0002, 0, 0, 65_535, 101];
     head.iter().try_for_each(|word| out.write_all(&word.to_le_bytes())).or_exit(Exit::Io)?;
     each(path, stretch, out, |out, contents, chunk| {

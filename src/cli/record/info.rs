@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::super::{Exit, Failure, print};
-use super::{flaws, open, shown, unread, wall};
+use super::{open, shown, unread, wall};
 use crate::record::{Contents, Margin, Quantity, Summary, note_in_words, summarize};
 use crate::time::ShowTime;
 
@@ -54,7 +54,7 @@ struct InfoTold<'a> {
 impl<'a> InfoTold<'a> {
     fn new(contents: &'a Contents, summary: &'a Summary) -> Self {
         let Contents { begin, end, messages, attachments, .. } = contents;
-        Self { metadata: begin, end, messages, attachments, flaws: flaws(contents), summary }
+        Self { metadata: begin, end, messages, attachments, flaws: contents.flaws(), summary }
     }
 }
 
@@ -144,7 +144,7 @@ fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
     if more > 0 {
         line(format_args!("  and {more} more; --json has them"));
     }
-    for flaw in flaws(contents) {
+    for flaw in contents.flaws() {
         line(format_args!("  {flaw}"));
     }
     out

@@ -21,8 +21,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let path = |value: String| json!({"value": value, "enabled": true, "timestampMethod": "receiveTime"});
     let places = (0..args.axes)
         .flat_map(|axis| ["asked", "sent"].map(|what| format!("/seat/{seat}.{what}_mm[{axis}]")));
-    let plot =
-        |title: String, paths: Vec<_>| json!({"title": title, "paths": paths, "xAxisVal": "timestamp"});
+    let plot = |title: String, paths: Vec<_>| {
+        json!({
+            "foxglovePanelTitle": title, "lichtblickPanelTitle": title, "paths": paths, "xAxisVal": "timestamp",
+        })
+    };
     let of_seat = |what: &str| format!("/seat/{seat}.{what}");
     let late = ["/tick.late_max_us".to_owned(), of_seat("ack_max_us")];
     let wrong = ["clamps", "lost", "refused", "unsent"].map(of_seat);
@@ -40,11 +43,18 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         "playbackConfig": {"speed": 1},
         "layout": {
             "direction": "column",
+            "splitPercentage": 40,
             "first": "Plot!p",
             "second": {
                 "direction": "column",
+                "splitPercentage": 100.0 / 3.0,
                 "first": "Plot!t",
-                "second": {"direction": "column", "first": "Plot!w", "second": "StateTransitions!s"},
+                "second": {
+                    "direction": "column",
+                    "splitPercentage": 50,
+                    "first": "Plot!w",
+                    "second": "StateTransitions!s",
+                },
             },
         },
     }))?;

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::super::{Exit, Failure, OrExit as _, print};
 use super::{open, shown, wall};
-use crate::record::beginning;
+use crate::record::{beginning, closing_of};
 
 /// Lists the recordings in a folder, oldest first.
 #[derive(Debug, clap::Args)]
@@ -34,6 +34,8 @@ struct Listed {
     cue: String,
     /// Which part of the recording of its show.
     part: u32,
+    /// Moments that were marked; 0 where it was not closed.
+    marks: u64,
     /// False where it was not closed.
     whole: bool,
 }
@@ -51,12 +53,17 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let mut out = String::new();
     for one in &listed {
-        let Listed { file, bytes, wall_ns, mode, hall, cue, part, whole } = one;
+        let Listed { file, bytes, wall_ns, mode, hall, cue, part, marks, whole } = one;
         let open = if *whole { "" } else { "  not closed: kinocue record recover" };
         let part = if *part > 1 { format!(", part {part}") } else { String::new() };
+        let marks = match marks {
+            0 => String::new(),
+            1 => ", 1 mark".to_owned(),
+            _ => format!(", {marks} marks"),
+        };
         writeln!(
             out,
-            "{}  {:>8.1} MB  {mode:<8}{hall}  {cue}{part}  {file}{open}",
+            "{}  {:>8.1} MB  {mode:<8}{hall}  {cue}{part}{marks}  {file}{open}",
             wall(*wall_ns),
             megabytes(*bytes)
         )
@@ -72,6 +79,7 @@ fn listed(path: &Path) -> Option<Listed> {
     let entries = beginning(open(path).ok()?).ok()?;
     let entry = |key: &str| shown(entries.get(key).map_or("", String::as_str));
     let name = path.file_name()?.to_string_lossy().into_owned();
+    let end = closing_of(open(path).ok()?).unwrap_or_default().end;
     Some(Listed {
         bytes: fs::metadata(path).ok()?.len(),
         wall_ns: entries.get("wall_ns")?.parse().ok()?,
@@ -79,6 +87,7 @@ fn listed(path: &Path) -> Option<Listed> {
         hall: entry("hall"),
         cue: entry("cue"),
         part: entry("part").parse().unwrap_or(1),
+        marks: end.get("marks").and_then(|marks| marks.parse().ok()).unwrap_or(0),
         whole: !name.ends_with(".part.mcap"),
         file: shown(&name),
     })

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
 use super::client::{ServerArgs, dump_record as dump};
-use super::{Exit, Failure, OrExit as _, names};
+use super::{Exit, Failure, OrExit as _, names, print};
 use crate::plain;
 use crate::record::{Contents, ReadError};
 
@@ -73,16 +73,12 @@ pub(super) fn unread(error: ReadError, path: &Path) -> Failure {
     Failure { exit: Exit::BadCue, error: anyhow::Error::new(error).context(path.display().to_string()) }
 }
 
-/// Says what is missing in a file.
-pub(super) fn flaws(contents: &Contents) -> Vec<String> {
-    let mut flaws = Vec::new();
-    if let Some(trouble) = &contents.trouble {
-        flaws.push(format!(
-            "the file {trouble}; only what precedes is shown; kinocue record recover saves it"
-        ));
+/// Says what is missing in a recording of which something was made; gives what ends the program.
+pub(super) fn tell_flaws(path: &Path, flaws: &[String]) -> Exit {
+    for flaw in flaws {
+        print::tell(&format!("{}: {flaw}", path.display()));
     }
-    flaws.extend(contents.faults.iter().map(|fault| format!("not read: {fault}")));
-    flaws
+    if flaws.is_empty() { Exit::Done } else { Exit::CheckFailed }
 }
 
 /// A wall time as people here read it.

@@ -10,9 +10,9 @@ use super::super::{Exit, Failure, OrExit as _, print};
 use super::{beside, open, unread};
 use crate::record::{self, RecoverError, Wanted};
 
-/// Repairs a recording that was cut short: writes all its complete messages, with an index, so that any viewer reads it.
+/// Repairs a recording that was cut short or damaged: writes all its complete messages, with an index, so that any viewer reads it.
 ///
-/// The new file is read back before it gets its name. The original stays.
+/// The new file is read back before it gets its name. The original stays. Exits with 1 if something in the middle is lost; what, is said.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue record recover ride.part.mcap")]
 pub(in super::super) struct Args {
@@ -47,9 +47,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     fs::hard_link(&part, &output).with_context(name).or_exit(Exit::Io)?;
     fs::remove_file(&part).with_context(name).or_exit(Exit::Io)?;
     let count: u64 = recovered.messages.values().sum();
-    let why = recovered.trouble.map_or_else(|| "was whole".to_owned(), |trouble| trouble.to_string());
-    print::tell(&format!("{}: {count} messages; {} {why}", output.display(), args.file.display()));
-    Ok(Exit::Done)
+    let (output, file, why) = (output.display(), args.file.display(), recovered.in_words());
+    print::tell(&format!("{output}: {count} messages; {file} {why}"));
+    Ok(if recovered.lost.is_empty() { Exit::Done } else { Exit::CheckFailed })
 }
 
 /// Writes, and reads back what was written.
@@ -59,6 +59,11 @@ fn written(args: &Args, out: File, part: &std::path::Path) -> Result<record::Rec
             RecoverError::Read(error) => unread(error, &args.file),
             RecoverError::Write(error) => Failure { exit: Exit::Io, error: error.into() },
         })?;
+    if recovered.messages.is_empty() {
+        let error =
+            anyhow!("{}: no message of it is complete; it {}", args.file.display(), recovered.in_words());
+        return Err(error).or_exit(Exit::BadCue);
+    }
     out.into_inner().map_err(|error| error.into_error()).or_exit(Exit::Io)?.sync_all().or_exit(Exit::Io)?;
     let unwanted = Wanted { samples: false, full: false, ..Wanted::ALL };
     let back = record::read(open(part)?, unwanted, &mut |_, _, _| ()).map_err(|error| unread(error, part))?;

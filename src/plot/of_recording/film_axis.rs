@@ -55,7 +55,8 @@ impl FilmAxis {
 
     /// All of the film between two show times, s, whatever ran.
     pub(crate) fn of_film(from_s: f64, until_s: f64, columns: usize) -> Self {
-        let pass = FilmPass { begin: MonoTime::default(), from_s, until_s, before_s: 0.0, after_s: 0.0 };
+        let (begin, end) = (MonoTime::default(), MonoTime::from_nanos(u64::MAX));
+        let pass = FilmPass { begin, end, from_s, until_s, before_s: 0.0, after_s: 0.0 };
         Self { time: TimeAxis::of_film(from_s, until_s, columns), passes: vec![pass] }
     }
 
@@ -72,6 +73,12 @@ impl FilmAxis {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to MOST")]
         let columns = columns as usize;
         Self::of_film(from_s, until_s, columns)
+    }
+
+    /// False before the film first ran in what is shown, and after it last did.
+    pub(super) fn runs(&self, at: MonoTime) -> bool {
+        self.passes.first().is_some_and(|pass| at > pass.begin)
+            && self.passes.last().is_some_and(|pass| at <= pass.end)
     }
 
     /// Where an instant of that show time, s, is; `None` where it is not on the axis.

@@ -1,11 +1,16 @@
 //! What is gathered of a stretch of a recording for its picture, column by column.
 
+use std::time::Duration;
+
 use serde_json::Value;
 
 use super::Look;
 use super::film_axis::Moment;
-use crate::plot::{Band, Flag, Shade, TimeAxis};
-use crate::record::{Contents, Falls, Margins, SeatSample, TickSample, Told, each_chunk, state_word};
+use super::flags::{Noted, SeatFlags};
+use crate::plot::{Band, Shade, TimeAxis};
+use crate::record::{
+    Contents, Falls, Margins, SeatFall, SeatSample, TickSample, Told, each_chunk, state_word,
+};
 use crate::time::{MonoTime, Rate, ShowTime};
 
 /// Asked and sent are apart where they differ by more, mm or degrees: more than pulses and rounding make.
@@ -15,8 +20,8 @@ pub(super) const BINS_US: [f64; 12] =
     [10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4, 1e5, f64::INFINITY];
 /// The lane of a seat that is out.
 const OUT: usize = 6;
-/// Flags of a picture; more are counted in one.
-const FLAGS: usize = 100;
+/// What is kept of what was said of how the seat stands.
+const SAID: usize = 1_000;
 /// Lateness of a column is kept of so many ticks at the most.
 const KEPT: usize = 20_000;
 
@@ -93,10 +98,9 @@ pub(crate) struct Gathered {
     pub(super) lanes: Vec<CountedLane>,
     pub(super) state: Option<&'static str>,
     pub(super) states: Vec<(&'static str, Vec<Shade>)>,
-    pub(super) flags: Vec<Flag>,
-    /// Marks, events and requests that have no flag.
-    pub(super) more_flags: u64,
-    pub(super) column: usize,
+    pub(super) flags: SeatFlags,
+    /// What was said of how the seat stands: when, and in words.
+    pub(super) said: Vec<(MonoTime, String)>,
     /// Ticks are taken from whole ones, and not from samples.
     pub(super) is_whole: bool,
 }
@@ -174,9 +178,8 @@ impl Gathered {
             lanes: ["held", "missed", "lost", "refused", "untaken", "gaps", "out"].map(lane).into(),
             state: None,
             states: Vec::new(),
-            flags: Vec::new(),
-            more_flags: 0,
-            column: 0,
+            flags: SeatFlags::default(),
+            said: Vec::new(),
             is_whole,
         }
     }
@@ -190,22 +193,39 @@ impl Gathered {
             Told::Chunks(chunks) => self.chunks(contents, &chunks),
             Told::Other(topic @ ("/mark" | "/event" | "/action"), data) => {
                 let seat = &contents.seats[self.look.lane].name;
-                let at_s = self.look.axis.time.place(self.column);
-                let Some(name) = flag_name(topic, data, seat) else { return };
-                if self.flags.len() < FLAGS {
-                    self.flags.push(Flag { at_s, name, is_mark: topic == "/mark" });
-                } else {
-                    self.more_flags += 1;
+                let note: Value = serde_json::from_slice(data).unwrap_or_default();
+                if topic == "/event" && note["kind"] == "standing" && note["seat"] == seat.as_str() {
+                    self.stands(at, note["text"].as_str().unwrap_or_default());
                 }
+                let Some(name) = flag_name(topic, &note, seat) else { return };
+                let film_s = note["film_s"].as_f64();
+                self.flags.note(Noted { at, film_s, name, is_mark: topic == "/mark" });
             }
             _ => {}
         }
     }
 
-    fn place(&mut self, at: MonoTime, film_s: f64) -> Option<(usize, Moment)> {
+    fn place(&self, at: MonoTime, film_s: f64) -> Option<(usize, Moment)> {
         let moment = self.look.axis.moment(at, film_s)?;
-        self.column = self.look.axis.time.column(moment.at_s)?;
-        Some((self.column, moment))
+        Some((self.look.axis.time.column(moment.at_s)?, moment))
+    }
+
+    fn stands(&mut self, at: MonoTime, text: &str) {
+        if self.said.len() < SAID {
+            self.said.push((at, text.to_owned()));
+        }
+    }
+
+    /// What was said about the time of it of why the seat fell out first.
+    pub(super) fn why_fallen(&self) -> Option<&str> {
+        /// The recorder is told of it a little later than it was found.
+        const ABOUT: Duration = Duration::from_secs(1);
+        let SeatFall { out: (out, _), standing, .. } = self.falls.first?;
+        let why = |text: &'_ str| text.strip_prefix(&format!("{standing}: ")).map(str::len);
+        let apart = |at: MonoTime| at.since(out).max(out.since(at));
+        let near = self.said.iter().filter(|(at, _)| apart(*at) <= ABOUT);
+        let why = near.filter_map(|(at, text)| Some((apart(*at), &text[text.len() - why(text)?..])));
+        why.min_by_key(|(apart, _)| *apart).map(|(_, why)| why)
     }
 
     fn seat(&mut self, at: MonoTime, sample: &SeatSample) {
@@ -249,6 +269,7 @@ impl Gathered {
     }
 
     fn tick(&mut self, at: MonoTime, sample: &TickSample) {
+        self.flags.tick(&self.look.axis, at, sample.film_s);
         let Some((column, moment)) = self.place(at, sample.film_s) else { return };
         if let Some(word) = self.state {
             let columns = self.look.axis.time.columns;
@@ -259,21 +280,26 @@ impl Gathered {
             });
             self.states[index].1[column] = Shade { height: 1.0, tone: 1.0 };
         }
-        self.counts.missed += sample.missed;
+        // While the film stands before it begins, or is over, nobody is led by it.
+        let missed = if self.look.axis.runs(at) { sample.missed } else { 0 };
+        self.counts.missed += missed;
         self.counts.dropped += sample.dropped;
-        self.on(1, column, sample.missed);
+        self.on(1, column, missed);
         self.on(5, column, sample.dropped);
         if self.falls.is_out() {
             // Nothing more is told of a seat that is out.
             self.lanes[OUT].1[column] = Shade { height: 1.0, tone: 1.0 };
         }
         if !self.is_whole {
-            self.late(column, moment, sample.late_max_us);
+            self.late(at, column, moment, sample.late_max_us);
         }
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "a picture is no finer")]
-    fn late(&mut self, column: usize, moment: Moment, late_us: f64) {
+    fn late(&mut self, at: MonoTime, column: usize, moment: Moment, late_us: f64) {
+        if !self.look.axis.runs(at) {
+            return;
+        }
         if self.late[column].len() < KEPT {
             self.late[column].push((late_us / 1e3) as f32);
         }
@@ -298,7 +324,7 @@ impl Gathered {
                 });
             }
             let Some((column, moment)) = self.place(at, film_s) else { return };
-            self.late(column, moment, micros(chunk.head.late_ns));
+            self.late(at, column, moment, micros(chunk.head.late_ns));
             for frame in chunk.frames().filter(|frame| frame.lane == lane) {
                 let is_taken = frame.handed.is_taken();
                 self.counts.sent += u64::from(is_taken);
@@ -369,8 +395,7 @@ fn micros(ns: u64) -> f64 {
 }
 
 /// What a note is called in the picture of a seat; none where it is of another seat.
-fn flag_name(topic: &str, data: &[u8], seat: &str) -> Option<String> {
-    let note: Value = serde_json::from_slice(data).unwrap_or_default();
+fn flag_name(topic: &str, note: &Value, seat: &str) -> Option<String> {
     let text = |key: &str| note[key].as_str().unwrap_or_default();
     let of = text("seat");
     match topic {

@@ -2,6 +2,7 @@
 //! sentence that says what happened.
 
 mod film_axis;
+mod flags;
 mod gather;
 mod panels;
 mod words;
@@ -36,15 +37,20 @@ pub(crate) fn of_recording(
     other: Option<Gathered>,
 ) -> Picture {
     let seat = &contents.seats[gathered.look.lane];
+    let flags = gathered.flags.close(&gathered.look.axis);
     let (lateness, latency) = (take(&mut gathered.lateness), take(&mut gathered.latency));
-    let histograms = [histogram("Lateness", lateness), histogram("Ack latency", latency)];
+    // A sample has one ack, and in a file of samples alone the latest of its ticks.
+    let of_ticks =
+        if gathered.is_whole { "Lateness of all ticks" } else { "Lateness, the latest tick of each sample" };
+    let histograms =
+        [histogram(of_ticks, lateness), histogram("Ack latency, the last ack of each sample", latency)];
     Picture {
         title: title(contents, &seat.name),
         sentence: sentence(&seat.name, &gathered, contents.rate_hz()),
         facts: facts(contents, summary, &gathered),
         time: gathered.look.axis.time.clone(),
         lanes: strips(take(&mut gathered.lanes), take(&mut gathered.states)),
-        flags: flags_of_passes(&gathered.look.axis.time).chain(take(&mut gathered.flags)).collect(),
+        flags: flags_of_passes(&gathered.look.axis.time).chain(flags).collect(),
         table: seats(summary),
         histograms: histograms
             .into_iter()
@@ -92,7 +98,11 @@ mod tests {
     use super::super::{Theme, braille, page, svg};
     use super::*;
     use crate::health::HealthState;
-    use crate::record::{Mode, Wanted, read, recorded_as, recorded_falling, recorded_filmed, summarize};
+    use crate::record::{
+        Mode, SeatSample, TickSample, Told, Wanted, read, recorded_as, recorded_falling, recorded_filmed,
+        standing_of, summarize,
+    };
+    use crate::time::MonoTime;
 
     /// What a seat at rest in the middle, that was asked for a tenth of the stroke more in some ticks, looks like.
     fn drawn(mode: Mode, asked: std::ops::Range<u32>, columns: usize) -> Picture {
@@ -101,11 +111,28 @@ mod tests {
     }
 
     fn drawn_of(mode: Mode, file: &[u8], columns: usize) -> Picture {
+        drawn_with(mode, file, columns, |_| Vec::new())
+    }
+
+    /// The same of a file that tells more once the ticks have come to so many ms: each with its own, also in ms.
+    fn drawn_with(
+        mode: Mode,
+        file: &[u8],
+        columns: usize,
+        more: impl Fn(u64) -> Vec<(u64, Told<'static>)>,
+    ) -> Picture {
         let (contents, summary) = summarize(file).unwrap();
         let axis = FilmAxis::over(&summary.passes, (f64::NEG_INFINITY, f64::INFINITY), columns).unwrap();
         let mut gathered =
             Gathered::new(&contents, Look { lane: 0, axis, is_detailed: true }, mode == Mode::Full);
-        read(file, Wanted::ALL, &mut |contents, at, told| gathered.take(contents, at, told)).unwrap();
+        read(file, Wanted::ALL, &mut |contents, at, told| {
+            let is_tick = matches!(told, Told::Tick(_));
+            gathered.take(contents, at, told);
+            for (ms, told) in if is_tick { more(at.as_nanos() / 1_000_000) } else { Vec::new() } {
+                gathered.take(contents, MonoTime::from_nanos(ms * 1_000_000), told);
+            }
+        })
+        .unwrap();
         of_recording(&contents, &summary, gathered, None)
     }
 
@@ -135,18 +162,83 @@ mod tests {
         for mode in [Mode::Full, Mode::Sampled] {
             let ticks = || (0..300).map(|_| (0.5, 0.5));
             let gone = drawn_of(mode, &recorded_falling(mode, ticks(), stays), 300);
-            assert!(gone.sentence.starts_with("A1 at 00:01.5"), "{}", gone.sentence);
-            assert!(
-                gone.sentence.contains(": fell out (lost), not back in what is shown; "),
-                "{}",
-                gone.sentence
-            );
+            let [still, out] = ["A1 stood still from 00:01.", ": judged lost at 00:01.5"];
+            assert!(gone.sentence.starts_with(still) && gone.sentence.contains(out), "{}", gone.sentence);
+            assert!(gone.sentence.contains(", not back in what is shown; "), "{}", gone.sentence);
             assert!(gone.facts.contains(&"Fell out: A1.".to_owned()), "{:?}", gone.facts);
             let out = gone.lanes.iter().find(|lane| lane.name == "out").expect("it is drawn");
             assert!(out.columns[299].height > 0.0 && out.columns[100].height == 0.0);
             let back = drawn_of(mode, &recorded_falling(mode, ticks(), comes_back), 300);
-            assert!(back.sentence.contains("fell out (lost), back in play at 00:02.0"), "{}", back.sentence);
+            assert!(back.sentence.contains(" to 00:02.0"), "{}", back.sentence);
+            assert!(back.sentence.contains(", back in play at 00:02.0"), "{}", back.sentence);
         }
+    }
+
+    #[test]
+    fn a_flag_stands_at_its_own_instant_however_wide_a_column_is() {
+        let action = br#"{"what": "pause", "result": "done"}"#;
+        let mark = br#"{"text": "jerk", "film_s": 1.777}"#;
+        // Told before the tick after it, while it goes on, half a second late, and with a show time of its own.
+        let more = |ms| match ms {
+            1_190 => vec![(1_234, Told::Other("/action", &action[..]))],
+            2_540 => {
+                vec![(2_021, Told::Other("/action", &action[..])), (1_790, Told::Other("/mark", &mark[..]))]
+            }
+            _ => Vec::new(),
+        };
+        for mode in [Mode::Full, Mode::Sampled] {
+            let ticks = (0..300).map(|_| (0.5, 0.5));
+            let picture = drawn_with(mode, &recorded_as(mode, ticks), 3, more);
+            let mut at: Vec<f64> = picture.flags.iter().map(|flag| flag.at_s).collect();
+            at.sort_by(f64::total_cmp);
+            let expected = [1.234, 1.777, 2.021];
+            assert_eq!(at.len(), 3, "{at:?}");
+            assert!(at.iter().zip(expected).all(|(at, right)| (at - right).abs() < 1e-6), "{at:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_missed_before_the_film_runs_and_once_it_is_over_is_not_told_of_the_seat() {
+        let film_ms = |tick: u64| 10 * tick.saturating_sub(100).min(200);
+        let file = recorded_filmed(Mode::Sampled, (0..500).map(|_| (0.5, 0.5)), film_ms);
+        let missed = |ms: u64, film_s| {
+            let sample =
+                TickSample { film_s, missed: 6, late_max_us: 7_500.0, ticks: 5, ..TickSample::default() };
+            (ms, Told::Tick(sample))
+        };
+        let idle = drawn_with(Mode::Sampled, &file, 300, |ms| match ms {
+            540 => vec![missed(545, 0.0)],
+            4_040 => vec![missed(4_045, 2.0)],
+            _ => Vec::new(),
+        });
+        assert!(!idle.sentence.contains("missed"), "{}", idle.sentence);
+        let ran = drawn_with(Mode::Sampled, &file, 300, |ms| {
+            if ms == 2_040 { vec![missed(2_045, 1.045)] } else { Vec::new() }
+        });
+        assert!(ran.sentence.contains("6 ticks missed"), "{}", ran.sentence);
+    }
+
+    #[test]
+    fn why_a_seat_fell_out_is_told_and_in_which_pass() {
+        let number = |wanted| (0..=u8::MAX).find(|number| standing_of(*number) == Some(wanted));
+        let stood = |film_s, standing| {
+            Told::Seat(0, SeatSample { film_s, standing: number(standing), ..SeatSample::default() })
+        };
+        let error =
+            br#"{"kind": "standing", "seat": "A1", "text": "error: Err12: alarm of the servo of axis 3"}"#;
+        let other = br#"{"kind": "standing", "seat": "A2", "text": "error: Err9: another"}"#;
+        let more = |ms| match ms {
+            40 => vec![(40, stood(0.04, HealthState::Ok))],
+            2_540 => vec![
+                (2_500, stood(1.5, HealthState::Error)),
+                (2_510, Told::Other("/event", &other[..])),
+                (2_520, Told::Other("/event", &error[..])),
+            ],
+            _ => Vec::new(),
+        };
+        let picture = drawn_with(Mode::Sampled, &thrice(Mode::Sampled), 450, more);
+        let said = ": judged error at 00:01.500 in pass 2 (Err12: alarm of the servo of axis 3), not back in what is shown; ";
+        assert!(picture.sentence.contains(said), "{}", picture.sentence);
     }
 
     #[test]

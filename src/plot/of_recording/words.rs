@@ -1,9 +1,10 @@
 //! What a picture of a recording says in words: the sentence, the facts below it, a row for each seat.
 
 use super::gather::{APART, Gathered};
+use crate::plain::escaped;
 use crate::plot::text::number;
 use crate::plot::{Table, TimeAxis};
-use crate::record::{Contents, Falls, Summary};
+use crate::record::{Contents, FilmInstant, SeatFall, Summary};
 use crate::time::ShowTime;
 
 /// A tick is late from here on, µs.
@@ -36,9 +37,9 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
         return format!("{name}: nothing was sent in what is shown.");
     }
     let held = counts.apart > APART || counts.clamps > 0;
-    let fell = fallen(&gathered.falls);
+    let fell = fallen(gathered);
     let mut words = match &fell {
-        Some((at, how)) => format!("{name} at {at}: {how}; "),
+        Some(how) => format!("{name}{how}; "),
         None if held => format!("{name} at {}: ", counts.apart_at),
         None => format!("{name}: "),
     };
@@ -82,17 +83,29 @@ pub(super) fn sentence(name: &str, gathered: &Gathered, rate_hz: f64) -> String 
     words + "."
 }
 
-/// When a seat fell out, and that it did, which is graver than all else; `None` where it did not.
-fn fallen(falls: &Falls) -> Option<(ShowTime, String)> {
-    let (at, standing) = falls.first?;
-    let time = ShowTime::from_secs_f64;
-    let back = match falls.back_s {
-        Some(back) => format!("back in play at {}", time(back)),
+/// That a seat fell out, which is graver than all else, since when it stood still, when that was found and why; `None` where it did not.
+fn fallen(gathered: &Gathered) -> Option<String> {
+    let SeatFall { still, out, standing, back, moved } = gathered.falls.first?;
+    let axis = &gathered.look.axis;
+    let place = |(at, film_s): FilmInstant| {
+        let moment = axis.moment(at, film_s);
+        moment.map_or_else(|| ShowTime::from_secs_f64(film_s).to_string(), |moment| moment.to_string())
+    };
+    let stood = match (still.map(place), moved.map(place)) {
+        (Some(from), Some(to)) => format!(" stood still from {from} to {to}"),
+        (Some(from), None) => format!(" stood still from {from} on"),
+        (None, _) => String::new(),
+    };
+    let why = gathered.why_fallen().map(|why| format!(" ({})", escaped(why, 200))).unwrap_or_default();
+    let times = match gathered.falls.count {
+        1 => String::new(),
+        times => format!(" for the first of {times} times"),
+    };
+    let back = match back.map(place) {
+        Some(back) => format!("back in play at {back}"),
         None => "not back in what is shown".to_owned(),
     };
-    let times =
-        if falls.count > 1 { format!(" for the first of {} times", falls.count) } else { String::new() };
-    Some((time(at), format!("fell out{times} ({standing}), {back}")))
+    Some(format!("{stood}: judged {standing} at {}{times}{why}, {back}", place(out)))
 }
 
 pub(super) fn facts(contents: &Contents, summary: &Summary, gathered: &Gathered) -> Vec<String> {
@@ -120,10 +133,10 @@ pub(super) fn facts(contents: &Contents, summary: &Summary, gathered: &Gathered)
         facts.push(format!("Fell out: {}.", fell.collect::<Vec<_>>().join(", ")));
     }
     facts.extend(passes(&gathered.look.axis.time));
-    if gathered.more_flags > 0 {
+    if gathered.flags.more > 0 {
         facts.push(format!(
             "{} more marks, events and requests have no flag; record info lists them.",
-            gathered.more_flags
+            gathered.flags.more
         ));
     }
     if summary.dropped > 0 {
@@ -131,6 +144,9 @@ pub(super) fn facts(contents: &Contents, summary: &Summary, gathered: &Gathered)
     }
     if let Some(trouble) = &contents.trouble {
         facts.push(format!("The file {trouble}."));
+    }
+    if let Some(why) = &contents.recovered {
+        facts.push(format!("Recovered from a file that {why}."));
     }
     facts
 }

@@ -152,7 +152,7 @@ fn an_anonymous_cut_holds_nothing_that_its_hall_its_cue_or_its_day_is_known_by()
     let stretch = Stretch { from: ShowTime::ZERO, until: ShowTime::from_millis(900), seat: None };
     for (whole, scene) in [(true, false), (true, true), (false, true)] {
         let manner = CutManner { anonymous: true, whole, scene, film_time: false };
-        let cut = cut(file.as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().into_inner();
+        let cut = cut(file.as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().0.into_inner();
         let (all, datagrams) = told_whole(&cut);
         for secret in secrets() {
             assert!(!has(&all, &secret), "{manner:?}: {} is in it", secret.escape_ascii());
