@@ -35,6 +35,7 @@ mod seat_testing;
 mod service_log;
 mod shared_link;
 mod show;
+mod standing;
 mod starts;
 mod state_mirror;
 mod status;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::HallContext;
-use super::status::standing_words;
+use super::standing::standing_words;
 use crate::app::recorder::{RecordAsk, ShowStart};
 use crate::control::{Code, Desired, Problem, Who};
 use crate::film::point::FilmState;

@@ -7,6 +7,7 @@ use super::features::Features;
 use super::hall::HallContext;
 use super::readiness::CORRECT;
 use super::seat_places::SeatPlaces;
+use super::standing::standing_words;
 use super::{belts, film};
 use crate::app::buttons::PadTable;
 use crate::app::links;
@@ -24,10 +25,6 @@ use crate::rt::Row;
 use crate::state::{Next, PlayMode, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker;
-
-/// Of a seat on drives that is not where it was led.
-const OFF_COURSE: &str = "its drives are not where they were led: something blocks or pushes them, their load is too much for the motors, \
-                          or what was sent to them was damaged on the way";
 
 /// The least and the greatest bound of the buckets, µs.
 const BOUNDS_US: [f64; 16] = [
@@ -222,26 +219,6 @@ impl StatusParts<'_> {
             measured,
             ..nameplate(controller)
         }
-    }
-}
-
-/// Why a controller stands so. Of a rigid seat all controllers stand as one of them does: that one is named.
-pub(super) fn standing_words(hall: &HallContext, index: usize, why: Why) -> (String, Coded) {
-    let whose = why.controller().unwrap_or(index);
-    let of = hall.config.controllers.get(whose);
-    let (words, coded) = match why {
-        // Drives have neither a PA96 nor filters.
-        Why::Astray(_) if of.is_some_and(|one| one.drives().is_some()) => {
-            (OFF_COURSE.to_owned(), Coded::new(StandingCode::OffCourse.word(), []))
-        }
-        _ => (why.to_string(), Coded::new(why.code(), why.figures())),
-    };
-    match of.filter(|_| whose != index) {
-        Some(other) => (
-            format!("{}: {words}", other.name),
-            Coded::new(StandingCode::Beside.word(), [other.name.clone()]),
-        ),
-        None => (words, coded),
     }
 }
 

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use super::coded::{RemedyCode, WarningCode};
 use super::readiness::CORRECT;
-use super::status::{StatusParts, standing_words};
+use super::standing::standing_words;
+use super::status::StatusParts;
 use super::{belts, player, recorded};
 use crate::app::links;
 use crate::app::notify::NotifyTable;
