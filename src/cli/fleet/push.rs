@@ -74,8 +74,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         for file in &mut files {
             let sent = file.put(&kept).await?;
             let (id, bytes) = (&file.id, file.cue.bytes);
+            let s = if sent == 1 { "" } else { "s" };
             print::tell(&format!(
-                "{id}: {bytes} bytes, sha256 {}; {sent} messages to the engine",
+                "{id}: {bytes} bytes, sha256 {}; {sent} message{s} to the engine",
                 file.cue.sha256
             ));
         }
