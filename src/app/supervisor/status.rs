@@ -19,7 +19,6 @@ use crate::control::{
     Times, Warning,
 };
 use crate::drive::link::AT_PARK;
-use crate::health::Why;
 use crate::motion::AxisGeometry;
 use crate::rt::Row;
 use crate::state::{Next, PlayMode, State};
