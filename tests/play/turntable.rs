@@ -1,14 +1,24 @@
 //! A chair of three cylinders and a turntable on one controller, which is judged by the virtual controller that it plays to.
 
+use std::net::{Ipv4Addr, UdpSocket};
+use std::time::Duration;
+
+use kinocue::harness::motion::Pulses;
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::Clock as _;
+use kinocue::wire::{
+    Analogue, Code, Dialect, FrameNo, MAX_LEN, Motion, ReadRequest, RegisterReply, Timing, position,
+};
+
 use super::process::{Sim, kinocue};
 use super::{Folder, nod_part, pulses};
 
-/// The chair at that controller, its turntable at rest at so many degrees.
-fn chair(address: &str, park_deg: i32) -> String {
+/// The chair at that controller.
+fn chair(address: &str) -> String {
     format!(
         "[show]\nbind = \"127.0.0.1:0\"\n[seat.chair]\naxes = 4\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 10000\n\
          max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n\
-         [seat.chair.axis4]\nunit = \"deg\"\nrange = [-180, 180]\npulses_per_rev = 36000\npark = {park_deg}\n\
+         [seat.chair.axis4]\nunit = \"deg\"\nrange = [-180, 180]\npulses_per_rev = 36000\n\
          max_velocity_deg_s = 400\nmax_acceleration_deg_s2 = 4000\nmax_jerk_deg_s3 = 200000\n\
          [[controller]]\nname = \"C1\"\nseat = \"chair\"\naddress = \"{address}\"\n"
     )
@@ -33,7 +43,7 @@ fn sim() -> Sim {
 fn a_chair_with_a_turntable_goes_up_and_round_to_either_side_and_rests_where_its_zero_is() {
     for turn_deg in [30.0, -30.0] {
         let (folder, sim) = (Folder::new(), sim());
-        let config = folder.write("hall.toml", chair(&sim.addresses[0], 0));
+        let config = folder.write("hall.toml", chair(&sim.addresses[0]));
         let cue = cue(&folder, 0.0, turn_deg);
         let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
         let report = kinocue(&["play", cue, "--config", config, "--json"]).report_of(0);
@@ -47,30 +57,71 @@ fn a_chair_with_a_turntable_goes_up_and_round_to_either_side_and_rests_where_its
     }
 }
 
+/// The number of frames that are nobody's show.
+const JOGGED: FrameNo = FrameNo(900_000_000);
+
+/// Has the turntable of that controller turn there, as somebody does who jogs it.
+fn turn_to(address: &str, turned: i32) {
+    let controller = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
+    controller.connect(address).expect("loopback can be reached");
+    let positions = [0, 0, 0, turned, 0, 0].map(Pulses);
+    let motion = Motion {
+        timing: Timing::Relative,
+        channel: 1,
+        accept: Code::ALL,
+        reply: Code::NONE,
+        frame: JOGGED,
+        time_ms: 500,
+        positions: &positions,
+        outputs: 0,
+        analogue: Analogue::OFF,
+        vibration: None,
+    };
+    controller.send(motion.emit(&mut [0; MAX_LEN])).expect("loopback takes it");
+    let place = || {
+        let ask = ReadRequest { channel: 0, accept: Code::ALL, reply: Code::ALL, start: 0x21, num: 2 };
+        let mut bytes = [0; MAX_LEN];
+        controller.send(ask.emit(&mut [0; MAX_LEN])).expect("loopback takes it");
+        let len = controller.recv(&mut bytes).expect("it answers");
+        let words: Vec<u16> = RegisterReply::parse(&bytes[..len]).expect("an answer").data.iter().collect();
+        position([words[0], words[1]], Dialect::Smc).0
+    };
+    while place() != turned {
+        // More questions than it can take would be an error of its own.
+        Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(10));
+    }
+}
+
 #[test]
 fn a_turntable_is_led_to_park_from_where_it_is_read_and_not_from_an_end_of_its_range() {
     let (folder, sim) = (Folder::new(), sim());
-    let play = |park_deg: i32| {
-        let config = folder.write("hall.toml", chair(&sim.addresses[0], park_deg));
-        let cue = cue(&folder, f64::from(park_deg), f64::from(park_deg));
-        let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
-        kinocue(&["play", cue, "--config", config, "--json"]).report_of(0)
-    };
-    play(-8);
-    play(5);
+    let config = folder.write("hall.toml", chair(&sim.addresses[0]));
+    let cue = cue(&folder, 0.0, 0.0);
+    let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
+    for turned in [-800, 500] {
+        turn_to(&sim.addresses[0], turned);
+        kinocue(&["play", cue, "--config", config, "--json"]).report_of(0);
+    }
     let seen = sim.end();
-    let turned: Vec<i32> = seen.rows.iter().map(|row| row.commanded[3]).collect();
-    assert_eq!((turned.iter().min(), turned.iter().max()), (Some(&-800), Some(&500)), "no farther than that");
-    let leap = turned.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max();
-    // 10 degrees a second are 10 pulses in a frame of 10 ms, the last frame of a Time and rounding left aside.
-    assert!(leap.is_some_and(|leap| leap <= 21), "{leap:?}");
-    assert_eq!(seen.controllers[0]["positions"][3], 500);
+    let shows: Vec<Vec<i32>> = (seen.rows.split(|row| row.frame == JOGGED.0).skip(1))
+        .map(|show| show.iter().map(|row| row.commanded[3]).collect())
+        .collect();
+    assert_eq!(shows.len(), 2);
+    for (show, turned) in shows.iter().zip([-800_i32, 500]) {
+        let led: Vec<i32> = [turned].iter().chain(show).copied().collect();
+        let (least, most) = (turned.min(0), turned.max(0));
+        assert!(led.iter().all(|at| (least..=most).contains(at)), "no farther than that: {led:?}");
+        let leap = led.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max();
+        // 10 degrees a second are 10 pulses in a frame of 10 ms, the last frame of a Time and rounding left aside.
+        assert!(leap.is_some_and(|leap| leap <= 21), "{leap:?}");
+        assert_eq!(led.last(), Some(&0));
+    }
 }
 
 #[test]
 fn a_turntable_that_nobody_asked_where_it_is_is_sent_nothing() {
     let (folder, sim) = (Folder::new(), sim());
-    let config = folder.write("hall.toml", chair(&sim.addresses[0], 0));
+    let config = folder.write("hall.toml", chair(&sim.addresses[0]));
     let cue = cue(&folder, 0.0, 30.0);
     let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
     let run = kinocue(&["play", cue, "--config", config, "--no-acks"]);
@@ -82,7 +133,7 @@ fn a_turntable_that_nobody_asked_where_it_is_is_sent_nothing() {
 #[test]
 fn a_cue_in_millimetres_is_no_cue_for_a_turntable() {
     let folder = Folder::new();
-    let config = folder.write("hall.toml", chair("127.0.0.1:9", 0));
+    let config = folder.write("hall.toml", chair("127.0.0.1:9"));
     let rows = "# units: mm\ntime_ms,a1,a2,a3,a4\n0,0,0,0,0\n1000,0,0,0,0\n";
     let cue = folder.write("mm.csv", rows);
     let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
