@@ -4,18 +4,19 @@
 #[path = "common/process.rs"]
 mod process;
 
+#[path = "common/jog.rs"]
+mod jog;
+
 use std::net::{Ipv4Addr, UdpSocket};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Duration;
 
+use jog::JoggedTo;
 use kinocue::harness::latency::{Percentiles, read};
 use kinocue::harness::motion::Pulses;
-use kinocue::harness::sys::clock::Monotonic;
-use kinocue::harness::time::Clock as _;
 use kinocue::wire::{
-    Access, Analogue, Code, Dialect, FrameNo, MAX_LEN, Motion, MotionRequest, ReadRequest, RegisterReply,
-    ReplyCode, Timing, Words, position, position_words,
+    Access, Dialect, FrameNo, MAX_LEN, MotionRequest, ReadRequest, RegisterReply, ReplyCode, Words,
+    position_words,
 };
 use process::{Run, Sim, kinocue};
 use serde_json::Value;
@@ -60,45 +61,12 @@ fn without_controllers_it_measures_virtual_ones_of_its_own_and_keeps_every_time(
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "nothing else is left");
 }
 
-/// Asks a virtual controller where its first axis stands.
-fn place(controller: &UdpSocket) -> i32 {
-    let ask = ReadRequest { channel: 0, accept: Code::ALL, reply: Code::ALL, start: 0x06, num: 2 };
-    let mut bytes = [0; MAX_LEN];
-    controller.send(ask.emit(&mut [0; MAX_LEN])).expect("loopback takes it");
-    let len = controller.recv(&mut bytes).expect("it answers");
-    let words: Vec<u16> = RegisterReply::parse(&bytes[..len]).expect("an answer").data.iter().collect();
-    position([words[0], words[1]], Dialect::Smc).0
-}
-
-/// Sends a virtual controller of three axes to `places`, and waits until its first one is there.
-fn send_to(address: &str, places: [i32; 3]) {
-    let controller = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
-    controller.connect(address).expect("loopback can be reached");
-    let positions = places.map(Pulses);
-    let motion = Motion {
-        timing: Timing::Relative,
-        channel: 0,
-        accept: Code::ALL,
-        reply: Code::NONE,
-        frame: FrameNo(1),
-        time_ms: 500,
-        positions: &positions,
-        outputs: 0,
-        analogue: Analogue::OFF,
-        vibration: None,
-    };
-    controller.send(motion.emit(&mut [0; MAX_LEN])).expect("loopback takes it");
-    while place(&controller) != places[0] {
-        // More questions than it can take would be an error of its own.
-        Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(10));
-    }
-}
-
 #[test]
 fn a_seat_away_from_park_is_held_where_it_stands_by_every_frame() {
     const PLACES: [i32; 3] = [90_001, 60_000, 12_345];
     let sim = Sim::one(&[]);
-    send_to(&sim.addresses[0], PLACES);
+    let (channel, frame, axis, register) = (0, FrameNo(1), 0, 0x06);
+    JoggedTo { channel, frame, positions: &PLACES, axis, register }.to(&sim.addresses[0]);
     let report = latency_to(&[&sim.addresses[0]], &[]).report_of(0);
     let sent = count(&report["report"]["controllers"][0]["sent"]);
     assert!(sent > 0 && count(&report["report"]["controllers"][0]["park_frames"]) == 0, "{report}");

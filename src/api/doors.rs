@@ -14,7 +14,6 @@ use super::problem::render;
 use super::tries::Tries;
 use super::{ApiError, gate, ports, serve};
 use crate::config;
-use crate::control::Place;
 use crate::log::Log;
 
 /// What is asked of whoever comes.
@@ -42,11 +41,7 @@ pub(crate) fn serve_behind_doors(
     let router = router.layer(from_fn_with_state(doors, pass));
     let (alive, _) = mpsc::channel(1); // nobody waits for the last of them
     let served = serve::ServedHall { router, closing, alive, log };
-    let places = serve::tcp_places();
-    for listener in listeners {
-        let listener = tokio::net::TcpListener::from_std(listener).map_err(ApiError::System)?;
-        tokio::spawn(serve::tcp(listener, places.clone(), served.clone()));
-    }
+    serve::tcp(listeners, &served).map_err(ApiError::System)?;
     Ok(addresses)
 }
 
@@ -55,10 +50,7 @@ async fn pass(State(doors): State<Arc<Doors>>, mut request: Request, next: Next)
     let response = match gate::admit(&doors.access, &doors.tries, &request) {
         Ok(who) => {
             if let Some(who) = who {
-                if let Some(place) = request.extensions().get::<Arc<Place>>() {
-                    place.show(&who.name);
-                }
-                request.extensions_mut().insert(who);
+                gate::introduce(&mut request, who);
             }
             gate::caught(next.run(request)).await
         }

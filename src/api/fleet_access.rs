@@ -99,7 +99,7 @@ impl FleetAccess {
 
     fn allows(&self, word: FleetWord) -> bool {
         let fleet = self.fleet.read().unwrap_or_else(PoisonError::into_inner);
-        fleet.as_ref().is_some_and(|fleet| fleet.allow.contains(&word))
+        fleet.as_ref().is_some_and(|fleet| fleet.allows(word))
     }
 
     /// Whose key has signed a letter, and what the hall is called in the fleet.
@@ -220,13 +220,7 @@ mod tests {
         let (access, pair) = access();
         let fleet = |role, allow: &[FleetWord]| {
             let key = FleetKey { name: "office".to_owned(), role, public: pair.public_key() };
-            Some(Fleet {
-                name: "berlin.h3".to_owned(),
-                allow: allow.to_vec(),
-                start: false,
-                start_bound: Duration::from_millis(2),
-                keys: vec![key],
-            })
+            Some(Fleet { allow: allow.to_vec(), ..fleet(vec![key]) })
         };
         let wall_ns = u64::try_from(NOW_MS).unwrap() * 1_000_000;
         let open = |pair: &KeyPair, to: &str, rev: i64| {

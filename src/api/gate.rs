@@ -67,14 +67,8 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
     let Some(who) = who else {
         return render(caught(next.run(request)).await, None);
     };
-    // Who has shown a token, or may open the control socket, keeps a place before those who have not.
-    let known = matches!(who.surface, Surface::Socket | Surface::Fleet)
-        || request.headers().contains_key(AUTHORIZATION);
-    if let Some(place) = request.extensions().get::<Arc<Place>>().filter(|_| known) {
-        place.show(&who.name);
-    }
-    let asker = KeyHolder { name: who.to_string(), is_known: known };
-    request.extensions_mut().insert(who);
+    let name = who.to_string();
+    let asker = KeyHolder { name, is_known: introduce(&mut request, who) };
     let key = one(request.headers(), &IDEMPOTENCY_KEY).map(|key| key.map(str::to_owned));
     let response = match key {
         // A stop is done each time that it comes.
@@ -109,6 +103,18 @@ pub(super) fn admit(access: &Access, tries: &Tries, request: &Request) -> Result
         Peer::Tcp(_) if in_the_open => None,
         Peer::Tcp(address) => Some(access.who(headers, *address, tries, Monotonic.now())?),
     })
+}
+
+/// Has a request, and the connection that it came by, know who asks. True of who has shown a token, or may open the control socket: they
+/// keep a place before those who have not.
+pub(super) fn introduce(request: &mut Request, who: Who) -> bool {
+    let is_known = matches!(who.surface, Surface::Socket | Surface::Fleet)
+        || request.headers().contains_key(AUTHORIZATION);
+    if let Some(place) = request.extensions().get::<Arc<Place>>().filter(|_| is_known) {
+        place.show(&who.name);
+    }
+    request.extensions_mut().insert(who);
+    is_known
 }
 
 /// What is no secret and changes nothing: the page and what belongs to it, the description of the API, whether it is well.

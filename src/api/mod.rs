@@ -278,12 +278,7 @@ fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, [router, of_f
     let hall = serve::ServedHall { router, closing: closing.clone(), alive, log };
     runtime.block_on(async move {
         tokio::spawn(Pulse::follow(shared));
-        let places = serve::tcp_places();
-        for listener in tcp {
-            let listener = tokio::net::TcpListener::from_std(listener);
-            let listener = listener.expect("the runtime has just been made, and takes sockets");
-            tokio::spawn(serve::tcp(listener, places.clone(), hall.clone()));
-        }
+        serve::tcp(tcp, &hall).expect("the runtime has just been made, and takes sockets");
         let taken =
             |listener| tokio::net::UnixListener::from_std(listener).expect("the runtime takes sockets");
         if let Some(fleet) = fleet {

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::future::poll_fn;
 use std::io;
-use std::net::{IpAddr, SocketAddr};
+use std::net::{self, IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
@@ -80,8 +80,19 @@ pub(super) async fn local(
     accept_each(hall.closing.clone(), |context| listener.poll_accept(context), on).await;
 }
 
-/// Serves one TCP port until the server ends.
-pub(super) async fn tcp(listener: TcpListener, places: Places, hall: ServedHall) {
+/// Has the runtime that calls serve these TCP ports until the server ends.
+///
+/// # Errors
+/// Where the runtime does not take one.
+pub(super) fn tcp(listeners: Vec<net::TcpListener>, hall: &ServedHall) -> io::Result<()> {
+    let places = Places::new(TCP);
+    for listener in listeners {
+        tokio::spawn(port(TcpListener::from_std(listener)?, places.clone(), hall.clone()));
+    }
+    Ok(())
+}
+
+async fn port(listener: TcpListener, places: Places, hall: ServedHall) {
     let on = |(stream, from): (TcpStream, SocketAddr)| {
         let address = from.ip().to_canonical();
         let place = hall.place(&places, Some(address), &address.to_string());
@@ -107,11 +118,6 @@ async fn accept_each<T>(
             Err(_) => tokio::time::sleep(PAUSE).await, // out of descriptors or memory: a moment later there may be some
         }
     }
-}
-
-/// Room for all connections over TCP.
-pub(super) fn tcp_places() -> Places {
-    Places::new(TCP)
 }
 
 async fn connection<S>(stream: S, peer: Peer, place: Place, hall: ServedHall)

@@ -14,6 +14,15 @@ pub(crate) struct Asset {
     pub(crate) body: &'static [u8],
 }
 
+/// A `Content-Type`, and the bytes of that.
+type ServedBytes = (&'static str, &'static [u8]);
+
+impl Asset {
+    fn served(self) -> ServedBytes {
+        (self.content_type, self.body)
+    }
+}
+
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const JS: &str = "text/javascript; charset=utf-8";
@@ -95,24 +104,29 @@ const FLEET: &[(&str, Asset)] = files!("fleet/":
     "fleet.js" JS,
 );
 
+/// What it has of the other page.
+const SHARED: [&str; 2] = ["/icon.svg", "/js/dom.js"];
+
 /// The same of the page of a desk.
 #[must_use]
-pub(crate) fn fleet(path: &str) -> Option<(&'static str, &'static [u8])> {
-    let path = if path == "/" { "/index.html" } else { path };
-    let icon = PAGE.iter().filter(|(at, _)| *at == "/icon.svg");
-    let found = FLEET.iter().chain(icon).find(|(at, _)| *at == path);
-    found.map(|(_, asset)| (asset.content_type, asset.body))
+pub(crate) fn fleet(path: &str) -> Option<ServedBytes> {
+    let shared = PAGE.iter().filter(|(at, _)| SHARED.contains(at));
+    find(FLEET.iter().chain(shared), path).map(Asset::served)
 }
 
 /// What is at a path, which begins with a slash; `/` is the page itself. None where there is nothing.
 #[must_use]
 pub(crate) fn asset(path: &str) -> Option<Asset> {
+    find(PAGE.iter().chain(VENDOR), path)
+}
+
+fn find(files: impl IntoIterator<Item = &'static (&'static str, Asset)>, path: &str) -> Option<Asset> {
     let path = if path == "/" { "/index.html" } else { path };
-    PAGE.iter().chain(VENDOR).find(|(at, _)| *at == path).map(|(_, asset)| *asset)
+    files.into_iter().find(|(at, _)| *at == path).map(|(_, asset)| *asset)
 }
 
 /// The content type and the bytes of what is at a path, as a server hands them out.
 #[must_use]
-pub(crate) fn page(path: &str) -> Option<(&'static str, &'static [u8])> {
-    asset(path).map(|asset| (asset.content_type, asset.body))
+pub(crate) fn page(path: &str) -> Option<ServedBytes> {
+    asset(path).map(Asset::served)
 }

@@ -2,12 +2,12 @@
 //! the very one that was noted when it came, by its inode, its length and when it was written. All else is never replaced.
 
 use std::collections::BTreeMap;
-use std::io::{self, Read as _, Write as _};
+use std::io;
 
 use serde::{Deserialize, Serialize};
 
 use super::upload::unwritten;
-use super::{Awaited, CueId, CueInfo, Library, Proved, Upload, file_name, file_problem, lock};
+use super::{Awaited, CueId, CueInfo, Library, Proved, Upload, file_name, file_problem, kept, lock};
 use crate::control::{Code, Problem};
 use crate::sys::folder::{Folder, Stamp};
 
@@ -15,8 +15,6 @@ use crate::sys::folder::{Folder, Stamp};
 const FILE: &str = ".fleet.json";
 /// While it is written.
 const NEW_FILE: &str = ".fleet.new";
-/// The most of it that is read, bytes.
-const MAX_LEN: u64 = 64 << 20;
 
 /// What is kept of a fleet, across starts of the program.
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -72,30 +70,16 @@ pub(crate) enum StandingOfCue {
 impl Brought {
     /// What was kept; nothing where that cannot be read: then all that lies there counts as people's.
     pub(super) fn read(folder: &Folder) -> Self {
-        let read = || -> io::Result<Self> {
-            let mut text = Vec::new();
-            if let Some((file, _)) = folder.file(FILE)? {
-                file.take(MAX_LEN).read_to_end(&mut text)?;
-            }
-            Ok(serde_json::from_slice(&text)?)
-        };
-        read().unwrap_or_default()
+        kept(folder, FILE)
     }
 
     /// Has it on the disk.
     fn write(&self, folder: &Folder) -> Result<(), Problem> {
-        let write = || -> io::Result<()> {
-            folder.remove_abandoned(NEW_FILE)?;
-            let mut file = folder.create(NEW_FILE)?;
-            file.write_all(&serde_json::to_vec(self)?)?;
-            file.sync_all()?;
-            folder.rename(NEW_FILE, FILE)?;
+        let write = || {
+            folder.replace(FILE, NEW_FILE, &serde_json::to_vec(self)?)?;
             folder.sync()
         };
-        write().map_err(|error| {
-            let _ = folder.remove(NEW_FILE); // what is left is removed by the next write
-            unwritten(&error)
-        })
+        write().map_err(|error: io::Error| unwritten(&error))
     }
 
     /// True of a file that was brought and is still the same.

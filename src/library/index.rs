@@ -2,19 +2,16 @@
 //! the cues; where it is missing or damaged, the cues are checked again.
 
 use std::collections::BTreeMap;
-use std::io::{self, Read as _, Write as _};
 
 use serde::{Deserialize, Serialize};
 
-use super::Verdict;
+use super::{Verdict, kept};
 use crate::sys::folder::{Folder, Stamp};
 
 /// Its file; no cue can have that name.
 const FILE: &str = ".index.json";
 /// While it is written.
 const NEW_FILE: &str = ".index.new";
-/// The most of it that is read, bytes.
-const MAX_LEN: u64 = 64 << 20;
 
 /// What is known of each file, by its name.
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -32,14 +29,7 @@ struct Known {
 impl Index {
     /// What was kept; nothing where that cannot be read.
     pub(super) fn read(folder: &Folder) -> Self {
-        let read = || -> io::Result<Self> {
-            let mut text = Vec::new();
-            if let Some((file, _)) = folder.file(FILE)? {
-                file.take(MAX_LEN).read_to_end(&mut text)?;
-            }
-            Ok(serde_json::from_slice(&text)?)
-        };
-        read().unwrap_or_default()
+        kept(folder, FILE)
     }
 
     /// What is known of a file with that content, and whether it was found for that hall.
@@ -54,18 +44,9 @@ impl Index {
         if let Ok(names) = folder.names() {
             self.0.retain(|name, _| names.binary_search(name).is_ok());
         }
-        let _ = self.write(folder);
-    }
-
-    fn write(&self, folder: &Folder) -> io::Result<()> {
-        let text = serde_json::to_vec(self)?;
-        folder.remove_abandoned(NEW_FILE)?;
-        let mut file = folder.create(NEW_FILE)?;
-        let written = file.write_all(&text).and_then(|()| file.sync_all());
-        written.and_then(|()| folder.rename(NEW_FILE, FILE)).inspect_err(|_| {
-            // What is left is removed by the next write.
-            let _ = folder.remove(NEW_FILE);
-        })
+        if let Ok(text) = serde_json::to_vec(self) {
+            let _ = folder.replace(FILE, NEW_FILE, &text);
+        }
     }
 }
 

@@ -33,6 +33,7 @@ use std::sync::atomic::{AtomicU64, AtomicUsize};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use serde::de::DeserializeOwned;
 use sha2::{Digest as _, Sha256};
 
 use crate::config::Store;
@@ -45,6 +46,8 @@ use index::Index;
 
 /// A CSV file of so many bytes is read by whoever wants to play it, known or not; MCAP may unpack to more.
 const SMALL: u64 = 16 << 20;
+/// The most that is read of a file beside the cues, bytes.
+const MAX_KEPT: u64 = 64 << 20;
 /// Curves that are kept; a page asks for the same one again and again.
 const CURVES: usize = 4;
 
@@ -383,6 +386,17 @@ fn file_problem(what: &str, error: &io::Error) -> Problem {
         format!("cannot {what}: {error}"),
         "check the folder of the library and its disk",
     )
+}
+
+/// What a file beside the cues keeps as JSON; nothing where it is missing or cannot be read.
+fn kept<T: DeserializeOwned + Default>(folder: &Folder, name: &str) -> T {
+    let read = || {
+        let (file, _) = folder.file(name).ok()??;
+        let mut text = Vec::new();
+        file.take(MAX_KEPT).read_to_end(&mut text).ok()?;
+        serde_json::from_slice(&text).ok()
+    };
+    read().unwrap_or_default()
 }
 
 /// Bytes as hexadecimal digits.

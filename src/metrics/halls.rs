@@ -2,11 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use prometheus_client::encoding::text;
-use prometheus_client::registry::Registry;
-
 pub(crate) use super::CONTENT_TYPE;
-use super::{Families, Labels, MetricFamily, MetricValues, flag};
+use super::{Labels, MetricFamily, MetricValues, encoded, flag};
 use crate::fleet::BriefStatus;
 
 /// What a desk knows.
@@ -38,11 +35,7 @@ impl FleetFigures {
     /// Never: a `String` takes whatever is written to it.
     #[must_use]
     pub(crate) fn render(&self) -> String {
-        let mut registry = Registry::with_prefix("kinocue");
-        registry.register_collector(Box::new(Families(self.families())));
-        let mut page = String::new();
-        text::encode(&mut page, &registry).expect("a string takes all that is written to it");
-        page
+        encoded(self.families())
     }
 
     fn families(&self) -> Vec<MetricFamily> {

@@ -29,8 +29,12 @@ pub(crate) const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0
 /// Never: a `String` takes whatever is written to it.
 #[must_use]
 pub(crate) fn render(status: &Status) -> String {
+    encoded(families(status))
+}
+
+fn encoded(families: Vec<MetricFamily>) -> String {
     let mut registry = Registry::with_prefix("kinocue");
-    registry.register_collector(Box::new(Families(families(status))));
+    registry.register_collector(Box::new(Families(families)));
     let mut page = String::new();
     text::encode(&mut page, &registry).expect("a string takes all that is written to it");
     page

@@ -49,7 +49,8 @@ pub(crate) struct Holder {
 }
 
 /// What is asked of the engine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Want {
     /// What the key is.
     Read,
@@ -57,8 +58,9 @@ pub(crate) enum Want {
     Swap { revision: u64, holder: Holder },
 }
 
-/// One request to the engine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// One request to the engine: to the link, a line of JSON.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct Ask {
     /// Its number; an answer to another one is none.
     pub(crate) ticket: u64,
@@ -67,7 +69,8 @@ pub(crate) struct Ask {
 }
 
 /// What the engine answered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Answer {
     /// The key, as it is.
     Key { holder: Holder, revision: u64 },
@@ -77,6 +80,16 @@ pub(crate) enum Answer {
     Granted { revision: u64 },
     /// Its revision is another one.
     Refused,
+}
+
+/// What came of a request: of the link, a line of JSON.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Answered {
+    /// That of the request.
+    pub(crate) ticket: u64,
+    /// `None` where the engine said nothing.
+    pub(crate) answer: Option<Answer>,
 }
 
 /// The other machine, as far as it was heard.

@@ -12,15 +12,13 @@
 //! it sends then. Clocks that differ by a thousandth take 1.2 ms of that.
 
 mod claim;
-mod lease;
 mod mac;
 mod message;
 
 #[cfg(test)]
 mod tests;
 
-pub(crate) use claim::{Answer, Ask, Beat, Claim, Holder, Role, Want};
-pub(crate) use lease::{LeaseAnswer, LeaseAsk, LeaseSwap, LeaseTold};
+pub(crate) use claim::{Answer, Answered, Ask, Beat, Claim, Holder, Role, Want};
 pub(crate) use mac::PairKey;
 pub(crate) use message::{Carried, LONGEST, Message};
 

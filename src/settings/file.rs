@@ -2,7 +2,7 @@
 //! which is on the disk before it takes the place of the last, so that whatever crashes leaves one of the two.
 
 use std::fs::File;
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -195,13 +195,7 @@ impl Tray {
 fn write(folder: &Path, text: &str) -> io::Result<()> {
     let folder = Folder::open(folder)?;
     folder.remove(UNFINISHED)?;
-    let mut file = folder.create(UNFINISHED)?;
-    let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_all());
-    if let Err(error) = written {
-        let _ = folder.remove(UNFINISHED); // it takes room
-        return Err(error);
-    }
-    folder.rename(UNFINISHED, FILE)?;
+    folder.replace(FILE, UNFINISHED, text.as_bytes())?;
     folder.sync()
 }
 

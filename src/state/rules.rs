@@ -55,8 +55,21 @@ pub(crate) struct HallRules {
 }
 
 impl HallRules {
-    /// Holds a step of the machine against them.
-    pub(crate) fn check(&mut self, before: &Machine, turn: Turn, taken: bool, after: &Machine) {
+    /// Has a hall take a turn, which may move the clock, and holds what comes of it against them.
+    pub(crate) fn follow(&mut self, hall: &mut Machine, turn: Turn, now: &mut MonoTime) {
+        let before = hall.clone();
+        let taken = match turn {
+            Turn::Step(step) => take(hall, step, *now).is_ok(),
+            Turn::Clock(ms) => {
+                *now = MonoTime::from_nanos(now.as_nanos().saturating_add_signed(ms * 1_000_000));
+                hall.tick(*now);
+                true
+            }
+        };
+        self.check(&before, turn, taken, hall);
+    }
+
+    fn check(&mut self, before: &Machine, turn: Turn, taken: bool, after: &Machine) {
         let (from, to) = (before.state(), after.state());
         match turn {
             Turn::Step(Step::Command(request)) => self.on_request(before, request, taken, after),

@@ -2,8 +2,8 @@
 //! begin.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind};
-use std::os::unix::fs::OpenOptionsExt as _;
+use std::io::{self, ErrorKind, Read as _};
+use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::path::Path;
 
 use rustix::fs::OFlags;
@@ -26,6 +26,20 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
             "it is a pipe or a device, not a file; copy its data to a file, and give that",
         )),
     }
+}
+
+/// The text of a file that nobody else may read, of so many bytes at the most; `None` where others may.
+///
+/// # Errors
+/// As [`open`]; where it is not text.
+pub(crate) fn secret(path: &Path, most: u64) -> io::Result<Option<String>> {
+    let file = open(path)?;
+    if file.metadata()?.permissions().mode() & 0o077 != 0 {
+        return Ok(None);
+    }
+    let mut text = String::new();
+    file.take(most).read_to_string(&mut text)?;
+    Ok(Some(text))
 }
 
 /// What to do where files cannot be opened because too many are; `None` where that is not the reason.

@@ -1,7 +1,7 @@
 //! A folder of plain files. Nothing here follows a symbolic link out of it, waits on a pipe, or names anything outside it.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::path::{Path, PathBuf};
 
@@ -150,6 +150,20 @@ impl Folder {
         Ok(rustix::fs::renameat(&self.fd, from, &self.fd, to)?)
     }
 
+    /// Puts a file of those bytes in the place of another, by way of `unfinished`: from the old whole to the new whole, whatever crashes.
+    /// The name is on the disk after [`Folder::sync`].
+    ///
+    /// # Errors
+    /// Those of the disk; where somebody has `unfinished` locked. What was there stays, and nothing of the new file.
+    pub(crate) fn replace(&self, name: &str, unfinished: &str, bytes: &[u8]) -> io::Result<()> {
+        self.remove_abandoned(unfinished)?;
+        let mut file = self.create(unfinished)?;
+        let written = file.write_all(bytes).and_then(|()| file.sync_all());
+        written.and_then(|()| self.rename(unfinished, name)).inspect_err(|_| {
+            let _ = self.remove(unfinished); // it takes room, and the next one removes what is left
+        })
+    }
+
     /// Removes a file; that there is none is no error.
     pub(crate) fn remove(&self, name: &str) -> io::Result<()> {
         match rustix::fs::unlinkat(&self.fd, name, AtFlags::empty()) {
@@ -167,7 +181,6 @@ impl Folder {
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::io::Write as _;
     use std::os::unix::fs::symlink;
 
     use super::*;
@@ -188,6 +201,24 @@ mod tests {
             assert!(folder.file(name).unwrap().is_none(), "{name}");
         }
         assert_eq!(folder.stamp("plain").unwrap().unwrap().size, 3);
+    }
+
+    #[test]
+    fn a_file_is_replaced_as_a_whole_and_where_it_cannot_be_nothing_of_the_new_one_stays() {
+        let inside = tempfile::tempdir().unwrap();
+        let at = |name: &str| inside.path().join(name);
+        fs::write(at("kept"), "old and long").unwrap();
+        fs::write(at("kept.new"), "of a crash").unwrap();
+        let folder = Folder::open(inside.path()).unwrap();
+        folder.replace("kept", "kept.new", b"new").unwrap();
+        assert_eq!(fs::read(at("kept")).unwrap(), b"new");
+        fs::create_dir(at("folder")).unwrap();
+        assert!(folder.replace("folder", "folder.new", b"new").is_err());
+        let busy = folder.create("busy.new").unwrap();
+        assert!(folder.replace("kept", "busy.new", b"newer").is_err(), "somebody writes it");
+        drop(busy);
+        assert_eq!(folder.names().unwrap(), ["busy.new", "folder", "kept"]);
+        assert_eq!(fs::read(at("kept")).unwrap(), b"new");
     }
 
     #[test]

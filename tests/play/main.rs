@@ -1,5 +1,7 @@
 //! `kinocue play` from outside: real processes and real sockets, from a cue to what the controllers executed.
 
+#[path = "../common/jog.rs"]
+mod jog;
 #[expect(dead_code, reason = "shared with tests that need more of it")]
 #[path = "../common/process.rs"]
 mod process;

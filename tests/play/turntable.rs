@@ -1,15 +1,8 @@
 //! A chair of three cylinders and a turntable on one controller, which is judged by the virtual controller that it plays to.
 
-use std::net::{Ipv4Addr, UdpSocket};
-use std::time::Duration;
+use kinocue::wire::FrameNo;
 
-use kinocue::harness::motion::Pulses;
-use kinocue::harness::sys::clock::Monotonic;
-use kinocue::harness::time::Clock as _;
-use kinocue::wire::{
-    Analogue, Code, Dialect, FrameNo, MAX_LEN, Motion, ReadRequest, RegisterReply, Timing, position,
-};
-
+use super::jog::JoggedTo;
 use super::process::{Sim, kinocue};
 use super::{Folder, nod_part, pulses};
 
@@ -62,34 +55,8 @@ const JOGGED: FrameNo = FrameNo(900_000_000);
 
 /// Has the turntable of that controller turn there, as somebody does who jogs it.
 fn turn_to(address: &str, turned: i32) {
-    let controller = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
-    controller.connect(address).expect("loopback can be reached");
-    let positions = [0, 0, 0, turned, 0, 0].map(Pulses);
-    let motion = Motion {
-        timing: Timing::Relative,
-        channel: 1,
-        accept: Code::ALL,
-        reply: Code::NONE,
-        frame: JOGGED,
-        time_ms: 500,
-        positions: &positions,
-        outputs: 0,
-        analogue: Analogue::OFF,
-        vibration: None,
-    };
-    controller.send(motion.emit(&mut [0; MAX_LEN])).expect("loopback takes it");
-    let place = || {
-        let ask = ReadRequest { channel: 0, accept: Code::ALL, reply: Code::ALL, start: 0x21, num: 2 };
-        let mut bytes = [0; MAX_LEN];
-        controller.send(ask.emit(&mut [0; MAX_LEN])).expect("loopback takes it");
-        let len = controller.recv(&mut bytes).expect("it answers");
-        let words: Vec<u16> = RegisterReply::parse(&bytes[..len]).expect("an answer").data.iter().collect();
-        position([words[0], words[1]], Dialect::Smc).0
-    };
-    while place() != turned {
-        // More questions than it can take would be an error of its own.
-        Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(10));
-    }
+    let positions = &[0, 0, 0, turned, 0, 0];
+    JoggedTo { channel: 1, frame: JOGGED, positions, axis: 3, register: 0x21 }.to(address);
 }
 
 #[test]

@@ -51,9 +51,9 @@ const ROWS: &[Row] = &[
     // Five more with the relay of buttons beside that of timecode, and alarms by two ways; not taken apart yet.
     // 30 more with fleets, nearly all of them lists of fields and of imports beside lists of as many in other rooms.
     // 39 more with what came to fleets, pairs and the doors of the fuzzer in one day; not taken apart yet.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 175.0, 43.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 174.0, 43.0),
     // Three more, likewise.
-    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 11.0, 2.0),
+    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 10.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
     // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 1,040 for films
@@ -86,7 +86,7 @@ const ROWS: &[Row] = &[
     // axes with limits of their own, 250 for pictures of incidents and a disk that stands still, 150 for what newcomers type.
     // 5,860 more: a second show machine that takes over, starts of several halls at one instant with their clocks, cues from a desk, what attackers found in homing,
     // drives and recordings, the page of halls, doors of the fuzzer, and the sandbox of what takes files apart.
-    ("lines of code", counts::lines_of_code, Less, 101_150.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 101_050.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
@@ -101,7 +101,7 @@ const ROWS: &[Row] = &[
     // A table: a row for each reason why a seat stands as it does.
     // The parts that a service opens, one after the other.
     ("lines of the longest function", counts::longest_function, Less, 65.0, 48.0),
-    ("lines of the longest file", counts::longest_file, Less, 470.0, 390.0),
+    ("lines of the longest file", counts::longest_file, Less, 469.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 3.4, 3.0),
     ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),
 ];

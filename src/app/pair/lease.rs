@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::{PairError, PairShared, lock, thread};
 use crate::api::unix_socket;
-use crate::pair::{LeaseAnswer, LeaseAsk, PROMISED};
+use crate::pair::{Answered, PROMISED};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -49,7 +49,7 @@ fn ask(shared: &PairShared, stream: &UnixStream) -> io::Result<()> {
         let due = lock(&shared.claim).ask_at();
         Monotonic.sleep_until(due);
         let ask = shared.act(|claim, now| claim.ask(now));
-        let mut line = serde_json::to_string(&LeaseAsk::from(ask)).expect("it is names and numbers");
+        let mut line = serde_json::to_string(&ask).expect("it is names and numbers");
         line.push('\n');
         (&mut &*stream).write_all(line.as_bytes())?;
         let mut reply = String::new();
@@ -57,9 +57,9 @@ fn ask(shared: &PairShared, stream: &UnixStream) -> io::Result<()> {
         if !reply.ends_with('\n') {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
-        let answer: LeaseAnswer = serde_json::from_str(&reply)?;
-        if let Some(told) = answer.told() {
-            shared.act(|claim, now| claim.answer(answer.ticket, told, now));
+        let Answered { ticket, answer } = serde_json::from_str(&reply)?;
+        if let Some(answer) = answer {
+            shared.act(|claim, now| claim.answer(ticket, answer, now));
         }
     }
 }

@@ -29,6 +29,7 @@ use crate::pair::{Carried, Claim, PairKey, Role};
 use crate::rt::Live;
 use crate::sd::WatchdogThread;
 use crate::sys::clock::Monotonic;
+use crate::sys::file::secret;
 use crate::time::{Clock as _, MonoTime};
 use crate::wire::FrameNo;
 
@@ -219,19 +220,11 @@ impl PairWatch {
 
 /// The key of a file that nobody else may read.
 fn key(path: &Path) -> Result<PairKey, PairError> {
-    use std::os::unix::fs::PermissionsExt as _;
     let name = path.display();
-    let read = || -> io::Result<(u32, String)> {
-        let file = fs::File::open(path)?;
-        let mode = file.metadata()?.permissions().mode();
-        let mut text = String::new();
-        file.take(LONGEST_KEY).read_to_string(&mut text)?;
-        Ok((mode, text))
-    };
-    let (mode, text) = read().map_err(|error| PairError::Key(format!("cannot read {name}: {error}")))?;
-    if mode & 0o077 != 0 {
+    let unread = |error| PairError::Key(format!("cannot read {name}: {error}"));
+    let Some(text) = secret(path, LONGEST_KEY).map_err(unread)? else {
         return Err(PairError::Key(format!("others may read {name}: `chmod 600` it, and make a new key")));
-    }
+    };
     let none =
         || format!("{name} has no key of 64 hexadecimal digits; make one: openssl rand -hex 32 > {name}");
     PairKey::parse(&text).ok_or_else(|| PairError::Key(none()))

@@ -213,7 +213,7 @@ impl FleetStarts {
     pub(super) fn due(&mut self, hall: &HallContext) -> Vec<Act> {
         let Some(held) = &self.held else { return Vec::new() };
         let left_ns = left_ns(&held.order, hall);
-        if matches!(held.phase, HeldPhase::Given(_)) {
+        if held.is_given() {
             let is_over = left_ns < -nanos(TOLD_BY);
             return if is_over { self.end("nobody said what came of it") } else { Vec::new() };
         }
@@ -267,7 +267,7 @@ impl FleetStarts {
     /// Calls it off, where one waits: at once, or as soon as the tick thread says that it has not begun it.
     fn call_off(&mut self, why: String) -> Vec<Act> {
         match &mut self.held {
-            Some(held) if matches!(held.phase, HeldPhase::Given(_)) => {
+            Some(held) if held.is_given() => {
                 held.off.get_or_insert(why);
                 vec![Act::Tick(TickCommand::CallOff)]
             }
@@ -281,7 +281,7 @@ impl FleetStarts {
         let Some(held) = self.held.take() else { return Vec::new() };
         let StartOrder { group, .. } = &held.order;
         let note = format!("the start of {group} at {} was called off: {why}", held.order.at());
-        let was_given = matches!(held.phase, HeldPhase::Given(_));
+        let was_given = held.is_given();
         self.last = Some(held.status(StartPhase::CalledOff, why.to_owned()));
         let rewind = was_given.then_some(Act::RewindStart);
         [Act::Note(note)].into_iter().chain(rewind).collect()
@@ -305,6 +305,11 @@ impl FleetStarts {
 }
 
 impl Held {
+    /// True if the tick thread has it.
+    fn is_given(&self) -> bool {
+        matches!(self.phase, HeldPhase::Given(_))
+    }
+
     fn now(&self) -> StartStatus {
         let phase =
             if matches!(self.phase, HeldPhase::Asked) { StartPhase::Asked } else { StartPhase::Committed };
@@ -333,12 +338,12 @@ impl Feature for FleetStarts {
             SupervisorEvent::Entered(_) => {
                 self.armed_for = None;
                 // Of one that the tick thread has, that says what came of it.
-                let waits = self.held.as_ref().is_some_and(|held| !matches!(held.phase, HeldPhase::Given(_)));
+                let waits = self.held.as_ref().is_some_and(|held| !held.is_given());
                 out.extend(if waits { self.end(&hall.cause()) } else { Vec::new() });
             }
             SupervisorEvent::Begun(_) => self.armed_for = None,
             SupervisorEvent::Leaving => out.extend(self.call_off("the service ends".to_owned())),
-            SupervisorEvent::Round(_) if self.is_given() => {
+            SupervisorEvent::Round(_) if self.may_begin() => {
                 if let Err(problem) = belts::check(hall) {
                     out.extend(self.call_off(problem.detail));
                 }
@@ -349,8 +354,9 @@ impl Feature for FleetStarts {
 }
 
 impl FleetStarts {
-    fn is_given(&self) -> bool {
-        self.held.as_ref().is_some_and(|held| matches!(held.phase, HeldPhase::Given(_)) && held.off.is_none())
+    /// True if the tick thread has one, and was not told to let it be.
+    fn may_begin(&self) -> bool {
+        self.held.as_ref().is_some_and(|held| held.is_given() && held.off.is_none())
     }
 
     /// Whoever wants something else of an armed hall wants no start of it.

@@ -23,6 +23,7 @@ pub(super) use cues::{FileBody, id_of as cue_id_of};
 pub(super) use film::{UseArgs, choose as choose_film_source, show as show_film};
 pub(super) use known::{KnownArgs, known};
 pub(super) use record::dump as dump_record;
+pub(super) use reply::ServiceProblem;
 pub(super) use server::ServerArgs;
 pub(super) use show::{home, preflight};
 

@@ -11,13 +11,12 @@ use crate::control::{FilmStatus, HallFacts, Status};
 /// Why something was not done (RFC 9457), as the daemon writes it.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct ServiceProblem {
+pub(in crate::cli) struct ServiceProblem {
     code: String,
     detail: String,
     remedy: String,
-    faults: Vec<String>,
-    #[serde(flatten)]
-    hall: HallFacts,
+    /// Every fault, where there are several.
+    pub(in crate::cli) faults: Vec<String>,
 }
 
 /// The status in a reply, or why there is none.
@@ -43,18 +42,31 @@ pub(super) fn done(reply: &HttpReply) -> Result<(), Failure> {
     if (200..300).contains(&reply.status) {
         return Ok(());
     }
-    let problem: ServiceProblem = serde_json::from_str(&reply.text).unwrap_or_default();
-    Err(anyhow!(problem.text(reply.status))).or_exit(exit(&problem.code, reply.status))
+    let problem = ServiceProblem::of(&reply.text);
+    let hall: HallFacts = serde_json::from_str(&reply.text).unwrap_or_default();
+    Err(anyhow!(problem.text(reply.status, &hall))).or_exit(exit(&problem.code, reply.status))
 }
 
 impl ServiceProblem {
-    fn text(&self, status: u16) -> String {
+    /// What a body says; of no other than the service's, nothing.
+    pub(in crate::cli) fn of(body: &str) -> Self {
+        serde_json::from_str(body).unwrap_or_default()
+    }
+
+    /// It in a line.
+    pub(in crate::cli) fn line(&self) -> String {
+        if self.detail.is_empty() {
+            return "the hall is of another version".to_owned();
+        }
+        format!("{}; {}", self.detail, self.remedy)
+    }
+
+    fn text(&self, status: u16, hall: &HallFacts) -> String {
         if self.detail.is_empty() {
             return format!("the daemon sent {status} with an empty body; see its log");
         }
-        let Self { detail, remedy, faults, hall, .. } = self;
-        let mut text = format!("{detail}; {remedy}");
-        faults.iter().for_each(|fault| text.extend(["\n  ", fault]));
+        let mut text = self.line();
+        self.faults.iter().for_each(|fault| text.extend(["\n  ", fault]));
         if *hall != HallFacts::default() {
             text.extend(["\n", &hall.line(None)]);
         }

@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use super::desk::said;
 use super::settings::DeskSettings;
 use super::{DeskArgs, engine, settings};
+use crate::cli::client::ServiceProblem;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::parse_level;
 use crate::control::HallFacts;
@@ -30,16 +31,23 @@ const LONG: Duration = Duration::from_secs(70);
 #[derive(Debug, clap::Args)]
 pub(super) struct StopArgs {
     #[command(flatten)]
-    desk: DeskArgs,
-    /// Halls: SITE.HALL, SITE.*, or all.
-    #[arg(value_name = "HALL", default_value = "all")]
-    halls: Vec<String>,
-    /// Print JSON: an array with an object for each hall.
-    #[arg(long)]
-    json: bool,
+    of: HallsOrAllArgs,
 }
 
-// The halls that are asked. No documentation: clap would show it as the help of commands.
+// The halls that are asked, all where none is named. No documentation: clap would show it as the help of commands.
+#[derive(Debug, clap::Args)]
+pub(super) struct HallsOrAllArgs {
+    #[command(flatten)]
+    pub(super) desk: DeskArgs,
+    /// Halls: SITE.HALL, SITE.*, or all.
+    #[arg(value_name = "HALL", default_value = "all")]
+    pub(super) halls: Vec<String>,
+    /// Print JSON: an array with an object for each hall.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+// The halls that are asked, each named. No documentation: clap would show it as the help of commands.
 #[derive(Debug, clap::Args)]
 struct HallArgs {
     #[command(flatten)]
@@ -113,14 +121,6 @@ pub(super) struct LinkReply {
     pub(super) reply: Value,
 }
 
-/// Why a hall did not do it, as it writes it.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-struct HallProblem {
-    detail: String,
-    remedy: String,
-}
-
 /// What came of it in a hall.
 #[derive(Debug)]
 pub(super) enum Answer {
@@ -133,8 +133,8 @@ pub(super) enum Answer {
 }
 
 pub(super) fn stop(args: &StopArgs) -> Result<Exit, Failure> {
-    let settings = settings::desk(&args.desk.desk)?;
-    ask_all(&settings, &args.halls, &STOP, args.json)
+    let HallsOrAllArgs { desk, halls, json } = &args.of;
+    ask_all(&settings::desk(&desk.desk)?, halls, &STOP, *json)
 }
 
 pub(super) fn pause(args: &PauseArgs) -> Result<Exit, Failure> {
@@ -289,8 +289,7 @@ impl Answer {
         if answer.status == 200 {
             return Ok(answer);
         }
-        let problem: HallProblem = serde_json::from_value(answer.reply).unwrap_or_default();
-        let text = format!("{}; {}", problem.detail, problem.remedy);
+        let text = serde_json::from_value::<ServiceProblem>(answer.reply).unwrap_or_default().line();
         // The link is there, and the hall behind it did not answer.
         Err(if answer.status == 503 { Self::Silent(text) } else { Self::Refused(text) })
     }

@@ -214,30 +214,16 @@ impl Halls {
 pub(super) async fn kept_of(client: &Client, names: &[String]) -> Result<BTreeMap<String, Kept>, Failure> {
     let kept = engine::kept(client);
     engine::prepare(&kept).await?;
-    let bucket = kept.get_stream_no_info(format!("KV_{}", fleet::SEEN)).await.or_exit(Exit::Unavailable)?;
-    let of_one = |name: &String| {
-        let (name, bucket) = (name.clone(), &bucket);
-        async move {
-            let subject = format!("$KV.{}.{name}", fleet::SEEN);
-            let entry = bucket.direct_get_last_for_subject(subject).await.ok()?;
-            if engine::is_answered(&entry) {
-                return None;
-            }
-            let status = serde_json::from_slice(&entry.payload).ok()?;
-            Some((name, (status, engine::age_of(&entry), Monotonic.now())))
-        }
+    let of_one = async |name: &String| {
+        let entry = engine::last_value(&kept, fleet::SEEN, name).await.ok()??;
+        let status = serde_json::from_slice(&entry.payload).ok()?;
+        let seen = (status, engine::age_of(&entry), Monotonic.now());
+        (!engine::is_answered(&entry)).then(|| (name.clone(), seen))
     };
     Ok(join_all(names.iter().map(of_one)).await.into_iter().flatten().collect())
 }
 
 impl HallSeen {
-    /// The same that much later, if nothing is heard until then.
-    pub(super) fn later(&self, by: Duration) -> Self {
-        let age_s = self.age_s.map(|age_s| age_s + by.as_secs_f64());
-        let silent = self.silent || age_s.is_none_or(|age_s| age_s > SILENT.as_secs_f64());
-        Self { age_s, silent, ..self.clone() }
-    }
-
     /// How much it needs a person: 0 most.
     pub(super) fn rank(&self) -> u8 {
         let Some(status) = self.status.as_ref().filter(|_| !self.silent) else { return 0 };
@@ -340,9 +326,12 @@ mod tests {
 
     #[test]
     fn a_hall_that_is_not_heard_meanwhile_falls_silent() {
-        let hall = seen("a", State::Parked, 0, 0.2);
-        assert!(!hall.later(Duration::from_millis(1_200)).silent);
-        let later = hall.later(Duration::from_secs(2));
+        let (status, at) = (seen("a", State::Parked, 0, 0.0).status.unwrap(), MonoTime::from_nanos(1_000));
+        let seen = BTreeMap::from([("a".to_owned(), (status, at))]);
+        let halls = Halls { seen, kept: BTreeMap::new(), names: vec!["a".to_owned()] };
+        let hall = |age_ms| halls.table(at + Duration::from_millis(age_ms)).remove(0);
+        assert!(!hall(1_400).silent);
+        let later = hall(2_200);
         assert!(
             later.silent && later.rank() == 0 && later.age_s.is_some_and(|age_s| age_s > 2.1),
             "{later:?}"

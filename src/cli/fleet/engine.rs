@@ -157,6 +157,15 @@ fn cues() -> Config {
     }
 }
 
+/// The last value of a hall in a bucket; `None` if it has none.
+pub(super) async fn last_value(
+    kept: &Context,
+    bucket: &str,
+    hall: &str,
+) -> anyhow::Result<Option<StreamMessage>> {
+    last_of(kept, &format!("KV_{bucket}"), &format!("$KV.{bucket}.{hall}")).await
+}
+
 /// The last message that a stream has of a subject; `None` if it has none.
 pub(super) async fn last_of(
     kept: &Context,
@@ -185,9 +194,7 @@ pub(super) fn age_of(message: &StreamMessage) -> Duration {
     Duration::from_nanos(wall_now_ns().saturating_sub(at))
 }
 
-/// Where the last value of a hall is in a bucket, and how it is written.
-pub(super) fn key_of(bucket: &str, hall: &str) -> (String, String) {
-    let key = format!("$KV.{bucket}.{hall}");
-    let written = format!("$JS.{}.API.{key}", fleet::DOMAIN);
-    (key, written)
+/// Where the value of a hall in a bucket is written, by the way that also passes leaf nodes.
+pub(super) fn value_to(bucket: &str, hall: &str) -> String {
+    format!("$JS.{}.API.$KV.{bucket}.{hall}", fleet::DOMAIN)
 }

@@ -1,6 +1,7 @@
 //! A hall as its link reaches it, and the client by which it reaches the engine.
 
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -29,6 +30,11 @@ impl Link {
     /// True if what is told now goes out now: what is told meanwhile would come late, when it is no longer so.
     pub(super) fn is_connected(&self) -> bool {
         self.client.connection_state() == State::Connected
+    }
+
+    /// How often the engine was reached: one that comes back may have less than it had.
+    pub(super) fn connects(&self) -> u64 {
+        self.client.statistics().connects.load(Ordering::Relaxed)
     }
 
     /// Looks something up at the hall.

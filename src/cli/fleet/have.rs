@@ -6,9 +6,9 @@ use async_nats::jetstream::context::Context;
 use futures_util::future::try_join_all;
 use serde::Serialize;
 
-use super::act::chosen;
+use super::act::{HallsOrAllArgs, chosen};
 use super::desk::{age, said};
-use super::{DeskArgs, engine, settings};
+use super::{engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print, table};
 use crate::fleet::{self, HadState, HaveReport, Letter, Wish, WishedCue};
 
@@ -24,13 +24,7 @@ const UNHEARD: Duration = Duration::from_secs(150);
 )]
 pub(super) struct Args {
     #[command(flatten)]
-    desk: DeskArgs,
-    /// Halls: SITE.HALL, SITE.*, or all.
-    #[arg(value_name = "HALL", default_value = "all")]
-    halls: Vec<String>,
-    /// Print JSON: an array with an object for each hall.
-    #[arg(long)]
-    json: bool,
+    of: HallsOrAllArgs,
 }
 
 /// What the engine knows of a hall's library.
@@ -71,9 +65,9 @@ struct HallRow<'h> {
     cues: Vec<CueStands>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let settings = settings::desk(&args.desk.desk)?;
-    let halls = chosen(&settings.halls, &args.halls)?;
+pub(super) fn run(Args { of }: &Args) -> Result<Exit, Failure> {
+    let settings = settings::desk(&of.desk.desk)?;
+    let halls = chosen(&settings.halls, &of.halls)?;
     let halls = engine::block_on(async {
         let client = engine::connect_desk(&settings.access, &settings.name).await?;
         let kept = engine::kept(&client);
@@ -81,7 +75,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         try_join_all(halls.iter().map(|hall| HallHas::look_up(&kept, hall))).await.or_exit(Exit::Unavailable)
     })?;
     let stand: Vec<_> = halls.iter().flat_map(HallHas::all).collect();
-    if args.json {
+    if of.json {
         let rows: Vec<_> = halls.iter().map(HallHas::row).collect();
         print::json(&rows)?;
     } else {
@@ -112,12 +106,9 @@ impl HallHas {
 
     /// What the engine has of it.
     pub(super) async fn look_up(kept: &Context, hall: &str) -> anyhow::Result<Self> {
-        let last = async |bucket: &str| {
-            let (key, _) = engine::key_of(bucket, hall);
-            engine::last_of(kept, &format!("KV_{bucket}"), &key).await
-        };
-        let want = last(fleet::WANT).await?;
-        let have = last(fleet::HAVE).await?.filter(|message| !engine::is_answered(message));
+        let want = engine::last_value(kept, fleet::WANT, hall).await?;
+        let have = engine::last_value(kept, fleet::HAVE, hall).await?;
+        let have = have.filter(|message| !engine::is_answered(message));
         let is_wished = want.is_some();
         let wished = want.and_then(|message| {
             let letter: Letter = serde_json::from_slice(&message.payload).ok()?;

@@ -5,16 +5,17 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use async_nats::jetstream::context::{Context, ContextBuilder, PublishErrorKind};
+use async_nats::jetstream::context::{Context, PublishErrorKind};
 use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::stream::{Config, DiscardPolicy, LastRawMessageErrorKind, StorageType};
 use tokio::io::{AsyncBufReadExt as _, AsyncWriteExt as _, BufReader};
 use tokio::net::UnixStream;
 use tokio::time::{sleep, timeout};
 
+use super::engine;
 use super::hall::Link;
-use crate::fleet::{self, DOMAIN};
-use crate::pair::{Holder, LeaseAnswer, LeaseAsk, LeaseSwap, LeaseTold};
+use crate::fleet;
+use crate::pair::{Answer, Answered, Ask, Holder, Want};
 
 /// How often the socket of the service is looked for.
 const AGAIN: Duration = Duration::from_millis(200);
@@ -34,11 +35,11 @@ async fn serve(link: &Link, socket: &Path) -> anyhow::Result<()> {
     let mut stream = UnixStream::connect(socket).await?;
     let (read, mut write) = stream.split();
     let mut lines = BufReader::new(read).lines();
-    let engine = ContextBuilder::new().domain(DOMAIN).timeout(ANSWER).build(link.client.clone());
+    let kept = engine::kept_within(&link.client, ANSWER);
     while let Some(line) = lines.next_line().await? {
-        let ask: LeaseAsk = serde_json::from_str(&line)?;
-        let told = if link.is_connected() { put(link, &engine, &ask).await } else { None };
-        let mut reply = serde_json::to_string(&LeaseAnswer { ticket: ask.ticket, told })?;
+        let Ask { ticket, want } = serde_json::from_str(&line)?;
+        let answer = if link.is_connected() { put(link, &kept, want).await } else { None };
+        let mut reply = serde_json::to_string(&Answered { ticket, answer })?;
         reply.push('\n');
         write.write_all(reply.as_bytes()).await?;
     }
@@ -46,35 +47,35 @@ async fn serve(link: &Link, socket: &Path) -> anyhow::Result<()> {
 }
 
 /// Asks; `None` where nobody answered in time.
-async fn put(link: &Link, engine: &Context, ask: &LeaseAsk) -> Option<LeaseTold> {
+async fn put(link: &Link, kept: &Context, want: Want) -> Option<Answer> {
     let asked = async {
-        match &ask.swap {
-            Some(swap) => write(link, engine, swap).await,
-            None => read(link, engine).await,
+        match want {
+            Want::Read => read(link, kept).await,
+            Want::Swap { revision, holder } => write(link, kept, revision, &holder).await,
         }
     };
     timeout(ANSWER, asked).await.ok()?.ok()
 }
 
-async fn read(link: &Link, engine: &Context) -> anyhow::Result<LeaseTold> {
+async fn read(link: &Link, kept: &Context) -> anyhow::Result<Answer> {
     // Made where it is missing: with nothing in it, which is no key.
-    let stream = engine.get_or_create_stream(bucket(&link.hall)).await?;
+    let stream = kept.get_or_create_stream(bucket(&link.hall)).await?;
     match stream.get_last_raw_message_by_subject(&fleet::lease_of(&link.hall)).await {
         Ok(message) => {
             let holder: Holder = serde_json::from_slice(&message.payload).context("it is no lease")?;
-            Ok(LeaseTold::Key { holder, revision: message.sequence })
+            Ok(Answer::Key { holder, revision: message.sequence })
         }
-        Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(LeaseTold::NoKey),
+        Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(Answer::NoKey),
         Err(error) => Err(error.into()),
     }
 }
 
-async fn write(link: &Link, engine: &Context, swap: &LeaseSwap) -> anyhow::Result<LeaseTold> {
-    let text = serde_json::to_vec(&swap.holder)?;
-    let message = PublishMessage::build().payload(text.into()).expected_last_subject_sequence(swap.revision);
-    let sent = engine.send_publish(fleet::lease_of(&link.hall), message).await?;
+async fn write(link: &Link, kept: &Context, revision: u64, holder: &Holder) -> anyhow::Result<Answer> {
+    let text = serde_json::to_vec(holder)?;
+    let message = PublishMessage::build().payload(text.into()).expected_last_subject_sequence(revision);
+    let sent = kept.send_publish(fleet::lease_of(&link.hall), message).await?;
     match sent.await {
-        Ok(ack) => Ok(LeaseTold::Granted { revision: ack.sequence }),
+        Ok(ack) => Ok(Answer::Granted { revision: ack.sequence }),
         // An engine that has lost the stream has no such revision either; it is made anew at the next look.
         Err(error)
             if matches!(
@@ -82,7 +83,7 @@ async fn write(link: &Link, engine: &Context, swap: &LeaseSwap) -> anyhow::Resul
                 PublishErrorKind::WrongLastSequence | PublishErrorKind::StreamNotFound
             ) =>
         {
-            Ok(LeaseTold::Refused)
+            Ok(Answer::Refused)
         }
         Err(error) => Err(error.into()),
     }

@@ -125,7 +125,7 @@ impl Link {
     /// Has the engine keep the last status: at each change of state, and each minute.
     async fn keep(&self, mut told: watch::Receiver<Option<BriefStatus>>) {
         let kept = engine::kept(&self.client);
-        let subject = format!("$JS.{}.API.$KV.{}.{}", fleet::DOMAIN, fleet::SEEN, self.hall);
+        let subject = engine::value_to(fleet::SEEN, &self.hall);
         let mut trouble = Trouble::default();
         loop {
             let Ok(status) = told.wait_for(Option::is_some).await.map(|status| status.clone()) else {

@@ -3,12 +3,11 @@
 //! late, are refused by the engine for ever.
 
 use std::collections::VecDeque;
-use std::sync::atomic::Ordering;
+use std::mem;
 
 use anyhow::Context as _;
 use async_nats::jetstream::context::Context;
 use async_nats::jetstream::message::PublishMessage;
-use async_nats::jetstream::stream::DirectGetErrorKind;
 use serde_json::json;
 
 use super::engine;
@@ -25,7 +24,7 @@ pub(super) struct LogTeller<'l> {
     /// The last record that the engine has, with its number there; not known before it was asked, and after a failure.
     last: Option<(u64, Option<LogRecord>)>,
     waiting: VecDeque<JournalPart>,
-    /// How often the engine was reached: one that comes back may have less than it had.
+    /// How often the engine was reached.
     connects: u64,
 }
 
@@ -49,8 +48,8 @@ impl<'l> LogTeller<'l> {
         if !self.link.is_connected() {
             return Ok(false);
         }
-        let connects = self.link.client.statistics().connects.load(Ordering::Relaxed);
-        if std::mem::replace(&mut self.connects, connects) != connects {
+        let connects = self.link.connects();
+        if mem::replace(&mut self.connects, connects) != connects {
             self.forget();
         }
         let told = self.tell_next().await;
@@ -91,21 +90,13 @@ impl<'l> LogTeller<'l> {
     /// What the engine has last of this hall. Behind what is no record of ours the journal is told from its first line: nobody can take that
     /// away again, and reports have each line once.
     async fn ask(&self) -> anyhow::Result<(u64, Option<LogRecord>)> {
-        let stream = self.kept.get_stream_no_info(fleet::LOG).await?;
-        match stream.direct_get_last_for_subject(self.subject.clone()).await {
-            Ok(message) => {
-                let record = serde_json::from_slice(&message.payload).ok();
-                if record.is_none() {
-                    print::tell(
-                        "the log: what the engine has last is no record of ours; telling the journal again",
-                    );
-                }
-                Ok((message.sequence, record))
-            }
-            Err(error) if error.kind() == DirectGetErrorKind::NotFound => Ok((0, None)),
-            Err(error) => {
-                Err(error).context("the engine does not say what it has; `kinocue fleet status` prepares it")
-            }
+        let Some(message) = engine::last_of(&self.kept, fleet::LOG, &self.subject).await? else {
+            return Ok((0, None));
+        };
+        let record = serde_json::from_slice(&message.payload).ok();
+        if record.is_none() {
+            print::tell("the log: what the engine has last is no record of ours; telling the journal again");
         }
+        Ok((message.sequence, record))
     }
 }

@@ -18,10 +18,10 @@ use futures_util::future::join_all;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tokio::signal::unix::{SignalKind, signal};
-use tokio::sync::{mpsc, watch};
-use tokio::time::{MissedTickBehavior, interval, sleep};
+use tokio::sync::watch;
+use tokio::time::sleep;
 
-use super::desk::{HallSeen, Halls, Kept, kept_of};
+use super::desk::{HallSeen, Halls, kept_of};
 use super::settings::DeskSettings;
 use super::{DeskArgs, act, engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print};
@@ -30,11 +30,9 @@ use crate::fleet;
 use crate::log::Log;
 use crate::metrics::halls::{CONTENT_TYPE, FleetFigures, HallFigures};
 use crate::sys::clock::Monotonic;
-use crate::time::{Clock as _, MonoTime};
+use crate::time::Clock as _;
 use crate::{api, console};
 
-/// How often what was heard is laid out for whoever looks.
-const LAY_OUT: Duration = Duration::from_millis(100);
 /// How often the engine is asked for what it has kept of halls that are not heard.
 const LOOK_UP: Duration = Duration::from_secs(10);
 /// The longest request that somebody may send.
@@ -59,8 +57,8 @@ pub(super) struct Args {
 struct Desk {
     settings: DeskSettings,
     client: Client,
-    /// What was last laid out, and when.
-    laid_out: watch::Receiver<(MonoTime, Vec<HallSeen>)>,
+    /// What was heard of them.
+    heard: Mutex<Halls>,
     /// How many halls were asked for a stop from here, by what came of it.
     stops: Mutex<BTreeMap<&'static str, u64>>,
 }
@@ -105,16 +103,16 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     engine::block_on(async {
         let mut ends = signal(SignalKind::terminate()).context("signals cannot be handled").or_system()?;
         let client = engine::connect_link(&settings.access, &settings.name).await?;
-        let (lay_out, laid_out) =
-            watch::channel((Monotonic.now(), Halls::of(&settings).table(Monotonic.now())));
-        let desk = Arc::new(Desk { settings, client, laid_out, stops: Mutex::default() });
+        let heard = Mutex::new(Halls::of(&settings));
+        let desk = Arc::new(Desk { settings, client, heard, stops: Mutex::default() });
         let (closing, closed) = watch::channel(false);
         let addresses = api::serve_behind_doors(&api, routes(Arc::clone(&desk)), closed, log);
         for address in addresses.map_err(anyhow::Error::from).or_exit(Exit::Unavailable)? {
             print::tell(&format!("shows {} halls at http://{address}/", desk.settings.halls.len()));
         }
         tokio::select! {
-            heard = desk.hear(&lay_out) => heard?,
+            heard = desk.hear() => heard?,
+            () = desk.look_up() => {}
             _ = ends.recv() => {}
             _ = tokio::signal::ctrl_c() => {}
         }
@@ -134,36 +132,33 @@ fn routes(desk: Arc<Desk>) -> Router {
 }
 
 impl Desk {
-    /// Hears the halls, and lays out what is known of them.
-    async fn hear(&self, lay_out: &watch::Sender<(MonoTime, Vec<HallSeen>)>) -> Result<(), Failure> {
-        let mut halls = Halls::of(&self.settings);
+    /// Hears the halls.
+    async fn hear(&self) -> Result<(), Failure> {
         let mut heard = self.client.subscribe(fleet::status_of("*.*")).await.or_exit(Exit::Unavailable)?;
-        let (found, mut kept) = mpsc::channel(1);
-        tokio::spawn(look_up(self.client.clone(), self.settings.halls.clone(), found));
-        let mut pace = interval(LAY_OUT);
-        pace.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        while let Some(message) = heard.next().await {
+            self.heard().hear(&message);
+        }
+        Err(anyhow!("the engine takes this desk no more")).or_exit(Exit::Unavailable)
+    }
+
+    /// Asks the engine again and again for what it has kept.
+    async fn look_up(&self) {
         loop {
-            tokio::select! {
-                message = heard.next() => match message {
-                    Some(message) => drop(halls.hear(&message)),
-                    None => return Err(anyhow!("the engine takes this desk no more")).or_exit(Exit::Unavailable),
-                },
-                Some(kept) = kept.recv() => halls.take(kept),
-                _ = pace.tick() => {
-                    let now = Monotonic.now();
-                    lay_out.send_replace((now, halls.table(now)));
-                }
+            if let Ok(kept) = kept_of(&self.client, &self.settings.halls).await {
+                self.heard().take(kept);
             }
+            sleep(LOOK_UP).await;
         }
     }
 
-    /// The halls as they are now, worst first: also where what was laid out is old.
+    /// The halls as they are now, worst first.
     fn table(&self) -> Vec<HallSeen> {
-        let (at, table) = &*self.laid_out.borrow();
-        let since = Monotonic.now().since(*at);
-        let mut table: Vec<_> = table.iter().map(|hall| hall.later(since)).collect();
-        table.sort_by_key(HallSeen::rank); // stable: by name among those of a rank
-        table
+        self.heard().table(Monotonic.now())
+    }
+
+    /// What is behind a lock is whole at any time, also where whoever held it panicked.
+    fn heard(&self) -> MutexGuard<'_, Halls> {
+        self.heard.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn is_connected(&self) -> bool {
@@ -172,18 +167,6 @@ impl Desk {
 
     fn stops(&self) -> MutexGuard<'_, BTreeMap<&'static str, u64>> {
         self.stops.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Asks the engine again and again for what it has kept.
-async fn look_up(client: Client, names: Vec<String>, found: mpsc::Sender<BTreeMap<String, Kept>>) {
-    loop {
-        if let Ok(kept) = kept_of(&client, &names).await
-            && found.send(kept).await.is_err()
-        {
-            return;
-        }
-        sleep(LOOK_UP).await;
     }
 }
 

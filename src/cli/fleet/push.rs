@@ -102,9 +102,7 @@ async fn wish(
     files: &[CueFile],
     only: bool,
 ) -> Result<u64, Failure> {
-    let (key, subject) = engine::key_of(fleet::WANT, hall);
-    let last =
-        engine::last_of(kept, &format!("KV_{}", fleet::WANT), &key).await.or_exit(Exit::Unavailable)?;
+    let last = engine::last_value(kept, fleet::WANT, hall).await.or_exit(Exit::Unavailable)?;
     let before = last.as_ref().map(|message| own_wish(&message.payload, settings, hall)).transpose();
     let before = match before {
         Err(why) if !only => {
@@ -121,7 +119,11 @@ async fn wish(
     let message = message.expected_last_subject_sequence(last.map_or(0, |message| message.sequence));
     let told =
         || format!("{hall}: the engine does not take the wish; if another desk wished meanwhile, push again");
-    let sent = kept.send_publish(subject, message).await.with_context(told).or_exit(Exit::Unavailable)?;
+    let sent = kept
+        .send_publish(engine::value_to(fleet::WANT, hall), message)
+        .await
+        .with_context(told)
+        .or_exit(Exit::Unavailable)?;
     Ok(sent.await.with_context(told).or_exit(Exit::Unavailable)?.sequence)
 }
 

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow};
@@ -11,6 +10,7 @@ use toml::de::DeTable;
 
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::config::{self, Entry, Faults, Section, is_fleet_id};
+use crate::sys::file::secret;
 
 /// The longest file that is read.
 const LONGEST: u64 = 64 << 10;
@@ -170,11 +170,10 @@ pub(super) fn is_loopback(host: &str) -> bool {
 /// The key in a file that nobody else may read.
 fn seed(path: &Path) -> Result<KeyPair, String> {
     let name = path.display();
-    let about = fs::metadata(path).map_err(|error| format!("cannot read {name}: {error}"))?;
-    if about.permissions().mode() & 0o077 != 0 {
+    let unread = |error| format!("cannot read {name}: {error}");
+    let Some(text) = secret(path, LONGEST).map_err(unread)? else {
         return Err(format!("others may read {name}; `chmod 600` it, and make a new key if somebody did"));
-    }
-    let text = fs::read_to_string(path).map_err(|error| format!("cannot read {name}: {error}"))?;
+    };
     KeyPair::from_seed(text.trim()).map_err(|_| format!("{name} has no key; `kinocue fleet init` makes keys"))
 }
 
@@ -215,6 +214,8 @@ fn member(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt as _;
+
     use super::*;
 
     fn of(text: &str, mode: u32) -> Result<LinkSettings, String> {

@@ -6,17 +6,16 @@
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
+use std::mem;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::pin::pin;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
 use async_nats::jetstream::context::Context;
 use futures_util::{StreamExt as _, stream};
 use hyper::body::Bytes;
-use serde::Deserialize;
 use tokio::sync::watch;
 use tokio::task::spawn_blocking;
 use tokio::time::sleep;
@@ -24,7 +23,7 @@ use tokio::time::sleep;
 use super::engine;
 use super::hall::Link;
 use super::part::{CuePart, sweep};
-use crate::cli::client::FileBody;
+use crate::cli::client::{FileBody, ServiceProblem};
 use crate::fleet::{self, BriefStatus, CueHad, HadState, HaveReport, WishedCue};
 use crate::state::State;
 use crate::sys::clock::Monotonic;
@@ -67,7 +66,7 @@ pub(super) struct WishKeeper<'l> {
     sent: Option<(HaveReport, MonoTime)>,
     /// Why a file, by its digest, is not tried again until then.
     later: BTreeMap<String, (MonoTime, HadState, String)>,
-    /// How often the engine was reached: one that comes back may have less than it had.
+    /// How often the engine was reached.
     connects: u64,
 }
 
@@ -85,15 +84,6 @@ enum Fetched {
 #[derive(Debug, thiserror::Error)]
 #[error("the engine does not have all of its file; push it again")]
 struct Lacking;
-
-/// What the hall says against something.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-struct HallSays {
-    detail: String,
-    remedy: String,
-    faults: Vec<String>,
-}
 
 impl<'l> WishKeeper<'l> {
     pub(super) fn new(link: &'l Link, folder: PathBuf, told: Told) -> Self {
@@ -119,12 +109,11 @@ impl<'l> WishKeeper<'l> {
             sleep(LOOK).await;
             return Ok(true);
         }
-        let connects = self.link.client.statistics().connects.load(Ordering::Relaxed);
-        if std::mem::replace(&mut self.connects, connects) != connects {
+        let connects = self.link.connects();
+        if mem::replace(&mut self.connects, connects) != connects {
             self.sent = None;
         }
-        let (key, _) = engine::key_of(fleet::WANT, &self.link.hall);
-        let want = engine::last_of(&self.kept, &format!("KV_{}", fleet::WANT), &key).await?;
+        let want = engine::last_value(&self.kept, fleet::WANT, &self.link.hall).await?;
         let report = self.ask(want.map(|message| (message.sequence, message.payload))).await?;
         let now = Monotonic.now();
         self.later.retain(|_, (until, ..)| *until > now);
@@ -173,7 +162,7 @@ impl<'l> WishKeeper<'l> {
                 let reply = self.link.put("/api/v1/fleet/wish", wish.clone().into()).await?;
                 match reply.status {
                     200 => None,
-                    400..=428 => Some(HallSays::of(&reply.text).line()),
+                    400..=428 => Some(ServiceProblem::of(&reply.text).line()),
                     status => anyhow::bail!("the hall replied {status}: {}", reply.text),
                 }
             }
@@ -204,7 +193,7 @@ impl<'l> WishKeeper<'l> {
             _ = told.wait_for(|status| !is_parked(status)) => return Ok(false),
         };
         self.asked = None;
-        let says = HallSays::of(&reply.text);
+        let says = ServiceProblem::of(&reply.text);
         match reply.status {
             200 => remove(part),
             // The hall has noted why, and says so.
@@ -284,10 +273,8 @@ impl<'l> WishKeeper<'l> {
 
     /// Returns when the engine is lost: what it was asked before is never answered.
     async fn cut(&self) {
-        let connects = self.link.client.statistics().connects.load(Ordering::Relaxed);
-        while self.link.is_connected()
-            && self.link.client.statistics().connects.load(Ordering::Relaxed) == connects
-        {
+        let connects = self.link.connects();
+        while self.link.is_connected() && self.link.connects() == connects {
             sleep(LOOK).await;
         }
     }
@@ -322,7 +309,7 @@ impl<'l> WishKeeper<'l> {
             !same || now.since(*at) >= KEEP
         });
         if is_news {
-            let (_, subject) = engine::key_of(fleet::HAVE, &self.link.hall);
+            let subject = engine::value_to(fleet::HAVE, &self.link.hall);
             let text = report.text_within(LONGEST);
             let sent = self.kept.publish(subject, text.into()).await.context("the engine takes no report")?;
             sent.await.context("the engine took no report of what the hall has")?;
@@ -343,19 +330,4 @@ fn is_parked(status: &Option<BriefStatus>) -> bool {
 
 fn remove(part: CuePart) {
     let _ = part.remove(); // what is left is swept
-}
-
-impl HallSays {
-    fn of(text: &str) -> Self {
-        serde_json::from_str(text).unwrap_or_default()
-    }
-
-    fn line(&self) -> String {
-        let Self { detail, remedy, .. } = self;
-        if detail.is_empty() {
-            "the hall is of another version".to_owned()
-        } else {
-            format!("{detail}; {remedy}")
-        }
-    }
 }

@@ -1,6 +1,8 @@
 // All halls of a desk. What is heard comes from /api/v1/fleet/halls, twice a second; STOP goes to /api/v1/fleet/stop. Texts of halls become
 // text here, never markup.
 
+import { byId, make, setText } from './js/dom.js';
+
 const EVERY_MS = 500;
 const PATIENCE_MS = 1500;
 const STOP_PATIENCE_MS = 8000;
@@ -8,23 +10,11 @@ const SILENT_S = 1.5;
 const HANDS_OFF_MS = 3000;
 const KEY = 'kinocue-token';
 
-const byId = (id) => document.getElementById(id);
 const tiles = new Map();
 let heard = performance.now();
 let everHeard = false;
 let engine = true;
 let touched = -Infinity;
-
-function setText(element, text) {
-  if (element.textContent !== text) element.textContent = text;
-}
-
-function make(tag, className, ...children) {
-  const element = document.createElement(tag);
-  element.className = className;
-  element.append(...children);
-  return element;
-}
 
 const headers = (more = {}) => {
   const token = sessionStorage.getItem(KEY);
@@ -45,15 +35,12 @@ async function ask(path, options, patience) {
 /** A tile without anything in it yet. */
 function newTile(name) {
   const parts = {
-    name: make('h2', ''), state: make('p', 'state'), why: make('p', 'wide'), film: make('p', 'wide old'), bar: make('progress', 'wide old'),
-    figures: make('p', 'wide figures old'), warn: make('p', 'wide warn old'), age: make('p', 'wide quiet'), stop: make('button', 'stop', 'STOP'),
+    name: make('h2'), state: make('p', { className: 'state' }), why: make('p', { className: 'wide' }), film: make('p', { className: 'wide old' }), bar: make('progress', { className: 'wide old' }),
+    figures: make('p', { className: 'wide figures old' }), warn: make('p', { className: 'wide warn old' }), age: make('p', { className: 'wide quiet' }), stop: make('button', { className: 'stop', type: 'button', 'aria-label': `STOP ${name}` }, 'STOP'),
   };
-  parts.stop.type = 'button';
-  parts.stop.setAttribute('aria-label', `STOP ${name}`);
   parts.stop.addEventListener('click', () => stop([name], parts.stop));
   const { name: title, state, stop: button, why, film, bar, figures, warn, age } = parts;
-  const tile = make('section', 'hall', title, button, state, why, film, bar, figures, warn, age);
-  tile.setAttribute('aria-label', name);
+  const tile = make('section', { className: 'hall', 'aria-label': name }, title, button, state, why, film, bar, figures, warn, age);
   return { tile, parts, told: null };
 }
 
@@ -81,7 +68,7 @@ function fill(one, hall) {
   const title = status && status.hall && status.hall !== hall.name ? `${hall.name}, ${status.hall}` : hall.name;
   if (parts.name.textContent !== title) {
     const address = consoleOf(hall.console);
-    const link = address ? Object.assign(make('a', '', title), { href: address, rel: 'noreferrer', target: '_blank' }) : title;
+    const link = address ? make('a', { href: address, rel: 'noreferrer', target: '_blank' }, title) : title;
     parts.name.replaceChildren(link);
   }
   setText(parts.state, silent ? 'silent' : status.state);

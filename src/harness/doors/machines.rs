@@ -11,7 +11,7 @@ use crate::film::point::FilmState;
 use crate::health::{Continuity, Groups, HealthInput, HealthTable, Identity, Notice, Pushed, Sighting};
 use crate::motion::Pulses;
 use crate::observe;
-use crate::state::rules::{HallRules, Step, Turn, take};
+use crate::state::rules::{HallRules, Step, Turn};
 use crate::state::{Demand, Event, Finding, Latch, Machine, Readiness, Transition, Trouble};
 use crate::time::MonoTime;
 use crate::tracker::{Books, Reply, Tracker};
@@ -137,21 +137,9 @@ pub(super) fn hall(octets: &[u8]) {
     let (mut hall, mut rules, mut now) = (Machine::new(BEGUN), HallRules::default(), BEGUN);
     for _ in 0..STEPS {
         let Some(turn) = turn(&mut script) else { break };
-        let before = hall.clone();
-        let taken = match turn {
-            Turn::Step(step) => take(&mut hall, step, now).is_ok(),
-            Turn::Clock(ms) => {
-                now = MonoTime::from_nanos(now.as_nanos().saturating_add_signed(ms * 1_000_000));
-                hall.tick(now);
-                true
-            }
-        };
-        rules.check(&before, turn, taken, &hall);
+        rules.follow(&mut hall, turn, &mut now);
     }
-    let before = hall.clone();
-    let stop = Step::Command(Transition::Stop);
-    let taken = take(&mut hall, stop, now).is_ok();
-    rules.check(&before, Turn::Step(stop), taken, &hall);
+    rules.follow(&mut hall, Turn::Step(Step::Command(Transition::Stop)), &mut now);
     // Here the clock may have been set back since the hall began to stop.
     hall.tick(now.max(hall.since()) + crate::state::STOPPING_FOR);
     assert!(!hall.may_send_motion(), "{} after a stop", hall.state());

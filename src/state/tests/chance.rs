@@ -84,16 +84,7 @@ proptest! {
         let mut hall = Machine { since: now, ..hall(start) };
         let mut rules = HallRules::default();
         for turn in turns {
-            let before = hall.clone();
-            let taken = match turn {
-                Turn::Step(step) => take(&mut hall, step, now).is_ok(),
-                Turn::Clock(ms) => {
-                    now = MonoTime::from_nanos(now.as_nanos().saturating_add_signed(ms * 1_000_000));
-                    hall.tick(now);
-                    true
-                }
-            };
-            rules.check(&before, turn, taken, &hall);
+            rules.follow(&mut hall, turn, &mut now);
             to_the_show(&mut hall.clone(), now);
             super::remedies::follow_to_the_show(&mut hall.clone(), now);
         }
