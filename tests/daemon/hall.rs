@@ -127,6 +127,11 @@ impl Hall {
         assert_eq!(answer, "ok\n", "{command}");
     }
 
+    /// Where a controller is, past its relay.
+    pub(crate) fn address(&self, controller: usize) -> &str {
+        &self.sim.addresses[controller]
+    }
+
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.dir.path().join(name)
     }

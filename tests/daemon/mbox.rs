@@ -17,9 +17,11 @@ fn open() -> Hall {
 }
 
 fn closed() -> Hall {
-    Hall::closed(&["--dialect", "mbox"], |config| {
-        config.replace("seat = \"bench3\"", "seat = \"bench3\"\ndialect = \"mbox\"\nestop_inputs = [1]")
-    })
+    Hall::closed(&["--dialect", "mbox"], as_mbox)
+}
+
+fn as_mbox(config: String) -> String {
+    config.replace("seat = \"bench3\"", "seat = \"bench3\"\ndialect = \"mbox\"\nestop_inputs = [1]")
 }
 
 fn health(status: &Value, controller: usize) -> &str {
@@ -124,6 +126,33 @@ fn an_emergency_stop_of_an_mbox_controller_is_seen_by_its_input_pressed_and_rele
     hall.happens("1@X1=1");
     let pressed = hall.wait(|status| health(status, 0) == "stopped");
     assert_eq!(pressed["controllers"][0]["emergency_stop"], true, "{pressed}");
+}
+
+#[test]
+fn an_emergency_stop_is_heard_of_while_seats_home() {
+    let mut hall = Hall::closed(&["--dialect", "mbox", "--homing-ms", "20000"], as_mbox);
+    hall.serve();
+    hall.wait(|status| status["state"] == "parked" && all_stand(status, "ok"));
+    hall.done(&["home", "--seats-empty"]);
+    hall.comes_to("homing");
+    hall.happens("2@X1=1");
+    let stopped = hall.comes_to("stopped");
+    assert!(stopped["cause"].as_str().expect("text").contains("emergency stop"), "{stopped}");
+}
+
+#[test]
+fn no_register_of_a_seat_that_another_machine_plays_is_written() {
+    let hall = open();
+    hall.play("night");
+    hall.rises(1);
+    let to = format!("{},name=A2,axes=3,dialect=mbox", hall.address(1));
+    for value in ["dpf0=0", "PA95=3"] {
+        let run = hall.run(&["register", "write", value, "--to", &to, "--bind", "127.0.0.1:0", "--yes"]);
+        assert_eq!(run.code, Some(79), "{run:?}");
+        assert!(run.stderr.contains("A2: moves, though nothing was sent to it from here"), "{run:?}");
+    }
+    assert_eq!(hall.status()["state"], "playing");
+    assert!(all_stand(&hall.status(), "ok"));
 }
 
 /// A controller that answers each read with registers of 32 bits, as the IMAX manual has them.

@@ -29,8 +29,8 @@ pub(super) enum Homing {
     /// There is none.
     #[default]
     Idle,
-    /// The controllers are told to, and watched; called off, none of them is told any more.
-    UnderWay(Arc<AtomicBool>),
+    /// These controllers are told to, and watched; called off, none of them is told any more.
+    UnderWay(Vec<usize>, Arc<AtomicBool>),
     /// They are home since then, and have to be seen.
     Settling(MonoTime),
 }
@@ -38,7 +38,7 @@ pub(super) enum Homing {
 impl Homing {
     /// The hall homes no longer: no further seat begins to. What has begun is the controllers' own.
     fn call_off(&mut self) {
-        if let Self::UnderWay(called_off) = std::mem::take(self) {
+        if let Self::UnderWay(_, called_off) = std::mem::take(self) {
             called_off.store(true, Ordering::Release);
         }
     }
@@ -47,9 +47,21 @@ impl Homing {
     /// over.
     fn begin(&mut self, hall: &HallContext) -> Option<Act> {
         hall.is_free().ok()?;
-        let called_off = Arc::default();
-        *self = Self::UnderWay(Arc::clone(&called_off));
-        Some(Act::Start(Job::Home(hall.lanes_on().collect(), called_off)))
+        let (lanes, called_off): (Vec<_>, _) = (hall.lanes_on().collect(), Arc::default());
+        *self = Self::UnderWay(lanes.clone(), Arc::clone(&called_off));
+        Some(Act::Start(Job::Home(lanes, called_off)))
+    }
+
+    /// Ends it where a seat was taken out meanwhile: there may be somebody on it, and what homes moves by itself.
+    fn mind_seats(&mut self, hall: &HallContext) -> Vec<Act> {
+        let Self::UnderWay(lanes, _) = self else { return Vec::new() };
+        let Some(out) = lanes.iter().copied().find(|lane| !hall.settings.is_on(*lane)) else {
+            return Vec::new();
+        };
+        self.call_off();
+        let name = &hall.config.controllers[out].name;
+        let note = format!("{name}: was taken out while the seats homed, so no seat goes on to home");
+        vec![Act::Note(note), tell(Event::Trouble(Trouble::Homing(out)))]
     }
 
     /// Takes what became of the seats: those that are home are looked at anew.
@@ -108,7 +120,10 @@ impl Feature for Homing {
                 }
             }
             SupervisorEvent::Leaving => self.call_off(),
-            SupervisorEvent::Round(table) => out.extend(self.settle(table, hall)),
+            SupervisorEvent::Round(table) => {
+                out.extend(self.mind_seats(hall));
+                out.extend(self.settle(table, hall));
+            }
             _ => {}
         }
     }
@@ -226,6 +241,24 @@ mod tests {
             assert!(homing.take(failed, &hall).is_empty());
             assert!(told(&mut homing, &SupervisorEvent::Round(&[row(hall.now)]), &hall).is_empty());
         }
+    }
+
+    #[test]
+    fn a_seat_that_is_taken_out_while_it_homes_ends_the_homing_and_one_that_was_out_does_not() {
+        let mut hall = hall(State::Parked, "one");
+        hall.settings.only = Some(["B".to_owned()].into());
+        let (mut homing, called_off) = begun(&mut hall);
+        let table = [row(hall.now), row(hall.now)];
+        assert!(told(&mut homing, &SupervisorEvent::Round(&table), &hall).is_empty());
+        hall.settings.only = Some(["A".to_owned()].into());
+        let acts = told(&mut homing, &SupervisorEvent::Round(&table), &hall);
+        let [Act::Note(note), Act::Tick(TickCommand::Event(Event::Trouble(Trouble::Homing(1))))] = &acts[..]
+        else {
+            panic!("{acts:?}")
+        };
+        assert!(note.starts_with("B1: was taken out"), "{note}");
+        assert!(called_off.load(Ordering::Acquire));
+        assert!(told(&mut homing, &SupervisorEvent::Round(&table), &hall).is_empty(), "it is told once");
     }
 
     #[test]

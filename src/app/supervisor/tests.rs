@@ -357,7 +357,7 @@ fn a_homing_that_is_stopped_tells_no_further_seat_to_home() {
     rig.post(Command::Home);
     rig.hear();
     rig.hear_of(State::Homing);
-    let Homing::UnderWay(called_off) = &rig.supervisor.features.homing else { panic!("it homes") };
+    let Homing::UnderWay(_, called_off) = &rig.supervisor.features.homing else { panic!("it homes") };
     let called_off = Arc::clone(called_off);
     assert!(!called_off.load(Ordering::Acquire));
     rig.ask(Command::Stop).unwrap();

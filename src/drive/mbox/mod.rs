@@ -53,6 +53,8 @@ pub(crate) struct MboxPeer {
     drives: Option<u16>,
     /// Somebody waits for a belt: its inputs are asked for while nothing moves as well.
     has_belts: bool,
+    /// Inputs alone tell of an emergency stop.
+    has_stop_inputs: bool,
     pub(super) pending: Pending,
     pub(super) position: Positions,
     pub(super) probe: Probe,
@@ -82,6 +84,7 @@ impl MboxPeer {
             axes,
             drives: None,
             has_belts: controller.belt_inputs != 0,
+            has_stop_inputs: dialect == Dialect::Mbox && controller.estop_inputs != 0,
             pending: Pending::new(),
             position: Positions::new(Arc::clone(seat), first_slot, led),
             probe: Probe::new(dialect, axes, controller.estop_inputs),
@@ -130,7 +133,8 @@ impl MboxPeer {
     fn next_sign(&mut self, is_led: bool) -> Option<MonitorRead> {
         self.turn = self.turn.wrapping_add(1);
         let is_asked = |read: &MonitorRead| match read {
-            Inputs => self.has_belts,
+            // No reply of an MBOX controller says that an emergency stop is pressed: with no acks that is in its inputs alone.
+            Inputs => self.has_belts || (!is_led && self.has_stop_inputs),
             Zero => is_led,
             read => read.first_axis().is_some_and(|first| first < self.axes),
         };

@@ -63,8 +63,9 @@ impl Watch {
     /// While nothing moves, no ack tells that a controller lives, nor where its seat is; and while frames flow none tells that a seat
     /// follows them.
     pub(super) fn beat(&mut self, now: MonoTime) {
-        // Preflight counts every datagram that a controller received: none of ours may come between.
-        if self.silent || self.is_hushed() || self.is_asked_otherwise() {
+        // Preflight counts every datagram that a controller received: none of ours may come between. Those that home are asked all the
+        // while: an emergency stop is heard of by their answers.
+        if self.silent || self.is_hushed() {
             return;
         }
         if self.live.is_moving() {
