@@ -185,7 +185,7 @@ fn standing(config: Config) -> Result<(Config, Vec<RefusedFrames>), Failure> {
     let targets = Targets { controllers: config.stations(), show: config.show.clone() };
     let mut talk = targets.open()?;
     let all: Vec<usize> = (0..targets.controllers.len()).collect();
-    targets.refuse_others(&mut talk, &all)?;
+    targets.refuse_company(&mut talk, &all)?;
     let stood = stand(&mut talk, &targets.controllers);
     drop(talk);
     let (mut controllers, mut places, mut refused) = (Vec::new(), Vec::<Vec<Pulses>>::new(), Vec::new());

@@ -11,7 +11,7 @@ use anyhow::{Context as _, anyhow};
 use super::{Exit, Failure, OrExit as _, exit, load, names, print};
 use crate::app::PlayError;
 use crate::config::{Config, Controller, Link, Show, Station, from_to_args};
-use crate::device::company::{Company, company};
+use crate::device::company::company;
 use crate::device::{Fault, RegisterAnswer, Request, RequestOutcome, Talk, refusal};
 use crate::drive::link::LinkLine;
 use crate::drive::rates::LinkLoad;
@@ -173,25 +173,21 @@ impl Targets {
         })
     }
 
-    /// Ends with 79 where somebody else sends to one of `lanes`.
-    pub(super) fn refuse_others(&self, talk: &mut Talk, lanes: &[usize]) -> Result<Vec<Company>, Failure> {
+    /// Ends with 79 where somebody else sends to one of `lanes`, or one moves: a controller that counts nothing is led by somebody else
+    /// all the same.
+    pub(super) fn refuse_company(&self, talk: &mut Talk, lanes: &[usize]) -> Result<(), Failure> {
         let found = company(talk, &self.controllers, lanes);
         let others: Vec<_> = (found.iter().filter(|one| one.packets > 0))
             .map(|one| (self.name(one.lane).to_owned(), one.packets))
             .collect();
-        if others.is_empty() {
-            Ok(found)
-        } else {
-            Err(PlayError::OtherMaster(others)).or_exit(Exit::OtherMaster)
-        }
-    }
-
-    /// The same, and where one moves: a controller that counts nothing is led by somebody else all the same.
-    pub(super) fn refuse_company(&self, talk: &mut Talk, lanes: &[usize]) -> Result<(), Failure> {
-        let found = self.refuse_others(talk, lanes)?;
         let moving: Vec<_> =
             found.iter().filter(|one| one.moves).map(|one| self.name(one.lane).to_owned()).collect();
-        if moving.is_empty() { Ok(()) } else { Err(PlayError::Moving(moving)).or_exit(Exit::OtherMaster) }
+        let refused = match (others.is_empty(), moving.is_empty()) {
+            (true, true) => return Ok(()),
+            (true, false) => PlayError::Moving(moving),
+            (false, _) => PlayError::OtherMaster(others),
+        };
+        Err(refused).or_exit(Exit::OtherMaster)
     }
 
     /// The name of a controller by its place.

@@ -16,6 +16,8 @@ use crate::wire::{Dialect, position};
 const PACKETS: Address = Address::Dp(0x34);
 /// From the first count to the second: whoever asks at rest does so four times a second.
 const BETWEEN: Duration = Duration::from_millis(800);
+/// So often one that counts nothing is looked at again: in a show it may rest for a moment.
+const AGAIN: usize = 4;
 const PATIENCE: Patience = Patience { timeout: Duration::from_millis(200), tries: 3 };
 /// A network may double one datagram.
 const TOLERATED: u16 = 1;
@@ -29,12 +31,12 @@ pub(crate) struct Company {
     pub(crate) lane: usize,
     /// Datagrams that it received and that were not sent from here; 0 where it does not tell.
     pub(crate) packets: u16,
-    /// Its seat was elsewhere at the second reading.
+    /// Its seat was elsewhere at a later reading.
     pub(crate) moves: bool,
 }
 
-/// Looks at `lanes` for about a second, in which nothing else is sent; gives what they show, in their order. One that does not
-/// answer shows nothing.
+/// Looks at `lanes` for about a second, and for three where one of them counts nothing; nothing else is sent meanwhile. Gives what they
+/// show, in their order. One that does not answer shows nothing.
 ///
 /// # Panics
 /// If a lane is not among `controllers`.
@@ -43,16 +45,20 @@ pub(crate) fn company<L: Link, C: Clock>(
     controllers: &[Controller<Station>],
     lanes: &[usize],
 ) -> Vec<Company> {
+    let times = if lanes.iter().all(|lane| counts(&controllers[*lane])) { 1 } else { AGAIN };
     let first = look(talk, controllers, lanes);
-    let until = talk.now() + BETWEEN;
-    talk.wait(until, &mut |_, _, _| {});
-    let again = look(talk, controllers, lanes);
-    let of = |(&lane, (first, again)): (&usize, (&Look, &Look))| Company {
-        lane,
-        packets: first.surplus(again),
-        moves: first.differs(again, &controllers[lane]),
-    };
-    lanes.iter().zip(first.iter().zip(&again)).map(of).collect()
+    let mut found: Vec<_> = lanes.iter().map(|&lane| Company { lane, packets: 0, moves: false }).collect();
+    for nth in 0..times {
+        let until = talk.now() + BETWEEN;
+        talk.wait(until, &mut |_, _, _| {});
+        for ((one, first), again) in found.iter_mut().zip(&first).zip(look(talk, controllers, lanes)) {
+            if nth == 0 {
+                one.packets = first.surplus(&again);
+            }
+            one.moves |= first.differs(&again, &controllers[one.lane]);
+        }
+    }
+    found
 }
 
 /// What one controller told at once.
@@ -89,6 +95,10 @@ impl Look {
     }
 }
 
+fn counts(controller: &Controller<Station>) -> bool {
+    controller.connection.dialect == Dialect::Smc
+}
+
 fn look<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
     controllers: &[Controller<Station>],
@@ -96,8 +106,7 @@ fn look<L: Link, C: Clock>(
 ) -> Vec<Look> {
     let mut requests: Vec<(usize, Request)> = Vec::new();
     for &lane in lanes {
-        let counts = controllers[lane].connection.dialect == Dialect::Smc;
-        requests.extend(counts.then(|| (lane, Request::read(PACKETS))));
+        requests.extend(counts(&controllers[lane]).then(|| (lane, Request::read(PACKETS))));
         let places: Vec<_> = places(controllers[lane].seat.axes).collect();
         requests.extend(reads(&places).into_iter().map(|read| (lane, read)));
     }
@@ -160,6 +169,23 @@ mod tests {
                 vec![reply]
             });
             assert_eq!(found.packets, shown_of_it, "{more}");
+        }
+    }
+
+    #[test]
+    fn one_that_counts_nothing_is_looked_at_long_enough_for_a_seat_that_rests_for_a_moment_of_its_show() {
+        let mbox =
+            from_to_args(&["127.0.0.1:7408,axes=3,dialect=mbox".to_owned()], &[], 6).unwrap().stations();
+        for (moves_at, moves) in [(5, true), (99, false)] {
+            let rig = Rig::of(vec![Setup { dialect: Dialect::Mbox, ..Setup::default() }]);
+            let asked = Cell::new(0);
+            rig.filter(move |_, mut reply| {
+                asked.set(asked.get() + 1);
+                // The upper word of its first axis, which comes first.
+                reply[17] += if asked.get() >= moves_at { 40 } else { 0 };
+                vec![reply]
+            });
+            assert_eq!(company(&mut rig.talk(), &mbox, &[0])[0].moves, moves, "{moves_at}");
         }
     }
 

@@ -90,8 +90,6 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let wanted = wanted(args, &targets)?;
     let mut talk = targets.open()?;
     let mut changes = changes(&mut talk, &targets, &wanted)?;
-    let all: Vec<usize> = (0..targets.controllers.len()).collect();
-    targets.refuse_others(&mut talk, &all)?;
     if changes.is_empty() {
         print::tell("nothing to change: all registers already have these values");
         if !args.keep {
@@ -106,6 +104,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::tell("nothing was written");
         return finish(args, &targets, &[], false).map(|()| Exit::Done);
     }
+    // Only now: whoever was asked may have taken a while to answer.
+    let all: Vec<usize> = (0..targets.controllers.len()).collect();
+    targets.refuse_company(&mut talk, &all)?;
     let mut troubles = Troubles::default();
     write(&mut talk, &targets, &mut changes, args.keep, &mut troubles);
     read_back(&mut talk, &targets, &mut changes, &mut troubles);
