@@ -18,7 +18,7 @@ use super::drive::{DriveEntry, DriveFamily, SeatDrive, refuse_axes};
 use super::fault::Faults;
 use super::link::LinkEntry;
 use super::section::{Entry, Section, did_you_mean};
-use super::site::{Site, inputs_up_to, seat_of};
+use super::site::{Site, seat_of};
 use super::{Connection, Controller};
 
 /// What an address begins with that names a link.
@@ -104,7 +104,6 @@ pub(super) fn drive_controller<'t>(
     let seat_at = section.get("seat");
     let seat = seat_of(&mut section, site);
     let axis_offset = section.whole_in("axis_offset", 0..=MAX_AXES - 1).unwrap_or(0);
-    let estop_inputs = family.map_or(0, |family| estop_inputs(&mut section, family));
     let accept_findings = acceptances(&mut section);
     let enabled = section.get("enabled").and_then(|entry| entry.switch(section.faults)).unwrap_or(true);
     refuse_keys(&mut section);
@@ -115,9 +114,6 @@ pub(super) fn drive_controller<'t>(
     let (seat, family, seat_at) = (seat?, family?, seat_at?);
     refuse_axes(seat_at, &seat, family, faults);
     let drive = drive_of(seat_at, &seat, family, drives, faults);
-    if let (Some(drive), Some(value)) = (&drive, table.get("estop_inputs")) {
-        refuse_switch(Entry::new("estop_inputs", value), drive, estop_inputs, faults);
-    }
     let ((motors, motors_at), name, link) = (motors?, name?, link?);
     let drives =
         Drives { drive: Arc::new(drive?), link: link.clone(), motors: motors.clone(), twins: Vec::new() };
@@ -130,7 +126,7 @@ pub(super) fn drive_controller<'t>(
         axis_offset,
         effects: Some(Vec::new()),
         at_most: [0.0; SWITCHES],
-        estop_inputs,
+        estop_inputs: 0,
         belt_inputs: 0,
         accept_findings,
     };
@@ -158,15 +154,6 @@ fn family(section: &mut Section<'_, '_, '_>) -> Option<DriveFamily> {
     entry.choice(&DriveFamily::ALL, section.faults)
 }
 
-/// Inputs 1 to 7 of a SilverMax; a SIXpack 2 has none.
-fn estop_inputs(section: &mut Section<'_, '_, '_>, family: DriveFamily) -> u16 {
-    if let Some(entry) = section.get("estop_inputs").filter(|_| family == DriveFamily::Sixpack2) {
-        entry.fault(section.faults, "kinocue reads no inputs of a SIXpack 2; omit it");
-        return 0;
-    }
-    inputs_up_to(section, "estop_inputs", 7)
-}
-
 /// Notes what controllers have and drives have not, by name.
 fn refuse_keys(section: &mut Section<'_, '_, '_>) {
     if section.get("fan_out").is_some_and(|entry| entry.value.as_str() != Some("slice")) {
@@ -176,6 +163,10 @@ fn refuse_keys(section: &mut Section<'_, '_, '_>) {
         ("accept", "drives have no accept code; omit it"),
         ("vibration_port_octets", "drives have no vibration frames; omit it"),
         ("belt_inputs", "kinocue reads no belts through drives; omit it"),
+        (
+            "estop_inputs",
+            "kinocue reads no inputs of drives while it leads them; wire the emergency stop to their power, and omit it",
+        ),
     ] {
         section.refuse(key, why);
     }
@@ -284,14 +275,4 @@ fn refuse_home(drive: &SeatDrive, family: DriveFamily, at: usize, faults: &mut F
         _ => return,
     };
     faults.note(at, format!("drive: {message}"));
-}
-
-/// Notes an input that would tell of an emergency stop whenever a seat is home.
-fn refuse_switch(entry: Entry<'_>, drive: &SeatDrive, estop_inputs: u16, faults: &mut Faults<'_>) {
-    if let HomeWay::Switch { input: Some(input), .. } | HomeWay::Index { input: Some(input), .. } =
-        drive.homing.way
-        && estop_inputs & 1 << (input - 1) != 0
-    {
-        entry.fault(faults, &format!("input {input} is the switch of home on these units; wire another"));
-    }
 }

@@ -52,14 +52,14 @@ fn only(faults: Result<Config, Vec<String>>) -> String {
 
 #[test]
 fn a_seat_of_silvermax_units_reads_as_it_is_written_with_defaults_for_the_rest() {
-    let hall = silver("estop_inputs = [2]\naxis_offset = 3\n").unwrap();
+    let hall = silver("axis_offset = 3\n").unwrap();
     let [link] = &hall.links[..] else { panic!("one link") };
     assert_eq!((link.wiring, link.baud, link.stop_bits), (LinkWiring::Rs232, 57_600, 2));
     assert_eq!((link.has_echo, link.rate_hz, link.family), (false, None, Some(DriveFamily::SilverMax)));
     let [one] = &hall.controllers[..] else { panic!("one seat") };
     let Drives { drive, link, motors, .. } = one.drives().unwrap();
     assert_eq!((one.name.as_str(), link.as_str(), one.group.as_str()), ("A1", "stalls", "A1"));
-    assert_eq!((one.window(), one.estop_inputs, one.address().as_str()), (3..6, 0b10, "link:stalls"));
+    assert_eq!((one.window(), one.address().as_str()), (3..6, "link:stalls"));
     assert_eq!(*motors, Motors::SilverMax(vec![16, 17, 18]));
     let homing = drive.homing;
     assert_eq!(homing.way, HomeWay::Switch { input: Some(1), active_high: true });
@@ -190,7 +190,7 @@ fn what_drives_do_not_have_is_refused_by_name() {
         ("effects = [\"air\"]\n[effects]\nair = 1\n", "effects: drives switch no effects"),
         ("dac1 = 0.5\n", "dac1: drives have no such output"),
         ("belt_inputs = [1]\n", "belt_inputs: kinocue reads no belts through drives"),
-        ("estop_inputs = [8]\n", "estop_inputs: 8 is outside 1..=7"),
+        ("estop_inputs = [2]\n", "estop_inputs: kinocue reads no inputs of drives"),
         ("motors = [1]\n", "motors: a SilverMax is one motor; list the unit of each axis as units"),
         ("axes = 3\n", "axes: unknown key in [[controller]]"),
         ("[show]\nack_every = 2\n", "ack_every: drives answer each segment"),
@@ -329,12 +329,6 @@ fn a_link_is_a_line_of_its_own_by_its_whole_path() {
             only(parse(&format!("{}{}{SEAT}{DRIVE}{A1}", link("stalls", one), link("circle", other))));
         assert!(fault.contains("port: [link.stalls] uses it already"), "{fault}");
     }
-}
-
-#[test]
-fn the_input_of_a_switch_tells_of_no_emergency_stop() {
-    let fault = only(silver("estop_inputs = [1, 2]\n"));
-    assert!(fault.contains("estop_inputs: input 1 is the switch of home on these units"), "{fault}");
 }
 
 #[test]

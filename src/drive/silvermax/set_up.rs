@@ -3,6 +3,7 @@
 use super::look::UnitFacts;
 use super::scale::DriveScale;
 use super::talk::{Answer, Talk, TalkFault};
+use crate::config::drive::homing::HomeWay;
 use crate::config::drive::{SeatDrive, SilverMaxDrive};
 use crate::drive::TICK_NS;
 use crate::drive::link::{HomedAs, LinkPort, sum_of};
@@ -325,7 +326,7 @@ impl UnitAxis<'_> {
             Request::WriteRegister { register: MARK, value: mark },
             Request::ClearInternalStatus,
             Request::EnableMultiTasking,
-            // On heat alone: an error is what a hard stop is found by, and an input the switch.
+            // On heat alone for now: the target may be far from where it stands.
             Request::KillConditions { enable: Io::COOL, state: 0 },
             // They lie before the switch: a second homing would end at them.
             Request::SoftLimitsOff,
@@ -338,7 +339,18 @@ impl UnitAxis<'_> {
             Request::TargetToPosition,
             Request::EnableDriver,
         ];
-        requests.into_iter().try_for_each(|request| write(talk, unit, request))
+        requests.into_iter().try_for_each(|request| write(talk, unit, request))?;
+        // What holds it up is somebody's leg: it must not make up for that at once when that lets go. A hard stop is found by the error.
+        match self.of.drive.homing.way {
+            HomeWay::HardStop => Ok(()),
+            _ => self.kill_on_errors(talk, Io::MOVING_ERROR),
+        }
+    }
+
+    /// Has the unit let go of its motor by itself on these errors, and where it is hot.
+    fn kill_on_errors<P: LinkPort>(&self, talk: &mut Talk<P>, errors: u16) -> Result<(), HomeError> {
+        write(talk, self.unit, Request::ClearInternalStatus)?;
+        write(talk, self.unit, Request::KillConditions { enable: errors | Io::COOL, state: errors })
     }
 
     /// That it has not been restarted since it was disarmed. One bad digit looks so, too: twice is believed.
@@ -349,14 +361,9 @@ impl UnitAxis<'_> {
 
     /// The limits of a show, and the kill conditions.
     pub(super) fn arm<P: LinkPort>(&self, talk: &mut Talk<P>) -> Result<(), HomeError> {
-        let errors = Io::MOVING_ERROR | Io::HOLDING_ERROR;
-        let requests = [
-            self.torque(None),
-            self.error_limits(),
-            Request::ClearInternalStatus,
-            Request::KillConditions { enable: errors | Io::COOL, state: errors },
-        ];
-        requests.into_iter().try_for_each(|request| write(talk, self.unit, request))
+        write(talk, self.unit, self.torque(None))?;
+        write(talk, self.unit, self.error_limits())?;
+        self.kill_on_errors(talk, Io::MOVING_ERROR | Io::HOLDING_ERROR)
     }
 
     /// Inside the stroke: what holds it there, read back; the canary last. One that was restarted meanwhile has lost its zero,

@@ -55,16 +55,25 @@ impl Question {
     }
 }
 
+/// How soon a question is asked again that was not answered.
+const AGAIN: Duration = Duration::from_millis(200);
+
+fn place(question: Question) -> usize {
+    QUESTIONS.iter().position(|(other, _)| *other == question).unwrap_or(0)
+}
+
 /// When each is due.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Polls {
     due: [MonoTime; QUESTIONS.len()],
+    /// Since when each has told nothing.
+    untold: [Option<MonoTime>; QUESTIONS.len()],
     started: MonoTime,
 }
 
 impl Polls {
     pub(super) fn new(now: MonoTime) -> Self {
-        Self { due: [now; QUESTIONS.len()], started: now }
+        Self { due: [now; QUESTIONS.len()], untold: [None; QUESTIONS.len()], started: now }
     }
 
     /// Its queue began to run.
@@ -76,9 +85,21 @@ impl Polls {
 
     /// To be asked as soon as there is time.
     pub(super) fn hurry(&mut self, question: Question, now: MonoTime) {
-        let at = QUESTIONS.iter().position(|(other, _)| *other == question).unwrap_or(0);
+        let at = place(question);
         // Who is asked for it again and again is not put off by that.
         self.due[at] = self.due[at].min(now);
+    }
+
+    /// Whether the answer told anything; since when none has.
+    pub(super) fn told(&mut self, question: Question, is_told: bool, now: MonoTime) -> Option<MonoTime> {
+        let untold = &mut self.untold[place(question)];
+        if is_told {
+            *untold = None;
+            return None;
+        }
+        let since = *untold.get_or_insert(now);
+        self.hurry(question, now + AGAIN);
+        Some(since)
     }
 
     /// What is due longest, and since when.

@@ -1,5 +1,7 @@
 //! What is asked of units while they play, and what the answers mean.
 
+use std::time::Duration;
+
 use super::axis::Doubt;
 use super::polls::Question;
 use super::{LOST, PROBES, SilverMax, number};
@@ -15,6 +17,9 @@ use crate::wire::silvermax::{Poll, Request, StatusWord, Words};
 const OFF_COURSE_MM: f64 = 0.5;
 /// How far a motor is beside the model where its target is asked at once, mm: farther than a servo lags.
 const FAR_MM: f64 = 1.5;
+/// A unit that takes its segments, and tells nothing for so long when asked where it is or whether it was restarted, leads its seat
+/// nobody knows where.
+const BLIND: Duration = Duration::from_secs(2);
 /// When exactly a unit reads its registers is not known to better than this, seconds.
 const READING: f64 = 0.000_5;
 
@@ -27,18 +32,30 @@ impl<P: LinkPort> Stream<SilverMax, P> {
         let request = question.request();
         let answer = self.talk.exchange(axis.terms.unit, request);
         self.heard(l, a, request, &answer);
-        let Answer::Data(words) = answer? else { return Ok(()) };
-        let sent = self.talk.moment().sent;
-        match question {
-            Question::Events => return self.happened(l, a, words.word().unwrap_or_default()),
-            _ => self.read(l, a, question, words, sent),
+        let words = if let Ok(Answer::Data(words)) = &answer { Some(words) } else { None };
+        let (event, value) = (words.and_then(Words::word), words.and_then(Words::value));
+        // A bare ACK says that nothing happened.
+        let is_quiet = matches!(&answer, Ok(Answer::Ack));
+        let is_told =
+            if question == Question::Events { is_quiet || event.is_some() } else { value.is_some() };
+        let untold = self.lanes[l].axes[a].polls.told(question, is_told, now);
+        if untold.is_some_and(|since| now.since(since) > BLIND) {
+            self.lose(l, a);
         }
-        Ok(())
+        answer?;
+        let sent = self.talk.moment().sent;
+        match (question, event, value) {
+            (Question::Events, Some(event), _) => self.happened(l, a, event),
+            (_, _, Some(value)) => {
+                self.read(l, a, question, value, sent);
+                Ok(())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// A register was read.
-    fn read(&mut self, l: usize, a: usize, question: Question, words: Words, sent: MonoTime) {
-        let Some(value) = words.value() else { return };
+    fn read(&mut self, l: usize, a: usize, question: Question, value: i32, sent: MonoTime) {
         let axis = &mut self.lanes[l].axes[a];
         let scale = axis.terms.scale;
         match question {
@@ -204,4 +221,4 @@ impl<P: LinkPort> Stream<SilverMax, P> {
 }
 
 /// A tenth of a millisecond.
-const TENTH: std::time::Duration = std::time::Duration::from_micros(100);
+const TENTH: Duration = Duration::from_micros(100);

@@ -166,6 +166,34 @@ fn a_hard_stop_is_found_by_the_error_and_a_person_says_here() {
 }
 
 #[test]
+fn an_axis_that_something_holds_up_while_it_looks_for_its_zero_is_let_go_and_never_makes_up_for_it() {
+    let index = HomeWay::Index { input: Some(1), active_high: true };
+    for (way, held_ms) in [(SWITCH, 200), (SWITCH, 1_000), (SWITCH, 3_000), (index, 1_000)] {
+        let mut talk = talk_to(&[UnitSetup::new(16)]);
+        let of = |way| {
+            let mut of = drive(way);
+            // A virtual index lasts for one count, which a fast axis passes between two ticks.
+            of.homing.speed_mm_s = if way == SWITCH { 40.0 } else { 10.0 };
+            of
+        };
+        let then = talk.now() + Duration::from_millis(900);
+        talk.port().script = Some((then, |line, now| line.bus_mut().act(None, Action::Blocked(true), now)));
+        let homed = home_as(&mut talk, &of(way), &[16]).0;
+        let words = homed.unwrap_err().to_string();
+        assert!(words.contains("moving error"), "{words}");
+        let until = then + Duration::from_millis(held_ms);
+        talk.port().sleep_until(until);
+        talk.port().line.bus_mut().units_mut().iter_mut().for_each(Unit::forget_executed);
+        act(&mut talk, Action::Blocked(false));
+        let until = talk.now() + Duration::from_secs(3);
+        talk.port().sleep_until(until);
+        assert_eq!(unit(&mut talk, 0).executed().velocity, 0.0, "{way:?} {held_ms}");
+        assert_eq!(home_as(&mut talk, &of(way), &[16]).0, Ok(()), "once it is free it is homed as ever");
+        assert!(unit(&mut talk, 0).executed().velocity < 45.0 * MM, "{way:?} {held_ms}");
+    }
+}
+
+#[test]
 fn the_index_is_looked_for_behind_the_edge() {
     let mut drive = drive(HomeWay::Index { input: Some(1), active_high: true });
     drive.homing.zero_mm = -0.5;
