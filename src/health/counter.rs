@@ -25,8 +25,12 @@ const DOUBLED: u64 = 64;
 pub(super) struct PacketCounter {
     /// When it is to be read next.
     next: Option<MonoTime>,
-    /// What was told, and not judged yet.
-    told: Option<u16>,
+    /// What had been sent when it was asked first for the count that is to come, or that came last.
+    asked: u64,
+    /// It has not told since.
+    is_open: bool,
+    /// What was told and not judged yet, and what had been sent when that was asked for.
+    told: Option<(u16, u64)>,
     first: Option<PacketCount>,
     /// The next count says no more than what may still arrive.
     anew: bool,
@@ -35,7 +39,9 @@ pub(super) struct PacketCounter {
 #[derive(Debug, Clone, Copy)]
 struct PacketCount {
     packets: u16,
-    traffic: Traffic,
+    /// Sent before it was asked for, so in the count or late; what was sent since then may be in it or come later.
+    sent: u64,
+    acked: u64,
     at: MonoTime,
     /// What it has not counted of all that was sent before.
     late: Overdue,
@@ -53,11 +59,18 @@ pub(super) enum CountVerdict {
 impl PacketCounter {
     /// The same that compares nothing with what was counted so far.
     pub(super) const fn anew(&self) -> Self {
-        Self { next: None, told: None, first: self.first, anew: true }
+        Self { next: None, told: None, anew: true, ..*self }
+    }
+
+    /// It is asked for its count, after so many datagrams.
+    pub(super) const fn ask(&mut self, sent: u64) {
+        if !self.is_open {
+            (self.asked, self.is_open) = (sent, true);
+        }
     }
 
     pub(super) const fn hear(&mut self, packets: u16) {
-        self.told = Some(packets);
+        (self.told, self.is_open) = (Some((packets, self.asked)), false);
     }
 
     /// True if it is time to read it; if so, the next time is due a while later.
@@ -73,20 +86,22 @@ impl PacketCounter {
 
     /// Judges what was told by all that was sent until now, which is a little more than it can have counted.
     pub(super) fn judge(&mut self, traffic: Traffic, now: MonoTime) -> Option<CountVerdict> {
-        let packets = self.told.take()?;
+        let (packets, asked) = self.told.take()?;
         let anew = std::mem::take(&mut self.anew);
-        let count = PacketCount { packets, traffic, at: now, late: Overdue::default() };
+        let count =
+            PacketCount { packets, sent: asked, acked: traffic.acked, at: now, late: Overdue::default() };
         let Some(first) = self.first.filter(|first| now.since(first.at) < STALE) else {
             self.first = Some(count);
             return None;
         };
-        let sent = traffic.sent - first.traffic.sent;
-        let acked = traffic.acked - first.traffic.acked;
+        let sent = traffic.sent - first.sent;
+        let acked = traffic.acked - first.acked;
         let grown = u64::from(packets.wrapping_sub(first.packets));
         let tolerated = TOLERATED + sent / DOUBLED;
         let fits = grown <= sent + first.late.most(now) + tolerated && grown + tolerated >= acked;
         if now.since(first.at) >= SPAN || !fits || anew {
-            let late = if fits { first.late.after(sent, grown, now) } else { Overdue::default() };
+            let due = asked.saturating_sub(first.sent);
+            let late = if fits { first.late.after(due, grown, now) } else { Overdue::default() };
             self.first = Some(PacketCount { late, ..count });
         }
         if anew {
@@ -112,8 +127,9 @@ mod tests {
         let mut counter = PacketCounter::default();
         let mut second = 0;
         let mut one = |packets: &u16| {
-            counter.hear(*packets);
             second += 1;
+            counter.ask(100 * second);
+            counter.hear(*packets);
             counter.judge(Traffic { sent: 100 * second, acked: 100 * second }, s(second))
         };
         counts.iter().map(&mut one).collect()
@@ -136,18 +152,35 @@ mod tests {
         for (more, said) in [(0, None), (60, Some(CountVerdict::Crowded))] {
             let mut counter = PacketCounter::default();
             let mut after = |packets: u16, sent, at| {
+                counter.ask(sent);
                 counter.hear(packets);
                 counter.judge(Traffic { sent, acked: 0 }, s(at))
             };
             assert_eq!((after(500, 0, 1), after(600, 400, 2)), (None, None), "300 of them are held back");
             counter = counter.anew();
             let mut after = |packets: u16, sent, at| {
+                counter.ask(sent);
                 counter.hear(packets);
                 counter.judge(Traffic { sent, acked: 0 }, s(at))
             };
             assert_eq!((after(650, 450, 3), after(700, 500, 5)), (None, None));
             assert_eq!(after(1_050 + more, 550, 6), said);
         }
+    }
+
+    /// A switch, the controller or this machine stands still while its answer is on the way, and frames go out meanwhile.
+    #[test]
+    fn what_is_sent_while_the_first_count_is_on_its_way_may_come_after_it() {
+        let mut counter = PacketCounter::default();
+        let mut after = |packets: u16, [asked, sent]: [u64; 2], at| {
+            counter.ask(asked);
+            counter.hear(packets);
+            counter.judge(Traffic { sent, acked: 0 }, s(at))
+        };
+        assert_eq!(after(500, [100, 400], 1), None, "300 frames are under way");
+        assert_eq!(after(1_300, [900, 900], 2), None);
+        assert_eq!(after(1_400, [1_000, 1_000], 12), None, "and are no more from then on");
+        assert_eq!(after(1_700, [1_100, 1_100], 13), Some(CountVerdict::Crowded));
     }
 
     #[test]

@@ -130,6 +130,7 @@ impl Member {
     }
 
     pub(super) fn on_read_sent(&mut self, datagrams: u32) {
+        self.counter.ask(self.traffic.sent);
         self.traffic.sent += u64::from(datagrams);
         self.replies.on_read_sent(self.reads.on_sent());
     }
@@ -324,7 +325,10 @@ impl Member {
     /// True if frames go there, and it is time to read its packet counter; if so, it counts as sent.
     pub(super) fn counts_now(&mut self, now: MonoTime) -> bool {
         let due = self.flows(now) && self.counter.is_turn(self.controller, now);
-        self.traffic.sent += u64::from(due);
+        if due {
+            self.counter.ask(self.traffic.sent);
+            self.traffic.sent += 1;
+        }
         due
     }
 

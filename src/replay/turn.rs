@@ -49,6 +49,15 @@ impl<'a> Turn<'a> {
                     self.bench.begins(controller, first, books);
                     true
                 }
+                // The ack thread brought its books up to date before it heard what comes next.
+                AckRecord::Posted(..) | AckRecord::Fate(..) => {
+                    let before = self.records.len();
+                    books.catch_up(&mut self);
+                    if self.records.len() == before {
+                        break;
+                    }
+                    continue;
+                }
                 _ => self.hears_told(record),
             };
             if !is_taken {

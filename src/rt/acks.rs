@@ -237,6 +237,8 @@ impl AckLoop {
                 copy(tap, &AckRecord::Reply(reply));
                 return books.on_reply(reply, &mut Records { sent, last_sent, watch, observer, live, tap });
             }
+            // A count of datagrams is held against what was sent and acked until then: that must be in the books.
+            books.catch_up(&mut Records { sent, last_sent, watch, observer, live, tap });
             copy(tap, &AckRecord::Heard(origin, at, octets));
             let is_report = observer.hear(controller, &message, at);
             let is_known = is_report

@@ -84,6 +84,12 @@ impl Books {
         self.waiting.push((reply, false));
     }
 
+    /// Matches the replies that wait and whose frames are recorded; the others go on waiting.
+    pub(crate) fn catch_up(&mut self, ledger: &mut impl Ledger) {
+        ledger.bring_up_to_date(&mut self.tracker);
+        self.match_all(MonoTime::default(), ledger);
+    }
+
     /// Ends a drain that began at `began`: matches all replies, then expires the frames that are too old.
     pub fn settle(&mut self, began: MonoTime, ledger: &mut impl Ledger) {
         ledger.bring_up_to_date(&mut self.tracker);
