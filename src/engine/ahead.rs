@@ -17,6 +17,10 @@ const LAG_HOLD: Duration = Duration::from_millis(50);
 impl Engine {
     /// A few missed ticks leave a lag that is slewed away; after too many the lanes hold, then go on from rest.
     pub(super) fn count_missed(&mut self, missed: u64) {
+        // Of a show that begins with this tick nothing was missed.
+        if self.playhead.frames() == 0 {
+            return;
+        }
         let gap = self.show.rate.offset(missed);
         match (&self.phase, self.phase.rest()) {
             (Phase::Holding(_), Some(Rest::Late | Rest::Film)) if missed > 0 => {

@@ -180,6 +180,27 @@ mod tests {
     }
 
     #[test]
+    fn a_hall_that_is_held_up_until_just_before_the_instant_starts_with_the_film_where_it_is() {
+        let film_zero = ORIGIN + ms(2_003);
+        let (_, index) = armed(100.0, &[], film_zero);
+        let bytes = |late: Option<(u64, u64)>| -> Vec<_> {
+            let show = armed(100.0, &[], film_zero).0.with(3, Event::StartAt(film_zero));
+            let show = match late {
+                Some((before, late)) => show.with(index - before, Event::Late(ms(late))),
+                None => show,
+            };
+            let played = show.with(1_000, Event::Leave).play();
+            assert_eq!(came_of(&played), [None], "{late:?}");
+            played.frames.iter().map(|frame| frame.bytes.clone()).collect()
+        };
+        let undisturbed = bytes(None);
+        // As much of the tick before it, of three, and of nine is slept through.
+        for late in [(1, 12), (1, 19), (3, 31), (9, 95)] {
+            assert!(bytes(Some(late)) == undisturbed, "{late:?}");
+        }
+    }
+
+    #[test]
     fn whoever_takes_the_hall_out_of_armed_wins_and_so_does_a_person_who_lets_it_go() {
         let film_zero = ORIGIN + ms(2_003);
         let play = |event: Event| {
