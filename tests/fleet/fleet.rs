@@ -40,7 +40,12 @@ pub(crate) struct Link {
 impl Engine {
     /// None where there is no such program, and somebody asked for that.
     pub(crate) fn start(halls: &str) -> Option<Self> {
-        let mut engine = Self::made(halls, "127.0.0.1")?;
+        Self::start_with(halls, &[])
+    }
+
+    /// The same of which `fleet init` was told more.
+    pub(crate) fn start_with(halls: &str, more: &[&str]) -> Option<Self> {
+        let mut engine = Self::made(halls, "127.0.0.1", more)?;
         engine.restart();
         Some(engine)
     }
@@ -50,7 +55,7 @@ impl Engine {
         if !is_installed("openssl") {
             return None;
         }
-        let mut engine = Self::made(halls, "10.9.9.1")?;
+        let mut engine = Self::made(halls, "10.9.9.1", &[])?;
         let fleet = engine.path("fleet");
         let lines: Vec<_> = engine.said.lines().filter(|line| line.starts_with("openssl ")).collect();
         assert_eq!(lines.len(), 2, "{}", engine.said);
@@ -76,7 +81,7 @@ impl Engine {
     }
 
     /// Its files, for an engine at that host.
-    fn made(halls: &str, host: &str) -> Option<Self> {
+    fn made(halls: &str, host: &str, more: &[&str]) -> Option<Self> {
         if !is_installed("nats-server") {
             return None;
         }
@@ -98,7 +103,7 @@ impl Engine {
             "--folder",
             folder,
         ];
-        let run = crate::process::kinocue(&init);
+        let run = crate::process::kinocue(&[&init, more].concat());
         assert_eq!(run.code, Some(0), "{run:?}");
         engine.said = run.stdout;
         let conf = engine.path("fleet/nats-server.conf");

@@ -63,6 +63,35 @@ impl Member {
     }
 }
 
+/// Whoever makes a stream says of which subjects, and to whom the engine answers.
+#[test]
+fn what_the_engine_answers_is_no_answer_of_a_hall_and_no_stop_whatever_the_key_of_a_pair_has_it_keep() {
+    let Some(engine) = Engine::start_with("h1,h2", &["--pairs", "h1"]) else { return };
+    let hall = engine.hall("h2", "[]");
+    let link = engine.link("h2", &hall);
+    engine.wait(|table| {
+        table.as_array().is_some_and(|halls| halls.iter().any(|hall| hall["silent"] == false))
+    });
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    runtime.block_on(async {
+        let pair = Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1").await;
+        let all = r#"{"name":"kc_lease_berlin_h1","subjects":["kc.cmd.>","kc.stop.>"],"storage":"memory"}"#;
+        let create = pair.client.request("$JS.API.STREAM.CREATE.kc_lease_berlin_h1", all.into());
+        let made = timeout(PATIENCE, create).await.unwrap().unwrap();
+        assert!(String::from_utf8_lossy(&made.payload).contains("\"subjects\":[\"kc.cmd."), "{made:?}");
+        let info = "$JS.API.STREAM.INFO.kc_lease_berlin_h1";
+        pair.client.publish_with_reply(info, "kc.stop.berlin.h2.office", "".into()).await.unwrap();
+        pair.client.flush().await.unwrap();
+    });
+    link.heard("no stop: a member had the engine answer here");
+    assert_eq!(hall.status()["state"], "parked");
+    let run = engine.desk(&["stop", "berlin.h2"]);
+    assert_eq!((run.code, run.stdout.as_str()), (Some(0), "berlin.h2: stopping\n"), "{run:?}");
+    hall.comes_to("stopped");
+    let run = engine.desk(&["level", "50%", "berlin.h2"]);
+    assert!(run.stdout.contains("refused: the fleet may not levels"), "{run:?}");
+}
+
 #[test]
 fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
     let Some(engine) = Engine::start("h1,h2") else { return };
@@ -81,6 +110,10 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
                 assert!(hall.may_publish(may).await, "{may}");
             }
             for may_not in [
+                "$JS.API.STREAM.CREATE.kc_lease_berlin_h1",
+                "$JS.hub.API.STREAM.CREATE.kc_lease_berlin_h1",
+                "$JS.hub.API.STREAM.INFO.kc_lease_berlin_h1",
+                "kc.lease.berlin.h1",
                 "kc.status.berlin.h2",
                 "kc.log.berlin.h2",
                 "kc.cmd.berlin.h2.office.pause",

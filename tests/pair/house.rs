@@ -194,7 +194,8 @@ fn lay_cables(seats: &Machine, engine: &Machine, shows: [&Machine; 2]) {
 /// Keys, certificate and the configuration of the engine.
 fn make_fleet(folder: &Path) {
     let text = folder.to_str().unwrap();
-    let args = ["fleet", "init", "--site", "berlin", "--halls", "h1", "--engine", ENGINE, "--folder", text];
+    let of = ["--site", "berlin", "--halls", "h1", "--pairs", "h1", "--engine", ENGINE, "--folder", text];
+    let args = [&["fleet", "init"][..], &of].concat();
     assert_eq!(crate::process::kinocue(&args).code, Some(0));
     let script = "openssl req -x509 -newkey ed25519 -nodes -days 9 -subj /CN=fleet-ca -keyout ca.key -out fleet-ca.pem\n\
         openssl req -newkey ed25519 -nodes -subj /CN=10.3.0.9 -keyout engine.key -out engine.csr\n\

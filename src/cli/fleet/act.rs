@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use anyhow::anyhow;
-use async_nats::Client;
-use async_nats::client::{Request, RequestErrorKind};
+use async_nats::{Client, StatusCode};
+use futures_util::StreamExt as _;
 use futures_util::future::join_all;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use tokio::time::timeout;
 
 use super::desk::said;
 use super::settings::DeskSettings;
@@ -117,6 +118,7 @@ pub(super) const STOP: Asked = Asked { word: "stop", args: Value::Null, patience
 /// What a hall's link answers.
 #[derive(Debug, Deserialize)]
 pub(super) struct LinkReply {
+    hall: String,
     status: u16,
     pub(super) reply: Value,
 }
@@ -238,18 +240,38 @@ pub(super) async fn request(
             None => return Err(Answer::Refused("the key of this desk cannot sign".to_owned())),
         },
     };
-    let request = Request::new().payload(letter.into()).timeout(Some(asked.patience));
-    Err(match client.send_request(subject, request).await {
-        Ok(message) => return Answer::of(&message.payload),
-        Err(error) if error.kind() == RequestErrorKind::NoResponders => {
-            Answer::Silent("nobody hears it there: its link or its network is down".to_owned())
-        }
-        Err(error) if error.kind() == RequestErrorKind::TimedOut => Answer::Silent(format!(
+    match timeout(asked.patience, answer_of(client, hall, subject, letter)).await {
+        Ok(Ok(Some(answer))) => Answer::of(answer),
+        Ok(Ok(None)) => Err(Answer::Silent("nobody hears it there: its link or its network is down".to_owned())),
+        Ok(Err(error)) => Err(Answer::Silent(format!("not asked: {error:#}"))),
+        Err(_) => Err(Answer::Silent(format!(
             "no answer within {} s; it may still take effect",
             asked.patience.as_secs()
-        )),
-        Err(error) => Answer::Silent(format!("not asked: {error}")),
-    })
+        ))),
+    }
+}
+
+/// What the hall's own link answers; `None` where nobody hears. Others may answer as well, such as an engine that was told to keep what is
+/// asked: that says nothing of the hall.
+async fn answer_of(
+    client: &Client,
+    hall: &str,
+    subject: String,
+    letter: String,
+) -> anyhow::Result<Option<LinkReply>> {
+    let inbox = client.new_inbox();
+    let mut answers = client.subscribe(inbox.clone()).await?;
+    client.publish_with_reply(subject, inbox, letter.into()).await?;
+    while let Some(message) = answers.next().await {
+        if message.status == Some(StatusCode::NO_RESPONDERS) {
+            return Ok(None);
+        }
+        let answer = serde_json::from_slice::<LinkReply>(&message.payload).ok();
+        if let Some(answer) = answer.filter(|answer| answer.hall == hall) {
+            return Ok(Some(answer));
+        }
+    }
+    anyhow::bail!("the engine is away")
 }
 
 /// What is asked, signed now for that hall.
@@ -282,10 +304,7 @@ impl Answer {
     }
 
     /// What a link's answer says, where the hall did it.
-    fn of(payload: &[u8]) -> Result<LinkReply, Self> {
-        let Ok(answer) = serde_json::from_slice::<LinkReply>(payload) else {
-            return Err(Self::Refused("what answers there is no link of ours".to_owned()));
-        };
+    fn of(answer: LinkReply) -> Result<LinkReply, Self> {
         if answer.status == 200 {
             return Ok(answer);
         }
@@ -329,9 +348,9 @@ mod tests {
     #[test]
     fn who_did_not_answer_decides_how_it_ends() {
         let answer = |status: u16| {
-            let reply = json!({ "hall": "a.b", "status": status, "reply": { "detail": "x", "remedy": "y" } });
+            let reply = json!({ "detail": "x", "remedy": "y" });
             let done = |_| Answer::Done("parked".to_owned());
-            Answer::of(reply.to_string().as_bytes()).map_or_else(|answer| answer, done)
+            Answer::of(LinkReply { hall: "a.b".to_owned(), status, reply }).map_or_else(|answer| answer, done)
         };
         let of = |all: &[u16]| exit(all.iter().map(|&status| answer(status)).collect::<Vec<_>>().iter());
         assert_eq!(of(&[200, 200]), Exit::Done);
@@ -339,6 +358,5 @@ mod tests {
         assert_eq!(of(&[403, 503, 200]), Exit::TryAgain);
         assert_eq!(answer(403).line(), "refused: x; y");
         assert_eq!(answer(200).line(), "parked");
-        assert!(matches!(Answer::of(b"hello"), Err(Answer::Refused(_))));
     }
 }

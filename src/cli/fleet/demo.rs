@@ -98,6 +98,7 @@ fn start(
     let plan = Plan {
         site: "demo",
         halls: &halls,
+        pairs: &[],
         desk: "office",
         engine: &address,
         store: store.to_str().unwrap_or_default(),

@@ -27,6 +27,9 @@ pub(super) struct Args {
     /// The halls.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', required = true, value_parser = name)]
     halls: Vec<String>,
+    /// Those of them with two show machines: their keys may keep a lease at the engine.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = name)]
+    pairs: Vec<String>,
     /// Who asks at the desk.
     #[arg(long, value_name = "NAME", value_parser = name, default_value = "office")]
     desk: String,
@@ -42,6 +45,8 @@ pub(super) struct Args {
 pub(super) struct Plan<'a> {
     pub(super) site: &'a str,
     pub(super) halls: &'a [String],
+    /// Those of them that keep a lease.
+    pub(super) pairs: &'a [String],
     pub(super) desk: &'a str,
     /// `HOST:PORT`.
     pub(super) engine: &'a str,
@@ -60,8 +65,12 @@ fn name(text: &str) -> Result<String, String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let Args { site, halls, desk, engine, folder } = args;
-    let plan = Plan { site, halls, desk, engine, store: "/var/lib/nats/jetstream", allow: "[]" };
+    let Args { site, halls, pairs, desk, engine, folder } = args;
+    let plan = Plan { site, halls, pairs, desk, engine, store: "/var/lib/nats/jetstream", allow: "[]" };
+    if let Some(nobody) = pairs.iter().find(|pair| !halls.contains(pair)) {
+        let error = anyhow!("--pairs: {nobody} is none of --halls, {}", halls.join(", "));
+        return Err(error).or_exit(Exit::Usage);
+    }
     let is_alone = host(engine)?;
     if folder.exists() {
         let error = anyhow!("{} is there; keys are made once: give another --folder", folder.display());
@@ -151,7 +160,11 @@ fn engine_conf(plan: &Plan<'_>, desk: &KeyPair, halls: &[(&String, KeyPair)]) ->
     user(&mut text, plan.desk, &desk.public_key(), &of_desk(plan.desk), false);
     for (hall, pair) in halls {
         let member = format!("{}.{hall}", plan.site);
-        user(&mut text, &member, &pair.public_key(), &of_hall(plan.site, &member), true);
+        let mut rights = of_hall(plan.site, &member);
+        if plan.pairs.contains(hall) {
+            rights.publish.extend(of_lease(&member));
+        }
+        user(&mut text, &member, &pair.public_key(), &rights, true);
     }
     text.push_str("  ]\n}\n");
     Ok(text)
@@ -198,11 +211,6 @@ fn of_desk(desk: &str) -> Rights {
 fn of_hall(site: &str, member: &str) -> Rights {
     let mut publish = vec![fleet::status_of(member), fleet::log_of(member)];
     publish.extend(api(&format!("DIRECT.GET.{LOG}.{}", fleet::log_of(member))));
-    // For its lease, where it has two show machines.
-    publish.push(fleet::lease_of(member));
-    let lease = fleet::lease_stream(member);
-    publish
-        .extend(["INFO", "CREATE", "MSG.GET"].iter().flat_map(|what| api(&format!("STREAM.{what}.{lease}"))));
     publish.extend(api(&format!("DIRECT.GET.KV_{WANT}.$KV.{WANT}.{member}")));
     publish.extend(api(&format!("DIRECT.GET.{CUES}.{}", fleet::chunk_of("*", "*"))));
     publish.extend([SEEN, HAVE].iter().flat_map(|bucket| api(&format!("$KV.{bucket}.{member}"))));
@@ -210,6 +218,14 @@ fn of_hall(site: &str, member: &str) -> Rights {
     let inbox = format!("{}.>", inbox(member));
     let subscribe = vec![fleet::command_to(member, "*", "*"), fleet::stop_to(member, "*"), all, inbox];
     Rights { publish, subscribe }
+}
+
+/// What a hall of two show machines may beside that. It makes the stream of its lease, and the engine lets whoever makes a stream say of which
+/// subjects: such a key could have the engine keep what others are asked, so none has it without need.
+fn of_lease(member: &str) -> Vec<String> {
+    let stream = fleet::lease_stream(member);
+    let asks = ["INFO", "CREATE", "MSG.GET"].into_iter().flat_map(|what| api(&format!("STREAM.{what}.{stream}")));
+    asks.chain([fleet::lease_of(member)]).collect()
 }
 
 fn user(text: &mut String, name: &str, public: &str, rights: &Rights, answers: bool) {

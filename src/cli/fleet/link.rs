@@ -25,6 +25,9 @@ use crate::fleet::{self, BriefStatus};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
+/// What is heard by several subjects.
+type Messages = stream::SelectAll<async_nats::Subscriber>;
+
 /// How often the hall is looked at, and so the most that is told of it.
 const LOOK: Duration = Duration::from_millis(100);
 /// How often it is told where nothing changes.
@@ -71,12 +74,15 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::tell(&format!("carries {} by {}", link.hall, link.socket.display()));
         let (tell, told) = watch::channel(None);
         let work = async {
+            // First, so that a hall that is heard of can also be stopped.
+            let stops = link.subscribe_to_stops().await;
+            let orders = link.subscribed([fleet::command_to(&link.hall, "*", "*")]).await;
             tokio::join!(
                 link.tell(&tell),
                 link.keep(told.clone()),
                 link.keep_wishes(parts, told),
-                link.hear_stops(),
-                link.hear_orders(),
+                link.hear_stops(stops),
+                link.hear_orders(orders),
                 link.tell_log(),
                 lease::carry(&link),
                 link.tell_clock(clock)
@@ -153,12 +159,15 @@ impl Link {
         }
     }
 
-    /// Passes stops on, by a socket of their own that waits for nothing.
-    async fn hear_stops(self: &Arc<Self>) {
+    async fn subscribe_to_stops(&self) -> Messages {
         let site = self.hall.split_once('.').map_or("", |(site, _)| site);
         let all = fleet::stop_to(&format!("{site}.{}", fleet::ALL), "*");
-        let mut both = self.subscribed([fleet::stop_to(&self.hall, "*"), all]).await;
-        while let Some(message) = both.next().await {
+        self.subscribed([fleet::stop_to(&self.hall, "*"), all]).await
+    }
+
+    /// Passes stops on, by a socket of their own that waits for nothing.
+    async fn hear_stops(self: &Arc<Self>, mut stops: Messages) {
+        while let Some(message) = stops.next().await {
             if is_of_engine(&message) {
                 print::tell("no stop: a member had the engine answer here");
                 continue;
@@ -179,8 +188,7 @@ impl Link {
     }
 
     /// Passes orders on, and what the hall answers back.
-    async fn hear_orders(self: &Arc<Self>) {
-        let mut orders = self.subscribed([fleet::command_to(&self.hall, "*", "*")]).await;
+    async fn hear_orders(self: &Arc<Self>, mut orders: Messages) {
         let places = Arc::new(Semaphore::new(AT_ONCE));
         while let Some(message) = orders.next().await {
             let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
@@ -282,10 +290,7 @@ impl Link {
         }
     }
 
-    async fn subscribed<const N: usize>(
-        &self,
-        subjects: [String; N],
-    ) -> stream::SelectAll<async_nats::Subscriber> {
+    async fn subscribed<const N: usize>(&self, subjects: [String; N]) -> Messages {
         let mut all = stream::SelectAll::new();
         for subject in subjects {
             // It fails where the client was closed, which nobody does.
@@ -301,9 +306,8 @@ impl Link {
 /// there. All else is somebody's stop, whatever is in it.
 fn is_of_engine(message: &Message) -> bool {
     let is_kept = message.headers.as_ref().is_some_and(|headers| headers.get("Nats-Stream").is_some());
-    let is_ack =
-        [&b"{\"stream\":"[..], b"{\"error\":"].iter().any(|start| message.payload.starts_with(start));
-    message.status.is_some() || is_kept || is_ack
+    let says = [&b"{\"stream\":"[..], b"{\"error\":", b"{\"type\":\"io.nats."];
+    message.status.is_some() || is_kept || says.iter().any(|start| message.payload.starts_with(start))
 }
 
 /// That the hall cannot be asked.
