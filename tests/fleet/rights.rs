@@ -69,9 +69,8 @@ fn what_the_engine_answers_is_no_answer_of_a_hall_and_no_stop_whatever_the_key_o
     let Some(engine) = Engine::start_with("h1,h2", &["--pairs", "h1"]) else { return };
     let hall = engine.hall("h2", "[]");
     let link = engine.link("h2", &hall);
-    engine.wait(|table| {
-        table.as_array().is_some_and(|halls| halls.iter().any(|hall| hall["silent"] == false))
-    });
+    engine
+        .wait(|table| table.as_array().is_some_and(|halls| halls.iter().any(|hall| hall["silent"] == false)));
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     runtime.block_on(async {
         let pair = Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1").await;

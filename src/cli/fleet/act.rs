@@ -242,7 +242,9 @@ pub(super) async fn request(
     };
     match timeout(asked.patience, answer_of(client, hall, subject, letter)).await {
         Ok(Ok(Some(answer))) => Answer::of(answer),
-        Ok(Ok(None)) => Err(Answer::Silent("nobody hears it there: its link or its network is down".to_owned())),
+        Ok(Ok(None)) => {
+            Err(Answer::Silent("nobody hears it there: its link or its network is down".to_owned()))
+        }
         Ok(Err(error)) => Err(Answer::Silent(format!("not asked: {error:#}"))),
         Err(_) => Err(Answer::Silent(format!(
             "no answer within {} s; it may still take effect",

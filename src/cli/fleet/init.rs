@@ -224,7 +224,8 @@ fn of_hall(site: &str, member: &str) -> Rights {
 /// subjects: such a key could have the engine keep what others are asked, so none has it without need.
 fn of_lease(member: &str) -> Vec<String> {
     let stream = fleet::lease_stream(member);
-    let asks = ["INFO", "CREATE", "MSG.GET"].into_iter().flat_map(|what| api(&format!("STREAM.{what}.{stream}")));
+    let asks =
+        ["INFO", "CREATE", "MSG.GET"].into_iter().flat_map(|what| api(&format!("STREAM.{what}.{stream}")));
     asks.chain([fleet::lease_of(member)]).collect()
 }
 
