@@ -28,12 +28,14 @@ mod margins;
 mod marks;
 mod notes;
 mod read;
+mod reading;
 #[cfg(test)]
 mod reading_tests;
 mod recorder;
 mod recording;
 mod recover;
 mod report;
+mod sample_text;
 mod sampled;
 mod scene;
 mod schemas;
@@ -62,7 +64,8 @@ pub(crate) use marks::{MarkBudget, MarkRefusal};
 pub(crate) use notes::{
     ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote, note_in_words,
 };
-pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning, read};
+pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning};
+pub(crate) use reading::{read, read_ahead};
 pub(crate) use recorder::Recorder;
 pub(crate) use recording::{ACKS, About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ};
 pub(crate) use recover::{RecoverError, Recovered, recover};
