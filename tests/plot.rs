@@ -216,3 +216,25 @@ fn the_examples_of_the_help_run_and_a_file_is_replaced_only_if_asked() {
     );
     assert!(!kinocue(&["cues/coaster.csv", "--from", "2:00"]).status.success(), "beyond the end");
 }
+
+/// The console of a kernel has no braille: what would be drawn with it is boxes there.
+#[test]
+fn a_picture_is_in_half_blocks_on_the_console_of_a_kernel_and_in_braille_on_other_terminals() {
+    let drawn = |terminal: Option<&str>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+        command
+            .args(["plot", "cues/coaster.csv"])
+            .env_remove("TERM")
+            .envs(terminal.map(|word| ("TERM", word)));
+        String::from_utf8(command.output().expect("it runs").stdout).expect("text")
+    };
+    let [console, other, none] = [Some("linux"), Some("xterm-256color"), None].map(drawn);
+    let count = |text: &str, is_one: fn(char) -> bool| text.chars().filter(|c| is_one(*c)).count();
+    let (is_dot, is_block): (fn(char) -> bool, fn(char) -> bool) =
+        (|c| ('\u{2801}'..='\u{28ff}').contains(&c), |c| "▀▄█".contains(c));
+    assert!(count(&other, is_dot) > 200 && count(&other, is_block) == 0, "{other}");
+    assert_eq!(none, other);
+    // A character for each, and no braille at all: not even an empty one has a glyph there.
+    assert_eq!(count(&console, is_block), count(&other, is_dot), "{console}");
+    assert_eq!(count(&console, |c| ('\u{2800}'..='\u{28ff}').contains(&c)), 0, "{console}");
+}
