@@ -44,6 +44,7 @@ mod summary;
 mod tap;
 #[cfg(test)]
 mod tests;
+mod waiting;
 
 pub(crate) use ack_record::{AckRecord, latency_ns, standing_of};
 pub(crate) use acks::{AckChunk, AckStanding};

@@ -92,7 +92,7 @@ pub(crate) enum Message {
     State(State),
     /// What the service tells.
     Note(Note),
-    /// A block of whole ticks, of which the first was then.
+    /// A block of whole ticks, of which the last was then.
     Ticks(Vec<u8>),
     /// What the ack thread took, as it crossed.
     Drains(Vec<u8>),
