@@ -346,3 +346,28 @@ fn messages_stand_in_a_file_in_the_order_of_their_times_whenever_they_were_told(
         assert_eq!(pairs.find(|pair| pair[1].1 < pair[0].1), None, "{mode:?}");
     }
 }
+
+#[test]
+fn an_incident_begins_with_how_the_hall_stood_then_and_not_with_how_it_stands_now() {
+    let mut bench = Bench::new();
+    bench.worker.record.flight_s = 2;
+    let ring = bench.folder.path().join("flight.ring");
+    let mut bench = Bench { worker: bench.worker.flying(&ring, 16 << 20), ..bench };
+    for (state, ticks) in [(4, 3_000), (9, 500), (12, 200)] {
+        let note = HallNote { state, ..HallNote::default() };
+        bench.worker.keep(at(bench.tick), Note::Hall(note));
+        bench.ticks(ticks);
+    }
+    bench.worker.on_incident(IncidentCause::Dump, at(bench.tick), at(bench.tick));
+    bench.worker.close_incident(at(bench.tick));
+    let path = bench.files().into_iter().find(|path| path != &ring).expect("an incident");
+    let file = std::fs::read(&path).expect("it is there");
+    let mut states = Vec::new();
+    let mut take = |_: &Contents, _, told: Told<'_>| {
+        if let Told::State(state) = told {
+            states.push(state);
+        }
+    };
+    read(file.as_slice(), Wanted::ALL, &mut take).expect("a recording");
+    assert_eq!(states, [4, 9, 12]);
+}
