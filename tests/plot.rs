@@ -69,13 +69,18 @@ fn a_page_fits_its_window_loads_nothing_and_shows_parts_larger() {
 
 /// A recording of a seat with that name; the film ran over the same two seconds three times, with the seat higher each time.
 fn recorded(path: &Path, name: &str) {
+    recorded_in_passes(path, name, 3);
+}
+
+/// The same in so many passes.
+fn recorded_in_passes(path: &Path, name: &str, passes: u64) {
     let seat = SeatType::bench3(3);
     let window = Window::new((0..3).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect());
     let seats = vec![RecordedSeat::new(name, &window, FrameKind::Datagram(VibrationPort::Two))];
-    recorded_show(seats, Rate::from_hz(100.0), path, 600, |tap, _, tick| {
+    recorded_show(seats, Rate::from_hz(100.0), path, 200 * passes, |tap, _, tick| {
         let (at, film) = (MonoTime::from_nanos(tick * 10_000_000), tick % 200);
         // A stroke of 150 mm is 300,000 pulses.
-        let pulses = i32::try_from(30_000 + 75_000 * (tick / 200) + 150 * film).expect("in the stroke");
+        let pulses = i32::try_from(30_000 + 75_000 * (tick / 200 % 3) + 150 * film).expect("in the stroke");
         let (positions, place) = ([Pulses(pulses); 3], f64::from(pulses) / 300_000.0);
         let motion = Motion {
             timing: Timing::Relative,
@@ -143,6 +148,48 @@ fn a_page_of_a_recording_shows_each_pass_of_the_film_beside_the_last_and_fits_it
     assert!(kinocue(&[text(&file), "-o", text(&svg)]).status.success());
     browser.open(&format!("file://{}", svg.display()));
     browser.shot("plot-recording-svg");
+}
+
+/// The names of flags stand beside each other on any screen, in the whole and in a part of it, and on paper.
+#[test]
+fn names_of_flags_do_not_run_into_each_other_however_narrow_the_page() {
+    let Some(browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let (file, page) = (folder.path().join("loop.mcap"), folder.path().join("loop.html"));
+    recorded_in_passes(&file, "A1", 12);
+    let shown = "return [...document.querySelectorAll('.flags span')].filter((one) => one.getClientRects().length).map((one) => { \
+         const { left, right, top } = one.getBoundingClientRect(); return [left, right, top, innerWidth]; })";
+    for theme in ["light", "dark", "print"] {
+        let run = kinocue(&[text(&file), "-o", text(&page), "--theme", theme, "--force"]);
+        assert!(run.status.success(), "{run:?}");
+        browser.open(&format!("file://{}", page.display()));
+        let mut counts = Vec::new();
+        for width in [320, 400, 800, 1600] {
+            browser.resize(width, 900);
+            browser.wait(&format!(
+                "innerWidth === {width} && document.querySelectorAll('.times .tick').length >= 3"
+            ));
+            for press in ["[data-does=whole]", "[data-does=in]", "[data-does=whole]"] {
+                browser.press(press);
+                let names: Vec<[f64; 4]> = serde_json::from_value(browser.eval(shown)).expect("places");
+                for (index, [left, right, top, inside]) in names.iter().enumerate() {
+                    let is_apart = |[from, to, other, _]: &[f64; 4]| {
+                        (top - other).abs() > 10.0 || *to <= left + 0.5 || right - 0.5 <= *from
+                    };
+                    assert!(names[..index].iter().all(is_apart), "{theme} {width} {press}: {names:?}");
+                    assert!(*left >= 0.0 && right <= inside, "{theme} {width} {press}: {names:?}");
+                }
+                counts.push(names.len());
+            }
+            browser.shot(&format!("plot-flags-{theme}-{width}"));
+        }
+        assert!(counts.iter().all(|count| *count >= 2) && counts.last() == Some(&11), "{counts:?}");
+        // As it is printed, which no script sees.
+        browser.eval("dispatchEvent(new Event('beforeprint'))");
+        let printed = browser.eval("return document.querySelector('.flags span').style.maxWidth");
+        assert_eq!(printed, json!(""));
+    }
+    assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
 #[test]
@@ -215,4 +262,26 @@ fn the_examples_of_the_help_run_and_a_file_is_replaced_only_if_asked() {
         "{picture}"
     );
     assert!(!kinocue(&["cues/coaster.csv", "--from", "2:00"]).status.success(), "beyond the end");
+}
+
+/// The console of a kernel has no braille: what would be drawn with it is boxes there.
+#[test]
+fn a_picture_is_in_half_blocks_on_the_console_of_a_kernel_and_in_braille_on_other_terminals() {
+    let drawn = |terminal: Option<&str>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+        command
+            .args(["plot", "cues/coaster.csv"])
+            .env_remove("TERM")
+            .envs(terminal.map(|word| ("TERM", word)));
+        String::from_utf8(command.output().expect("it runs").stdout).expect("text")
+    };
+    let [console, other, none] = [Some("linux"), Some("xterm-256color"), None].map(drawn);
+    let count = |text: &str, is_one: fn(char) -> bool| text.chars().filter(|c| is_one(*c)).count();
+    let (is_dot, is_block): (fn(char) -> bool, fn(char) -> bool) =
+        (|c| ('\u{2801}'..='\u{28ff}').contains(&c), |c| "▀▄█".contains(c));
+    assert!(count(&other, is_dot) > 200 && count(&other, is_block) == 0, "{other}");
+    assert_eq!(none, other);
+    // A character for each, and no braille at all: not even an empty one has a glyph there.
+    assert_eq!(count(&console, is_block), count(&other, is_dot), "{console}");
+    assert_eq!(count(&console, |c| ('\u{2800}'..='\u{28ff}').contains(&c)), 0, "{console}");
 }

@@ -11,7 +11,7 @@ use anyhow::anyhow;
 use super::record::{open, seat_in, unread};
 use super::{Exit, Failure, OrExit as _};
 use crate::plot::{self, FilmAxis, Gathered, Look, Picture};
-use crate::record::{Contents, Summary, Wanted, beginning, read, summarize};
+use crate::record::{Contents, Summary, Wanted, beginning, read_ahead, summarize};
 use crate::time::ShowTime;
 
 /// What is drawn of a recording.
@@ -107,7 +107,7 @@ fn gathered(file: &OpenRecording<'_>, look: Look, contents: &Contents) -> Result
     let is_whole = contents.messages.contains_key("/full/sent");
     let mut gathered = Gathered::new(contents, look, is_whole);
     let wanted = Wanted { seat: Some(seat), ..Wanted::ALL };
-    read(file.input(), wanted, &mut |contents, at, told| gathered.take(contents, at, told))
+    read_ahead(file.input(), wanted, &mut |contents, at, told| gathered.take(contents, at, told))
         .map_err(|error| unread(error, file.path))?;
     Ok(gathered)
 }

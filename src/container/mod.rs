@@ -4,6 +4,7 @@
 //! The file is read by the `mcap` crate; the bodies of the few records that matter are taken apart here, because the crate
 //! reserves as much memory as a length in the file claims.
 
+mod ahead;
 mod saved;
 mod walk;
 mod zstd;
@@ -16,6 +17,7 @@ use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::plain::escaped;
+pub(crate) use ahead::{SplitReader, each_sound_ahead};
 pub(crate) use saved::{LostChunk, each_outside, each_saved};
 use walk::Walk;
 use zstd::Zstd;
@@ -95,11 +97,13 @@ fn each_of<E: From<Trouble>>(
     take: impl FnMut(u8, &[u8]) -> Result<(), E>,
 ) -> Result<(), (u64, E)> {
     let mut walk = Walk::new(most);
+    // No byte is read before it is asked for, so that the walk is where the reader is.
+    let input = BufReader::with_capacity(READ, input);
     walk_on(input, &mut walk, most, chunks, take).map_err(|error| (walk.record(), error))
 }
 
 fn walk_on<E: From<Trouble>>(
-    input: impl Read,
+    mut input: impl Read,
     walk: &mut Walk,
     most: u64,
     chunks: LinearReaderOptions,
@@ -107,8 +111,6 @@ fn walk_on<E: From<Trouble>>(
 ) -> Result<(), E> {
     let mut reader = LinearReader::new_with_options(chunks.with_record_length_limit(MAX_RECORD));
     reader.add_decompressor(Zstd::new()).map_err(|error| trouble(&error, 0, false))?;
-    // No byte is read before it is asked for, so that the walk is where the reader is.
-    let mut input = BufReader::with_capacity(READ, input);
     let (mut unpacked, mut begun) = (0_u64, false);
     while let Some(event) = reader.next_event() {
         match event {

@@ -6,7 +6,8 @@ use std::io::Read;
 use mcap::records::op;
 use mcap::sans_io::linear_reader::LinearReaderOptions;
 
-use super::{MAGIC, Trouble, each_of, each_sound};
+use super::walk::Walk;
+use super::{MAGIC, Trouble, checked, each_of, walk_on};
 
 /// A chunk of which nothing can be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,7 +19,7 @@ pub(crate) struct LostChunk {
 }
 
 /// Why reading ends within a chunk.
-enum WithinChunk<E> {
+pub(super) enum WithinChunk<E> {
     /// It is damaged.
     Chunk(Trouble),
     /// Whoever takes its records will have no more.
@@ -43,23 +44,22 @@ pub(crate) fn each_saved<E: From<Trouble>>(
 ) -> Result<(), E> {
     let mut unpacked = 0_u64;
     let mut is_over = false;
-    whole_chunks(input, most, |opcode, body| {
+    whole_chunks(input, most, plain(), |opcode, body| {
         is_over |= opcode == op::DATA_END;
         match opcode {
             _ if is_over => return Ok(()),
             op::CHUNK => {}
             _ => return take(opcode, body),
         }
-        let inside = each_sound(alone(body).as_slice(), most, |opcode, body| {
+        let inside = each_in_chunk(body, |opcode, body| {
             unpacked += body.len() as u64;
-            let is_of_chunk = !matches!(opcode, op::DATA_END | op::FOOTER);
-            if is_of_chunk { take(opcode, body).map_err(WithinChunk::Taker) } else { Ok(()) }
+            take(opcode, body).map_err(WithinChunk::Taker)
         });
         match inside {
             Ok(()) if unpacked > most => Err(Trouble::TooLarge.into()),
             Ok(()) => Ok(()),
-            Err((_, WithinChunk::Taker(error))) => Err(error),
-            Err((_, WithinChunk::Chunk(trouble))) => {
+            Err(WithinChunk::Taker(error)) => Err(error),
+            Err(WithinChunk::Chunk(trouble)) => {
                 let at = |from: usize| body.get(from..).and_then(|rest| rest.first_chunk());
                 let ns = |from| at(from).map_or(0, |octets| u64::from_le_bytes(*octets));
                 lost(LostChunk { span: (ns(0), ns(8)), trouble });
@@ -72,7 +72,7 @@ pub(crate) fn each_saved<E: From<Trouble>>(
 /// Hands over the records that stand in no chunk, of the summary as well, up to where the file cannot be read.
 pub(crate) fn each_outside(input: impl Read, most: u64, mut take: impl FnMut(u8, &[u8])) {
     // Why there is no more is told by whoever reads it for what it holds.
-    let _: Result<(), Trouble> = whole_chunks(input, most, |opcode, body| {
+    let _: Result<(), Trouble> = whole_chunks(input, most, plain(), |opcode, body| {
         if opcode != op::CHUNK {
             take(opcode, body);
         }
@@ -80,16 +80,32 @@ pub(crate) fn each_outside(input: impl Read, most: u64, mut take: impl FnMut(u8,
     });
 }
 
+/// A sum over all of a file is wrong where a chunk is.
+fn plain() -> LinearReaderOptions {
+    LinearReaderOptions::default().with_emit_chunks(true)
+}
+
 /// Hands over all records outside of chunks, and chunks as they stand there.
-fn whole_chunks<E: From<Trouble>>(
+pub(super) fn whole_chunks<E: From<Trouble>>(
     input: impl Read,
     most: u64,
+    options: LinearReaderOptions,
     take: impl FnMut(u8, &[u8]) -> Result<(), E>,
 ) -> Result<(), E> {
-    // A sum over all of it is wrong where a chunk is.
-    let options = LinearReaderOptions::default().with_emit_chunks(true);
     let read = each_of(input, most, options, take);
     read.map_err(|(_, error)| error)
+}
+
+/// Hands over the records in a chunk, as it stands in a file; none before its sum is right.
+pub(super) fn each_in_chunk<E: From<Trouble>>(
+    chunk: &[u8],
+    mut take: impl FnMut(u8, &[u8]) -> Result<(), E>,
+) -> Result<(), E> {
+    let (file, options) = (alone(chunk), checked().with_prevalidate_chunk_crcs(true));
+    walk_on(file.as_slice(), &mut Walk::new(u64::MAX), u64::MAX, options, |opcode, body| match opcode {
+        op::DATA_END | op::FOOTER => Ok(()),
+        _ => take(opcode, body),
+    })
 }
 
 /// A file that has this chunk alone.

@@ -43,6 +43,34 @@ function ticks() {
   }
 }
 
+const GAP = 6; // px between two names, which else read as one
+// Flags with their names, and how these stand on paper.
+const flags = [...document.querySelectorAll('.flags .flag')].map((flag) => ({ flag, name: flag.firstChild, paper: [flag.className, flag.firstChild.hidden, flag.firstChild.style.top] }));
+
+/** Puts the names of flags into rows in which they do not run into each other; what a person has marked comes first. */
+function names() {
+  const box = document.querySelector('.flags'), shown = flags.filter(({ flag }) => !flag.hidden);
+  if (shown.length === 0) return;
+  box.classList.add('fitted');
+  const length = box.clientWidth, { left, right } = box.getBoundingClientRect(), rows = [[], [], [], []];
+  for (const one of shown) {
+    one.at = parseFloat(one.flag.style.left) / 100 * length;
+    one.before = one.at > .6 * length;
+    one.flag.classList.toggle('late', one.before);
+    one.name.hidden = false;
+    one.name.style.maxWidth = `min(22em, ${(one.before ? left + one.at : innerWidth - right + length - one.at) - 4}px)`;
+  }
+  for (const one of shown) one.width = one.name.offsetWidth;
+  for (const { name, at, before, width } of [...shown].sort((a, b) => b.flag.classList.contains('marked') - a.flag.classList.contains('marked'))) {
+    const begin = before ? at - width : at;
+    const row = rows.findIndex((taken) => taken.every(([from, to]) => to + GAP <= begin || begin + width + GAP <= from));
+    name.hidden = row < 0;
+    if (row < 0) continue;
+    rows[row].push([begin, begin + width]);
+    name.style.top = `${20 * row}px`;
+  }
+}
+
 function draw() {
   const [begin, end] = view;
   ticks();
@@ -52,6 +80,7 @@ function draw() {
     one.hidden = at < -1e-9 || at > 1 + 1e-9;
     one.style.left = `${100 * at}%`;
   }
+  names();
 }
 
 /** Shows the part between two places, never less than eight columns of it. */
@@ -101,4 +130,11 @@ for (const box of document.querySelectorAll('.drag')) {
   }, { passive: false });
 }
 addEventListener('resize', draw);
+addEventListener('beforeprint', () => {
+  for (const { flag, name, paper } of flags) {
+    [flag.className, name.hidden, name.style.top] = paper;
+    name.style.maxWidth = '';
+  }
+});
+addEventListener('afterprint', draw);
 draw();

@@ -53,6 +53,9 @@ fn passes(time: &TimeAxis) -> String {
     if passes.is_empty() { passes } else { format!(" data-passes=\"[{passes}]\"") }
 }
 
+/// How long the axis is on a sheet of A4, px: shorter than on most screens.
+pub(super) const PAPER: f64 = 620.0;
+
 /// Passes whose begin is a line across each panel.
 const MOST_PASSES: usize = 40;
 
@@ -156,17 +159,17 @@ fn flags(picture: &Picture) -> String {
     if picture.flags.is_empty() {
         return String::new();
     }
-    // As on a screen of this width; each has its name as a title besides.
-    let rows = flag_rows(picture, 1_000.0, |x, _| x > 600.0);
+    // As on paper; on a screen the script puts names where its width has room for them. Each is a title besides.
+    let rows = flag_rows(picture, PAPER, |x, _| x > 0.6 * PAPER);
     let flag = |(flag, row): (&super::Flag, Option<(u8, bool)>)| {
         let late = if row.is_some_and(|(_, is_before)| is_before) { " late" } else { "" };
+        let marked = if flag.is_mark { " marked" } else { "" };
         let name = safe(&flag.name);
-        let shown = row.map(|(row, _)| format!("<span style=\"top:{}px\">{name}</span>", 20 * row));
+        let place = row.map_or("hidden".to_owned(), |(row, _)| format!("style=\"top:{}px\"", 20 * row));
         format!(
-            "<i class=\"flag{late}\" {}\" title=\"{name}, {}\">{}</i>",
+            "<i class=\"flag{late}{marked}\" {}\" title=\"{name}, {}\"><span {place}>{name}</span></i>",
             at(&picture.time, flag.at_s),
             clock(picture.time.film_s(flag.at_s), 0.0),
-            shown.unwrap_or_default()
         )
     };
     let flags: String = picture.flags.iter().zip(rows).map(flag).collect();

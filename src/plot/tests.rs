@@ -171,11 +171,12 @@ fn names_of_flags_do_not_run_into_each_other_and_what_has_no_room_keeps_its_line
             let number =
                 |before: &str| flag.split(before).nth(1)?.split(['%', 'p']).next()?.parse::<f64>().ok();
             let (part, row) = (number("left:")?, number("<span style=\"top:")?);
-            let begin = if flag.starts_with(" late") { 10.0 * part - 178.0 } else { 10.0 * part };
+            let x = super::page::PAPER / 100.0 * part;
+            let begin = if flag.starts_with(" late") { x - 178.0 } else { x };
             Some((begin, row, flag))
         })
         .collect();
-    assert!((12..40).contains(&shown.len()), "{}", shown.len());
+    assert!((8..40).contains(&shown.len()), "{}", shown.len());
     assert!(shown.iter().any(|(_, _, flag)| flag.contains(&marked)), "what a person has marked has a name");
     for (index, (begin, row, flag)) in shown.iter().enumerate() {
         let before = shown[..index].iter().rev().find(|(_, other, _)| other == row);

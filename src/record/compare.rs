@@ -7,7 +7,8 @@ use std::io::Read;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::read::{Contents, ReadError, Told, Wanted, read};
+use super::read::{Contents, ReadError, Told, Wanted};
+use super::reading::read;
 use super::summary::{each_chunk, state_word};
 use crate::plain::escaped;
 

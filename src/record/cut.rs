@@ -7,7 +7,8 @@ use mcap::McapError;
 
 use super::anonymous::Anonymous;
 use super::block::Block;
-use super::read::{Contents, ReadError, Told, Wanted, read};
+use super::read::{Contents, ReadError, Told, Wanted};
+use super::reading::read;
 use super::scene::SeatScene;
 use super::summary::each_chunk;
 use super::{About, AckChunk, Chunk, EntryMaker, Message, Mode, Opening, RecordedSeat, Recording, Sampled};

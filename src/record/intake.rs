@@ -179,8 +179,9 @@ impl Intake {
             fold.take(&chunk, tell);
             if let Some(whole) = whole {
                 let block = whole.ticks.add(&chunk, seats);
-                whole.last = chunk.head.deadline;
-                block.into_iter().for_each(|(at, block)| whole.tell(at, block, tell));
+                // As of its last tick: by then its samples are told.
+                let last = std::mem::replace(&mut whole.last, chunk.head.deadline);
+                block.into_iter().for_each(|(_, block)| whole.tell(last, block, tell));
             }
         }
         self.take_acks(&mut drains, None);
@@ -212,8 +213,8 @@ impl Intake {
     pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
         self.fold.close(tell);
         let Some(whole) = &mut self.whole else { return };
-        if let Some((at, block)) = whole.ticks.close() {
-            whole.tell(at, block, tell);
+        if let Some((_, block)) = whole.ticks.close() {
+            whole.tell(whole.last, block, tell);
         }
         // Replies come after the last tick as well.
         whole.tell_drains(whole.last, tell);
@@ -221,7 +222,7 @@ impl Intake {
 }
 
 impl Whole {
-    /// Tells of a block that began then, and of the drains so far.
+    /// Tells of a block whose last tick was then, and of the drains so far.
     fn tell(&mut self, at: MonoTime, block: Vec<u8>, tell: &mut impl FnMut(MonoTime, Message)) {
         tell(at, Message::Ticks(block));
         self.tell_drains(at, tell);

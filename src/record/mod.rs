@@ -28,12 +28,14 @@ mod margins;
 mod marks;
 mod notes;
 mod read;
+mod reading;
 #[cfg(test)]
 mod reading_tests;
 mod recorder;
 mod recording;
 mod recover;
 mod report;
+mod sample_text;
 mod sampled;
 mod scene;
 mod schemas;
@@ -42,6 +44,7 @@ mod summary;
 mod tap;
 #[cfg(test)]
 mod tests;
+mod waiting;
 
 pub(crate) use ack_record::{AckRecord, latency_ns, standing_of};
 pub(crate) use acks::{AckChunk, AckStanding};
@@ -62,7 +65,8 @@ pub(crate) use marks::{MarkBudget, MarkRefusal};
 pub(crate) use notes::{
     ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote, note_in_words,
 };
-pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning, read};
+pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning};
+pub(crate) use reading::{read, read_ahead};
 pub(crate) use recorder::Recorder;
 pub(crate) use recording::{ACKS, About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ};
 pub(crate) use recover::{RecoverError, Recovered, recover};

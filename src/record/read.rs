@@ -1,28 +1,22 @@
-//! Recordings read back: record by record, so that a long one takes no more memory than a short one. Control thread; takes any bytes
-//! without a panic. What is complete of a file that is cut short or damaged is read, and why there is no more is said.
+//! What a recording says of itself, as far as it is read back, and what its messages tell. What is complete of a file that is cut short or
+//! damaged is read, and why there is no more is said. Control thread; takes any bytes without a panic.
 
 use std::collections::BTreeMap;
 use std::io::Read;
 
 use mcap::records::op;
-use serde::Deserialize;
-use serde_json::Value;
 
-use super::ack_columns;
-use super::full;
 use super::judging::Judging;
 use super::margins::Margin;
-use super::recording::{ACKS, END, RECOVERED, REPORT, SENT, VERSION};
+use super::recording::VERSION;
 use super::sampled::{SeatSample, TickSample};
 use super::seat::RecordedSeat;
-use crate::container::{self, ChannelRecord, Trouble};
+use crate::container::{self, Trouble};
 use crate::plain::escaped;
 use crate::time::MonoTime;
 
 /// What a file may unpack to: a day of the largest hall.
-const MOST: u64 = 256 << 30;
-/// The longest metadata or report that is kept, bytes.
-const KEPT: usize = 16 << 20;
+pub(super) const MOST: u64 = 256 << 30;
 /// Faults that are told; more are counted.
 const FAULTS_TOLD: usize = 20;
 /// Seats of a hall at the most.
@@ -72,7 +66,7 @@ pub(crate) enum Told<'a> {
 }
 
 /// What a file says of itself, as far as it was read.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub(crate) struct Contents {
     /// The entries of its first metadata record.
     pub(crate) begin: BTreeMap<String, String>,
@@ -140,7 +134,7 @@ impl Contents {
     }
 
     /// The instant of a message on the clock of the ticks.
-    fn instant(&self, log_time: u64) -> MonoTime {
+    pub(super) fn instant(&self, log_time: u64) -> MonoTime {
         let (mono, wall) = self.clocks;
         MonoTime::from_nanos(log_time.saturating_add(mono).saturating_sub(wall))
     }
@@ -151,13 +145,13 @@ impl Contents {
         at.as_nanos().saturating_add(wall).saturating_sub(mono)
     }
 
-    fn fault(&mut self, fault: impl FnOnce() -> String) {
+    pub(super) fn fault(&mut self, fault: impl FnOnce() -> String) {
         if self.faults.len() < FAULTS_TOLD {
             self.faults.push(fault());
         }
     }
 
-    fn begun(&mut self, entries: BTreeMap<&str, &str>) -> Result<(), ReadError> {
+    pub(super) fn begun(&mut self, entries: BTreeMap<&str, &str>) -> Result<(), ReadError> {
         let entry = |key: &str| entries.get(key).copied().unwrap_or_default();
         let bad = |field, why: String| ReadError::Metadata { field, why: escaped(&why, 200).into_owned() };
         if entry("kind") != "recording" {
@@ -184,7 +178,7 @@ impl Contents {
     }
 }
 
-fn owned(entries: BTreeMap<&str, &str>) -> BTreeMap<String, String> {
+pub(super) fn owned(entries: BTreeMap<&str, &str>) -> BTreeMap<String, String> {
     entries.into_iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect()
 }
 
@@ -202,38 +196,6 @@ pub(crate) struct Wanted<'a> {
 impl Wanted<'_> {
     /// All there is.
     pub(crate) const ALL: Self = Self { seat: None, samples: true, full: true };
-}
-
-/// What the messages of a channel are.
-#[derive(Debug, Clone)]
-enum RecordedTopic {
-    Seat(usize),
-    Tick,
-    Hall,
-    Sent,
-    Acks,
-    Other(String),
-}
-
-/// Reads a recording, and tells of each message that is wanted in the order of the file.
-///
-/// # Errors
-/// Where it is none. What is complete in one that is cut short or damaged is read; [`Contents::trouble`] says so.
-pub(crate) fn read(
-    input: impl Read,
-    wanted: Wanted<'_>,
-    take: &mut dyn FnMut(&Contents, MonoTime, Told<'_>),
-) -> Result<Contents, ReadError> {
-    let mut reading = Reading { contents: Contents::default(), topics: BTreeMap::new(), wanted, take };
-    let read = container::each_sound(input, MOST, |opcode, body| reading.record(opcode, body));
-    let mut contents = reading.contents;
-    match read {
-        Err((_, ReadError::File(trouble))) if !contents.begin.is_empty() => contents.trouble = Some(trouble),
-        Err((_, error)) => return Err(error),
-        Ok(()) if contents.begin.is_empty() => return Err(ReadError::Foreign),
-        Ok(()) => {}
-    }
-    Ok(contents)
 }
 
 /// The entries of a recording's first metadata record, which stands at its front.
@@ -257,105 +219,4 @@ pub(crate) fn beginning(input: impl Read) -> Result<BTreeMap<String, String>, Re
         Err((_, error)) => Err(error),
         Ok(()) => Err(ReadError::Foreign),
     }
-}
-
-struct Reading<'a, 'b> {
-    contents: Contents,
-    topics: BTreeMap<u16, (String, RecordedTopic)>,
-    wanted: Wanted<'a>,
-    take: &'b mut dyn FnMut(&Contents, MonoTime, Told<'_>),
-}
-
-impl Reading<'_, '_> {
-    fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), ReadError> {
-        match opcode {
-            op::METADATA => match container::metadata(body) {
-                Some(("kinocue", entries)) if self.contents.begin.is_empty() => {
-                    self.contents.begun(entries)?
-                }
-                Some((RECOVERED, entries)) => {
-                    let why = entries.get("why").filter(|why| !why.is_empty());
-                    self.contents.recovered = why.map(|why| escaped(why, 1_000).into_owned());
-                }
-                Some((END, entries)) if body.len() <= KEPT => self.contents.end = owned(entries),
-                _ => {}
-            },
-            op::CHANNEL => {
-                if let Some(channel) = ChannelRecord::parse(body) {
-                    let topic = self.topic(channel.topic);
-                    self.topics.insert(channel.id, (channel.topic.to_owned(), topic));
-                }
-            }
-            op::MESSAGE => self.message(body),
-            op::ATTACHMENT => {
-                if let Some((name, data)) = container::attachment(body) {
-                    self.contents.attachments.insert(name.to_owned(), data.len());
-                    if name == REPORT && data.len() <= KEPT {
-                        self.contents.report = Some(data.to_vec());
-                    }
-                }
-            }
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn topic(&self, topic: &str) -> RecordedTopic {
-        match topic {
-            "/tick" => RecordedTopic::Tick,
-            "/hall" => RecordedTopic::Hall,
-            SENT => RecordedTopic::Sent,
-            ACKS => RecordedTopic::Acks,
-            other => {
-                let seat = other.strip_prefix("/seat/").and_then(|name| self.contents.seat(name));
-                seat.map_or_else(|| RecordedTopic::Other(other.to_owned()), RecordedTopic::Seat)
-            }
-        }
-    }
-
-    fn message(&mut self, body: &[u8]) {
-        let Self { contents, topics, wanted, take } = self;
-        let Some((channel, log_time, data)) = container::message(body) else { return };
-        let Some((name, topic)) = topics.get(&channel) else { return };
-        match contents.messages.get_mut(name) {
-            Some(count) => *count += 1,
-            None => drop(contents.messages.insert(name.clone(), 1)),
-        }
-        let (first, last) = contents.span.unwrap_or((log_time, log_time));
-        contents.span = Some((first.min(log_time), last.max(log_time)));
-        let told = match topic {
-            RecordedTopic::Seat(lane) => {
-                let is_wanted = wanted.seat.is_none_or(|name| contents.seats[*lane].name == name);
-                if !wanted.samples || !is_wanted {
-                    return;
-                }
-                json(data).map(|sample| Told::Seat(*lane, sample))
-            }
-            RecordedTopic::Tick => json(data).map(Told::Tick),
-            RecordedTopic::Hall => json::<Value>(data).and_then(|hall| {
-                hall["state"].as_u64().map(Told::State).ok_or_else(|| "no state".to_owned())
-            }),
-            RecordedTopic::Sent | RecordedTopic::Acks if !wanted.full => return,
-            RecordedTopic::Sent => {
-                let chunks = full::unpack(data, &contents.seats);
-                chunks.map(Told::Chunks).ok_or_else(|| "not a block of ticks".to_owned())
-            }
-            RecordedTopic::Acks => {
-                ack_columns::unpacked(data).map(Told::Drains).ok_or_else(|| "no drains".to_owned())
-            }
-            RecordedTopic::Other(name) => Ok(Told::Other(name, data)),
-        };
-        match told {
-            Ok(told) => take(contents, contents.instant(log_time), told),
-            Err(why) => {
-                let (name, number) = (escaped(name, 100), contents.messages.get(name).copied().unwrap_or(0));
-                let fault = format!("{name}, message {number}: {}", escaped(&why, 200));
-                contents.fault(|| fault);
-            }
-        }
-    }
-}
-
-fn json<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String> {
-    serde_json::from_slice(data).map_err(|error| error.to_string())
 }

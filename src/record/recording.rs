@@ -14,6 +14,7 @@ use super::flight::Entry;
 use super::judging::Judging;
 use super::notes::topics;
 use super::schemas::{schema_of_seat, schema_of_tick, state_number};
+use super::waiting::Waiting;
 use super::{Message, RecordedSeat};
 use crate::time::{MonoTime, Rate};
 
@@ -235,6 +236,10 @@ pub(crate) struct Recording<W: Write + Seek> {
     maker: EntryMaker,
     sequence: u32,
     last: u64,
+    waiting: Waiting,
+    /// The channel of samples of ticks, and the log time of the last: all samples up to then are told.
+    ticks: Option<u16>,
+    sampled: u64,
 }
 
 impl<W: Write + Seek> Recording<W> {
@@ -263,7 +268,18 @@ impl<W: Write + Seek> Recording<W> {
             };
             channels.push(writer.add_channel(schema, topic, encoding, &BTreeMap::new())?);
         }
-        Ok(Self { writer, written: ChunkTime::default(), channels, maker, sequence: 0, last: 0 })
+        let ticks = opening.channels.iter().position(|(topic, ..)| topic == "/tick");
+        Ok(Self {
+            writer,
+            written: ChunkTime::default(),
+            channels,
+            maker,
+            sequence: 0,
+            last: 0,
+            waiting: Waiting::default(),
+            ticks: ticks.and_then(|place| u16::try_from(place).ok()),
+            sampled: 0,
+        })
     }
 
     /// Adds a message.
@@ -274,16 +290,34 @@ impl<W: Write + Seek> Recording<W> {
 
     /// Adds one that was made before; of a channel that the opening lacks nothing.
     pub(crate) fn put(&mut self, entry: &Entry) -> McapResult<()> {
-        let Entry { channel, log_time, data } = entry;
-        let Some(&channel_id) = self.channels.get(usize::from(*channel)) else { return Ok(()) };
-        if self.written.is_over(*log_time) {
-            self.flush()?;
+        if usize::from(entry.channel) >= self.channels.len() {
+            return Ok(());
         }
-        self.sequence = self.sequence.wrapping_add(1);
-        self.last = self.last.max(*log_time);
-        let (log_time, publish_time) = (*log_time, *log_time);
-        let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time };
-        self.writer.write_to_known_channel(&header, data)
+        self.last = self.last.max(entry.log_time);
+        if self.ticks == Some(entry.channel) {
+            self.sampled = self.sampled.max(entry.log_time);
+        }
+        self.waiting.put(entry);
+        if self.waiting.is_long() { self.settle(self.told()) } else { Ok(()) }
+    }
+
+    /// The log time up to which all is told; where there are no samples nothing waits for them.
+    const fn told(&self) -> u64 {
+        if self.sampled == 0 { u64::MAX } else { self.sampled }
+    }
+
+    /// Writes what waits, in the order of its log times, up to one of these.
+    fn settle(&mut self, until: u64) -> McapResult<()> {
+        let Self { writer, written, channels, sequence, waiting, .. } = self;
+        waiting.hand_over(until, |channel, log_time, data| {
+            if written.is_over(log_time) {
+                writer.flush()?;
+            }
+            *sequence = sequence.wrapping_add(1);
+            let (channel_id, sequence) = (channels[usize::from(channel)], *sequence);
+            let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+            writer.write_to_known_channel(&header, data)
+        })
     }
 
     /// Attaches a file.
@@ -293,13 +327,15 @@ impl<W: Write + Seek> Recording<W> {
         self.writer.attach(&Attachment { log_time, create_time, name, media_type, data: data.into() })
     }
 
-    /// Has everything so far read even of a file that is cut short.
+    /// Has everything so far read even of a file that is cut short; what is newer than the last samples the next time.
     pub(crate) fn flush(&mut self) -> McapResult<()> {
+        self.settle(self.told())?;
         self.writer.flush()
     }
 
     /// Ends the file with these figures, and a report if there is one; gives what was written to.
     pub(crate) fn finish(mut self, end: &[(&str, String)], report: Option<&[u8]>) -> McapResult<W> {
+        self.settle(u64::MAX)?;
         if let Some(report) = report {
             self.attach(REPORT, "application/json", report)?;
         }

@@ -19,9 +19,11 @@ pub(crate) struct SeatSample {
     /// Show time of that frame, seconds; that of the last tick where there was none.
     pub(crate) film_s: f64,
     /// Where each axis was asked to be, mm, or degrees where it turns.
-    pub(crate) asked_mm: Vec<f64>,
+    #[serde(with = "places")]
+    pub(crate) asked_mm: PerAxis<f64>,
     /// Where it was sent.
-    pub(crate) sent_mm: Vec<f64>,
+    #[serde(with = "places")]
+    pub(crate) sent_mm: PerAxis<f64>,
     /// The level of motion, 0 to 1.
     pub(crate) level: f64,
     /// Frames that the kernel took.
@@ -31,7 +33,8 @@ pub(crate) struct SeatSample {
     /// How often the limiter held the seat back.
     pub(crate) clamps: u64,
     /// Where its axes were measured to be last; none where nobody was asked.
-    pub(crate) measured_mm: Vec<f64>,
+    #[serde(with = "places")]
+    pub(crate) measured_mm: PerAxis<f64>,
     /// Frames that were acked.
     pub(crate) acked: u32,
     /// Frames that were refused.
@@ -52,7 +55,11 @@ pub(crate) struct SeatSample {
 impl SeatSample {
     /// How far asked and sent are apart at most, mm or degrees.
     pub(crate) fn apart(&self) -> f64 {
-        self.asked_mm.iter().zip(&self.sent_mm).map(|(asked, sent)| (asked - sent).abs()).fold(0.0, f64::max)
+        self.asked_mm
+            .iter()
+            .zip(self.sent_mm.iter())
+            .map(|(asked, sent)| (asked - sent).abs())
+            .fold(0.0, f64::max)
     }
 }
 
@@ -85,7 +92,7 @@ pub(crate) enum Message {
     State(State),
     /// What the service tells.
     Note(Note),
-    /// A block of whole ticks, of which the first was then.
+    /// A block of whole ticks, of which the last was then.
     Ticks(Vec<u8>),
     /// What the ack thread took, as it crossed.
     Drains(Vec<u8>),
@@ -104,7 +111,7 @@ struct SeatWindow {
     /// What lasts: how its group stands, what of that was told last, and where its axes were measured to be.
     standing: Option<u8>,
     told: Option<u8>,
-    measured_mm: Vec<f64>,
+    measured_mm: PerAxis<f64>,
 }
 
 /// The fold of ticks into samples.
@@ -179,7 +186,7 @@ impl Sampled {
                 None => sample.film_s = closed_s,
             }
             if let Some(at) = worst.map(|(at, ..)| at).or_else(|| is_heard.then_some(closed_at)) {
-                (sample.standing, sample.measured_mm) = (window.standing, window.measured_mm.clone());
+                (sample.standing, sample.measured_mm) = (window.standing, window.measured_mm);
                 window.told = window.standing;
                 tell(at, Message::Seat(lane, sample));
             }
@@ -259,6 +266,30 @@ fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
-fn round(values: &[f64]) -> Vec<f64> {
-    values.iter().copied().map(rounded).collect()
+fn round(values: &[f64]) -> PerAxis<f64> {
+    PerAxis::from_fn(values.len(), |axis| rounded(values[axis]))
+}
+
+/// A place for each axis, as a list.
+mod places {
+    use serde::de::Error as _;
+    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
+
+    use crate::motion::MAX_AXES;
+    use crate::wire::PerAxis;
+
+    pub(super) fn serialize<S: Serializer>(places: &PerAxis<f64>, to: S) -> Result<S::Ok, S::Error> {
+        places[..].serialize(to)
+    }
+
+    pub(super) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<PerAxis<f64>, D::Error> {
+        let places = Vec::<f64>::deserialize(from)?;
+        if places.len() > MAX_AXES {
+            return Err(D::Error::custom(format!(
+                "places of {} axes; a seat has at most {MAX_AXES}",
+                places.len()
+            )));
+        }
+        Ok(PerAxis::new(&places))
+    }
 }

@@ -5,7 +5,8 @@ use std::io::Read;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::read::{Contents, ReadError, Told, Wanted, read};
+use super::read::{Contents, ReadError, Told, Wanted};
+use super::reading::read_ahead;
 use super::{Chunk, Falls, Margin, Margins, TickSample};
 use crate::plain::escaped;
 use crate::state::State;
@@ -174,7 +175,7 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
     let mut summary = Summary::default();
     let mut margins: Option<Margins> = None;
     let mut last = (MonoTime::default(), None);
-    let contents = read(input, Wanted::ALL, &mut |contents, at, told| {
+    let contents = read_ahead(input, Wanted::ALL, &mut |contents, at, told| {
         if summary.seats.is_empty() {
             let named =
                 |seat: &super::RecordedSeat| SeatTotals { name: seat.name.clone(), ..SeatTotals::default() };

@@ -1,6 +1,7 @@
 //! The thread behind the taps: takes what comes, and writes it to the flight recorder, to the recording of a show and to that of an
 //! incident. What cannot be written is told, and tried again; it never holds up whoever it comes from.
 
+mod halls;
 mod incident;
 
 use std::collections::VecDeque;
@@ -10,6 +11,7 @@ use std::sync::mpsc::Receiver;
 use std::thread::Builder;
 use std::time::Duration;
 
+use self::halls::HallNotes;
 use super::AGAIN;
 use super::beginning::{begun, small_file};
 use super::disk::Disk;
@@ -48,8 +50,7 @@ pub(super) struct Worker {
     flight: Option<Flight>,
     /// Samples of the last ten seconds.
     recent: VecDeque<Entry>,
-    /// How the hall stands, for files that are begun later.
-    hall: Option<Entry>,
+    halls: HallNotes,
     show: Option<OpenRecording>,
     incidents: Incidents,
     incident: Option<OpenFile>,
@@ -82,7 +83,7 @@ impl Worker {
             safe: None,
             flight: None,
             recent: VecDeque::new(),
-            hall: None,
+            halls: HallNotes::default(),
             show: None,
             incidents: Incidents::default(),
             incident: None,
@@ -226,7 +227,8 @@ impl Worker {
             }
         }
         if matches!(message, Message::Note(Note::Hall(_))) {
-            self.hall = Some(entry.clone());
+            let reach = BEFORE.max(Duration::from_secs(self.record.flight_s.into()));
+            self.halls.put(entry.clone(), reach);
         }
         if !is_full && self.record.mode != RecordMode::Off {
             let oldest = entry.log_time.saturating_sub(u64::try_from(BEFORE.as_nanos()).unwrap_or(u64::MAX));
@@ -268,8 +270,8 @@ impl Worker {
             let disk = disk.until_begun();
             // The first has what was before the show, and all of them how the hall stands.
             let before = if number == 1 { &self.recent } else { &VecDeque::new() };
-            let is_told = |hall: &&Entry| before.front().is_some_and(|first| first.log_time <= hall.log_time);
-            let entries = self.hall.iter().filter(|hall| !is_told(hall)).chain(before);
+            let since = before.front().map_or(u64::MAX, |first| first.log_time);
+            let entries = self.halls.before(since).into_iter().chain(before);
             let mut file = begun(out, &opening, self.maker, self.safe.as_deref(), entries)?;
             if let Some(cue) = attached.as_ref().filter(|_| number == 1)
                 && let Some(octets) = small_file(cue)

@@ -63,7 +63,10 @@ impl Worker {
         let opening = opening.with("caused_ns", at.as_nanos().to_string());
         let oldest = self.maker.wall(at).saturating_sub(1_000_000_000 * u64::from(self.record.flight_s));
         let held = flight.read()?;
-        let entries = self.hall.iter().chain(held.iter().filter(|entry| entry.log_time >= oldest));
+        let since = held.first().map_or(oldest, |first| first.log_time.max(oldest));
+        // How the hall stood then, not how it stands by now.
+        let entries =
+            self.halls.before(since).into_iter().chain(held.iter().filter(|entry| entry.log_time >= oldest));
         let mut file = begun(out, &opening, self.maker, self.safe.as_deref(), entries)?;
         file.flush().map_err(in_io)?;
         self.incident = Some(OpenFile { file, disk: disk.begun(), counts: Counts::default() });

@@ -8,8 +8,8 @@ use super::*;
 use crate::motion::{MAX_AXES, Pulses, SeatType, Slot, Window};
 use crate::net::Delivery;
 use crate::record::{
-    About, AckRecord, Asked, Contents, FrameKind, HallNote, Judging, RecordedSeat, Recording, Taps, TickHead,
-    Told, Wanted, each_chunk, read, summarize,
+    About, AckRecord, Asked, Contents, EventNote, FrameKind, HallNote, Judging, RecordedSeat, Recording,
+    Taps, TickHead, Told, Wanted, each_chunk, read, summarize,
 };
 use crate::replay::replay;
 use crate::time::{Rate, ShowTime};
@@ -315,4 +315,59 @@ fn a_folder_that_takes_no_files_is_told_at_once_and_tried_until_it_does() {
     assert!(again <= Duration::from_secs(30), "{again:?}");
     assert!(bench.worker.link.status().troubles.is_empty());
     assert_eq!(bench.worker.intake.counts().dropped, 0);
+}
+
+/// Topics and log times of a file, as its messages stand there.
+fn as_written(path: &Path) -> Vec<(String, u64)> {
+    let file = std::fs::read(path).expect("it is there");
+    let messages = mcap::MessageStream::new(&file).expect("a recording").map(|one| one.expect("it is whole"));
+    messages.map(|one| (one.channel.topic.clone(), one.log_time)).collect()
+}
+
+#[test]
+fn messages_stand_in_a_file_in_the_order_of_their_times_whenever_they_were_told() {
+    for mode in [RecordMode::Full, RecordMode::Sampled] {
+        let mut bench = Bench::new();
+        (bench.worker.record.mode, bench.worker.record.part_mib) = (mode, 1_000);
+        bench.ticks(100);
+        bench.begin();
+        for number in 0..300 {
+            bench.ticks(11);
+            // Wherever in a window, of which the sample is told later.
+            let text = number.to_string();
+            bench
+                .worker
+                .keep(at(bench.tick), Note::Event(EventNote { kind: "trouble", seat: String::new(), text }));
+        }
+        bench.worker.close_show(at(bench.tick));
+        let messages = as_written(&bench.files()[0]);
+        assert_eq!(messages.iter().filter(|(topic, _)| topic == "/event").count(), 300);
+        let mut pairs = messages.windows(2);
+        assert_eq!(pairs.find(|pair| pair[1].1 < pair[0].1), None, "{mode:?}");
+    }
+}
+
+#[test]
+fn an_incident_begins_with_how_the_hall_stood_then_and_not_with_how_it_stands_now() {
+    let mut bench = Bench::new();
+    bench.worker.record.flight_s = 2;
+    let ring = bench.folder.path().join("flight.ring");
+    let mut bench = Bench { worker: bench.worker.flying(&ring, 16 << 20), ..bench };
+    for (state, ticks) in [(4, 3_000), (9, 500), (12, 200)] {
+        let note = HallNote { state, ..HallNote::default() };
+        bench.worker.keep(at(bench.tick), Note::Hall(note));
+        bench.ticks(ticks);
+    }
+    bench.worker.on_incident(IncidentCause::Dump, at(bench.tick), at(bench.tick));
+    bench.worker.close_incident(at(bench.tick));
+    let path = bench.files().into_iter().find(|path| path != &ring).expect("an incident");
+    let file = std::fs::read(&path).expect("it is there");
+    let mut states = Vec::new();
+    let mut take = |_: &Contents, _, told: Told<'_>| {
+        if let Told::State(state) = told {
+            states.push(state);
+        }
+    };
+    read(file.as_slice(), Wanted::ALL, &mut take).expect("a recording");
+    assert_eq!(states, [4, 9, 12]);
 }
