@@ -98,7 +98,8 @@ fn command(order: &Order) -> Result<Command, Problem> {
             Command::Commit { ticket }
         }
         word => {
-            let asked = config::FleetWord::ALL.iter().filter(|(_, word)| *word != config::FleetWord::Cues);
+            let is_order = |word: &config::FleetWord| !config::FleetWord::OF_WISHES.contains(word);
+            let asked = config::FleetWord::ALL.iter().filter(|(_, word)| is_order(word));
             let words = asked.map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
             let detail = format!(
                 "the fleet may not {word:?}; it may ask {words}, ready, start and commit, and a stop by its own way"

@@ -73,7 +73,7 @@ impl FleetAccess {
     pub(super) fn open_wish(&self, letter: &Letter, wall_ns: u64) -> Result<(Who, Wish), Problem> {
         let (who, name) = self.sender(letter)?;
         if who.role < Role::Operate {
-            return Err(Problem::role("to wish for cues", Role::Operate, &who));
+            return Err(Problem::role("to wish for something", Role::Operate, &who));
         }
         let wish = Wish::of(letter).map_err(|why| bad_value(format!("no wish: {why}"), "send one"))?;
         if wish.to != name {
@@ -86,20 +86,25 @@ impl FleetAccess {
             let detail = format!("the rev of the wish, {}, is of more than a day from now", wish.rev);
             return Err(Problem::new(Code::Late, detail, "set the clocks of desk and hall, and push again"));
         }
-        if !self.allows(FleetWord::Cues) {
-            let detail = "allow of [fleet] does not name cues";
-            return Err(Problem::new(
-                Code::Role,
-                detail,
-                "ask somebody in the hall, or add it there and reload",
-            ));
-        }
+        // What of it is not allowed is refused by itself.
+        let parts = [
+            (FleetWord::Cues, wish.playlists.is_empty() || !wish.cues.is_empty()),
+            (FleetWord::Playlists, !wish.playlists.is_empty()),
+        ];
+        let words: Vec<_> = parts.iter().filter(|(_, has)| *has).map(|(word, _)| *word).collect();
+        self.check_allowed(&words)?;
         Ok((who, wish))
     }
 
-    fn allows(&self, word: FleetWord) -> bool {
+    /// That the configuration allows one of these words.
+    pub(super) fn check_allowed(&self, words: &[FleetWord]) -> Result<(), Problem> {
         let fleet = self.fleet.read().unwrap_or_else(PoisonError::into_inner);
-        fleet.as_ref().is_some_and(|fleet| fleet.allows(word))
+        if fleet.as_ref().is_some_and(|fleet| words.iter().any(|word| fleet.allows(*word))) {
+            return Ok(());
+        }
+        let words: Vec<_> = words.iter().map(ToString::to_string).collect();
+        let detail = format!("allow of [fleet] does not name {}", words.join(", "));
+        Err(Problem::new(Code::Role, detail, "ask somebody in the hall, or add it there and reload"))
     }
 
     /// Whose key has signed a letter, and what the hall is called in the fleet.

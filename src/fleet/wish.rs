@@ -1,8 +1,9 @@
-//! What a hall shall have in its library, as a desk wishes it, and what it has, as the hall says it.
+//! What a hall shall have in its library and among its playlists, as a desk wishes it, and what it has, as the hall says it.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
 
 use super::Letter;
 
@@ -14,7 +15,7 @@ pub(crate) const CHUNK: u64 = 128 << 10;
 const DIGITS: usize = 64;
 
 /// What a hall shall have: the text of a letter. It names all of it, each time.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wish {
     /// The hall that it is for, `SITE.HALL`.
@@ -23,6 +24,24 @@ pub(crate) struct Wish {
     pub(crate) rev: u64,
     /// Cues by their ids.
     pub(crate) cues: BTreeMap<String, WishedCue>,
+    /// Playlists by their ids.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) playlists: BTreeMap<String, WishedPlaylist>,
+}
+
+/// The file of a playlist, which is so short that it is in the wish itself.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct WishedPlaylist {
+    /// All of it, TOML.
+    pub(crate) text: String,
+    /// From when on the hall shall have it, Unix milliseconds; 0 for at once. Until then it keeps what it has of that id.
+    #[serde(default, skip_serializing_if = "is_at_once")]
+    pub(crate) from_ms: u64,
+}
+
+fn is_at_once(from_ms: &u64) -> bool {
+    *from_ms == 0
 }
 
 /// The file of a cue.
@@ -52,13 +71,16 @@ pub(crate) struct HaveReport {
     /// Why it does not take what the engine has as its wish; null if it does.
     pub(crate) refused: Option<String>,
     /// What it has of its wish, by the ids of cues.
-    pub(crate) cues: BTreeMap<String, CueHad>,
+    pub(crate) cues: BTreeMap<String, WishHad>,
+    /// The same by the ids of playlists.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) playlists: BTreeMap<String, WishHad>,
 }
 
-/// What a hall has of one cue.
+/// What a hall has of one file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
-pub(crate) struct CueHad {
+pub(crate) struct WishHad {
     /// The file that is wished, its SHA-256.
     pub(crate) sha256: String,
     /// How long that is.
@@ -67,19 +89,21 @@ pub(crate) struct CueHad {
     pub(crate) state: HadState,
     /// How much of it was fetched, while it is.
     pub(crate) percent: Option<u8>,
-    /// Why it waits, or is refused.
+    /// Why it waits, is refused, or comes later.
     pub(crate) why: Option<String>,
     /// Every fault that stands against it, with its place.
     pub(crate) faults: Vec<String>,
 }
 
-/// How far a wished cue is.
+/// How far a wished file is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum HadState {
-    /// It is in the library, and proved for the seats of the hall.
+    /// It is there, and proved or checked for the seats of the hall.
     Ready,
-    /// It is to be fetched, and nothing stands against that.
+    /// Nothing stands against it, and it comes at its time.
+    Due,
+    /// It is to be fetched or taken in, and nothing stands against that.
     Missing,
     /// It is being fetched.
     Fetching,
@@ -108,6 +132,15 @@ impl Wish {
     }
 }
 
+impl WishedPlaylist {
+    /// Its file, by its digest.
+    #[must_use]
+    pub(crate) fn file(&self) -> WishedCue {
+        let sha256 = Sha256::digest(&self.text).iter().map(|byte| format!("{byte:02x}")).collect();
+        WishedCue { sha256, bytes: self.text.len() as u64 }
+    }
+}
+
 impl WishedCue {
     /// How many messages of the engine have it.
     #[must_use]
@@ -122,12 +155,18 @@ impl WishedCue {
     }
 }
 
-impl CueHad {
-    /// Of that cue.
+impl WishHad {
+    /// Of that file.
     #[must_use]
-    pub(crate) fn new(cue: &WishedCue, state: HadState, why: Option<String>) -> Self {
-        let WishedCue { sha256, bytes } = cue.clone();
+    pub(crate) fn new(file: &WishedCue, state: HadState, why: Option<String>) -> Self {
+        let WishedCue { sha256, bytes } = file.clone();
         Self { sha256, bytes, state, percent: None, why, faults: Vec::new() }
+    }
+
+    /// True if nothing more comes of it until somebody does something, or its time has come.
+    #[must_use]
+    pub(crate) fn is_settled(&self) -> bool {
+        matches!(self.state, HadState::Ready | HadState::Refused | HadState::Due)
     }
 
     /// It in words: `ready`, `fetching 61 %`, `waiting: the hall is armed`.
@@ -136,6 +175,7 @@ impl CueHad {
         let why = self.why.as_deref().unwrap_or("it does not say why");
         match self.state {
             HadState::Ready => "ready".to_owned(),
+            HadState::Due => format!("checked; {why}"),
             HadState::Missing => "not fetched yet".to_owned(),
             HadState::Fetching if self.percent.is_some_and(|percent| percent >= 100) => {
                 "fetched, and being proved".to_owned()
@@ -155,8 +195,8 @@ impl HaveReport {
         let (mut report, mut kept) = (self.clone(), 32);
         while text(&report).len() > most && kept > 0 {
             kept /= 2;
-            for cue in report.cues.values_mut().filter(|cue| cue.faults.len() > kept) {
-                cue.faults.truncate(kept);
+            for had in report.cues.values_mut().chain(report.playlists.values_mut()) {
+                had.faults.truncate(kept);
             }
         }
         text(&report)
@@ -197,6 +237,24 @@ mod tests {
     }
 
     #[test]
+    fn a_wish_of_cues_alone_is_as_it_was_before_there_were_playlists() {
+        let mut wish = wish("{}").unwrap();
+        assert_eq!(serde_json::to_string(&wish).unwrap(), r#"{"to":"berlin.h3","rev":7,"cues":{}}"#);
+        let playlist = |from_ms| WishedPlaylist { text: "title = \"x\"".to_owned(), from_ms };
+        wish.playlists.insert("at-once".to_owned(), playlist(0));
+        wish.playlists.insert("later".to_owned(), playlist(5));
+        let text = serde_json::to_string(&wish).unwrap();
+        assert!(
+            text.contains(
+                r#""at-once":{"text":"title = \"x\""},"later":{"text":"title = \"x\"","from_ms":5}"#
+            ),
+            "{text}"
+        );
+        assert_eq!(serde_json::from_str::<Wish>(&text).unwrap(), wish);
+        assert_eq!(wish.playlists["later"].file().bytes, 11);
+    }
+
+    #[test]
     fn an_order_is_no_wish_and_a_wish_is_no_order() {
         let pair = KeyPair::new_user();
         let order = r#"{"id":"1","to":"a.b","word":"load","args":{},"sent_ms":5}"#;
@@ -218,7 +276,7 @@ mod tests {
         let mut report = HaveReport::default();
         for id in 0..100 {
             let cue = WishedCue { sha256: "0".repeat(DIGITS), bytes: 1 };
-            let mut had = CueHad::new(&cue, HadState::Refused, Some("it does not pass".to_owned()));
+            let mut had = WishHad::new(&cue, HadState::Refused, Some("it does not pass".to_owned()));
             had.faults = vec!["a1 moves 260 mm/s, limit 240".to_owned(); 21];
             report.cues.insert(id.to_string(), had);
         }

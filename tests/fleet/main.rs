@@ -32,6 +32,7 @@ mod demo;
 mod desk;
 mod fleet;
 mod forged;
+mod lists;
 mod log;
 mod page;
 mod relay;

@@ -19,11 +19,13 @@ mod log;
 mod object;
 mod page;
 mod part;
+mod playlist;
 mod push;
 mod report;
 mod settings;
 mod start;
 mod wishes;
+mod wishing;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -39,6 +41,7 @@ Examples:
   kinocue fleet start --group trio --at +10s
   kinocue fleet report --day yesterday
   kinocue fleet push cues/storm.mcap --to 'berlin.*'     tomorrow's cue into all halls, and where not, and why
+  kinocue fleet playlist today.toml --to all --from 04:00
   kinocue fleet have
 
 Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 75 a hall did not answer, 78 bad settings";
@@ -71,6 +74,7 @@ enum FleetCommand {
     Start(start::Args),
     Report(report::Args),
     Push(push::Args),
+    Playlist(playlist::Args),
     Have(have::Args),
 }
 
@@ -99,6 +103,7 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Start(args) => start::run(args),
         FleetCommand::Report(args) => report::run(args),
         FleetCommand::Push(args) => push::run(args),
+        FleetCommand::Playlist(args) => playlist::run(args),
         FleetCommand::Have(args) => have::run(args),
     }
 }
