@@ -87,12 +87,14 @@ impl FleetAccess {
             return Err(Problem::new(Code::Late, detail, "set the clocks of desk and hall, and push again"));
         }
         // What of it is not allowed is refused by itself.
-        let parts = [
-            (FleetWord::Cues, wish.playlists.is_empty() || !wish.cues.is_empty()),
-            (FleetWord::Playlists, !wish.playlists.is_empty()),
-        ];
-        let words: Vec<_> = parts.iter().filter(|(_, has)| *has).map(|(word, _)| *word).collect();
-        self.check_allowed(&words)?;
+        let has_cues = !wish.cues.is_empty() || !wish.drops.cues.is_empty();
+        let has_playlists = !wish.playlists.is_empty() || !wish.drops.playlists.is_empty();
+        let words = match (has_cues, has_playlists) {
+            (true, false) => &[FleetWord::Cues][..],
+            (false, true) => &[FleetWord::Playlists],
+            _ => &FleetWord::OF_WISHES,
+        };
+        self.check_allowed(words)?;
         Ok((who, wish))
     }
 

@@ -8,7 +8,7 @@ use jiff::tz::TimeZone;
 
 use super::input::id;
 use super::problem::bad_value;
-use super::shared::{Shared, lock};
+use super::shared::Shared;
 use crate::config::{Config, FleetWord};
 use crate::control::{Code, Problem, Status, Who};
 use crate::fleet::{HadState, Wish, WishHad, WishedPlaylist};
@@ -19,7 +19,10 @@ use crate::playlist::{Playlist, PlaylistId, WishedText, theirs};
 use crate::state::State;
 use crate::sys::clock::wall_now_ns;
 
-type AllHad = BTreeMap<String, WishHad>;
+/// What the hall has, by ids.
+pub(super) type AllHad = BTreeMap<String, WishHad>;
+/// Why something could not be done of a wish when that was tried last.
+pub(super) type FailedWishes = BTreeMap<String, Problem>;
 
 /// The hall for which playlists are checked.
 struct ListChecker<'a> {
@@ -45,9 +48,14 @@ fn time(playlist: &WishedPlaylist) -> Result<Timestamp, Problem> {
 }
 
 /// What the hall has of the playlists of a wish; `cues` is what it has of its cues.
-pub(super) fn had(shared: &Shared, wish: &Wish, cues: &AllHad, status: &Status) -> Result<AllHad, Problem> {
+pub(super) fn had(
+    shared: &Shared,
+    wish: &Wish,
+    cues: &AllHad,
+    status: &Status,
+    failed: &FailedWishes,
+) -> Result<AllHad, Problem> {
     let mut all = standings(shared, wish, cues, status)?;
-    let failed = lock(&shared.fleet_failed);
     for (name, had) in all.iter_mut().filter(|(_, had)| had.state == HadState::Missing) {
         if let Some(problem) = failed.get(name) {
             (had.state, had.why) = (HadState::Waiting, Some(problem.to_string()));
@@ -57,9 +65,13 @@ pub(super) fn had(shared: &Shared, wish: &Wish, cues: &AllHad, status: &Status) 
 }
 
 /// Takes in the playlists of a wish that may come now; notes why one of them did not.
-pub(super) fn bring(shared: &Shared, who: &Who, wish: &Wish, cues: &AllHad) -> Result<(), Problem> {
-    let mut failed = lock(&shared.fleet_failed); // so that one is taken in at a time
-    failed.clear();
+pub(super) fn bring(
+    shared: &Shared,
+    who: &Who,
+    wish: &Wish,
+    cues: &AllHad,
+    failed: &mut FailedWishes,
+) -> Result<(), Problem> {
     let all = standings(shared, wish, cues, &shared.handle.status())?;
     for (name, _) in all.iter().filter(|(_, had)| had.state == HadState::Missing) {
         let id = id(name)?;

@@ -9,12 +9,13 @@ use axum::extract::{Request, State};
 use jiff::Zoned;
 
 use super::fleet_cues::{self, check_cue};
+use super::fleet_drops;
 use super::fleet_kept::{keep, kept_wish};
 use super::fleet_lists::{self, check_playlist};
-use super::input::{parse, whole_within};
-use super::shared::Shared;
+use super::input::{id, parse, whole_within};
+use super::shared::{Shared, lock};
 use crate::control::Problem;
-use crate::fleet::{HaveReport, LONGEST_WISH, Letter, Wish};
+use crate::fleet::{Drops, HaveReport, LONGEST_WISH, Letter, Wish};
 use crate::journal::stamp;
 use crate::state::State as HallState;
 use crate::sys::clock::wall_now_ns;
@@ -72,15 +73,20 @@ fn settle(shared: &Shared) -> Result<(), Problem> {
         return Ok(());
     }
     let Ok((who, wish)) = kept_wish(shared) else { return Ok(()) };
+    let mut failed = lock(&shared.fleet_failed); // so that one thing is done at a time
+    failed.clear();
+    fleet_drops::drop_all(shared, &who, &wish, &mut failed)?;
     if wish.playlists.is_empty() {
         return Ok(());
     }
     let cues = fleet_cues::had(shared, &wish, &status)?;
-    fleet_lists::bring(shared, &who, &wish, &cues)
+    fleet_lists::bring(shared, &who, &wish, &cues, &mut failed)
 }
 
 /// That all that a wish names can be what it is named.
 fn check(wish: &Wish, most: u64) -> Result<(), Problem> {
+    let Drops { cues, playlists } = &wish.drops;
+    cues.iter().chain(playlists).try_for_each(|name| id(name).map(drop))?;
     wish.cues.iter().try_for_each(|(id, cue)| check_cue(id, cue, most))?;
     wish.playlists.iter().try_for_each(|(id, playlist)| check_playlist(id, playlist))
 }
@@ -88,14 +94,18 @@ fn check(wish: &Wish, most: u64) -> Result<(), Problem> {
 /// What the hall has of a wish.
 fn report(shared: &Shared, wish: &Wish) -> Result<HaveReport, Problem> {
     let status = shared.handle.status();
+    let failed = lock(&shared.fleet_failed);
     let cues = fleet_cues::had(shared, wish, &status)?;
+    let [dropped_cues, dropped_playlists] = fleet_drops::had(shared, wish, &status, &failed)?;
     Ok(HaveReport {
         at: stamp(&Zoned::now()),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         config: shared.library.config_digest(),
         rev: wish.rev,
-        playlists: fleet_lists::had(shared, wish, &cues, &status)?,
+        playlists: fleet_lists::had(shared, wish, &cues, &status, &failed)?,
         cues,
+        dropped_cues,
+        dropped_playlists,
         ..HaveReport::default()
     })
 }

@@ -32,6 +32,7 @@ mod doors;
 mod fleet;
 mod fleet_access;
 mod fleet_cues;
+mod fleet_drops;
 mod fleet_kept;
 mod fleet_lists;
 mod fleet_wishes;

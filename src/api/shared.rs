@@ -39,7 +39,7 @@ pub(super) struct Shared {
     pub(super) access: Access,
     /// Who of the fleet may ask.
     pub(super) fleet: FleetAccess,
-    /// Why playlists that the fleet wishes could not be taken in when that was tried last, by their ids; held by whoever tries it.
+    /// Why what the fleet wishes could not be done when that was tried last; held by whoever tries it.
     pub(super) fleet_failed: Mutex<BTreeMap<String, Problem>>,
     /// Wrong tokens.
     pub(super) tries: Tries,

@@ -1,6 +1,6 @@
 //! What a hall shall have in its library and among its playlists, as a desk wishes it, and what it has, as the hall says it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -27,6 +27,28 @@ pub(crate) struct Wish {
     /// Playlists by their ids.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) playlists: BTreeMap<String, WishedPlaylist>,
+    /// What shall go of what an earlier wish brought. What no wish names any more stays by itself: a wish that is lost, or another desk's,
+    /// empties no library.
+    #[serde(default, skip_serializing_if = "Drops::is_empty")]
+    pub(crate) drops: Drops,
+}
+
+/// What shall go, by its ids.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(crate) struct Drops {
+    /// Cues.
+    #[serde(skip_serializing_if = "BTreeSet::is_empty")]
+    pub(crate) cues: BTreeSet<String>,
+    /// Playlists.
+    #[serde(skip_serializing_if = "BTreeSet::is_empty")]
+    pub(crate) playlists: BTreeSet<String>,
+}
+
+impl Drops {
+    fn is_empty(&self) -> bool {
+        self.cues.is_empty() && self.playlists.is_empty()
+    }
 }
 
 /// The file of a playlist, which is so short that it is in the wish itself.
@@ -75,6 +97,12 @@ pub(crate) struct HaveReport {
     /// The same by the ids of playlists.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) playlists: BTreeMap<String, WishHad>,
+    /// How far it is with cues that shall go; `ready` once none is there that was brought.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) dropped_cues: BTreeMap<String, WishHad>,
+    /// The same with playlists.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) dropped_playlists: BTreeMap<String, WishHad>,
 }
 
 /// What a hall has of one file.
@@ -128,7 +156,36 @@ impl Wish {
                 return Err(format!("{id:?} is empty"));
             }
         }
-        Ok(wish)
+        let Drops { cues, playlists } = &wish.drops;
+        let both = cues.iter().find(|id| wish.cues.contains_key(*id));
+        match both.or_else(|| playlists.iter().find(|id| wish.playlists.contains_key(*id))) {
+            Some(id) => Err(format!("{id:?} shall come and go")),
+            None => Ok(wish),
+        }
+    }
+
+    /// Wishes for a cue.
+    pub(crate) fn want_cue(&mut self, id: &str, cue: &WishedCue) {
+        self.drops.cues.remove(id);
+        self.cues.insert(id.to_owned(), cue.clone());
+    }
+
+    /// Wishes for a playlist.
+    pub(crate) fn want_playlist(&mut self, id: &str, playlist: &WishedPlaylist) {
+        self.drops.playlists.remove(id);
+        self.playlists.insert(id.to_owned(), playlist.clone());
+    }
+
+    /// Wishes a cue to go.
+    pub(crate) fn drop_cue(&mut self, id: &str) {
+        self.cues.remove(id);
+        self.drops.cues.insert(id.to_owned());
+    }
+
+    /// Wishes a playlist to go.
+    pub(crate) fn drop_playlist(&mut self, id: &str) {
+        self.playlists.remove(id);
+        self.drops.playlists.insert(id.to_owned());
     }
 }
 
@@ -252,6 +309,27 @@ mod tests {
         );
         assert_eq!(serde_json::from_str::<Wish>(&text).unwrap(), wish);
         assert_eq!(wish.playlists["later"].file().bytes, 11);
+    }
+
+    #[test]
+    fn what_shall_come_shall_not_go_and_the_last_word_counts() {
+        let mut wish = wish("{}").unwrap();
+        wish.want_cue("storm", &WishedCue { sha256: "0".repeat(DIGITS), bytes: 1 });
+        wish.want_playlist("today", &WishedPlaylist { text: String::new(), from_ms: 0 });
+        wish.drop_cue("storm");
+        wish.drop_playlist("today");
+        let text = serde_json::to_string(&wish).unwrap();
+        assert_eq!(
+            text,
+            r#"{"to":"berlin.h3","rev":7,"cues":{},"drops":{"cues":["storm"],"playlists":["today"]}}"#
+        );
+        let of = |body: &str| Wish::of(&Letter::sign(&KeyPair::new_user(), body.to_owned()).unwrap());
+        assert_eq!(of(&text).unwrap(), wish);
+        let both = r#""playlists":{"today":{"text":""}},"drops""#;
+        assert!(of(&text.replace(r#""drops""#, both)).unwrap_err().contains("shall come and go"));
+        wish.want_cue("storm", &WishedCue { sha256: "0".repeat(DIGITS), bytes: 1 });
+        wish.want_playlist("today", &WishedPlaylist { text: String::new(), from_ms: 0 });
+        assert!(wish.drops.is_empty() && wish.cues.len() == 1 && wish.playlists.len() == 1);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::io;
 
 use serde::{Deserialize, Serialize};
 
-use super::brought_files::BroughtFiles;
+use super::brought_files::{BroughtFiles, LeftThere};
 use super::upload::unwritten;
 use super::{Awaited, CueId, CueInfo, Library, Proved, Upload, file_name, file_problem, kept, lock};
 use crate::control::{Code, Problem};
@@ -145,6 +145,29 @@ impl Library {
         })
     }
 
+    /// What is left of a cue that shall go.
+    pub(crate) fn left_there(&self, id: &CueId) -> Result<LeftThere, Problem> {
+        let left = lock(&self.inner.brought).files.left_there(&self.folder()?, &names(id));
+        left.map_err(|error| file_problem("read the library", &error))
+    }
+
+    /// Removes what was brought of a cue, where `may` still lets it.
+    ///
+    /// # Errors
+    /// Where it does not, or the disk does not; files that people put there stay in any case.
+    pub(crate) fn drop_brought(
+        &self,
+        id: &CueId,
+        may: impl FnOnce() -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
+        let folder = self.folder()?;
+        let mut brought = lock(&self.inner.brought);
+        may()?;
+        let removed = brought.files.remove(&folder, &names(id));
+        removed.map_err(|error| file_problem("remove the cue", &error))?;
+        brought.write(&folder)
+    }
+
     fn folder(&self) -> Result<Folder, Problem> {
         Folder::open(&self.inner.dir).map_err(|error| file_problem("open the library", &error))
     }
@@ -191,6 +214,11 @@ impl Upload {
         brought.note(&folder, name, stamp)?;
         proved.put()
     }
+}
+
+/// The files that a cue may be.
+fn names(id: &CueId) -> [String; 2] {
+    [false, true].map(|mcap| file_name(id, mcap))
 }
 
 /// That people have a cue of that id.
@@ -240,6 +268,26 @@ mod tests {
         fs::remove_file(path("storm.csv")).unwrap();
         fs::write(path("storm.csv"), "1").unwrap();
         assert!(!Brought::read(&folder).has_no_other(&folder, &id("storm")).unwrap(), "a damaged note");
+    }
+
+    #[test]
+    fn what_was_brought_goes_and_what_people_put_beside_or_over_it_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let (folder, path) = (Folder::open(dir.path()).unwrap(), |name: &str| dir.path().join(name));
+        let mut brought = Brought::default();
+        let left = |brought: &Brought| brought.files.left_there(&folder, &names(&id("storm"))).unwrap();
+        assert_eq!(left(&brought), LeftThere::Nothing);
+        fs::write(path("new"), "1").unwrap();
+        noted(&folder, &mut brought, "new", "storm.csv");
+        folder.rename("new", "storm.csv").unwrap();
+        fs::write(path("storm.mcap"), "theirs").unwrap();
+        assert_eq!(left(&brought), LeftThere::Brought);
+        brought.files.remove(&folder, &names(&id("storm"))).unwrap();
+        assert_eq!((left(&brought), brought.files.len()), (LeftThere::Theirs, 0));
+        assert!(!path("storm.csv").exists() && path("storm.mcap").exists());
+        fs::write(path("storm.csv"), "1").unwrap();
+        brought.files.remove(&folder, &names(&id("storm"))).unwrap();
+        assert!(path("storm.csv").exists(), "the same name, and not the file that came");
     }
 
     #[test]

@@ -19,6 +19,17 @@ struct BroughtFile {
     stamp: Stamp,
 }
 
+/// What is left of names that shall go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LeftThere {
+    /// Nothing is there.
+    Nothing,
+    /// A file that was brought is there.
+    Brought,
+    /// Only what people put there.
+    Theirs,
+}
+
 impl BroughtFiles {
     /// True of a file that was brought and is still the same.
     fn has(&self, name: &str, stamp: Stamp) -> bool {
@@ -31,9 +42,39 @@ impl BroughtFiles {
         Ok(!folder.has(name)? || folder.stamp(name)?.is_some_and(|stamp| self.has(name, stamp)))
     }
 
+    /// What is left of these names.
+    pub(crate) fn left_there(&self, folder: &Folder, names: &[String]) -> io::Result<LeftThere> {
+        let mut left = LeftThere::Nothing;
+        for name in names {
+            if folder.stamp(name)?.is_some_and(|stamp| self.has(name, stamp)) {
+                return Ok(LeftThere::Brought);
+            }
+            if folder.has(name)? {
+                left = LeftThere::Theirs;
+            }
+        }
+        Ok(left)
+    }
+
+    /// Removes what was brought of these names, and forgets it.
+    pub(crate) fn remove(&mut self, folder: &Folder, names: &[String]) -> io::Result<()> {
+        for name in names {
+            if folder.stamp(name)?.is_some_and(|stamp| self.has(name, stamp)) {
+                folder.remove(name)?;
+            }
+        }
+        folder.sync()?;
+        self.forget_gone(folder);
+        Ok(())
+    }
+
+    fn forget_gone(&mut self, folder: &Folder) {
+        self.0.retain(|file| folder.stamp(&file.name).ok().flatten() == Some(file.stamp));
+    }
+
     /// Adds a file that is about to get its name, and forgets those that are gone.
     pub(crate) fn note(&mut self, folder: &Folder, name: String, stamp: Stamp) {
-        self.0.retain(|file| folder.stamp(&file.name).ok().flatten() == Some(file.stamp));
+        self.forget_gone(folder);
         self.0.push(BroughtFile { name, stamp });
     }
 

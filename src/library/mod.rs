@@ -17,7 +17,7 @@ mod sketch;
 mod upload;
 
 pub(crate) use brought::{StandingOfCue, theirs};
-pub(crate) use brought_files::BroughtFiles;
+pub(crate) use brought_files::{BroughtFiles, LeftThere};
 pub use child::Awaited;
 pub(crate) use curve::{CurveData, Drawing, MAX_POINTS, draw, needs_hall};
 pub(crate) use hashed::Hashed;

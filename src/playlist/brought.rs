@@ -7,7 +7,7 @@ use std::path::Path;
 use super::shelf::{file_name, read_as};
 use super::{Playlist, PlaylistId, Shelf};
 use crate::control::{Code, Problem};
-use crate::library::{BroughtFiles, kept};
+use crate::library::{BroughtFiles, LeftThere, kept};
 use crate::sys::folder::{Folder, Stamp};
 
 /// Notes which files were brought; no playlist can have that name.
@@ -85,6 +85,40 @@ impl Shelf {
         };
         put().inspect_err(|_| drop(folder.remove(NEW_LIST))) // what is left is written over by the next one
     }
+
+    /// What is left of a playlist that shall go.
+    ///
+    /// # Errors
+    /// Where the folder cannot be read.
+    pub(crate) fn left_there(&self, id: &PlaylistId) -> Result<LeftThere, Problem> {
+        let left = || match Folder::open(&self.dir) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(LeftThere::Nothing),
+            folder => {
+                let folder = folder?;
+                kept::<BroughtFiles>(&folder, FILE).left_there(&folder, &[file_name(id)])
+            }
+        };
+        left().map_err(|error: io::Error| unkept("read the playlists", &error))
+    }
+
+    /// Removes a playlist that was brought, where `may` still lets it. Not for two threads at a time.
+    ///
+    /// # Errors
+    /// Where it does not, or the disk does not; one that people put there stays in any case.
+    pub(crate) fn drop_brought(
+        &self,
+        id: &PlaylistId,
+        may: impl FnOnce() -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
+        may()?;
+        let remove = || {
+            let folder = Folder::open(&self.dir)?;
+            let mut brought: BroughtFiles = kept(&folder, FILE);
+            brought.remove(&folder, &[file_name(id)])?;
+            note(&folder, &brought)
+        };
+        remove().map_err(|error: io::Error| unkept("remove the playlist", &error))
+    }
 }
 
 /// Has a text on the disk under a name that no playlist has.
@@ -146,6 +180,16 @@ mod tests {
         fs::remove_file(&path).unwrap();
         std::os::unix::fs::symlink("/dev/null", &path).unwrap();
         assert_eq!(stands(ONE), WishedText::Theirs, "what is no file");
+        fs::remove_file(&path).unwrap();
+        shelf.bring(&id, TWO, || Ok(())).unwrap();
+        assert_eq!(shelf.left_there(&id).unwrap(), LeftThere::Brought);
+        shelf.drop_brought(&id, || Err(theirs(&id))).unwrap_err();
+        assert!(path.exists(), "the hall said no at last");
+        shelf.drop_brought(&id, || Ok(())).unwrap();
+        assert_eq!(shelf.left_there(&id).unwrap(), LeftThere::Nothing);
+        fs::write(&path, TWO).unwrap();
+        shelf.drop_brought(&id, || Ok(())).unwrap();
+        assert_eq!(shelf.left_there(&id).unwrap(), LeftThere::Theirs, "theirs stays, whatever is asked");
         let mut names: Vec<_> = fs::read_dir(&own)
             .unwrap()
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())

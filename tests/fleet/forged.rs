@@ -131,6 +131,8 @@ fn no_playlist_counts_that_was_altered_is_another_s_is_old_or_names_a_path_and_n
         list.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
         json!({ "to": "berlin.h1", "rev": rev, "cues": {}, "playlists": { id: list } })
     };
+    let drops =
+        |id: &str| json!({ "to": "berlin.h1", "rev": rev + 1, "cues": {}, "drops": { "playlists": [id] } });
     let next = of(rev + 1, "today", json!({}));
     let mut altered = own(next.clone());
     altered["body"] = altered["body"].as_str().unwrap().replace("night", "ride").into();
@@ -145,6 +147,8 @@ fn no_playlist_counts_that_was_altered_is_another_s_is_old_or_names_a_path_and_n
         (own(of(rev + 1, "../today", json!({}))), "is not an id"),
         (own(of(rev + 1, "today", json!({ "from_ms": u64::MAX }))), "is no time"),
         (own(of(rev + 1, "today", json!({ "load": true }))), "unknown field"),
+        (letter(&KeyPair::new_user(), &drops("today")), "no key of [fleet] has signed this"),
+        (own(drops("../today")), "is not an id"),
     ] {
         forger.wish(&what);
         engine.has("berlin.h1", |hall| {

@@ -30,6 +30,7 @@ mod cues;
 mod cuts;
 mod demo;
 mod desk;
+mod drops;
 mod fleet;
 mod forged;
 mod lists;

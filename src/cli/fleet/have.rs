@@ -48,6 +48,10 @@ pub(super) struct HallHas {
 pub(super) enum FileKind {
     Cue,
     Playlist,
+    /// One that shall go.
+    DroppedCue,
+    /// One that shall go.
+    DroppedPlaylist,
 }
 
 /// A file that is wished.
@@ -82,6 +86,7 @@ struct HallRow<'h> {
     wished_rev: Option<u64>,
     cues: Vec<FileStands>,
     playlists: Vec<FileStands>,
+    dropped: Vec<FileStands>,
 }
 
 pub(super) fn run(Args { of }: &Args) -> Result<Exit, Failure> {
@@ -157,11 +162,17 @@ impl HallHas {
         let had = match file.kind {
             FileKind::Cue => report.cues.get(&file.id),
             FileKind::Playlist => report.playlists.get(&file.id),
+            FileKind::DroppedCue => report.dropped_cues.get(&file.id),
+            FileKind::DroppedPlaylist => report.dropped_playlists.get(&file.id),
         };
         let had = had.filter(|had| had.sha256 == file.sha256);
         if let Some(had) = had.filter(|had| had.state == HadState::Ready || report.seen >= seq) {
-            let text =
-                if self.is_unheard() { format!("{}, as it was heard last", had.said()) } else { had.said() };
+            let said = match had.state {
+                HadState::Ready if file.is_dropped() => "gone".to_owned(),
+                HadState::Missing if file.is_dropped() => "to go".to_owned(),
+                _ => had.said(),
+            };
+            let text = if self.is_unheard() { format!("{said}, as it was heard last") } else { said };
             return FileStands {
                 faults: had.faults.clone(),
                 percent: had.percent,
@@ -191,8 +202,16 @@ impl HallHas {
         wish.playlists.iter().map(|(id, list)| self.stands(&file(id, list.file().sha256), *seq)).collect()
     }
 
+    fn dropped(&self) -> Vec<FileStands> {
+        let Some((seq, wish)) = &self.wished else { return Vec::new() };
+        let file = |kind, id: &String| WishedFile { kind, id: id.clone(), sha256: String::new() };
+        let cues = wish.drops.cues.iter().map(|id| file(FileKind::DroppedCue, id));
+        let playlists = wish.drops.playlists.iter().map(|id| file(FileKind::DroppedPlaylist, id));
+        cues.chain(playlists).map(|file| self.stands(&file, *seq)).collect()
+    }
+
     fn all(&self) -> Vec<FileStands> {
-        [self.cues(), self.playlists()].concat()
+        [self.cues(), self.playlists(), self.dropped()].concat()
     }
 
     /// True if what it told is old.
@@ -202,7 +221,13 @@ impl HallHas {
 
     fn row(&self) -> HallRow<'_> {
         let wished_rev = self.wished.as_ref().map(|(_, wish)| wish.rev);
-        HallRow { hall: self, wished_rev, cues: self.cues(), playlists: self.playlists() }
+        HallRow {
+            hall: self,
+            wished_rev,
+            cues: self.cues(),
+            playlists: self.playlists(),
+            dropped: self.dropped(),
+        }
     }
 }
 
@@ -212,7 +237,14 @@ impl WishedFile {
         match self.kind {
             FileKind::Cue => self.id.clone(),
             FileKind::Playlist => format!("playlist {}", self.id),
+            FileKind::DroppedCue => format!("dropped {}", self.id),
+            FileKind::DroppedPlaylist => format!("dropped playlist {}", self.id),
         }
+    }
+
+    /// True of what shall go.
+    pub(super) fn is_dropped(&self) -> bool {
+        matches!(self.kind, FileKind::DroppedCue | FileKind::DroppedPlaylist)
     }
 }
 

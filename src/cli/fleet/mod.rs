@@ -9,6 +9,7 @@ mod act;
 mod clock;
 mod demo;
 mod desk;
+mod drop;
 mod engine;
 mod hall;
 mod have;
@@ -42,6 +43,7 @@ Examples:
   kinocue fleet report --day yesterday
   kinocue fleet push cues/storm.mcap --to 'berlin.*'     tomorrow's cue into all halls, and where not, and why
   kinocue fleet playlist today.toml --to all --from 04:00
+  kinocue fleet drop storm --to all                      what the fleet brought goes again
   kinocue fleet have
 
 Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 75 a hall did not answer, 78 bad settings";
@@ -75,6 +77,7 @@ enum FleetCommand {
     Report(report::Args),
     Push(push::Args),
     Playlist(playlist::Args),
+    Drop(drop::Args),
     Have(have::Args),
 }
 
@@ -104,6 +107,7 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Report(args) => report::run(args),
         FleetCommand::Push(args) => push::run(args),
         FleetCommand::Playlist(args) => playlist::run(args),
+        FleetCommand::Drop(args) => drop::run(args),
         FleetCommand::Have(args) => have::run(args),
     }
 }

@@ -62,7 +62,10 @@ pub(super) fn run(Args { files, from, of }: &Args) -> Result<Exit, Failure> {
         let client = engine::connect_desk(&settings.access, &settings.name).await?;
         let kept = engine::kept(&client);
         engine::prepare(&kept).await?;
-        of.wish(&kept, &settings, halls, &wished, |wish| wish.playlists.extend(playlists.clone())).await
+        of.wish(&kept, &settings, halls, &wished, |wish| {
+            playlists.iter().for_each(|(id, playlist)| wish.want_playlist(id, playlist));
+        })
+        .await
     })
 }
 

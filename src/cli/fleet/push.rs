@@ -55,8 +55,10 @@ pub(super) fn run(Args { files: paths, of }: &Args) -> Result<Exit, Failure> {
             ));
         }
         let wished: Vec<_> = files.iter().map(file_of).collect();
-        let cues = || files.iter().map(|file| (file.id.clone(), file.cue.clone()));
-        of.wish(&kept, &settings, halls, &wished, |wish| wish.cues.extend(cues())).await
+        of.wish(&kept, &settings, halls, &wished, |wish| {
+            files.iter().for_each(|file| wish.want_cue(&file.id, &file.cue));
+        })
+        .await
     })
 }
 

@@ -321,7 +321,8 @@ impl<'l> WishKeeper<'l> {
 
 /// All that is wished.
 fn all_had(report: &HaveReport) -> impl Iterator<Item = &WishHad> {
-    report.cues.values().chain(report.playlists.values())
+    let dropped = report.dropped_cues.values().chain(report.dropped_playlists.values());
+    report.cues.values().chain(report.playlists.values()).chain(dropped)
 }
 
 fn is_parked(status: &Option<BriefStatus>) -> bool {

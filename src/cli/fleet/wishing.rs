@@ -169,7 +169,9 @@ async fn follow(
 
 fn conclude(all: &[FileStands]) -> Result<Exit, Failure> {
     let ready = all.iter().filter(|one| one.is_ready()).count();
-    let mut text = if ready == all.len() {
+    let mut text = if ready == all.len() && all.iter().all(|one| one.file.is_dropped()) {
+        "all halls are without it\n".to_owned()
+    } else if ready == all.len() {
         "all halls have all of it\n".to_owned()
     } else {
         format!("{ready} of {} are there; not there:\n", all.len())
