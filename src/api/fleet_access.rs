@@ -65,7 +65,10 @@ impl FleetAccess {
         }
         let asked_at = asked_at(&order, wall_ns, now)?;
         let ask = read(&order)?;
-        self.first_time(letter, &order, now)?;
+        // A cue is fetched in thousands of pieces; they are not to use up the room of its key for orders.
+        if !order.only_reads() {
+            self.first_time(letter, &order, now)?;
+        }
         Ok((who, ask, asked_at))
     }
 
@@ -216,6 +219,12 @@ mod tests {
         assert_eq!(open(&access, &stranger).err(), Some(Code::Token));
         let forged = Letter { key: pair.public_key(), ..stranger };
         assert_eq!(open(&access, &forged).err(), Some(Code::Token));
+        let pull = |sent_ms| letter(&pair, "8", "berlin.h3", "pull", "{}", sent_ms);
+        assert!(
+            open(&access, &pull(NOW_MS)).is_ok() && open(&access, &pull(NOW_MS)).is_ok(),
+            "it only reads"
+        );
+        assert_eq!(open(&access, &pull(NOW_MS - 2001)).err(), Some(Code::Late));
         access.set(Some(&fleet(Vec::new())));
         assert_eq!(open(&access, &pause("6", "berlin.h3", NOW_MS)).err(), Some(Code::Token), "revoked");
         access.set(None);

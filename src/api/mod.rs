@@ -35,6 +35,7 @@ mod fleet_cues;
 mod fleet_drops;
 mod fleet_kept;
 mod fleet_lists;
+mod fleet_pull;
 mod fleet_wishes;
 mod gate;
 mod guarded;

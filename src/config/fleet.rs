@@ -60,13 +60,15 @@ pub(crate) enum FleetWord {
     Cues,
     /// To put playlists beside the library, while parked; loads none of them.
     Playlists,
+    /// To fetch cues out of the library, while parked.
+    Pull,
     /// To start at an instant what a person in the hall has armed for that; by a key of its own, not by `allow`.
     Start,
 }
 
 impl FleetWord {
     /// Those of `allow`, by the words of the configuration.
-    pub(crate) const ALL: [(&'static str, Self); 8] = [
+    pub(crate) const ALL: [(&'static str, Self); 9] = [
         ("pause", Self::Pause),
         ("park", Self::Park),
         ("disarm", Self::Disarm),
@@ -75,6 +77,7 @@ impl FleetWord {
         ("trim", Self::Trim),
         ("cues", Self::Cues),
         ("playlists", Self::Playlists),
+        ("pull", Self::Pull),
     ];
     /// Those that are no orders, but say what wishes count for.
     pub(crate) const OF_WISHES: [Self; 2] = [Self::Cues, Self::Playlists];
@@ -94,6 +97,7 @@ plain::displayed!(FleetWord {
     Self::Trim => "trim",
     Self::Cues => "cues",
     Self::Playlists => "playlists",
+    Self::Pull => "pull",
     Self::Start => "start",
 });
 

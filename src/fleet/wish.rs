@@ -123,6 +123,19 @@ pub(crate) struct WishHad {
     pub(crate) faults: Vec<String>,
 }
 
+/// A piece of a cue that a hall gives out, the reply to `pull`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct CuePiece {
+    /// SHA-256 of the whole file, as the hall says.
+    pub(crate) sha256: String,
+    /// How long the whole file is, as the hall says.
+    pub(crate) bytes: u64,
+    /// True if it is MCAP; CSV if not.
+    pub(crate) mcap: bool,
+    /// The piece, base64: [`CHUNK`] bytes, but the last.
+    pub(crate) data: String,
+}
+
 /// How far a wished file is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -147,12 +160,12 @@ impl Wish {
     /// The wish of a letter, whoever has signed that; why it is none.
     pub(crate) fn of(letter: &Letter) -> Result<Self, String> {
         let wish: Self = serde_json::from_str(&letter.body).map_err(|error| error.to_string())?;
-        let small = |digit: u8| digit.is_ascii_digit() || (b'a'..=b'f').contains(&digit);
-        for (id, WishedCue { sha256, bytes }) in &wish.cues {
-            if sha256.len() != DIGITS || !sha256.bytes().all(small) {
+        for (id, cue) in &wish.cues {
+            if !cue.is_named() {
+                let sha256 = &cue.sha256;
                 return Err(format!("{sha256:?}, of {id:?}, is not {DIGITS} small hexadecimal digits"));
             }
-            if *bytes == 0 {
+            if cue.bytes == 0 {
                 return Err(format!("{id:?} is empty"));
             }
         }
@@ -199,6 +212,13 @@ impl WishedPlaylist {
 }
 
 impl WishedCue {
+    /// True if its digest is one: it names files.
+    #[must_use]
+    pub(crate) fn is_named(&self) -> bool {
+        let small = |digit: u8| digit.is_ascii_digit() || (b'a'..=b'f').contains(&digit);
+        self.sha256.len() == DIGITS && self.sha256.bytes().all(small)
+    }
+
     /// How many messages of the engine have it.
     #[must_use]
     pub(crate) fn chunks(&self) -> u64 {

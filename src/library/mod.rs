@@ -13,6 +13,7 @@ mod hashed;
 mod id;
 mod index;
 mod info;
+mod part;
 mod sketch;
 mod upload;
 

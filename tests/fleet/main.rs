@@ -36,6 +36,7 @@ mod forged;
 mod lists;
 mod log;
 mod page;
+mod pull;
 mod relay;
 mod rights;
 mod socket;

@@ -21,6 +21,7 @@ mod object;
 mod page;
 mod part;
 mod playlist;
+mod pull;
 mod push;
 mod report;
 mod settings;
@@ -44,6 +45,7 @@ Examples:
   kinocue fleet push cues/storm.mcap --to 'berlin.*'     tomorrow's cue into all halls, and where not, and why
   kinocue fleet playlist today.toml --to all --from 04:00
   kinocue fleet drop storm --to all                      what the fleet brought goes again
+  kinocue fleet pull berlin.h1 storm                     a hall's cue back to this desk
   kinocue fleet have
 
 Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 75 a hall did not answer, 78 bad settings";
@@ -78,6 +80,7 @@ enum FleetCommand {
     Push(push::Args),
     Playlist(playlist::Args),
     Drop(drop::Args),
+    Pull(pull::Args),
     Have(have::Args),
 }
 
@@ -108,6 +111,7 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Push(args) => push::run(args),
         FleetCommand::Playlist(args) => playlist::run(args),
         FleetCommand::Drop(args) => drop::run(args),
+        FleetCommand::Pull(args) => pull::run(args),
         FleetCommand::Have(args) => have::run(args),
     }
 }

@@ -107,7 +107,7 @@ async fn wish(
 
 /// What this very desk wished before for that hall; why it is none of its wishes. Of others nothing is taken over: it would be signed
 /// anew here.
-fn own_wish(payload: &[u8], settings: &DeskSettings, hall: &str) -> Result<Wish, &'static str> {
+pub(super) fn own_wish(payload: &[u8], settings: &DeskSettings, hall: &str) -> Result<Wish, &'static str> {
     let letter: Letter = serde_json::from_slice(payload).map_err(|_| "is no wish")?;
     if letter.key != settings.access.pair.public_key() || !letter.is_signed() {
         return Err("was not signed by this desk");
