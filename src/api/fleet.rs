@@ -14,6 +14,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use super::fleet_pull::{self, PullArgs};
 use super::input::{Json, id};
 use super::problem::bad_value;
 use super::settings::{Trim, check_levels};
@@ -24,6 +25,7 @@ use crate::config;
 use crate::control::{ClockReading, Code, Command, HallFacts, LevelsChange, Problem, StartOrder};
 use crate::fleet::{BriefStatus, Letter, Order};
 use crate::journal::{self, JournalPart, stamp};
+use crate::library::CueId;
 use crate::sys::clock::{Monotonic, wall_at, wall_now_ns};
 use crate::time::Clock as _;
 
@@ -38,6 +40,8 @@ const LONGEST_TICKET: usize = 64;
 enum FleetAsk {
     /// How the hall is, for a start; nothing is done for that.
     Ready,
+    /// A piece of a cue, which is not done either.
+    Piece(CueId, u64),
     /// Something that is done.
     Of(Command),
 }
@@ -45,6 +49,10 @@ enum FleetAsk {
 fn asks(order: &Order) -> Result<FleetAsk, Problem> {
     if order.word == "ready" {
         return args::<Nothing>(order).map(|_| FleetAsk::Ready);
+    }
+    if order.word == "pull" {
+        let PullArgs { cue, n } = args(order)?;
+        return Ok(FleetAsk::Piece(id(&cue)?, n));
     }
     command(order).map(FleetAsk::Of)
 }
@@ -98,10 +106,13 @@ fn command(order: &Order) -> Result<Command, Problem> {
             Command::Commit { ticket }
         }
         word => {
-            let asked = config::FleetWord::ALL.iter().filter(|(_, word)| *word != config::FleetWord::Cues);
+            let is_order = |word: &config::FleetWord| {
+                *word != config::FleetWord::Pull && !config::FleetWord::OF_WISHES.contains(word)
+            };
+            let asked = config::FleetWord::ALL.iter().filter(|(_, word)| is_order(word));
             let words = asked.map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
             let detail = format!(
-                "the fleet may not {word:?}; it may ask {words}, ready, start and commit, and a stop by its own way"
+                "the fleet may not {word:?}; it may ask {words}, ready, pull, start and commit, and a stop by its own way"
             );
             return Err(Problem::new(Code::Role, detail, "ask somebody in the hall"));
         }
@@ -187,13 +198,21 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<JsonRepl
     Ok(JsonReply(BriefStatus::of(&shared.handle.status(), stamp(&Zoned::now()))))
 }
 
-/// Takes a signed order, and replies with the state that it led to; `ready` with the brief status.
+/// Takes a signed order, and replies with the state that it led to; `ready` with the brief status, `pull` with a piece of a cue.
 pub(super) async fn order(
     State(shared): State<Arc<Shared>>,
     Json(letter): Json<Letter>,
 ) -> Result<Response, Problem> {
     let (who, ask, asked_at) = shared.fleet.open(&letter, asks, wall_now_ns(), Monotonic.now())?;
-    let FleetAsk::Of(ask) = ask else { return status(State(shared)).await.map(JsonReply::into_response) };
+    let ask = match ask {
+        FleetAsk::Ready => return status(State(shared)).await.map(JsonReply::into_response),
+        FleetAsk::Piece(id, n) => {
+            return fleet_pull::piece(&shared, &who, id, n)
+                .await
+                .map(|piece| JsonReply(piece).into_response());
+        }
+        FleetAsk::Of(ask) => ask,
+    };
     let status = shared.handle.post_asked(who, ask, asked_at)?.answer().await?;
     Ok(JsonReply(HallFacts::from(&*status)).into_response())
 }

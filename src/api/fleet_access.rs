@@ -65,7 +65,10 @@ impl FleetAccess {
         }
         let asked_at = asked_at(&order, wall_ns, now)?;
         let ask = read(&order)?;
-        self.first_time(letter, &order, now)?;
+        // A cue is fetched in thousands of pieces; they are not to use up the room of its key for orders.
+        if !order.only_reads() {
+            self.first_time(letter, &order, now)?;
+        }
         Ok((who, ask, asked_at))
     }
 
@@ -73,7 +76,7 @@ impl FleetAccess {
     pub(super) fn open_wish(&self, letter: &Letter, wall_ns: u64) -> Result<(Who, Wish), Problem> {
         let (who, name) = self.sender(letter)?;
         if who.role < Role::Operate {
-            return Err(Problem::role("to wish for cues", Role::Operate, &who));
+            return Err(Problem::role("to wish for something", Role::Operate, &who));
         }
         let wish = Wish::of(letter).map_err(|why| bad_value(format!("no wish: {why}"), "send one"))?;
         if wish.to != name {
@@ -86,20 +89,27 @@ impl FleetAccess {
             let detail = format!("the rev of the wish, {}, is of more than a day from now", wish.rev);
             return Err(Problem::new(Code::Late, detail, "set the clocks of desk and hall, and push again"));
         }
-        if !self.allows(FleetWord::Cues) {
-            let detail = "allow of [fleet] does not name cues";
-            return Err(Problem::new(
-                Code::Role,
-                detail,
-                "ask somebody in the hall, or add it there and reload",
-            ));
-        }
+        // What of it is not allowed is refused by itself.
+        let has_cues = !wish.cues.is_empty() || !wish.drops.cues.is_empty();
+        let has_playlists = !wish.playlists.is_empty() || !wish.drops.playlists.is_empty();
+        let words = match (has_cues, has_playlists) {
+            (true, false) => &[FleetWord::Cues][..],
+            (false, true) => &[FleetWord::Playlists],
+            _ => &FleetWord::OF_WISHES,
+        };
+        self.check_allowed(words)?;
         Ok((who, wish))
     }
 
-    fn allows(&self, word: FleetWord) -> bool {
+    /// That the configuration allows one of these words.
+    pub(super) fn check_allowed(&self, words: &[FleetWord]) -> Result<(), Problem> {
         let fleet = self.fleet.read().unwrap_or_else(PoisonError::into_inner);
-        fleet.as_ref().is_some_and(|fleet| fleet.allows(word))
+        if fleet.as_ref().is_some_and(|fleet| words.iter().any(|word| fleet.allows(*word))) {
+            return Ok(());
+        }
+        let words: Vec<_> = words.iter().map(ToString::to_string).collect();
+        let detail = format!("allow of [fleet] does not name {}", words.join(", "));
+        Err(Problem::new(Code::Role, detail, "ask somebody in the hall, or add it there and reload"))
     }
 
     /// Whose key has signed a letter, and what the hall is called in the fleet.
@@ -209,6 +219,12 @@ mod tests {
         assert_eq!(open(&access, &stranger).err(), Some(Code::Token));
         let forged = Letter { key: pair.public_key(), ..stranger };
         assert_eq!(open(&access, &forged).err(), Some(Code::Token));
+        let pull = |sent_ms| letter(&pair, "8", "berlin.h3", "pull", "{}", sent_ms);
+        assert!(
+            open(&access, &pull(NOW_MS)).is_ok() && open(&access, &pull(NOW_MS)).is_ok(),
+            "it only reads"
+        );
+        assert_eq!(open(&access, &pull(NOW_MS - 2001)).err(), Some(Code::Late));
         access.set(Some(&fleet(Vec::new())));
         assert_eq!(open(&access, &pause("6", "berlin.h3", NOW_MS)).err(), Some(Code::Token), "revoked");
         access.set(None);

@@ -32,6 +32,11 @@ mod doors;
 mod fleet;
 mod fleet_access;
 mod fleet_cues;
+mod fleet_drops;
+mod fleet_kept;
+mod fleet_lists;
+mod fleet_pull;
+mod fleet_wishes;
 mod gate;
 mod guarded;
 mod history;
@@ -63,7 +68,7 @@ pub(crate) use fleet::Letterbox;
 #[cfg(feature = "harness")]
 pub(crate) use fleet::{try_letter, try_order};
 #[cfg(feature = "harness")]
-pub(crate) use fleet_cues::try_wish;
+pub(crate) use fleet_wishes::try_wish;
 pub(crate) use serving::ServingThread;
 pub(crate) use socket::unix as unix_socket;
 pub(crate) use stop::fleet_stop_socket;
@@ -238,6 +243,7 @@ fn shared(
         handle,
         access,
         fleet,
+        fleet_failed: Default::default(),
         tries: Default::default(),
         once: Default::default(),
         streams: Streams::default(),
@@ -277,12 +283,13 @@ fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, [router, of_f
     let (alive, mut all_gone) = mpsc::channel(1);
     let hall = serve::ServedHall { router, closing: closing.clone(), alive, log };
     runtime.block_on(async move {
-        tokio::spawn(Pulse::follow(shared));
+        tokio::spawn(Pulse::follow(Arc::clone(&shared)));
         serve::tcp(tcp, &hall).expect("the runtime has just been made, and takes sockets");
         let taken =
             |listener| tokio::net::UnixListener::from_std(listener).expect("the runtime takes sockets");
         if let Some(fleet) = fleet {
             let hall = serve::ServedHall { router: of_fleet, ..hall.clone() };
+            tokio::spawn(fleet_wishes::keep_settled(shared));
             tokio::spawn(serve::local(taken(fleet), Peer::of_link, "the fleet socket", hall));
         }
         tokio::spawn(serve::local(taken(local), Peer::of_user, "the control socket", hall));

@@ -16,8 +16,8 @@ use utoipa_axum::routes;
 use super::problem::{PROBLEM_JSON, ProblemBody};
 use super::shared::Shared;
 use super::{
-    controllers, cues, fleet, fleet_cues, gate, history, playlist, recordings, reports, service, settings,
-    show, status,
+    controllers, cues, fleet, fleet_cues, fleet_wishes, gate, history, playlist, recordings, reports,
+    service, settings, show, status,
 };
 use crate::control::Code;
 
@@ -92,7 +92,7 @@ pub(super) fn of_fleet() -> axum::Router<Arc<Shared>> {
         .route("/api/v1/fleet/order", post(fleet::order))
         .route("/api/v1/fleet/clock", post(fleet::clock))
         .route("/api/v1/fleet/journal", post(fleet::journal))
-        .route("/api/v1/fleet/wish", get(fleet_cues::kept).put(fleet_cues::wish))
+        .route("/api/v1/fleet/wish", get(fleet_wishes::kept).put(fleet_wishes::wish))
         .route("/api/v1/fleet/cues/{id}", put(fleet_cues::take))
         .route("/api/v1/status", get(status::status))
         .route("/api/v1/cues", get(cues::all))

@@ -1,8 +1,9 @@
 //! What all handlers share.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use axum::extract::Request;
@@ -38,6 +39,8 @@ pub(super) struct Shared {
     pub(super) access: Access,
     /// Who of the fleet may ask.
     pub(super) fleet: FleetAccess,
+    /// Why what the fleet wishes could not be done when that was tried last; held by whoever tries it.
+    pub(super) fleet_failed: Mutex<BTreeMap<String, Problem>>,
     /// Wrong tokens.
     pub(super) tries: Tries,
     /// Requests that may come twice.
@@ -89,6 +92,11 @@ impl StillAsked {
     pub(super) fn of(request: &Request) -> Self {
         request.extensions().get::<Self>().expect("each request has passed the gate").clone()
     }
+}
+
+/// What is behind a lock, which is whole also where a thread that held it panicked.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Room for what waits for a disk.
@@ -148,7 +156,7 @@ impl Shared {
 
     /// A status as JSON. Of many who ask for the same one it is written once.
     pub(super) fn write(&self, status: &Arc<Status>) -> Bytes {
-        let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut written = lock(&self.written);
         if let Some((same, json)) = written.as_ref()
             && Arc::ptr_eq(same, status)
         {

@@ -58,13 +58,17 @@ pub(crate) enum FleetWord {
     Trim,
     /// To put cues into the library, while parked; loads none of them.
     Cues,
+    /// To put playlists beside the library, while parked; loads none of them.
+    Playlists,
+    /// To fetch cues out of the library, while parked.
+    Pull,
     /// To start at an instant what a person in the hall has armed for that; by a key of its own, not by `allow`.
     Start,
 }
 
 impl FleetWord {
     /// Those of `allow`, by the words of the configuration.
-    pub(crate) const ALL: [(&'static str, Self); 7] = [
+    pub(crate) const ALL: [(&'static str, Self); 9] = [
         ("pause", Self::Pause),
         ("park", Self::Park),
         ("disarm", Self::Disarm),
@@ -72,7 +76,11 @@ impl FleetWord {
         ("levels", Self::Levels),
         ("trim", Self::Trim),
         ("cues", Self::Cues),
+        ("playlists", Self::Playlists),
+        ("pull", Self::Pull),
     ];
+    /// Those that are no orders, but say what wishes count for.
+    pub(crate) const OF_WISHES: [Self; 2] = [Self::Cues, Self::Playlists];
     /// What nobody who is elsewhere may ask, whatever the configuration says.
     const NEVER: [&'static str; 13] = [
         "arm", "home", "clear", "go", "resume", "seek", "enable", "disable", "seats", "test", "reload",
@@ -88,6 +96,8 @@ plain::displayed!(FleetWord {
     Self::Levels => "levels",
     Self::Trim => "trim",
     Self::Cues => "cues",
+    Self::Playlists => "playlists",
+    Self::Pull => "pull",
     Self::Start => "start",
 });
 

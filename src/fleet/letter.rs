@@ -55,6 +55,12 @@ impl Letter {
 }
 
 impl Order {
+    /// True if nothing is done for it, so that it may come again while it is new.
+    #[must_use]
+    pub(crate) fn only_reads(&self) -> bool {
+        self.word == "pull"
+    }
+
     /// The order of a letter; why it is none.
     pub(crate) fn of(letter: &Letter) -> Result<Self, String> {
         let order: Self = serde_json::from_str(&letter.body).map_err(|error| error.to_string())?;

@@ -14,7 +14,9 @@ pub(crate) use letter::{Letter, Order};
 pub(crate) use ntp::try_answer as try_ntp;
 pub(crate) use ntp::{ClockSample, LEN as NTP_LEN, answer as ntp_answer, question as ntp_question};
 pub(crate) use proof::LogRecord;
-pub(crate) use wish::{CHUNK, CueHad, HadState, HaveReport, LONGEST_WISH, Wish, WishedCue};
+pub(crate) use wish::{
+    CHUNK, CuePiece, Drops, HadState, HaveReport, LONGEST_WISH, Wish, WishHad, WishedCue, WishedPlaylist,
+};
 
 /// The JetStream domain that has all streams and buckets.
 pub(crate) const DOMAIN: &str = "hub";

@@ -1,8 +1,9 @@
-//! What a hall shall have in its library, as a desk wishes it, and what it has, as the hall says it.
+//! What a hall shall have in its library and among its playlists, as a desk wishes it, and what it has, as the hall says it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
 
 use super::Letter;
 
@@ -14,7 +15,7 @@ pub(crate) const CHUNK: u64 = 128 << 10;
 const DIGITS: usize = 64;
 
 /// What a hall shall have: the text of a letter. It names all of it, each time.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wish {
     /// The hall that it is for, `SITE.HALL`.
@@ -23,6 +24,46 @@ pub(crate) struct Wish {
     pub(crate) rev: u64,
     /// Cues by their ids.
     pub(crate) cues: BTreeMap<String, WishedCue>,
+    /// Playlists by their ids.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) playlists: BTreeMap<String, WishedPlaylist>,
+    /// What shall go of what an earlier wish brought. What no wish names any more stays by itself: a wish that is lost, or another desk's,
+    /// empties no library.
+    #[serde(default, skip_serializing_if = "Drops::is_empty")]
+    pub(crate) drops: Drops,
+}
+
+/// What shall go, by its ids.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(crate) struct Drops {
+    /// Cues.
+    #[serde(skip_serializing_if = "BTreeSet::is_empty")]
+    pub(crate) cues: BTreeSet<String>,
+    /// Playlists.
+    #[serde(skip_serializing_if = "BTreeSet::is_empty")]
+    pub(crate) playlists: BTreeSet<String>,
+}
+
+impl Drops {
+    fn is_empty(&self) -> bool {
+        self.cues.is_empty() && self.playlists.is_empty()
+    }
+}
+
+/// The file of a playlist, which is so short that it is in the wish itself.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct WishedPlaylist {
+    /// All of it, TOML.
+    pub(crate) text: String,
+    /// From when on the hall shall have it, Unix milliseconds; 0 for at once. Until then it keeps what it has of that id.
+    #[serde(default, skip_serializing_if = "is_at_once")]
+    pub(crate) from_ms: u64,
+}
+
+fn is_at_once(from_ms: &u64) -> bool {
+    *from_ms == 0
 }
 
 /// The file of a cue.
@@ -52,13 +93,22 @@ pub(crate) struct HaveReport {
     /// Why it does not take what the engine has as its wish; null if it does.
     pub(crate) refused: Option<String>,
     /// What it has of its wish, by the ids of cues.
-    pub(crate) cues: BTreeMap<String, CueHad>,
+    pub(crate) cues: BTreeMap<String, WishHad>,
+    /// The same by the ids of playlists.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) playlists: BTreeMap<String, WishHad>,
+    /// How far it is with cues that shall go; `ready` once none is there that was brought.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) dropped_cues: BTreeMap<String, WishHad>,
+    /// The same with playlists.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) dropped_playlists: BTreeMap<String, WishHad>,
 }
 
-/// What a hall has of one cue.
+/// What a hall has of one file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
-pub(crate) struct CueHad {
+pub(crate) struct WishHad {
     /// The file that is wished, its SHA-256.
     pub(crate) sha256: String,
     /// How long that is.
@@ -67,19 +117,34 @@ pub(crate) struct CueHad {
     pub(crate) state: HadState,
     /// How much of it was fetched, while it is.
     pub(crate) percent: Option<u8>,
-    /// Why it waits, or is refused.
+    /// Why it waits, is refused, or comes later.
     pub(crate) why: Option<String>,
     /// Every fault that stands against it, with its place.
     pub(crate) faults: Vec<String>,
 }
 
-/// How far a wished cue is.
+/// A piece of a cue that a hall gives out, the reply to `pull`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct CuePiece {
+    /// SHA-256 of the whole file, as the hall says.
+    pub(crate) sha256: String,
+    /// How long the whole file is, as the hall says.
+    pub(crate) bytes: u64,
+    /// True if it is MCAP; CSV if not.
+    pub(crate) mcap: bool,
+    /// The piece, base64: [`CHUNK`] bytes, but the last.
+    pub(crate) data: String,
+}
+
+/// How far a wished file is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum HadState {
-    /// It is in the library, and proved for the seats of the hall.
+    /// It is there, and proved or checked for the seats of the hall.
     Ready,
-    /// It is to be fetched, and nothing stands against that.
+    /// Nothing stands against it, and it comes at its time.
+    Due,
+    /// It is to be fetched or taken in, and nothing stands against that.
     Missing,
     /// It is being fetched.
     Fetching,
@@ -95,20 +160,65 @@ impl Wish {
     /// The wish of a letter, whoever has signed that; why it is none.
     pub(crate) fn of(letter: &Letter) -> Result<Self, String> {
         let wish: Self = serde_json::from_str(&letter.body).map_err(|error| error.to_string())?;
-        let small = |digit: u8| digit.is_ascii_digit() || (b'a'..=b'f').contains(&digit);
-        for (id, WishedCue { sha256, bytes }) in &wish.cues {
-            if sha256.len() != DIGITS || !sha256.bytes().all(small) {
+        for (id, cue) in &wish.cues {
+            if !cue.is_named() {
+                let sha256 = &cue.sha256;
                 return Err(format!("{sha256:?}, of {id:?}, is not {DIGITS} small hexadecimal digits"));
             }
-            if *bytes == 0 {
+            if cue.bytes == 0 {
                 return Err(format!("{id:?} is empty"));
             }
         }
-        Ok(wish)
+        let Drops { cues, playlists } = &wish.drops;
+        let both = cues.iter().find(|id| wish.cues.contains_key(*id));
+        match both.or_else(|| playlists.iter().find(|id| wish.playlists.contains_key(*id))) {
+            Some(id) => Err(format!("{id:?} shall come and go")),
+            None => Ok(wish),
+        }
+    }
+
+    /// Wishes for a cue.
+    pub(crate) fn want_cue(&mut self, id: &str, cue: &WishedCue) {
+        self.drops.cues.remove(id);
+        self.cues.insert(id.to_owned(), cue.clone());
+    }
+
+    /// Wishes for a playlist.
+    pub(crate) fn want_playlist(&mut self, id: &str, playlist: &WishedPlaylist) {
+        self.drops.playlists.remove(id);
+        self.playlists.insert(id.to_owned(), playlist.clone());
+    }
+
+    /// Wishes a cue to go.
+    pub(crate) fn drop_cue(&mut self, id: &str) {
+        self.cues.remove(id);
+        self.drops.cues.insert(id.to_owned());
+    }
+
+    /// Wishes a playlist to go.
+    pub(crate) fn drop_playlist(&mut self, id: &str) {
+        self.playlists.remove(id);
+        self.drops.playlists.insert(id.to_owned());
+    }
+}
+
+impl WishedPlaylist {
+    /// Its file, by its digest.
+    #[must_use]
+    pub(crate) fn file(&self) -> WishedCue {
+        let sha256 = Sha256::digest(&self.text).iter().map(|byte| format!("{byte:02x}")).collect();
+        WishedCue { sha256, bytes: self.text.len() as u64 }
     }
 }
 
 impl WishedCue {
+    /// True if its digest is one: it names files.
+    #[must_use]
+    pub(crate) fn is_named(&self) -> bool {
+        let small = |digit: u8| digit.is_ascii_digit() || (b'a'..=b'f').contains(&digit);
+        self.sha256.len() == DIGITS && self.sha256.bytes().all(small)
+    }
+
     /// How many messages of the engine have it.
     #[must_use]
     pub(crate) fn chunks(&self) -> u64 {
@@ -122,12 +232,18 @@ impl WishedCue {
     }
 }
 
-impl CueHad {
-    /// Of that cue.
+impl WishHad {
+    /// Of that file.
     #[must_use]
-    pub(crate) fn new(cue: &WishedCue, state: HadState, why: Option<String>) -> Self {
-        let WishedCue { sha256, bytes } = cue.clone();
+    pub(crate) fn new(file: &WishedCue, state: HadState, why: Option<String>) -> Self {
+        let WishedCue { sha256, bytes } = file.clone();
         Self { sha256, bytes, state, percent: None, why, faults: Vec::new() }
+    }
+
+    /// True if nothing more comes of it until somebody does something, or its time has come.
+    #[must_use]
+    pub(crate) fn is_settled(&self) -> bool {
+        matches!(self.state, HadState::Ready | HadState::Refused | HadState::Due)
     }
 
     /// It in words: `ready`, `fetching 61 %`, `waiting: the hall is armed`.
@@ -136,6 +252,7 @@ impl CueHad {
         let why = self.why.as_deref().unwrap_or("it does not say why");
         match self.state {
             HadState::Ready => "ready".to_owned(),
+            HadState::Due => format!("checked; {why}"),
             HadState::Missing => "not fetched yet".to_owned(),
             HadState::Fetching if self.percent.is_some_and(|percent| percent >= 100) => {
                 "fetched, and being proved".to_owned()
@@ -155,8 +272,8 @@ impl HaveReport {
         let (mut report, mut kept) = (self.clone(), 32);
         while text(&report).len() > most && kept > 0 {
             kept /= 2;
-            for cue in report.cues.values_mut().filter(|cue| cue.faults.len() > kept) {
-                cue.faults.truncate(kept);
+            for had in report.cues.values_mut().chain(report.playlists.values_mut()) {
+                had.faults.truncate(kept);
             }
         }
         text(&report)
@@ -197,6 +314,45 @@ mod tests {
     }
 
     #[test]
+    fn a_wish_of_cues_alone_is_as_it_was_before_there_were_playlists() {
+        let mut wish = wish("{}").unwrap();
+        assert_eq!(serde_json::to_string(&wish).unwrap(), r#"{"to":"berlin.h3","rev":7,"cues":{}}"#);
+        let playlist = |from_ms| WishedPlaylist { text: "title = \"x\"".to_owned(), from_ms };
+        wish.playlists.insert("at-once".to_owned(), playlist(0));
+        wish.playlists.insert("later".to_owned(), playlist(5));
+        let text = serde_json::to_string(&wish).unwrap();
+        assert!(
+            text.contains(
+                r#""at-once":{"text":"title = \"x\""},"later":{"text":"title = \"x\"","from_ms":5}"#
+            ),
+            "{text}"
+        );
+        assert_eq!(serde_json::from_str::<Wish>(&text).unwrap(), wish);
+        assert_eq!(wish.playlists["later"].file().bytes, 11);
+    }
+
+    #[test]
+    fn what_shall_come_shall_not_go_and_the_last_word_counts() {
+        let mut wish = wish("{}").unwrap();
+        wish.want_cue("storm", &WishedCue { sha256: "0".repeat(DIGITS), bytes: 1 });
+        wish.want_playlist("today", &WishedPlaylist { text: String::new(), from_ms: 0 });
+        wish.drop_cue("storm");
+        wish.drop_playlist("today");
+        let text = serde_json::to_string(&wish).unwrap();
+        assert_eq!(
+            text,
+            r#"{"to":"berlin.h3","rev":7,"cues":{},"drops":{"cues":["storm"],"playlists":["today"]}}"#
+        );
+        let of = |body: &str| Wish::of(&Letter::sign(&KeyPair::new_user(), body.to_owned()).unwrap());
+        assert_eq!(of(&text).unwrap(), wish);
+        let both = r#""playlists":{"today":{"text":""}},"drops""#;
+        assert!(of(&text.replace(r#""drops""#, both)).unwrap_err().contains("shall come and go"));
+        wish.want_cue("storm", &WishedCue { sha256: "0".repeat(DIGITS), bytes: 1 });
+        wish.want_playlist("today", &WishedPlaylist { text: String::new(), from_ms: 0 });
+        assert!(wish.drops.is_empty() && wish.cues.len() == 1 && wish.playlists.len() == 1);
+    }
+
+    #[test]
     fn an_order_is_no_wish_and_a_wish_is_no_order() {
         let pair = KeyPair::new_user();
         let order = r#"{"id":"1","to":"a.b","word":"load","args":{},"sent_ms":5}"#;
@@ -218,7 +374,7 @@ mod tests {
         let mut report = HaveReport::default();
         for id in 0..100 {
             let cue = WishedCue { sha256: "0".repeat(DIGITS), bytes: 1 };
-            let mut had = CueHad::new(&cue, HadState::Refused, Some("it does not pass".to_owned()));
+            let mut had = WishHad::new(&cue, HadState::Refused, Some("it does not pass".to_owned()));
             had.faults = vec!["a1 moves 260 mm/s, limit 240".to_owned(); 21];
             report.cues.insert(id.to_string(), had);
         }

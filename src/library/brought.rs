@@ -1,11 +1,11 @@
-//! What a fleet brought into the library, and what it wishes. What people put there is theirs: a file counts as brought only where it is
-//! the very one that was noted when it came, by its inode, its length and when it was written. All else is never replaced.
+//! What a fleet brought into the library, and what it wishes.
 
 use std::collections::BTreeMap;
 use std::io;
 
 use serde::{Deserialize, Serialize};
 
+use super::brought_files::{BroughtFiles, LeftThere};
 use super::upload::unwritten;
 use super::{Awaited, CueId, CueInfo, Library, Proved, Upload, file_name, file_problem, kept, lock};
 use crate::control::{Code, Problem};
@@ -22,16 +22,10 @@ const NEW_FILE: &str = ".fleet.new";
 pub(super) struct Brought {
     /// What is wished, as it was signed.
     wish: Option<String>,
-    /// Files that were brought. One is noted before it is put into its place, so that a crash leaves none that nobody knows.
-    files: Vec<BroughtFile>,
+    /// Files that were brought.
+    files: BroughtFiles,
     /// Cues that did not pass.
     refused: BTreeMap<String, RefusedCue>,
-}
-
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct BroughtFile {
-    name: String,
-    stamp: Stamp,
 }
 
 /// A cue that did not pass, so that it is not brought again and again.
@@ -82,28 +76,15 @@ impl Brought {
         write().map_err(|error: io::Error| unwritten(&error))
     }
 
-    /// True of a file that was brought and is still the same.
-    fn has(&self, name: &str, stamp: Stamp) -> bool {
-        self.files.iter().any(|file| file.name == name && file.stamp == stamp)
-    }
-
     /// True if nothing of that id is there but what was brought.
     fn has_no_other(&self, folder: &Folder, id: &CueId) -> io::Result<bool> {
-        for mcap in [false, true] {
-            let name = file_name(id, mcap);
-            // What is there and is no regular file is nobody's to replace either.
-            if folder.has(&name)? && !folder.stamp(&name)?.is_some_and(|stamp| self.has(&name, stamp)) {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+        let has_no_other = |mcap| self.files.has_no_other(folder, &file_name(id, mcap));
+        Ok(has_no_other(false)? && has_no_other(true)?)
     }
 
-    /// Notes a file that is about to get its name, and forgets those that are gone.
-    fn note(&mut self, folder: &Folder, file: BroughtFile) -> Result<(), Problem> {
-        let is_there = |file: &BroughtFile| folder.stamp(&file.name).ok().flatten() == Some(file.stamp);
-        self.files.retain(is_there);
-        self.files.push(file);
+    /// Notes a file that is about to get its name.
+    fn note(&mut self, folder: &Folder, name: String, stamp: Stamp) -> Result<(), Problem> {
+        self.files.note(folder, name, stamp);
         self.write(folder)
     }
 }
@@ -164,6 +145,29 @@ impl Library {
         })
     }
 
+    /// What is left of a cue that shall go.
+    pub(crate) fn left_there(&self, id: &CueId) -> Result<LeftThere, Problem> {
+        let left = lock(&self.inner.brought).files.left_there(&self.folder()?, &names(id));
+        left.map_err(|error| file_problem("read the library", &error))
+    }
+
+    /// Removes what was brought of a cue, where `may` still lets it.
+    ///
+    /// # Errors
+    /// Where it does not, or the disk does not; files that people put there stay in any case.
+    pub(crate) fn drop_brought(
+        &self,
+        id: &CueId,
+        may: impl FnOnce() -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
+        let folder = self.folder()?;
+        let mut brought = lock(&self.inner.brought);
+        may()?;
+        let removed = brought.files.remove(&folder, &names(id));
+        removed.map_err(|error| file_problem("remove the cue", &error))?;
+        brought.write(&folder)
+    }
+
     fn folder(&self) -> Result<Folder, Problem> {
         Folder::open(&self.inner.dir).map_err(|error| file_problem("open the library", &error))
     }
@@ -207,9 +211,14 @@ impl Upload {
         }
         let (name, stamp) = proved.file()?;
         brought.refused.remove(&id.to_string());
-        brought.note(&folder, BroughtFile { name, stamp })?;
+        brought.note(&folder, name, stamp)?;
         proved.put()
     }
+}
+
+/// The files that a cue may be.
+fn names(id: &CueId) -> [String; 2] {
+    [false, true].map(|mcap| file_name(id, mcap))
 }
 
 /// That people have a cue of that id.
@@ -232,7 +241,7 @@ mod tests {
     /// Notes a file as it is noted before it gets its name.
     fn noted(folder: &Folder, brought: &mut Brought, from: &str, name: &str) {
         let stamp = folder.stamp(from).unwrap().unwrap();
-        brought.note(folder, BroughtFile { name: name.to_owned(), stamp }).unwrap();
+        brought.note(folder, name.to_owned(), stamp).unwrap();
     }
 
     #[test]
@@ -259,6 +268,26 @@ mod tests {
         fs::remove_file(path("storm.csv")).unwrap();
         fs::write(path("storm.csv"), "1").unwrap();
         assert!(!Brought::read(&folder).has_no_other(&folder, &id("storm")).unwrap(), "a damaged note");
+    }
+
+    #[test]
+    fn what_was_brought_goes_and_what_people_put_beside_or_over_it_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let (folder, path) = (Folder::open(dir.path()).unwrap(), |name: &str| dir.path().join(name));
+        let mut brought = Brought::default();
+        let left = |brought: &Brought| brought.files.left_there(&folder, &names(&id("storm"))).unwrap();
+        assert_eq!(left(&brought), LeftThere::Nothing);
+        fs::write(path("new"), "1").unwrap();
+        noted(&folder, &mut brought, "new", "storm.csv");
+        folder.rename("new", "storm.csv").unwrap();
+        fs::write(path("storm.mcap"), "theirs").unwrap();
+        assert_eq!(left(&brought), LeftThere::Brought);
+        brought.files.remove(&folder, &names(&id("storm"))).unwrap();
+        assert_eq!((left(&brought), brought.files.len()), (LeftThere::Theirs, 0));
+        assert!(!path("storm.csv").exists() && path("storm.mcap").exists());
+        fs::write(path("storm.csv"), "1").unwrap();
+        brought.files.remove(&folder, &names(&id("storm"))).unwrap();
+        assert!(path("storm.csv").exists(), "the same name, and not the file that came");
     }
 
     #[test]

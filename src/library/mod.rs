@@ -6,16 +6,19 @@
 //! gets that name. The library's verdict is for people and playlists: a cue is proved again before it is played.
 
 mod brought;
+mod brought_files;
 mod child;
 mod curve;
 mod hashed;
 mod id;
 mod index;
 mod info;
+mod part;
 mod sketch;
 mod upload;
 
 pub(crate) use brought::{StandingOfCue, theirs};
+pub(crate) use brought_files::{BroughtFiles, LeftThere};
 pub use child::Awaited;
 pub(crate) use curve::{CurveData, Drawing, MAX_POINTS, draw, needs_hall};
 pub(crate) use hashed::Hashed;
@@ -36,7 +39,7 @@ use std::time::Duration;
 use serde::de::DeserializeOwned;
 use sha2::{Digest as _, Sha256};
 
-use crate::config::Store;
+use crate::config::{self, Config, Store};
 use crate::control::{Code, Problem};
 use crate::cue::{self, Source, limits};
 use crate::sys::folder::{Folder, Stamp};
@@ -328,6 +331,17 @@ impl Library {
         }
     }
 
+    /// The configuration of the hall as its file now is, as cues are checked for it.
+    ///
+    /// # Errors
+    /// [`Problem`] where it has faults.
+    pub(crate) fn config(&self) -> Result<Config, Problem> {
+        config::load(&self.inner.hall.config).map_err(|_| {
+            let remedy = "run kinocue check on the configuration and correct it";
+            Problem::new(Code::Check, "the configuration of the hall has faults", remedy)
+        })
+    }
+
     /// SHA-256 of the file of the hall's configuration as it now is, hexadecimal.
     #[must_use]
     pub(crate) fn config_digest(&self) -> String {
@@ -389,7 +403,7 @@ fn file_problem(what: &str, error: &io::Error) -> Problem {
 }
 
 /// What a file beside the cues keeps as JSON; nothing where it is missing or cannot be read.
-fn kept<T: DeserializeOwned + Default>(folder: &Folder, name: &str) -> T {
+pub(crate) fn kept<T: DeserializeOwned + Default>(folder: &Folder, name: &str) -> T {
     let read = || {
         let (file, _) = folder.file(name).ok()??;
         let mut text = Vec::new();

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use super::{Entry, Playlist};
 use crate::config::{Config, ConfigFault, did_you_mean};
-use crate::library::{CueId, Library, Proved};
+use crate::control::Problem;
+use crate::library::{CueId, CueInfo, Library, Proved};
 
 impl Playlist {
     /// Every fault of a playlist for a library and a hall: a cue that is missing or does not pass, a preset or an effect
@@ -12,6 +13,15 @@ impl Playlist {
     /// a long one beside a show. Empty where all of it can be played.
     #[must_use]
     pub fn check(&self, library: &Library, config: &Config) -> Vec<ConfigFault> {
+        self.check_by(config, |cue| library.examine(cue))
+    }
+
+    /// The same by what `examine` says of each cue.
+    pub(crate) fn check_by(
+        &self,
+        config: &Config,
+        examine: impl Fn(&CueId) -> Result<CueInfo, Problem>,
+    ) -> Vec<ConfigFault> {
         let mut faults = Vec::new();
         let mut examined: BTreeSet<(&CueId, bool)> = BTreeSet::new();
         for entry in &self.entries {
@@ -21,7 +31,7 @@ impl Playlist {
                 None
             });
             if examined.insert((&entry.cue, begins.is_some()))
-                && let Err(message) = examine(library, &entry.cue, begins.is_some())
+                && let Err(message) = judge(&entry.cue, examine(&entry.cue), begins.is_some())
             {
                 faults.push(self.fault(entry.places.cue, message));
             }
@@ -63,9 +73,8 @@ impl Playlist {
 }
 
 /// Why a cue cannot be played, or not led by a film, if it cannot.
-fn examine(library: &Library, cue: &CueId, is_led: bool) -> Result<(), String> {
-    let info =
-        library.examine(cue).map_err(|problem| format!("cue: {}; {}", problem.detail, problem.remedy))?;
+fn judge(cue: &CueId, info: Result<CueInfo, Problem>, is_led: bool) -> Result<(), String> {
+    let info = info.map_err(|problem| format!("cue: {}; {}", problem.detail, problem.remedy))?;
     let failed = |when: &str, faults: &[String]| {
         let first = faults.first().map_or("it does not pass", String::as_str);
         let more = match faults.len() {

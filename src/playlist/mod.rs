@@ -4,6 +4,7 @@
 //! A schedule starts nothing by itself: it only reports what is due. The supervisor starts it, and only while a person
 //! has armed the hall.
 
+mod brought;
 mod check;
 mod parse;
 mod schedule;
@@ -11,6 +12,7 @@ mod shelf;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use brought::{WishedText, theirs};
 pub(crate) use schedule::{Schedule, next_start};
 pub(crate) use shelf::PlaylistInfo;
 pub use shelf::Shelf;
@@ -121,6 +123,13 @@ impl At {
     #[must_use]
     pub(crate) fn is_on(&self, day: Weekday) -> bool {
         self.days.contains(&day.to_monday_zero_offset())
+    }
+}
+
+impl Playlist {
+    /// Its cues, in order; one may be there more than once.
+    pub(crate) fn cues(&self) -> impl Iterator<Item = &CueId> {
+        self.entries.iter().map(|entry| &entry.cue)
     }
 }
 

@@ -18,7 +18,7 @@ const ENDING: &str = ".toml";
 /// A folder of playlists; cheap to make, reads at each question.
 #[derive(Debug, Clone)]
 pub struct Shelf {
-    dir: PathBuf,
+    pub(super) dir: PathBuf,
 }
 
 /// One playlist of the folder.
@@ -69,7 +69,7 @@ impl Shelf {
     /// # Errors
     /// [`Problem`] where there is none of that name, or it has faults, each with its place.
     pub(crate) fn read(&self, id: &PlaylistId) -> Result<Playlist, Problem> {
-        let name = format!("{id}{ENDING}");
+        let name = file_name(id);
         let path = self.dir.join(&name);
         let text = match self.text(&name) {
             Ok(Some(text)) => text,
@@ -80,11 +80,7 @@ impl Shelf {
                 return Err(Problem::new(Code::File, detail, "check the file; it has to be UTF-8 text"));
             }
         };
-        Playlist::parse(&path, &text).map_err(|faults| {
-            let lines = faults.to_string().lines().map(str::to_owned).collect();
-            Problem::new(Code::Check, format!("the playlist {id} has faults"), "correct these faults")
-                .with(lines)
-        })
+        read_as(id, &path, &text)
     }
 
     fn ids(&self) -> Vec<PlaylistId> {
@@ -102,7 +98,7 @@ impl Shelf {
         )
     }
 
-    fn text(&self, name: &str) -> io::Result<Option<String>> {
+    pub(super) fn text(&self, name: &str) -> io::Result<Option<String>> {
         let Some((file, stamp)) = Folder::open(&self.dir)?.file(name)? else { return Ok(None) };
         if stamp.size > MAX_LEN {
             return Err(io::Error::other(format!("it is longer than {MAX_LEN} bytes")));
@@ -111,4 +107,17 @@ impl Shelf {
         file.take(MAX_LEN).read_to_string(&mut text)?;
         Ok(Some(text))
     }
+}
+
+/// The file of a playlist.
+pub(super) fn file_name(id: &PlaylistId) -> String {
+    format!("{id}{ENDING}")
+}
+
+/// The playlist that a text is.
+pub(super) fn read_as(id: &PlaylistId, path: &Path, text: &str) -> Result<Playlist, Problem> {
+    Playlist::parse(path, text).map_err(|faults| {
+        let lines = faults.to_string().lines().map(str::to_owned).collect();
+        Problem::new(Code::Check, format!("the playlist {id} has faults"), "correct these faults").with(lines)
+    })
 }

@@ -25,7 +25,12 @@ fn push(engine: &Engine, id: &str, text: &str, more: &[&str]) -> crate::process:
 
 /// What is in the library of a hall, with what is in it.
 pub(crate) fn library(hall: &Hall) -> Vec<(String, Vec<u8>)> {
-    let entries = fs::read_dir(hall.path("cues")).unwrap().map(Result::unwrap);
+    folder(hall, "cues")
+}
+
+/// What people see in a folder of a hall, with what is in it.
+pub(crate) fn folder(hall: &Hall, name: &str) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(hall.path(name)).unwrap().map(Result::unwrap);
     let mut files: Vec<_> = entries
         .filter_map(|entry| Some((entry.file_name().into_string().unwrap(), fs::read(entry.path()).ok()?)))
         .filter(|(name, _)| !name.starts_with('.'))

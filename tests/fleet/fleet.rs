@@ -20,7 +20,8 @@ use crate::process::{Guarded, PATIENCE, Run};
 use crate::programs::is_installed;
 
 /// All words that a hall may allow.
-pub(crate) const ALL: &str = r#"["pause", "park", "disarm", "load", "levels", "trim", "cues"]"#;
+pub(crate) const ALL: &str =
+    r#"["pause", "park", "disarm", "load", "levels", "trim", "cues", "playlists", "pull"]"#;
 
 /// An engine that runs, with the keys of all who know it.
 pub(crate) struct Engine {

@@ -11,6 +11,7 @@ use sha2::{Digest as _, Sha256};
 use crate::cues::{cue, library};
 use crate::fleet::Engine;
 use crate::hall::swell;
+use crate::lists;
 use crate::rights::Member;
 
 /// A desk that says whatever it is told to.
@@ -113,6 +114,64 @@ fn no_wish_counts_that_was_altered_is_another_s_is_old_or_names_a_path_and_nothi
     );
     let run = engine.desk(&["push", file.to_str().unwrap(), "--to", "berlin.h1", "--only"]);
     assert_eq!(run.code, Some(0), "{run:?}");
+}
+
+#[test]
+fn no_playlist_counts_that_was_altered_is_another_s_is_old_or_names_a_path_and_nothing_changes() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", r#"["cues", "playlists"]"#);
+    let _link = engine.link("h1", &hall);
+    let run = lists::send(&engine, "today", &lists::of("Today", "ride"), &[]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let rev = engine.has("berlin.h1", |_| true)["wished_rev"].as_u64().unwrap();
+    let (before, forger) = (lists::lists(&hall), Forger::of(&engine));
+    let own = |body: Value| letter(&forger.pair, &body);
+    let of = |rev: u64, id: &str, more: Value| {
+        let mut list = json!({ "text": lists::of("Night", "night") });
+        list.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        json!({ "to": "berlin.h1", "rev": rev, "cues": {}, "playlists": { id: list } })
+    };
+    let drops =
+        |id: &str| json!({ "to": "berlin.h1", "rev": rev + 1, "cues": {}, "drops": { "playlists": [id] } });
+    let next = of(rev + 1, "today", json!({}));
+    let mut altered = own(next.clone());
+    altered["body"] = altered["body"].as_str().unwrap().replace("night", "ride").into();
+    let mut foreign = next.clone();
+    foreign["to"] = "berlin.h2".into();
+    for (what, says) in [
+        (altered, "no key of [fleet] has signed this"),
+        (letter(&KeyPair::new_user(), &next), "no key of [fleet] has signed this"),
+        (own(foreign), "the wish is for berlin.h2, and this hall is berlin.h1"),
+        (own(of(rev - 1, "today", json!({}))), "is older than the one that the hall keeps"),
+        (own(of(rev, "today", json!({}))), "there are two wishes of rev"),
+        (own(of(rev + 1, "../today", json!({}))), "is not an id"),
+        (own(of(rev + 1, "today", json!({ "from_ms": u64::MAX }))), "is no time"),
+        (own(of(rev + 1, "today", json!({ "load": true }))), "unknown field"),
+        (letter(&KeyPair::new_user(), &drops("today")), "no key of [fleet] has signed this"),
+        (own(drops("../today")), "is not an id"),
+    ] {
+        forger.wish(&what);
+        engine.has("berlin.h1", |hall| {
+            hall["report"]["refused"].as_str().is_some_and(|why| why.contains(says))
+        });
+        assert_eq!(lists::lists(&hall), before, "{what}");
+    }
+    assert!(!hall.path("today.toml").exists());
+}
+
+#[test]
+fn a_hall_that_allows_cues_alone_takes_no_playlist_and_its_cues_come_all_the_same() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", r#"["cues"]"#);
+    let _link = engine.link("h1", &hall);
+    let run = lists::send(&engine, "today", &lists::of("Today", "ride"), &[]);
+    let says = "berlin.h1: playlist today: refused: allow of [fleet] does not name playlists";
+    assert!(run.code == Some(1) && run.stdout.contains(says), "{run:?}");
+    let file = cue(&engine, "storm", &swell(3));
+    assert_eq!(engine.desk(&["push", file.to_str().unwrap(), "--to", "all"]).code, Some(0));
+    let run = engine.desk(&["have"]);
+    assert!(run.code == Some(1) && run.stdout.contains("1 of 2") && run.stdout.contains(says), "{run:?}");
+    assert!(lists::lists(&hall).is_empty());
 }
 
 #[test]

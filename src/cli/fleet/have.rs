@@ -10,17 +10,17 @@ use super::act::{HallsOrAllArgs, chosen};
 use super::desk::{age, said};
 use super::{engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print, table};
-use crate::fleet::{self, HadState, HaveReport, Letter, Wish, WishedCue};
+use crate::fleet::{self, HadState, HaveReport, Letter, Wish};
 
 /// A hall tells what it has each minute; after so long without a word it is not heard.
 const UNHEARD: Duration = Duration::from_secs(150);
 
 /// Shows which hall has what was wished for it, which lags, and why.
 ///
-/// A hall has a cue once it is in its library and proved for its seats. With the version of its program and the digest of its configuration.
+/// A hall has a cue once it is in its library and proved for its seats, and a playlist once it is there and all that it names. With the version of its program and the digest of its configuration.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 all halls have all of it, 1 a hall refuses a cue, 69 the engine does not answer, 75 a hall lags or is not heard"
+    after_help = "Exit codes: 0 all halls have all of it, 1 a hall refuses something, 69 the engine does not answer, 75 a hall lags or is not heard"
 )]
 pub(super) struct Args {
     #[command(flatten)]
@@ -43,12 +43,34 @@ pub(super) struct HallHas {
     is_foreign: bool,
 }
 
-/// How a hall stands to one cue.
+/// What a wish names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FileKind {
+    Cue,
+    Playlist,
+    /// One that shall go.
+    DroppedCue,
+    /// One that shall go.
+    DroppedPlaylist,
+}
+
+/// A file that is wished.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct CueStands {
-    pub(super) hall: String,
+pub(super) struct WishedFile {
+    #[serde(skip)]
+    pub(super) kind: FileKind,
     pub(super) id: String,
-    pub(super) state: HadState,
+    #[serde(skip)]
+    pub(super) sha256: String,
+}
+
+/// How a hall stands to one file.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct FileStands {
+    pub(super) hall: String,
+    #[serde(flatten)]
+    pub(super) file: WishedFile,
+    state: HadState,
     /// It in words.
     text: String,
     /// Every fault that stands against it.
@@ -62,7 +84,9 @@ struct HallRow<'h> {
     #[serde(flatten)]
     hall: &'h HallHas,
     wished_rev: Option<u64>,
-    cues: Vec<CueStands>,
+    cues: Vec<FileStands>,
+    playlists: Vec<FileStands>,
+    dropped: Vec<FileStands>,
 }
 
 pub(super) fn run(Args { of }: &Args) -> Result<Exit, Failure> {
@@ -87,14 +111,13 @@ pub(super) fn run(Args { of }: &Args) -> Result<Exit, Failure> {
 }
 
 /// How it ends: what only waits ends well by itself, and what is refused does not.
-pub(super) fn exit_of(stand: &[CueStands]) -> Exit {
-    let any = |state| stand.iter().any(|one| one.state == state);
-    if any(HadState::Refused) {
+pub(super) fn exit_of(stand: &[FileStands]) -> Exit {
+    if stand.iter().any(|one| one.state == HadState::Refused) {
         Exit::CheckFailed
-    } else if stand.iter().any(|one| one.state != HadState::Ready) {
-        Exit::TryAgain
-    } else {
+    } else if stand.iter().all(|one| matches!(one.state, HadState::Ready | HadState::Due)) {
         Exit::Done
+    } else {
+        Exit::TryAgain
     }
 }
 
@@ -124,11 +147,11 @@ impl HallHas {
         })
     }
 
-    /// How it stands to a cue that it was wished by that message of the engine.
-    pub(super) fn stands(&self, id: &str, cue: &WishedCue, seq: u64) -> CueStands {
+    /// How it stands to a file that it was wished by that message of the engine.
+    pub(super) fn stands(&self, file: &WishedFile, seq: u64) -> FileStands {
         let stands = |state, text: String| {
-            let (hall, id) = (self.name.clone(), id.to_owned());
-            CueStands { hall, id, state, text, faults: Vec::new(), percent: None }
+            let (hall, file) = (self.name.clone(), file.clone());
+            FileStands { hall, file, state, text, faults: Vec::new(), percent: None }
         };
         let open = |text: &str| stands(HadState::Waiting, format!("waiting: {text}"));
         let Some(report) = &self.report else {
@@ -136,11 +159,25 @@ impl HallHas {
                 "the hall told nothing yet; check its link, and that its service is of this version",
             );
         };
-        let had = report.cues.get(id).filter(|had| had.sha256 == cue.sha256);
+        let had = match file.kind {
+            FileKind::Cue => report.cues.get(&file.id),
+            FileKind::Playlist => report.playlists.get(&file.id),
+            FileKind::DroppedCue => report.dropped_cues.get(&file.id),
+            FileKind::DroppedPlaylist => report.dropped_playlists.get(&file.id),
+        };
+        let had = had.filter(|had| had.sha256 == file.sha256);
         if let Some(had) = had.filter(|had| had.state == HadState::Ready || report.seen >= seq) {
-            let text =
-                if self.is_unheard() { format!("{}, as it was heard last", had.said()) } else { had.said() };
-            return CueStands { faults: had.faults.clone(), percent: had.percent, ..stands(had.state, text) };
+            let said = match had.state {
+                HadState::Ready if file.is_dropped() => "gone".to_owned(),
+                HadState::Missing if file.is_dropped() => "to go".to_owned(),
+                _ => had.said(),
+            };
+            let text = if self.is_unheard() { format!("{said}, as it was heard last") } else { said };
+            return FileStands {
+                faults: had.faults.clone(),
+                percent: had.percent,
+                ..stands(had.state, text)
+            };
         }
         match &report.refused {
             _ if report.seen < seq && self.is_unheard() => {
@@ -152,9 +189,29 @@ impl HallHas {
         }
     }
 
-    fn all(&self) -> Vec<CueStands> {
+    fn cues(&self) -> Vec<FileStands> {
         let Some((seq, wish)) = &self.wished else { return Vec::new() };
-        wish.cues.iter().map(|(id, cue)| self.stands(id, cue, *seq)).collect()
+        let file = |id: &String, sha256: String| WishedFile { kind: FileKind::Cue, id: id.clone(), sha256 };
+        wish.cues.iter().map(|(id, cue)| self.stands(&file(id, cue.sha256.clone()), *seq)).collect()
+    }
+
+    fn playlists(&self) -> Vec<FileStands> {
+        let Some((seq, wish)) = &self.wished else { return Vec::new() };
+        let file =
+            |id: &String, sha256: String| WishedFile { kind: FileKind::Playlist, id: id.clone(), sha256 };
+        wish.playlists.iter().map(|(id, list)| self.stands(&file(id, list.file().sha256), *seq)).collect()
+    }
+
+    fn dropped(&self) -> Vec<FileStands> {
+        let Some((seq, wish)) = &self.wished else { return Vec::new() };
+        let file = |kind, id: &String| WishedFile { kind, id: id.clone(), sha256: String::new() };
+        let cues = wish.drops.cues.iter().map(|id| file(FileKind::DroppedCue, id));
+        let playlists = wish.drops.playlists.iter().map(|id| file(FileKind::DroppedPlaylist, id));
+        cues.chain(playlists).map(|file| self.stands(&file, *seq)).collect()
+    }
+
+    fn all(&self) -> Vec<FileStands> {
+        [self.cues(), self.playlists(), self.dropped()].concat()
     }
 
     /// True if what it told is old.
@@ -163,25 +220,54 @@ impl HallHas {
     }
 
     fn row(&self) -> HallRow<'_> {
-        HallRow { hall: self, wished_rev: self.wished.as_ref().map(|(_, wish)| wish.rev), cues: self.all() }
+        let wished_rev = self.wished.as_ref().map(|(_, wish)| wish.rev);
+        HallRow {
+            hall: self,
+            wished_rev,
+            cues: self.cues(),
+            playlists: self.playlists(),
+            dropped: self.dropped(),
+        }
     }
 }
 
-impl CueStands {
-    /// True if nothing more comes of it by itself.
+impl WishedFile {
+    /// As people read it: cues by their ids alone.
+    pub(super) fn name(&self) -> String {
+        match self.kind {
+            FileKind::Cue => self.id.clone(),
+            FileKind::Playlist => format!("playlist {}", self.id),
+            FileKind::DroppedCue => format!("dropped {}", self.id),
+            FileKind::DroppedPlaylist => format!("dropped playlist {}", self.id),
+        }
+    }
+
+    /// True of what shall go.
+    pub(super) fn is_dropped(&self) -> bool {
+        matches!(self.kind, FileKind::DroppedCue | FileKind::DroppedPlaylist)
+    }
+}
+
+impl FileStands {
+    /// True if nothing more comes of it by itself, but what comes at its time.
     pub(super) fn is_settled(&self) -> bool {
-        matches!(self.state, HadState::Ready | HadState::Refused)
+        matches!(self.state, HadState::Ready | HadState::Refused | HadState::Due)
+    }
+
+    /// True if it is there.
+    pub(super) fn is_ready(&self) -> bool {
+        self.state == HadState::Ready
     }
 
     /// It in a line.
     pub(super) fn said(&self) -> String {
-        said(&format!("{}: {}: {}", self.hall, self.id, self.text))
+        said(&format!("{}: {}: {}", self.hall, self.file.name(), self.text))
     }
 
     /// The same without what changes all the time.
     pub(super) fn said_coarsely(&self) -> String {
         match self.percent {
-            Some(..100) => said(&format!("{}: {}: fetching", self.hall, self.id)),
+            Some(..100) => said(&format!("{}: {}: fetching", self.hall, self.file.name())),
             _ => self.said(),
         }
     }
@@ -197,18 +283,18 @@ impl CueStands {
 }
 
 /// The table as people read it, and below it what is not there.
-fn drawn(halls: &[HallHas], stand: &[CueStands]) -> String {
+fn drawn(halls: &[HallHas], stand: &[FileStands]) -> String {
     let header = ["hall", "has", "version", "configuration", "told", "what to know"];
     let mut text = table::table(header, halls.iter().map(|hall| line(hall, stand)));
-    for one in stand.iter().filter(|one| one.state != HadState::Ready) {
+    for one in stand.iter().filter(|one| !one.is_ready()) {
         text.push_str(&one.whole());
     }
     text
 }
 
-fn line(hall: &HallHas, stand: &[CueStands]) -> [String; 6] {
+fn line(hall: &HallHas, stand: &[FileStands]) -> [String; 6] {
     let own = || stand.iter().filter(|one| one.hall == hall.name);
-    let ready = own().filter(|one| one.state == HadState::Ready).count();
+    let ready = own().filter(|one| one.is_ready()).count();
     let know = match (&hall.report, &hall.wished) {
         _ if hall.is_foreign => "what the engine has as its wish is none; push again with --only",
         (None, _) => "it told nothing yet",

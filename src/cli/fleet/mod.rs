@@ -9,6 +9,7 @@ mod act;
 mod clock;
 mod demo;
 mod desk;
+mod drop;
 mod engine;
 mod hall;
 mod have;
@@ -19,11 +20,14 @@ mod log;
 mod object;
 mod page;
 mod part;
+mod playlist;
+mod pull;
 mod push;
 mod report;
 mod settings;
 mod start;
 mod wishes;
+mod wishing;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -39,6 +43,9 @@ Examples:
   kinocue fleet start --group trio --at +10s
   kinocue fleet report --day yesterday
   kinocue fleet push cues/storm.mcap --to 'berlin.*'     tomorrow's cue into all halls, and where not, and why
+  kinocue fleet playlist today.toml --to all --from 04:00
+  kinocue fleet drop storm --to all                      what the fleet brought goes again
+  kinocue fleet pull berlin.h1 storm                     a hall's cue back to this desk
   kinocue fleet have
 
 Exit codes: 0 done, 1 a hall refused, 64 usage, 69 the engine does not answer, 75 a hall did not answer, 78 bad settings";
@@ -71,6 +78,9 @@ enum FleetCommand {
     Start(start::Args),
     Report(report::Args),
     Push(push::Args),
+    Playlist(playlist::Args),
+    Drop(drop::Args),
+    Pull(pull::Args),
     Have(have::Args),
 }
 
@@ -99,6 +109,9 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Start(args) => start::run(args),
         FleetCommand::Report(args) => report::run(args),
         FleetCommand::Push(args) => push::run(args),
+        FleetCommand::Playlist(args) => playlist::run(args),
+        FleetCommand::Drop(args) => drop::run(args),
+        FleetCommand::Pull(args) => pull::run(args),
         FleetCommand::Have(args) => have::run(args),
     }
 }

@@ -24,7 +24,7 @@ use super::engine;
 use super::hall::Link;
 use super::part::{CuePart, sweep};
 use crate::cli::client::{FileBody, ServiceProblem};
-use crate::fleet::{self, BriefStatus, CueHad, HadState, HaveReport, WishedCue};
+use crate::fleet::{self, BriefStatus, HadState, HaveReport, WishHad, WishedCue};
 use crate::state::State;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -117,7 +117,7 @@ impl<'l> WishKeeper<'l> {
         let report = self.ask(want.map(|message| (message.sequence, message.payload))).await?;
         let now = Monotonic.now();
         self.later.retain(|_, (until, ..)| *until > now);
-        let is_next = |(_, had): &(&String, &CueHad)| {
+        let is_next = |(_, had): &(&String, &WishHad)| {
             had.state == HadState::Missing && !self.later.contains_key(&had.sha256)
         };
         let next = report
@@ -130,7 +130,7 @@ impl<'l> WishKeeper<'l> {
             None => {
                 self.tell(&report, None).await?;
                 let waits = |digest: &str| {
-                    let unsettled = |had: &CueHad| !is_settled(had) && had.sha256 == digest;
+                    let unsettled = |had: &WishHad| !had.is_settled() && had.sha256 == digest;
                     report.cues.values().any(unsettled)
                 };
                 sweep(&self.folder, waits);
@@ -149,7 +149,7 @@ impl<'l> WishKeeper<'l> {
         let state = self.told.borrow().as_ref().map(|status| status.state.to_string()).unwrap_or_default();
         if let Some((before, at, state_before, report)) = &self.asked {
             // A hall that plays is left alone, and so is one that has all.
-            let is_settled = !self.is_parked() || report.cues.values().all(is_settled);
+            let is_settled = !self.is_parked() || all_had(report).all(WishHad::is_settled);
             if *before == want && *state_before == state && is_settled && now.since(*at) < KEEP {
                 return Ok(report.clone());
             }
@@ -296,7 +296,7 @@ impl<'l> WishKeeper<'l> {
     async fn tell(&mut self, report: &HaveReport, fetching: Option<(&str, u8)>) -> anyhow::Result<()> {
         let mut report = report.clone();
         for (id, had) in &mut report.cues {
-            if let Some((_, state, why)) = self.later.get(&had.sha256).filter(|_| !is_settled(had)) {
+            if let Some((_, state, why)) = self.later.get(&had.sha256).filter(|_| !had.is_settled()) {
                 (had.state, had.why) = (*state, Some(why.clone()));
             }
             if let Some((_, percent)) = fetching.filter(|(fetched, _)| id == fetched) {
@@ -319,9 +319,10 @@ impl<'l> WishKeeper<'l> {
     }
 }
 
-/// True if it stays so by itself.
-fn is_settled(had: &CueHad) -> bool {
-    matches!(had.state, HadState::Ready | HadState::Refused)
+/// All that is wished.
+fn all_had(report: &HaveReport) -> impl Iterator<Item = &WishHad> {
+    let dropped = report.dropped_cues.values().chain(report.dropped_playlists.values());
+    report.cues.values().chain(report.playlists.values()).chain(dropped)
 }
 
 fn is_parked(status: &Option<BriefStatus>) -> bool {

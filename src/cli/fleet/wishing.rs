@@ -1,0 +1,184 @@
+//! A desk's wishes for halls: signed, beside what this desk wished before, and followed until the halls have what is wished.
+
+use std::collections::BTreeMap;
+use std::io::{IsTerminal as _, stderr};
+use std::time::Duration;
+
+use anyhow::{Context as _, anyhow};
+use async_nats::jetstream::context::Context;
+use async_nats::jetstream::message::PublishMessage;
+use futures_util::future::join_all;
+use tokio::time::{Instant, sleep};
+
+use super::act::chosen;
+use super::have::{FileStands, HallHas, WishedFile, exit_of};
+use super::settings::DeskSettings;
+use super::{DeskArgs, engine, settings};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::fleet::{self, LONGEST_WISH, Letter, Wish};
+use crate::sys::clock::wall_now_ns;
+
+/// How often it is looked what halls have.
+const LOOK: Duration = Duration::from_secs(1);
+
+// For whom something is wished, and how long that is waited for. No documentation: clap would show it as the help of commands.
+#[derive(Debug, clap::Args)]
+pub(super) struct WishArgs {
+    #[command(flatten)]
+    desk: DeskArgs,
+    /// Halls: SITE.HALL, SITE.*, or all.
+    #[arg(long, value_name = "HALL", required = true, num_args = 1..)]
+    to: Vec<String>,
+    /// Wish for these alone, whatever was wished before; what halls have stays there.
+    #[arg(long)]
+    only: bool,
+    /// Do not wait until the halls have them.
+    #[arg(long)]
+    no_wait: bool,
+    /// Wait so many seconds at the most.
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    within: u64,
+}
+
+impl WishArgs {
+    /// Whose desk it is, and the halls that are meant.
+    pub(super) fn read(&self) -> Result<(DeskSettings, Vec<String>), Failure> {
+        let settings = settings::desk(&self.desk.desk)?;
+        let halls = chosen(&settings.halls, &self.to)?;
+        Ok((settings, halls))
+    }
+
+    /// Wishes it of all halls, each by `change` of what was wished before, and says what came of these files there.
+    pub(super) async fn wish(
+        &self,
+        kept: &Context,
+        settings: &DeskSettings,
+        halls: Vec<String>,
+        files: &[WishedFile],
+        change: impl Fn(&mut Wish),
+    ) -> Result<Exit, Failure> {
+        let mut wished = BTreeMap::new();
+        for hall in halls {
+            let seq = wish(kept, settings, &hall, self.only, &change).await?;
+            wished.insert(hall, seq);
+        }
+        if self.no_wait {
+            print::tell("the halls take it when they are parked; kinocue fleet have says who has what");
+            return Ok(Exit::Done);
+        }
+        let until = Instant::now() + Duration::from_secs(self.within);
+        follow(kept, &wished, files, until).await
+    }
+}
+
+/// Wishes for a hall what it shall have beside what was wished before; says which message of the engine that is.
+async fn wish(
+    kept: &Context,
+    settings: &DeskSettings,
+    hall: &str,
+    only: bool,
+    change: impl Fn(&mut Wish),
+) -> Result<u64, Failure> {
+    let last = engine::last_value(kept, fleet::WANT, hall).await.or_exit(Exit::Unavailable)?;
+    let before = last.as_ref().map(|message| own_wish(&message.payload, settings, hall)).transpose();
+    let before = match before {
+        Err(why) if !only => {
+            let why = anyhow!("{hall}: what was wished before {why}; --only wishes for these alone");
+            return Err(why).or_exit(Exit::CheckFailed);
+        }
+        before => before.unwrap_or_default(),
+    };
+    let rev = before.as_ref().map_or(0, |wish| wish.rev).saturating_add(1).max(wall_now_ns() / 1_000_000);
+    let mut wish = before.filter(|_| !only).unwrap_or_default();
+    (wish.to, wish.rev) = (hall.to_owned(), rev);
+    change(&mut wish);
+    let text = signed(settings, &wish)?;
+    let message = PublishMessage::build().payload(text.into());
+    let message = message.expected_last_subject_sequence(last.map_or(0, |message| message.sequence));
+    let told =
+        || format!("{hall}: the engine does not take the wish; if another desk wished meanwhile, try again");
+    let sent = kept
+        .send_publish(engine::value_to(fleet::WANT, hall), message)
+        .await
+        .with_context(told)
+        .or_exit(Exit::Unavailable)?;
+    Ok(sent.await.with_context(told).or_exit(Exit::Unavailable)?.sequence)
+}
+
+/// What this very desk wished before for that hall; why it is none of its wishes. Of others nothing is taken over: it would be signed
+/// anew here.
+pub(super) fn own_wish(payload: &[u8], settings: &DeskSettings, hall: &str) -> Result<Wish, &'static str> {
+    let letter: Letter = serde_json::from_slice(payload).map_err(|_| "is no wish")?;
+    if letter.key != settings.access.pair.public_key() || !letter.is_signed() {
+        return Err("was not signed by this desk");
+    }
+    let wish = Wish::of(&letter).map_err(|_| "is no wish")?;
+    if wish.to == hall { Ok(wish) } else { Err("was for another hall") }
+}
+
+fn signed(settings: &DeskSettings, wish: &Wish) -> Result<String, Failure> {
+    let body = serde_json::to_string(wish).expect("text and numbers are written");
+    let letter = Letter::sign(&settings.access.pair, body);
+    let letter = letter.context("the key of this desk cannot sign").or_exit(Exit::Config)?;
+    let text = serde_json::to_string(&letter).expect("text is written");
+    if text.len() <= LONGEST_WISH {
+        return Ok(text);
+    }
+    let why = anyhow!(
+        "{}: a wish has at most {LONGEST_WISH} bytes, and this one {}; wish for less with --only",
+        wish.to,
+        text.len()
+    );
+    Err(why).or_exit(Exit::Usage)
+}
+
+/// Tells how far the halls are until each has all of it or refuses some; says then who has what.
+async fn follow(
+    kept: &Context,
+    wished: &BTreeMap<String, u64>,
+    files: &[WishedFile],
+    until: Instant,
+) -> Result<Exit, Failure> {
+    let mut told = BTreeMap::new();
+    let each_step = stderr().is_terminal();
+    loop {
+        // An engine that is away meanwhile is waited for: the wishes are there.
+        let look_up = |(hall, seq): (&'_ String, &'_ u64)| {
+            let (hall, seq) = (hall.clone(), *seq);
+            async move {
+                let has = HallHas::look_up(kept, &hall).await.unwrap_or_else(|_| HallHas::unknown(&hall));
+                files.iter().map(|file| has.stands(file, seq)).collect::<Vec<_>>()
+            }
+        };
+        let all = join_all(wished.iter().map(look_up)).await.concat();
+        for one in &all {
+            let text = if each_step { one.said() } else { one.said_coarsely() };
+            if told.insert((one.hall.clone(), one.file.name()), text.clone()).as_ref() != Some(&text) {
+                print::tell(&text);
+            }
+        }
+        if all.iter().all(FileStands::is_settled) || Instant::now() >= until {
+            return conclude(&all);
+        }
+        tokio::select! {
+            () = sleep(LOOK) => {}
+            _ = tokio::signal::ctrl_c() => return conclude(&all),
+        }
+    }
+}
+
+fn conclude(all: &[FileStands]) -> Result<Exit, Failure> {
+    let ready = all.iter().filter(|one| one.is_ready()).count();
+    let mut text = if ready == all.len() && all.iter().all(|one| one.file.is_dropped()) {
+        "all halls are without it\n".to_owned()
+    } else if ready == all.len() {
+        "all halls have all of it\n".to_owned()
+    } else {
+        format!("{ready} of {} are there; not there:\n", all.len())
+    };
+    for one in all.iter().filter(|one| !one.is_ready()) {
+        text.push_str(&one.whole());
+    }
+    print::out(&text)?;
+    Ok(exit_of(all))
+}
