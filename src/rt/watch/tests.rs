@@ -1,3 +1,4 @@
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::path::Path;
 
 use rtrb::RingBuffer;
@@ -7,10 +8,17 @@ use crate::config::{LossPolicy, from_to_args};
 use crate::cue::{Source, read};
 use crate::drive::{Incoming, Manner, lanes};
 use crate::health::Groups;
+use crate::motion::Pulses;
 use crate::net::Ports;
 use crate::observe::Watched;
+use crate::rt::{AckLoop, MailEnds, mailboxes};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, Rate};
 use crate::timeline::Timeline;
-use crate::wire::{Access, Dialect, FromController, RegisterReply, Words};
+use crate::wire::{
+    Access, Dialect, FrameNo, FromController, MAX_LEN, MotionReply, PerAxis, RegisterReply, Timing,
+    VibrationPort, Words,
+};
 
 /// A watch over one controller with a belt, and room for two alarms.
 fn watch(dialect: Dialect) -> (Watch, rtrb::Consumer<Alarm>, Observer) {
@@ -61,4 +69,35 @@ fn no_alarm_is_dropped_where_the_tick_thread_has_no_room_and_all_come_in_their_o
         heard.extend(std::iter::from_fn(|| alarms.pop().ok()));
     }
     assert_eq!(heard, all);
+}
+
+/// Acks are matched when all that came was read; a count of datagrams is held against them before that.
+#[test]
+fn what_was_acked_before_an_answer_came_is_in_the_books_when_that_is_heard() {
+    let controller = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let SocketAddr::V4(address) = controller.local_addr().unwrap() else { panic!("it is IPv4") };
+    let ports = Ports::open("127.0.0.1:0".parse().unwrap(), &[address]).unwrap();
+    let ours = SocketAddrV4::new(Ipv4Addr::LOCALHOST, ports.local().port());
+    let live = Arc::new(Live::new(1));
+    let (mut mail, MailEnds { sent, ticks, .. }) = mailboxes(1, Rate::from_hz(1_000.0), Arc::clone(&live));
+    let (dialect, vibration_port) = (Dialect::Smc, VibrationPort::Two);
+    let watched = Watched { address, dialect, vibration_port, estop_inputs: 0 };
+    let mut acks = AckLoop::new(ports.split().1, vec![watched], 1, sent, ticks);
+    acks.tell(Arc::clone(&live));
+    let frame = FrameNo(1);
+    mail.post(Sent::Posted { lane: 0, frame, asked: true, at: Monotonic.now() });
+    let (timing, code, positions) = (Timing::Relative, ReplyCode::Running, PerAxis::new(&[Pulses(0); 3]));
+    let (channel, error, time_ms, inputs, extend, vibration) = (0, 0, 1, 0, 0, None);
+    let ack =
+        MotionReply { timing, code, channel, error, frame, time_ms, positions, inputs, extend, vibration };
+    let (access, start, num) = (Access::Read, 0x34, 1);
+    let count = RegisterReply { access, code, channel, error, start, num, data: Words::from(&[7][..]) };
+    controller.send_to(ack.emit(&mut [0; MAX_LEN]), ours).unwrap();
+    controller.send_to(count.emit(&mut [0; MAX_LEN]), ours).unwrap();
+    let mut acked = Vec::new();
+    acks.drain(&mut |controller, _| {
+        acked.push(live.evidence(controller).unwrap().acked());
+        true
+    });
+    assert_eq!(acked, [Some(frame)]);
 }
