@@ -20,7 +20,11 @@ use super::link::{RecordAsk, RecordLink, RecordPart, ShowStart};
 use super::open::{OpenFile, OpenRecording};
 use crate::app::recording::in_io;
 use crate::config::{Record, RecordMode};
-use crate::record::{Entry, EntryMaker, Flight, IncidentCause, Incidents, Intake, Message, Note, Opening};
+use crate::record::{
+    Entry, EntryMaker, Flight, HallNote, IncidentCause, Incidents, Intake, Message, Note, Opening,
+    state_number,
+};
+use crate::state::State;
 use crate::sys::file::want_of_files;
 use crate::sys::realtime;
 use crate::time::{Clock, MonoTime};
@@ -36,6 +40,8 @@ const BEFORE: Duration = Duration::from_secs(10);
 const AFTER: Duration = Duration::from_secs(5);
 /// Asks that are taken in one look; more wait for the next.
 const ASKS: usize = 256;
+/// States of the hall that are kept: more than it comes to before it is told of one.
+const STATES: usize = 8;
 
 /// What the thread has.
 pub(super) struct Worker {
@@ -51,6 +57,8 @@ pub(super) struct Worker {
     /// Samples of the last ten seconds.
     recent: VecDeque<Entry>,
     halls: HallNotes,
+    /// The states that ticks told last, each with its first tick.
+    states: VecDeque<(MonoTime, State)>,
     show: Option<OpenRecording>,
     incidents: Incidents,
     incident: Option<OpenFile>,
@@ -84,6 +92,7 @@ impl Worker {
             flight: None,
             recent: VecDeque::new(),
             halls: HallNotes::default(),
+            states: VecDeque::new(),
             show: None,
             incidents: Incidents::default(),
             incident: None,
@@ -146,8 +155,10 @@ impl Worker {
     /// Takes what is there, and minds what is due.
     fn look(&mut self, now: MonoTime) {
         self.link.looks(now);
-        self.take_asks(now);
+        // Ticks first: of what was told so far the ticks are there.
+        let asks: Vec<_> = self.asks.try_iter().take(ASKS).collect();
         self.take_taps();
+        self.take_asks(asks, now);
         self.mind_ends(now);
         if now >= self.flush_at {
             self.flush(now);
@@ -160,11 +171,11 @@ impl Worker {
         }
     }
 
-    fn take_asks(&mut self, now: MonoTime) {
-        for _ in 0..ASKS {
-            let Ok((at, ask)) = self.asks.try_recv() else { return };
+    fn take_asks(&mut self, asks: Vec<(MonoTime, RecordAsk)>, now: MonoTime) {
+        for (at, ask) in asks {
             match ask {
                 RecordAsk::Keep(note) => {
+                    let note = self.as_of_ticks(at, note);
                     let is_mark = matches!(note, Note::Mark(_));
                     self.keep(at, note);
                     if is_mark {
@@ -206,6 +217,18 @@ impl Worker {
         }
     }
 
+    /// A note on the hall with the state in which the tick before it was: whoever tells hears of each change some milliseconds later, and
+    /// told states that were over.
+    fn as_of_ticks(&self, at: MonoTime, note: Note) -> Note {
+        let state = self.states.iter().rev().find(|(since, _)| *since <= at);
+        match (note, state) {
+            (Note::Hall(hall), Some((_, state))) => {
+                Note::Hall(HallNote { state: state_number(*state), ..hall })
+            }
+            (note, _) => note,
+        }
+    }
+
     fn keep(&mut self, at: MonoTime, note: Note) {
         self.write(at, &Message::Note(note));
     }
@@ -213,6 +236,12 @@ impl Worker {
     /// Gives a message to whoever keeps it.
     fn write(&mut self, at: MonoTime, message: &Message) {
         let Ok(entry) = self.maker.entry(at, message) else { return };
+        if let Message::State(state) = message {
+            self.states.push_back((at, *state));
+            if self.states.len() > STATES {
+                self.states.pop_front();
+            }
+        }
         if let Some(flight) = &mut self.flight {
             flight.put(&entry);
         }

@@ -8,8 +8,8 @@ use super::*;
 use crate::motion::{MAX_AXES, Pulses, SeatType, Slot, Window};
 use crate::net::Delivery;
 use crate::record::{
-    About, AckRecord, Asked, Contents, EventNote, FrameKind, HallNote, Judging, RecordedSeat, Recording,
-    Taps, TickHead, Told, Wanted, each_chunk, read, summarize,
+    About, AckRecord, Asked, Contents, EventNote, FrameKind, Judging, RecordedSeat, Recording, Taps,
+    TickHead, Told, Wanted, each_chunk, read, summarize,
 };
 use crate::replay::replay;
 use crate::time::{Rate, ShowTime};
@@ -370,4 +370,28 @@ fn an_incident_begins_with_how_the_hall_stood_then_and_not_with_how_it_stands_no
     };
     read(file.as_slice(), Wanted::ALL, &mut take).expect("a recording");
     assert_eq!(states, [4, 9, 12]);
+}
+
+#[test]
+fn the_hall_is_in_the_state_of_its_ticks_however_late_the_supervisor_hears_of_it() {
+    let mut bench = Bench::new();
+    bench.begin();
+    bench.ticks(100);
+    let playing = state_number(State::Playing(crate::state::PlayMode::Following));
+    for state in [playing - 1, playing] {
+        bench.tick();
+        bench.worker.link.keep_of(at(bench.tick), Note::Hall(HallNote { state, ..HallNote::default() }));
+    }
+    bench.ticks(60);
+    bench.worker.close_show(at(bench.tick));
+    let (mut states, file) = (Vec::new(), std::fs::read(&bench.files()[0]).expect("it is there"));
+    let mut take = |_: &Contents, _, told: Told<'_>| {
+        if let Told::State(state) = told {
+            states.push(state);
+        }
+    };
+    read(file.as_slice(), Wanted::ALL, &mut take).expect("a recording");
+    // The first was told before there was a tick.
+    let playing = u64::try_from(playing).expect("few");
+    assert_eq!(states, [0, playing, playing, playing]);
 }
