@@ -50,7 +50,13 @@ impl<'a> Turn<'a> {
                     true
                 }
                 // The ack thread brought its books up to date before it heard what comes next.
-                AckRecord::Posted(..) | AckRecord::Fate(..) => {
+                AckRecord::Posted(..)
+                | AckRecord::Skipped(..)
+                | AckRecord::Failed(..)
+                | AckRecord::Joined(_)
+                | AckRecord::FellOut(..)
+                | AckRecord::Unread(_)
+                | AckRecord::Fate(..) => {
                     let before = self.records.len();
                     books.catch_up(&mut self);
                     if self.records.len() == before {
