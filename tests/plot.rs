@@ -277,8 +277,8 @@ fn a_picture_is_in_half_blocks_on_the_console_of_a_kernel_and_in_braille_on_othe
     };
     let [console, other, none] = [Some("linux"), Some("xterm-256color"), None].map(drawn);
     let count = |text: &str, is_one: fn(char) -> bool| text.chars().filter(|c| is_one(*c)).count();
-    let (is_dot, is_block): (fn(char) -> bool, fn(char) -> bool) =
-        (|c| ('\u{2801}'..='\u{28ff}').contains(&c), |c| "▀▄█".contains(c));
+    let is_dot = |c| ('\u{2801}'..='\u{28ff}').contains(&c);
+    let is_block = |c| "▀▄█".contains(c);
     assert!(count(&other, is_dot) > 200 && count(&other, is_block) == 0, "{other}");
     assert_eq!(none, other);
     // A character for each, and no braille at all: not even an empty one has a glyph there.

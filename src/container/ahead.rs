@@ -96,9 +96,12 @@ impl<R: SplitReader> ChunkJob<R> {
     }
 }
 
+/// The way to a thread that takes chunks apart, and the way back.
+type ChunkThread<R> = (SyncSender<ChunkJob<R>>, Receiver<ChunkJob<R>>);
+
 /// The threads, and what they have.
 struct Crew<R: SplitReader> {
-    threads: Vec<(SyncSender<ChunkJob<R>>, Receiver<ChunkJob<R>>)>,
+    threads: Vec<ChunkThread<R>>,
     /// Threads that have a chunk, in the order of these.
     waiting: VecDeque<usize>,
     /// Chunks so far, and what they unpacked to.
@@ -261,10 +264,11 @@ mod tests {
                     let channel = ChannelRecord::parse(&body).expect("it is whole");
                     Arc::make_mut(&mut self.known).insert(channel.id, channel.topic.to_owned());
                 }
-                SaidPart::Record(opcode, body) => match Self::part(Some(&self.known), opcode, &body) {
-                    Some(SaidPart::Said(said)) => self.said.push(said),
-                    _ => {}
-                },
+                SaidPart::Record(opcode, body) => {
+                    if let Some(SaidPart::Said(said)) = Self::part(Some(&self.known), opcode, &body) {
+                        self.said.push(said);
+                    }
+                }
             }
             Ok(())
         }
@@ -313,7 +317,7 @@ mod tests {
         // A channel becomes another one now and then, while chunks behind it are under way.
         let is_new = |number: u64| number.is_multiple_of(7) || number == 30;
         let one = |number: u64| {
-            let named = is_new(number).then(|| channel(&format!("/{number}"))).unwrap_or_default();
+            let named = if is_new(number) { channel(&format!("/{number}")) } else { Vec::new() };
             chunk(&[said(10 * number), named, said(10 * number + 1)].concat())
         };
         let chunks: Vec<Vec<u8>> = (0..60).map(one).collect();

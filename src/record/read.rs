@@ -49,6 +49,10 @@ impl From<Trouble> for ReadError {
 }
 
 /// What a message tells.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all of them are samples, which a box each would make slower"
+)]
 #[derive(Debug)]
 pub(crate) enum Told<'a> {
     /// A sample of the seat of that place.

@@ -74,6 +74,10 @@ struct KnownChannels {
 }
 
 /// What a message says.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all of them are samples, which a box each would make slower"
+)]
 #[derive(Debug)]
 enum ReadMessage {
     /// That, or why it says nothing.
@@ -85,6 +89,10 @@ enum ReadMessage {
 }
 
 /// What a record comes to.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all of them are samples, which a box each would make slower"
+)]
 #[derive(Debug)]
 enum ReadPart {
     /// A message of that channel, with its log time.

@@ -82,6 +82,10 @@ pub(crate) struct TickSample {
 }
 
 /// Something to be written.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all of them are samples, which a box each would make slower"
+)]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Message {
     /// Of the seat of a lane.
