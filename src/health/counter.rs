@@ -29,8 +29,8 @@ pub(super) struct PacketCounter {
     asked: u64,
     /// It has not told since.
     is_open: bool,
-    /// What was told and not judged yet, and what had been sent when that was asked for.
-    told: Option<(u16, u64)>,
+    /// What was told and not judged yet, what had been sent when that was asked for, and what had been acked when it came.
+    told: Option<(u16, u64, u64)>,
     first: Option<PacketCount>,
     /// The next count says no more than what may still arrive.
     anew: bool,
@@ -69,8 +69,9 @@ impl PacketCounter {
         }
     }
 
-    pub(super) const fn hear(&mut self, packets: u16) {
-        (self.told, self.is_open) = (Some((packets, self.asked)), false);
+    /// It tells its count, after so many acks.
+    pub(super) const fn hear(&mut self, packets: u16, acked: u64) {
+        (self.told, self.is_open) = (Some((packets, self.asked, acked)), false);
     }
 
     /// True if it is time to read it; if so, the next time is due a while later.
@@ -86,16 +87,17 @@ impl PacketCounter {
 
     /// Judges what was told by all that was sent until now, which is a little more than it can have counted.
     pub(super) fn judge(&mut self, traffic: Traffic, now: MonoTime) -> Option<CountVerdict> {
-        let (packets, asked) = self.told.take()?;
+        let (packets, asked, acked_by_then) = self.told.take()?;
         let anew = std::mem::take(&mut self.anew);
         let count =
-            PacketCount { packets, sent: asked, acked: traffic.acked, at: now, late: Overdue::default() };
+            PacketCount { packets, sent: asked, acked: acked_by_then, at: now, late: Overdue::default() };
         let Some(first) = self.first.filter(|first| now.since(first.at) < STALE) else {
             self.first = Some(count);
             return None;
         };
         let sent = traffic.sent - first.sent;
-        let acked = traffic.acked - first.acked;
+        // What is acked after it may be of frames that it has not counted.
+        let acked = acked_by_then - first.acked;
         let grown = u64::from(packets.wrapping_sub(first.packets));
         let tolerated = TOLERATED + sent / DOUBLED;
         let fits = grown <= sent + first.late.most(now) + tolerated && grown + tolerated >= acked;
@@ -129,7 +131,7 @@ mod tests {
         let mut one = |packets: &u16| {
             second += 1;
             counter.ask(100 * second);
-            counter.hear(*packets);
+            counter.hear(*packets, 100 * second);
             counter.judge(Traffic { sent: 100 * second, acked: 100 * second }, s(second))
         };
         counts.iter().map(&mut one).collect()
@@ -153,14 +155,14 @@ mod tests {
             let mut counter = PacketCounter::default();
             let mut after = |packets: u16, sent, at| {
                 counter.ask(sent);
-                counter.hear(packets);
+                counter.hear(packets, 0);
                 counter.judge(Traffic { sent, acked: 0 }, s(at))
             };
             assert_eq!((after(500, 0, 1), after(600, 400, 2)), (None, None), "300 of them are held back");
             counter = counter.anew();
             let mut after = |packets: u16, sent, at| {
                 counter.ask(sent);
-                counter.hear(packets);
+                counter.hear(packets, 0);
                 counter.judge(Traffic { sent, acked: 0 }, s(at))
             };
             assert_eq!((after(650, 450, 3), after(700, 500, 5)), (None, None));
@@ -174,13 +176,25 @@ mod tests {
         let mut counter = PacketCounter::default();
         let mut after = |packets: u16, [asked, sent]: [u64; 2], at| {
             counter.ask(asked);
-            counter.hear(packets);
+            counter.hear(packets, 0);
             counter.judge(Traffic { sent, acked: 0 }, s(at))
         };
         assert_eq!(after(500, [100, 400], 1), None, "300 frames are under way");
         assert_eq!(after(1_300, [900, 900], 2), None);
         assert_eq!(after(1_400, [1_000, 1_000], 12), None, "and are no more from then on");
         assert_eq!(after(1_700, [1_100, 1_100], 13), Some(CountVerdict::Crowded));
+    }
+
+    #[test]
+    fn what_is_acked_behind_a_count_that_is_judged_only_then_need_not_be_in_it() {
+        let mut counter = PacketCounter::default();
+        for (packets, acked_by_then, acked, at) in
+            [(500, 100, 100, 1), (600, 200, 900, 2), (1_400, 1_000, 1_000, 3)]
+        {
+            counter.ask(acked);
+            counter.hear(packets, acked_by_then);
+            assert_eq!(counter.judge(Traffic { sent: acked, acked }, s(at)), None, "{at}");
+        }
     }
 
     #[test]

@@ -163,7 +163,7 @@ impl Member {
         self.on_answer(at);
         if let Some(packets) = sighting.packets() {
             // A look at a time, somebody else's frames are no more than may be under way: what they add up to tells.
-            self.counter.hear(packets);
+            self.counter.hear(packets, self.traffic.acked);
         }
         self.faults.on_error(sighting.error);
         self.faults.on_alarm(DPFE, sighting.alarm);
@@ -310,7 +310,7 @@ impl Member {
     }
 
     pub(super) const fn on_count(&mut self, packets: u16) {
-        self.counter.hear(packets);
+        self.counter.hear(packets, self.traffic.acked);
     }
 
     pub(super) fn tick(&mut self, now: MonoTime) {

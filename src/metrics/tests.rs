@@ -96,7 +96,6 @@ fn playing() -> Status {
         ..Warning::default()
     };
     Status {
-        broadcasts: vec![],
         buttons: vec![],
         notify: vec![],
         test: None,

@@ -51,7 +51,6 @@ impl<'a> Turn<'a> {
                 }
                 // The ack thread brought its books up to date before it heard what comes next.
                 AckRecord::Posted(..)
-                | AckRecord::Skipped(..)
                 | AckRecord::Failed(..)
                 | AckRecord::Joined(_)
                 | AckRecord::FellOut(..)
@@ -191,9 +190,6 @@ impl Ledger for Turn<'_> {
                 AckRecord::Failed(controller, frame) if self.bench.knows(controller, frame) => {
                     tracker.on_send_failed(controller, frame);
                 }
-                AckRecord::Skipped(controller, next) if self.bench.knows(controller, next) => {
-                    tracker.on_skipped(controller, next);
-                }
                 AckRecord::Joined(controller) if controller < controllers => self.bench.on_joined(controller),
                 AckRecord::FellOut(controller, why, _) if controller < controllers => {
                     self.bench.health.on_fell_out(controller, why);
@@ -202,7 +198,6 @@ impl Ledger for Turn<'_> {
                     self.bench.health.on_unread(controller);
                 }
                 AckRecord::Failed(..)
-                | AckRecord::Skipped(..)
                 | AckRecord::Joined(_)
                 | AckRecord::FellOut(..)
                 | AckRecord::Unread(_) => {}

@@ -47,6 +47,5 @@ mod processes;
 mod rules;
 mod seat;
 mod soak;
-mod together;
 mod town;
 mod words;

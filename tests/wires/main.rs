@@ -14,7 +14,6 @@ mod serving;
 mod statuses;
 
 mod answers;
-mod broadcast;
 mod cable;
 mod forger;
 mod hall;

@@ -165,7 +165,11 @@ fn ask(of: &HallArgs, asked: Asked) -> Result<Exit, Failure> {
 
 /// Asks all of them at once, and says what came of it in each.
 fn ask_all(settings: &DeskSettings, halls: &[String], asked: &Asked, json: bool) -> Result<Exit, Failure> {
-    let halls = chosen(&settings.halls, halls)?;
+    // A name that is spelled wrongly must not keep the others from being stopped.
+    let (halls, unknown) = match asked.word {
+        "stop" => known(&settings.halls, halls)?,
+        _ => (chosen(&settings.halls, halls)?, Vec::new()),
+    };
     engine::block_on(async {
         let client = engine::connect_desk(&settings.access, &settings.name).await?;
         let answers = join_all(halls.iter().map(|hall| ask_one(settings, &client, hall, asked))).await;
@@ -178,8 +182,22 @@ fn ask_all(settings: &DeskSettings, halls: &[String], asked: &Asked, json: bool)
                 answers.iter().map(|(hall, answer)| format!("{hall}: {}\n", said(&answer.line()))).collect();
             print::out(&lines)?;
         }
+        chosen(&settings.halls, &unknown)?;
         Ok(exit(answers.iter().map(|(_, answer)| answer)))
     })
+}
+
+/// The halls of a desk among those that are meant, and what is none.
+///
+/// # Errors
+/// Where none is one.
+pub(super) fn known(all: &[String], meant: &[String]) -> Result<(Vec<String>, Vec<String>), Failure> {
+    let is_known = |one: &String| chosen(all, std::slice::from_ref(one)).is_ok();
+    let (known, unknown): (Vec<_>, Vec<_>) = meant.iter().cloned().partition(is_known);
+    if known.is_empty() {
+        return chosen(all, meant).map(|halls| (halls, unknown));
+    }
+    Ok((chosen(all, &known)?, unknown))
 }
 
 /// How it ends: what is most to worry about decides.
@@ -345,6 +363,10 @@ mod tests {
         for nobody in ["ber.*", "berlin", "h1", "berlin.h3", "*"] {
             assert_eq!(of(&[nobody]), Err(Exit::NoInput), "{nobody}");
         }
+        let meant = ["bern.h1", "berlin.h9"].map(str::to_owned);
+        let (halls, unknown) = known(&all, &meant).unwrap();
+        assert_eq!((&halls[..], &unknown[..]), (&all[2..], &meant[1..]));
+        assert_eq!(known(&all, &meant[1..]).unwrap_err().exit, Exit::NoInput);
     }
 
     #[test]

@@ -191,9 +191,9 @@ async fn stop(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
         Ok(asked) => asked,
         Err(error) => return wrong(format!("no list of halls: {error}")),
     };
-    let halls = match act::chosen(&desk.settings.halls, &asked.halls) {
-        Ok(halls) if halls.is_empty() => return wrong("no hall is named".to_owned()),
-        Ok(halls) => halls,
+    let (halls, unknown) = match act::known(&desk.settings.halls, &asked.halls) {
+        Ok((halls, _)) if halls.is_empty() => return wrong("no hall is named".to_owned()),
+        Ok(both) => both,
         Err(failure) => return wrong(failure.to_string()),
     };
     let ask = async |hall: String| {
@@ -201,7 +201,10 @@ async fn stop(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
         *desk.stops().entry(answer.result()).or_default() += 1;
         answer.json(&hall)
     };
-    let answers: Vec<Value> = join_all(halls.into_iter().map(ask)).await;
+    let mut answers: Vec<Value> = join_all(halls.into_iter().map(ask)).await;
+    answers.extend(
+        unknown.iter().map(|one| act::Answer::Silent("it is no hall of this desk".to_owned()).json(one)),
+    );
     json(&answers)
 }
 

@@ -55,13 +55,13 @@ pub(crate) struct MotionCodec {
 }
 
 impl MotionCodec {
-    /// Writes a frame that is numbered already, for whoever that code means.
+    /// Writes a frame that is numbered already.
     pub(crate) fn write<'b>(
         &self,
         window: &Window,
-        (beat, pose): (&Beat, &Pose),
+        beat: &Beat,
+        pose: &Pose,
         mix: Mix,
-        code: Code,
         stamped: &mut Stamped,
         buf: &'b mut [u8; MAX_LEN],
     ) -> &'b [u8] {
@@ -82,8 +82,8 @@ impl MotionCodec {
         let motion = Motion {
             timing: beat.timing,
             channel: self.channel,
-            accept: code,
-            reply: if stamped.asked { code } else { Code::NONE },
+            accept: self.code,
+            reply: if stamped.asked { self.code } else { Code::NONE },
             frame: stamped.frame,
             time_ms: beat.time_ms,
             positions: &positions[..slots.len()],

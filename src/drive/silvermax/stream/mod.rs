@@ -237,6 +237,7 @@ impl SilverLane {
             (axis.step, axis.stood_at) = (0, None);
             axis.owes_stop |= brakes;
             axis.doubt = axis.doubt.filter(|doubt| matches!(doubt, Doubt::Unanswered(_)));
+            axis.polls.forget_untold();
         }
     }
 

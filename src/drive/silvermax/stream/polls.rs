@@ -76,9 +76,15 @@ impl Polls {
         Self { due: [now; QUESTIONS.len()], untold: [None; QUESTIONS.len()], started: now }
     }
 
+    /// Nothing is held against it of before.
+    pub(super) const fn forget_untold(&mut self) {
+        self.untold = [None; QUESTIONS.len()];
+    }
+
     /// Its queue began to run.
     pub(super) fn on_start(&mut self, now: MonoTime) {
         self.started = now;
+        self.forget_untold();
         self.hurry(Question::TicksLeft, now);
         self.due[3] = now + OFTEN;
     }
