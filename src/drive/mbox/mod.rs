@@ -174,7 +174,8 @@ impl MboxPeer {
         let claim = self.pending.answered(read, at);
         // What nobody waits for may be the answer to what another thread asked; else it was repeated on its way.
         let is_answer = claim.is_some() || others_ask;
-        let is_sign = read.first_axis().is_some() || (read == Inputs && self.has_belts);
+        let is_sign =
+            read.first_axis().is_some() || (read == Inputs && (self.has_belts || self.has_stop_inputs));
         out.extend((is_answer && is_sign).then_some(Evidence::Alive));
         let word = reply.data.get(0);
         match (read, claim) {

@@ -134,9 +134,11 @@ fn what_the_kernel_does_not_take_is_not_waited_for() {
 
 #[test]
 fn an_answer_with_inputs_is_a_sign_of_life_where_they_are_asked_for() {
-    for (has_belts, alive) in [(true, true), (false, false)] {
+    for (has_belts, has_stop_inputs, alive) in
+        [(true, false, true), (false, true, true), (false, false, false)]
+    {
         let mut peer = peer(Dialect::Smc, 3);
-        peer.has_belts = has_belts;
+        (peer.has_belts, peer.has_stop_inputs) = (has_belts, has_stop_inputs);
         asked(&mut peer, Need::Identity, 0);
         let inputs = RegisterReply { code: ReplyCode::EmergencyStop, ..answer(0x5e, &[3]) };
         let told = hear(&mut peer, inputs, 1);
