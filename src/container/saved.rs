@@ -32,7 +32,7 @@ impl<E> From<Trouble> for WithinChunk<E> {
     }
 }
 
-/// The same as [`each_sound`] up to the summary, but a chunk that is damaged is handed to `lost`, and reading goes on behind it.
+/// The same as [`super::each_sound`] up to the summary, but a chunk that is damaged is handed to `lost`, and reading goes on behind it.
 ///
 /// # Errors
 /// That of `take`, or what else is wrong with the file.
