@@ -13,6 +13,7 @@ import json
 import os
 import pathlib
 import random
+import shutil
 import statistics
 import subprocess
 import sys
@@ -43,7 +44,8 @@ class Soak(Hall):
         command = [self.program, *map(str, words), "--socket", str(self.socket)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=90)
         if done.returncode != 0:
-            self.turned_down.append(f"{' '.join(map(str, words))}: {done.stderr.strip().splitlines()[:1]}")
+            said = (done.stderr + done.stdout).strip().splitlines()
+            self.turned_down.append(f"{' '.join(map(str, words))}: {said[:4]}")
         return done.returncode == 0
 
     def go_on(self, chance):
@@ -155,6 +157,7 @@ def main():
     parser.add_argument("--rate", default=1000, type=int, help="ticks per second")
     parser.add_argument("--loss", default=0.01, type=float, help="share of datagrams that stay unanswered")
     parser.add_argument("--port", default=29410, type=int, help="the frame port; the controllers take those after it")
+    parser.add_argument("--keep", type=pathlib.Path, help="a folder for the log of the server and its recordings")
     parser.add_argument("--seed", default=1, type=int, help="seed of what is asked for")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="kinocue-soak.") as name:
@@ -173,6 +176,8 @@ def main():
                 time.sleep(3)
                 sums = {key: value for key, value in hall.sample().items() if key in SUMS}
             code = hall.end()
+            if args.keep:
+                shutil.copytree(folder, args.keep, ignore=shutil.ignore_patterns("*.sock"), dirs_exist_ok=True)
         print(f"\nThe accounts at the end: {json.dumps(sums)}")
         print(f"Simulated controllers: {json.dumps(simulated(folder))}")
         print(f"{hall.asked} requests, {len(hall.turned_down)} turned down: {json.dumps(sorted(set(hall.turned_down))[:20], indent=1)}")
