@@ -8,7 +8,7 @@ use axum::Json as JsonReply;
 use axum::extract::{Request, State};
 
 use super::cues::receive;
-use super::fleet_kept::kept_wish;
+use super::fleet_kept::{Wished, kept_wish, list_with};
 use super::input::{Id, id};
 use super::shared::Shared;
 use crate::config::FleetWord;
@@ -16,7 +16,6 @@ use crate::control::{Code, Problem, Status, Who};
 use crate::fleet::{HadState, Wish, WishHad, WishedCue};
 use crate::library::{CueId, CueInfo, StandingOfCue, theirs};
 use crate::log::{Line, Priority};
-use crate::state::State as HallState;
 
 /// Takes the file of a cue that is wished, checked and proved as any upload is.
 pub(super) async fn take(
@@ -71,18 +70,13 @@ pub(super) fn check_cue(text: &str, cue: &WishedCue, most: u64) -> Result<(), Pr
 
 /// That the hall rests, unarmed, and has not loaded what would be replaced.
 fn check_rest(status: &Status, id: &CueId, replaces: bool) -> Result<(), Problem> {
+    Wished::Comes.check_parked(status)?;
     let id = id.to_string();
-    let wait =
-        |detail: String| Err(Problem::new(Code::State, detail, "it comes by itself when that is over"));
-    if status.state != HallState::Parked {
-        return wait(format!("the hall is {}", status.state));
-    }
     if status.show.as_ref().is_some_and(|show| show.cue == id) {
-        return wait(format!("{id} is loaded"));
+        return Wished::Comes.waits(format!("{id} is loaded"));
     }
-    let list = status.playlist.as_ref().filter(|list| list.entries.iter().any(|entry| entry.cue == id));
-    match list.filter(|_| replaces) {
-        Some(list) => wait(format!("the playlist {}, which has {id}, is loaded", list.id)),
+    match list_with(status, &id).filter(|_| replaces) {
+        Some(list) => Wished::Comes.waits(format!("the playlist {}, which has {id}, is loaded", list.id)),
         None => Ok(()),
     }
 }

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::fleet_kept::{Wished, list_with};
 use super::fleet_lists::{AllHad, FailedWishes};
 use super::input::id;
 use super::shared::Shared;
@@ -12,7 +13,6 @@ use crate::fleet::{HadState, Wish, WishHad};
 use crate::library::{Id, LeftThere};
 use crate::log::{Line, Priority};
 use crate::playlist::{Playlist, PlaylistInfo};
-use crate::state::State;
 
 /// What may be dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,10 +125,6 @@ fn standing(shared: &Shared, wish: &Wish, status: &Status, one: DroppedFile<'_>)
     })
 }
 
-fn wait(detail: String) -> Result<(), Problem> {
-    Err(Problem::new(Code::State, detail, "it goes by itself when that is over"))
-}
-
 /// That no playlist names a cue that shall go: none of the hall, and none that is still to come.
 fn check_unused(shared: &Shared, wish: &Wish, (kind, name): DroppedFile<'_>) -> Result<(), Problem> {
     if kind == DroppedKind::Playlist {
@@ -136,10 +132,11 @@ fn check_unused(shared: &Shared, wish: &Wish, (kind, name): DroppedFile<'_>) -> 
     }
     for PlaylistInfo { id, cues, faults, .. } in shared.shelf.list() {
         if !faults.is_empty() {
-            return wait(format!("the playlist {id} has faults, and nobody knows whether it names {name}"));
+            return Wished::Goes
+                .waits(format!("the playlist {id} has faults, and nobody knows whether it names {name}"));
         }
         if cues.contains(name) {
-            return wait(format!("the playlist {id} names it"));
+            return Wished::Goes.waits(format!("the playlist {id} names it"));
         }
     }
     let names_it = |id: &str, text: &str| {
@@ -147,27 +144,24 @@ fn check_unused(shared: &Shared, wish: &Wish, (kind, name): DroppedFile<'_>) -> 
         playlist.is_some_and(|playlist: Playlist| playlist.cues().any(|cue| cue.to_string() == *name))
     };
     match wish.playlists.iter().find(|(id, playlist)| names_it(id, &playlist.text)) {
-        Some((id, _)) => wait(format!("the playlist {id}, which is wished, names it")),
+        Some((id, _)) => Wished::Goes.waits(format!("the playlist {id}, which is wished, names it")),
         None => Ok(()),
     }
 }
 
 /// That the hall rests, unarmed, and has not loaded it.
 fn check_rest(status: &Status, (kind, name): DroppedFile<'_>) -> Result<(), Problem> {
-    if status.state != State::Parked {
-        return wait(format!("the hall is {}", status.state));
-    }
-    let list = status.playlist.as_ref();
+    Wished::Goes.check_parked(status)?;
     match kind {
         DroppedKind::Cue if status.show.as_ref().is_some_and(|show| show.cue == *name) => {
-            wait(format!("{name} is loaded"))
+            Wished::Goes.waits(format!("{name} is loaded"))
         }
-        DroppedKind::Cue => match list.filter(|list| list.entries.iter().any(|entry| entry.cue == *name)) {
-            Some(list) => wait(format!("the playlist {}, which is loaded, names it", list.id)),
+        DroppedKind::Cue => match list_with(status, name) {
+            Some(list) => Wished::Goes.waits(format!("the playlist {}, which is loaded, names it", list.id)),
             None => Ok(()),
         },
-        DroppedKind::Playlist if list.is_some_and(|list| list.id == *name) => {
-            wait(format!("{name} is loaded"))
+        DroppedKind::Playlist if status.playlist.as_ref().is_some_and(|list| list.id == *name) => {
+            Wished::Goes.waits(format!("{name} is loaded"))
         }
         DroppedKind::Playlist => Ok(()),
     }

@@ -2,9 +2,10 @@
 
 use super::problem::bad_value;
 use super::shared::Shared;
-use crate::control::{Code, Problem, Who};
+use crate::control::{Code, PlaylistStatus, Problem, Status, Who};
 use crate::fleet::{Letter, Wish};
 use crate::library::Library;
+use crate::state::State;
 use crate::sys::clock::wall_now_ns;
 
 /// Keeps a wish that is newer than the one that is kept.
@@ -38,4 +39,36 @@ pub(super) fn kept_wish(shared: &Shared) -> Result<(Who, Wish), Problem> {
     let kept = shared.library.wish().ok_or_else(none)?;
     let letter = serde_json::from_str(&kept).map_err(|error| bad_value(error.to_string(), "push again"))?;
     shared.fleet.open_wish(&letter, wall_now_ns())
+}
+
+/// Whether what is wished comes or goes.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Wished {
+    Comes,
+    Goes,
+}
+
+impl Wished {
+    /// It has to wait, and why.
+    pub(super) fn waits(self, detail: String) -> Result<(), Problem> {
+        let remedy = match self {
+            Self::Comes => "it comes by itself when that is over",
+            Self::Goes => "it goes by itself when that is over",
+        };
+        Err(Problem::new(Code::State, detail, remedy))
+    }
+
+    /// That the hall rests, unarmed.
+    pub(super) fn check_parked(self, status: &Status) -> Result<(), Problem> {
+        if status.state == State::Parked {
+            Ok(())
+        } else {
+            self.waits(format!("the hall is {}", status.state))
+        }
+    }
+}
+
+/// The playlist that is loaded, where that names a cue.
+pub(super) fn list_with<'s>(status: &'s Status, cue: &str) -> Option<&'s PlaylistStatus> {
+    status.playlist.as_ref().filter(|list| list.entries.iter().any(|entry| entry.cue == cue))
 }

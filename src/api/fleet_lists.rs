@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
+use super::fleet_kept::Wished;
 use super::input::id;
 use super::problem::bad_value;
 use super::shared::Shared;
@@ -16,7 +17,6 @@ use crate::journal::stamp;
 use crate::library::{CueInfo, Proved};
 use crate::log::{Line, Priority};
 use crate::playlist::{Playlist, PlaylistId, WishedText, theirs};
-use crate::state::State;
 use crate::sys::clock::wall_now_ns;
 
 /// What the hall has, by ids.
@@ -169,14 +169,10 @@ impl ListChecker<'_> {
 
 /// That the hall rests, unarmed, and has not loaded that playlist.
 fn check_rest(status: &Status, id: &PlaylistId) -> Result<(), Problem> {
-    let wait =
-        |detail: String| Err(Problem::new(Code::State, detail, "it comes by itself when that is over"));
-    if status.state != State::Parked {
-        return wait(format!("the hall is {}", status.state));
-    }
+    Wished::Comes.check_parked(status)?;
     let id = id.to_string();
     match status.playlist.as_ref().filter(|list| list.id == id) {
-        Some(_) => wait(format!("{id} is loaded, and stays until another is, or none")),
+        Some(_) => Wished::Comes.waits(format!("{id} is loaded, and stays until another is, or none")),
         None => Ok(()),
     }
 }

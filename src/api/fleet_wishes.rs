@@ -13,12 +13,13 @@ use super::fleet_drops;
 use super::fleet_kept::{keep, kept_wish};
 use super::fleet_lists::{self, check_playlist};
 use super::input::{id, parse, whole_within};
-use super::shared::{Shared, lock};
+use super::shared::Shared;
 use crate::control::Problem;
 use crate::fleet::{Drops, HaveReport, LONGEST_WISH, Letter, Wish};
 use crate::journal::stamp;
 use crate::state::State as HallState;
 use crate::sys::clock::wall_now_ns;
+use crate::sys::lock::lock;
 
 /// How often it is looked whether the time of something has come: whether or not the engine is there then.
 const LOOK: Duration = Duration::from_secs(5);

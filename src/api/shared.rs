@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use axum::extract::Request;
@@ -22,6 +22,7 @@ use crate::library::{Awaited, Library};
 use crate::log::Log;
 use crate::playlist::Shelf;
 use crate::sys::clock::Monotonic;
+use crate::sys::lock::lock;
 use crate::time::{Clock as _, MonoTime};
 
 /// How long the tick counter may stand still in a process that is well.
@@ -92,11 +93,6 @@ impl StillAsked {
     pub(super) fn of(request: &Request) -> Self {
         request.extensions().get::<Self>().expect("each request has passed the gate").clone()
     }
-}
-
-/// What is behind a lock, which is whole also where a thread that held it panicked.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Room for what waits for a disk.

@@ -1,11 +1,12 @@
 //! Room for those who are pushed to. It is for whoever leads the show first: where there is none left, one of the least role
 //! makes room for a greater one.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use tokio::sync::Notify;
 
 use crate::control::{Code, Problem, Surface, Who};
+use crate::sys::lock::lock;
 
 /// How many are pushed to at a time over TCP, and over the control socket.
 const MOST: (usize, usize) = (32, 16);
@@ -78,10 +79,6 @@ impl Drop for StreamPlace {
 fn too_many() -> Problem {
     let remedy = "close another page, or poll the status";
     Problem::new(Code::Busy, "too many event streams are open", remedy)
-}
-
-fn lock(watching: &Mutex<Vec<Watching>>) -> MutexGuard<'_, Vec<Watching>> {
-    watching.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 use std::time::Duration;
 
 use super::late::Overdue;
-use super::proof::Traffic;
 use crate::time::MonoTime;
 
 /// How often it is read.
@@ -86,7 +85,7 @@ impl PacketCounter {
     }
 
     /// Judges what was told by all that was sent until now, which is a little more than it can have counted.
-    pub(super) fn judge(&mut self, traffic: Traffic, now: MonoTime) -> Option<CountVerdict> {
+    pub(super) fn judge(&mut self, sent: u64, now: MonoTime) -> Option<CountVerdict> {
         let (packets, asked, acked_by_then) = self.told.take()?;
         let anew = std::mem::take(&mut self.anew);
         let count =
@@ -95,7 +94,7 @@ impl PacketCounter {
             self.first = Some(count);
             return None;
         };
-        let sent = traffic.sent - first.sent;
+        let sent = sent - first.sent;
         // What is acked after it may be of frames that it has not counted.
         let acked = acked_by_then - first.acked;
         let grown = u64::from(packets.wrapping_sub(first.packets));
@@ -132,7 +131,7 @@ mod tests {
             second += 1;
             counter.ask(100 * second);
             counter.hear(*packets, 100 * second);
-            counter.judge(Traffic { sent: 100 * second, acked: 100 * second }, s(second))
+            counter.judge(100 * second, s(second))
         };
         counts.iter().map(&mut one).collect()
     }
@@ -156,14 +155,14 @@ mod tests {
             let mut after = |packets: u16, sent, at| {
                 counter.ask(sent);
                 counter.hear(packets, 0);
-                counter.judge(Traffic { sent, acked: 0 }, s(at))
+                counter.judge(sent, s(at))
             };
             assert_eq!((after(500, 0, 1), after(600, 400, 2)), (None, None), "300 of them are held back");
             counter = counter.anew();
             let mut after = |packets: u16, sent, at| {
                 counter.ask(sent);
                 counter.hear(packets, 0);
-                counter.judge(Traffic { sent, acked: 0 }, s(at))
+                counter.judge(sent, s(at))
             };
             assert_eq!((after(650, 450, 3), after(700, 500, 5)), (None, None));
             assert_eq!(after(1_050 + more, 550, 6), said);
@@ -177,7 +176,7 @@ mod tests {
         let mut after = |packets: u16, [asked, sent]: [u64; 2], at| {
             counter.ask(asked);
             counter.hear(packets, 0);
-            counter.judge(Traffic { sent, acked: 0 }, s(at))
+            counter.judge(sent, s(at))
         };
         assert_eq!(after(500, [100, 400], 1), None, "300 frames are under way");
         assert_eq!(after(1_300, [900, 900], 2), None);
@@ -193,7 +192,7 @@ mod tests {
         {
             counter.ask(acked);
             counter.hear(packets, acked_by_then);
-            assert_eq!(counter.judge(Traffic { sent: acked, acked }, s(at)), None, "{at}");
+            assert_eq!(counter.judge(acked, s(at)), None, "{at}");
         }
     }
 

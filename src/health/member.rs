@@ -315,7 +315,7 @@ impl Member {
 
     pub(super) fn tick(&mut self, now: MonoTime) {
         self.replies.tick(now);
-        match self.counter.judge(self.traffic, now) {
+        match self.counter.judge(self.traffic.sent, now) {
             Some(CountVerdict::Crowded) => self.must_home_again(Why::OtherMaster(self.controller)),
             Some(CountVerdict::Rebooted) => self.must_home_again(Why::Rebooted(self.controller)),
             None => {}

@@ -39,13 +39,14 @@ pub(crate) use tried::try_file;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, SyncSender, TrySendError};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use jiff::Zoned;
 use jiff::civil::Date;
 
 use crate::config::Log;
+use crate::sys::lock::lock;
 use record::{Line, day_of};
 use writer::{QueuedLine, Writer};
 
@@ -206,9 +207,4 @@ impl Standing {
             *trouble = Some(words);
         }
     }
-}
-
-/// What is behind a lock is whole at any time, also where a thread that held it panicked.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::brought_files::{BroughtFiles, LeftThere};
 use super::upload::unwritten;
-use super::{Awaited, CueId, CueInfo, Library, Proved, Upload, file_name, file_problem, kept, lock};
+use super::{Awaited, CueId, CueInfo, Library, Proved, Upload, file_name, file_problem, kept};
 use crate::control::{Code, Problem};
 use crate::sys::folder::{Folder, Stamp};
+use crate::sys::lock::lock;
 
 /// Its file; no cue can have that name.
 const FILE: &str = ".fleet.json";

@@ -33,7 +33,7 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, AtomicUsize};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use serde::de::DeserializeOwned;
@@ -43,6 +43,7 @@ use crate::config::{self, Config, Store};
 use crate::control::{Code, Problem};
 use crate::cue::{self, Source, limits};
 use crate::sys::folder::{Folder, Stamp};
+use crate::sys::lock::lock;
 use crate::timeline::Timeline;
 use brought::Brought;
 use index::Index;
@@ -416,11 +417,6 @@ pub(crate) fn kept<T: DeserializeOwned + Default>(folder: &Folder, name: &str) -
 /// Bytes as hexadecimal digits.
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// What is behind a lock is whole at any time, also where a thread that held it panicked.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -2,9 +2,10 @@
 
 use std::os::unix::fs::FileExt as _;
 
-use super::{CueId, Library, file_problem, lock};
+use super::{CueId, Library, file_problem};
 use crate::control::{Code, Problem};
 use crate::sys::folder::Stamp;
+use crate::sys::lock::lock;
 
 /// A part of the file of a cue.
 #[derive(Debug, PartialEq, Eq)]

@@ -7,9 +7,10 @@ use std::sync::atomic::Ordering;
 
 use sha2::{Digest as _, Sha256};
 
-use super::{Awaited, CueId, CueInfo, Library, Verdict, child, file_name, file_problem, hex, lock};
+use super::{Awaited, CueId, CueInfo, Library, Verdict, child, file_name, file_problem, hex};
 use crate::control::{Code, Problem};
 use crate::sys::folder::{Folder, Stamp};
+use crate::sys::lock::lock;
 
 /// What the names of unfinished files begin with; no id does.
 pub(super) const UNFINISHED: &str = ".upload-";

@@ -49,26 +49,18 @@ impl<'a> Turn<'a> {
                     self.bench.begins(controller, first, books);
                     true
                 }
-                // The ack thread brought its books up to date before it heard what comes next.
-                AckRecord::Posted(..)
-                | AckRecord::Failed(..)
-                | AckRecord::Joined(_)
-                | AckRecord::FellOut(..)
-                | AckRecord::Unread(_)
-                | AckRecord::Fate(..) => {
-                    let before = self.records.len();
-                    books.catch_up(&mut self);
-                    if self.records.len() == before {
-                        break;
-                    }
-                    continue;
-                }
                 _ => self.hears_told(record),
             };
-            if !is_taken {
+            if is_taken {
+                self.records = rest;
+                continue;
+            }
+            // Perhaps the ack thread brought its books up to date before it heard what comes next.
+            let before = self.records.len();
+            books.catch_up(&mut self);
+            if self.records.len() == before {
                 break;
             }
-            self.records = rest;
         }
         books.settle(self.began, &mut self);
         self.take_rest(books.tracker_mut());

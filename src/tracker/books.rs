@@ -74,7 +74,6 @@ impl Books {
     /// Puts a reply by; where there is no more room, those before it are matched first.
     pub fn on_reply(&mut self, reply: Reply, ledger: &mut impl Ledger) {
         if self.waiting.len() == ROOM {
-            ledger.bring_up_to_date(&mut self.tracker);
             self.match_all(reply.at, ledger);
             // Replies to frames that nobody sent must not fill the room.
             if self.waiting.len() > ROOM / 2 {
@@ -86,13 +85,11 @@ impl Books {
 
     /// Matches the replies that wait and whose frames are recorded; the others go on waiting.
     pub(crate) fn catch_up(&mut self, ledger: &mut impl Ledger) {
-        ledger.bring_up_to_date(&mut self.tracker);
         self.match_all(MonoTime::default(), ledger);
     }
 
     /// Ends a drain that began at `began`: matches all replies, then expires the frames that are too old.
     pub fn settle(&mut self, began: MonoTime, ledger: &mut impl Ledger) {
-        ledger.bring_up_to_date(&mut self.tracker);
         self.match_all(began, ledger);
         self.tracker.expire(began);
     }
@@ -108,6 +105,7 @@ impl Books {
     /// one will tell.
     fn match_all(&mut self, now: MonoTime, ledger: &mut impl Ledger) {
         let tracker = &mut self.tracker;
+        ledger.bring_up_to_date(tracker);
         self.waiting.retain_mut(|(reply, is_early)| {
             let early = !tracker.recorded(reply.controller, reply.frame);
             if early && now.since(reply.at) <= ACK_TIMEOUT {

@@ -239,6 +239,13 @@ impl Engine {
         }
     }
 
+    /// Waits until one of its halls is heard.
+    pub(crate) fn hears_one(&self) -> Value {
+        self.wait(|table| {
+            table.as_array().is_some_and(|halls| halls.iter().any(|hall| hall["silent"] == false))
+        })
+    }
+
     /// Waits until every hall of the desk is heard.
     pub(crate) fn hears_all(&self) -> Value {
         self.wait(|table| {

@@ -63,10 +63,7 @@ fn linked() -> Option<(Engine, Hall, Link)> {
     let engine = Engine::start("h1,h2")?;
     let hall = engine.hall("h1", "[]");
     let link = engine.link("h1", &hall);
-    let is_heard = |table: &Value| {
-        table.as_array().is_some_and(|halls| halls.iter().any(|hall| hall["silent"] == false))
-    };
-    engine.wait(is_heard);
+    engine.hears_one();
     Some((engine, hall, link))
 }
 

@@ -60,7 +60,7 @@ fn who_has_no_token_sees_nothing_and_no_page_of_others_stops_a_hall() {
     let Some(engine) = Engine::start("h1") else { return };
     let hall = engine.hall("h1", "[]");
     let _link = engine.link("h1", &hall);
-    engine.wait(|table| table[0]["silent"] == false);
+    engine.hears_all();
     let token =
         Sha256::digest("correct-horse").iter().map(|octet| format!("{octet:02x}")).collect::<String>();
     let page =

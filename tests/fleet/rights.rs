@@ -69,8 +69,7 @@ fn what_the_engine_answers_is_no_answer_of_a_hall_and_no_stop_whatever_the_key_o
     let Some(engine) = Engine::start_with("h1,h2", &["--pairs", "h1"]) else { return };
     let hall = engine.hall("h2", "[]");
     let link = engine.link("h2", &hall);
-    engine
-        .wait(|table| table.as_array().is_some_and(|halls| halls.iter().any(|hall| hall["silent"] == false)));
+    engine.hears_one();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     runtime.block_on(async {
         let pair = Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1").await;
@@ -194,8 +193,7 @@ fn a_key_of_a_hall_has_the_engine_neither_stop_another_nor_speak_for_it() {
     let Some(engine) = Engine::start("h1,h2,h3") else { return };
     let two = engine.hall("h2", "[]");
     let link = engine.link("h2", &two);
-    engine
-        .wait(|table| table.as_array().is_some_and(|halls| halls.iter().any(|hall| hall["silent"] == false)));
+    engine.hears_one();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let thief = runtime.block_on(Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1")).client;
     // The engine answers each of these, to wherever it is asked to answer.

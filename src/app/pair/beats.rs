@@ -4,10 +4,11 @@ use std::net::{SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::{Heard, PairError, PairShared, lock, thread};
+use super::{Heard, PairError, PairShared, thread};
 use crate::log::Priority;
 use crate::pair::{BEAT, Carried, Message};
 use crate::sys::clock::Monotonic;
+use crate::sys::lock::lock;
 use crate::time::{Clock as _, ShowTime};
 
 /// What people have set goes with each so-manieth beat.

@@ -7,10 +7,11 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{PairError, PairShared, lock, thread};
+use super::{PairError, PairShared, thread};
 use crate::api::unix_socket;
 use crate::pair::{Answered, PROMISED};
 use crate::sys::clock::Monotonic;
+use crate::sys::lock::lock;
 use crate::time::Clock as _;
 
 /// The longest line of a link.

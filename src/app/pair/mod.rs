@@ -13,7 +13,7 @@ use std::io::{self, Read as _};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::Builder;
 
 use sha2::{Digest as _, Sha256};
@@ -30,6 +30,7 @@ use crate::rt::Live;
 use crate::sd::WatchdogThread;
 use crate::sys::clock::Monotonic;
 use crate::sys::file::secret;
+use crate::sys::lock::lock;
 use crate::time::{Clock as _, MonoTime};
 use crate::wire::FrameNo;
 
@@ -112,10 +113,6 @@ pub(crate) struct Pair {
 /// What is to be told of the pair.
 #[derive(Debug, Clone)]
 pub(crate) struct PairWatch(Arc<PairShared>);
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 impl PairShared {
     /// Does one thing with the claim, now, and passes on what comes of it.

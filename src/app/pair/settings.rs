@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{PairError, PairShared, lock, thread};
+use super::{PairError, PairShared, thread};
 use crate::log::Priority;
 use crate::pair::{LONGEST, Role};
 use crate::settings::{self, Settings};
 use crate::sys::clock::Monotonic;
+use crate::sys::lock::lock;
 use crate::time::Clock as _;
 
 /// How often it is looked at.

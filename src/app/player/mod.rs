@@ -9,12 +9,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::{Builder, JoinHandle};
 
 pub(crate) use child::film_length_s;
 
 use crate::config::FilmPlayer;
+use crate::sys::lock::lock;
 use crate::sys::own_folder::OwnFolder;
 use crate::sys::realtime;
 use crate::time::ShowTime;
@@ -61,10 +62,6 @@ pub(crate) struct PlayerState {
     /// How often it ended by itself, and how it did the last time.
     pub(crate) ends: u64,
     pub(crate) ended: String,
-}
-
-fn lock<T>(what: &Mutex<T>) -> MutexGuard<'_, T> {
-    what.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What player and supervisor share.

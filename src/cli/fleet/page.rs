@@ -1,7 +1,7 @@
 //! `kinocue fleet desk`: a page with all halls of a desk, worst first, and a STOP for each of them; the same as figures for Prometheus.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
@@ -30,6 +30,7 @@ use crate::fleet;
 use crate::log::Log;
 use crate::metrics::halls::{CONTENT_TYPE, FleetFigures, HallFigures};
 use crate::sys::clock::Monotonic;
+use crate::sys::lock::lock;
 use crate::time::Clock as _;
 use crate::{api, console};
 
@@ -136,7 +137,7 @@ impl Desk {
     async fn hear(&self) -> Result<(), Failure> {
         let mut heard = self.client.subscribe(fleet::status_of("*.*")).await.or_exit(Exit::Unavailable)?;
         while let Some(message) = heard.next().await {
-            self.heard().hear(&message);
+            lock(&self.heard).hear(&message);
         }
         Err(anyhow!("the engine takes this desk no more")).or_exit(Exit::Unavailable)
     }
@@ -145,7 +146,7 @@ impl Desk {
     async fn look_up(&self) {
         loop {
             if let Ok(kept) = kept_of(&self.client, &self.settings.halls).await {
-                self.heard().take(kept);
+                lock(&self.heard).take(kept);
             }
             sleep(LOOK_UP).await;
         }
@@ -153,20 +154,11 @@ impl Desk {
 
     /// The halls as they are now, worst first.
     fn table(&self) -> Vec<HallSeen> {
-        self.heard().table(Monotonic.now())
-    }
-
-    /// What is behind a lock is whole at any time, also where whoever held it panicked.
-    fn heard(&self) -> MutexGuard<'_, Halls> {
-        self.heard.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.heard).table(Monotonic.now())
     }
 
     fn is_connected(&self) -> bool {
         self.client.connection_state() == EngineState::Connected
-    }
-
-    fn stops(&self) -> MutexGuard<'_, BTreeMap<&'static str, u64>> {
-        self.stops.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -198,7 +190,7 @@ async fn stop(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
     };
     let ask = async |hall: String| {
         let answer = act::ask_one(&desk.settings, &desk.client, &hall, &act::STOP).await;
-        *desk.stops().entry(answer.result()).or_default() += 1;
+        *lock(&desk.stops).entry(answer.result()).or_default() += 1;
         answer.json(&hall)
     };
     let mut answers: Vec<Value> = join_all(halls.into_iter().map(ask)).await;
@@ -219,7 +211,7 @@ async fn figures(State(desk): State<Arc<Desk>>) -> Response {
     let figures = FleetFigures {
         engine: desk.is_connected(),
         halls: halls.iter().map(of_hall).collect(),
-        stops: desk.stops().clone(),
+        stops: lock(&desk.stops).clone(),
     };
     ([(header::CONTENT_TYPE, CONTENT_TYPE)], figures.render()).into_response()
 }

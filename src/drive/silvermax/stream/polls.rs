@@ -117,11 +117,8 @@ impl Polls {
 
     /// It was asked.
     pub(super) fn asked(&mut self, question: Question, now: MonoTime) {
-        for ((other, every), due) in QUESTIONS.iter().zip(&mut self.due) {
-            if *other == question {
-                let is_new = question == Question::TicksLeft && now < self.started + OFTEN_FOR;
-                *due = now + if is_new { OFTEN } else { *every };
-            }
-        }
+        let (at, is_new) =
+            (place(question), question == Question::TicksLeft && now < self.started + OFTEN_FOR);
+        self.due[at] = now + if is_new { OFTEN } else { QUESTIONS[at].1 };
     }
 }
