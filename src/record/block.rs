@@ -2,10 +2,10 @@
 
 use prost::Message as _;
 
-use super::chunk::{Chunk, SentFrame, TickHead};
+use super::chunk::{Chunk, TickHead};
 use super::columns::ColumnSet;
 use super::full::{Lane, Sent};
-use super::seat::{FrameKind, RecordedAxis, RecordedSeat};
+use super::seat::{FrameKind, ReadFrame, RecordedAxis, RecordedSeat};
 use crate::state::State;
 use crate::time::MonoTime;
 use crate::wire::{MAX_LEN, MotionRequest, Timing};
@@ -15,6 +15,8 @@ use crate::wire::{MAX_LEN, MotionRequest, Timing};
 pub(crate) struct Block {
     first: Option<MonoTime>,
     ticks: usize,
+    /// When the last tick woke, µs.
+    woken: u64,
     columns: ColumnSet,
     lanes: Vec<LaneWriter>,
 }
@@ -32,6 +34,17 @@ struct LaneWriter {
 impl Block {
     /// Adds a tick. Gives the block before it where that is full.
     pub(crate) fn add(&mut self, chunk: &Chunk<'_>, seats: &[RecordedSeat]) -> Option<(MonoTime, Vec<u8>)> {
+        let full = self.begin(chunk, seats.len());
+        for frame in chunk.frames() {
+            if let Some(seat) = seats.get(frame.lane) {
+                self.frame(&seat.read(frame), seat);
+            }
+        }
+        full
+    }
+
+    /// A tick of so many lanes begins. Gives the block before it where that is full.
+    pub(super) fn begin(&mut self, chunk: &Chunk<'_>, lanes: usize) -> Option<(MonoTime, Vec<u8>)> {
         const LONGEST_NS: u128 = 500_000_000;
         let TickHead { index, deadline, late_ns, missed, film, state } = chunk.head;
         let is_full = self
@@ -44,15 +57,18 @@ impl Block {
             [index, deadline.as_nanos(), late_ns / 1_000, missed].map(u64::cast_signed);
         let row = [index, due, late, missed, film.as_nanos(), state, chunk.dropped.into()];
         self.columns.push(self.ticks, row);
-        self.lanes.resize_with(seats.len(), LaneWriter::default);
-        let woken = (deadline.as_nanos() / 1_000).wrapping_add(late_ns / 1_000);
-        for frame in chunk.frames() {
-            if let (Some(lane), Some(seat)) = (self.lanes.get_mut(frame.lane), seats.get(frame.lane)) {
-                lane.push(&frame, seat, self.ticks as i64, woken);
-            }
-        }
+        self.lanes.resize_with(lanes, LaneWriter::default);
+        self.woken = (deadline.as_nanos() / 1_000).wrapping_add(late_ns / 1_000);
         self.ticks += 1;
         full
+    }
+
+    /// Adds a frame of that tick.
+    pub(super) fn frame(&mut self, read: &ReadFrame<'_>, seat: &RecordedSeat) {
+        let (tick, woken) = (self.ticks as i64 - 1, self.woken);
+        if let Some(lane) = self.lanes.get_mut(read.frame.lane) {
+            lane.push(read, seat, tick, woken);
+        }
     }
 
     /// Gives what there is, and the instant of its first tick.
@@ -71,19 +87,20 @@ fn count(len: usize) -> u32 {
 
 impl LaneWriter {
     /// Adds a frame of that tick, which woke at `woken`, µs.
-    fn push(&mut self, frame: &SentFrame<'_>, seat: &RecordedSeat, tick: i64, woken: u64) {
+    fn push(&mut self, read: &ReadFrame<'_>, seat: &RecordedSeat, tick: i64, woken: u64) {
+        let ReadFrame { frame, asked: wanted, motion } = read;
         let asked = &frame.asked;
         let after = (frame.at.as_nanos() / 1_000).wrapping_sub(woken).cast_signed();
         #[expect(clippy::cast_possible_truncation, reason = "a chunk has it in so many bits")]
         let (level, handed) = (i64::from((asked.level as f32).to_bits()), frame.handed as i64);
-        let request = request(seat.frames, frame.datagram);
+        let request =
+            motion.as_ref().and_then(|motion| whole(seat.frames, motion.request.as_ref()?, frame.datagram));
         let in_raw = if request.is_some() { 0 } else { frame.datagram.len() as i64 + 1 };
         let of_all = [tick, after, handed, asked.slots as i64, level, asked.clamps.cast_signed(), in_raw];
         let row = self.frames;
         self.frames += 1;
-        self.fields.push(row, of_all.into_iter().chain(request.iter().flat_map(fields)));
-        let wanted = seat.asked(asked);
-        let sent = request.map_or_else(|| seat.sent(frame), |request| seat.measured(&request.positions));
+        self.fields.push(row, of_all.into_iter().chain(request.into_iter().flat_map(fields)));
+        let sent = read.sent();
         let farther = |(axis, (geometry, wanted)): (usize, (&RecordedAxis, &f64))| {
             geometry.pulses(*wanted) - sent.get(axis).map_or(0, |place| geometry.pulses(*place))
         };
@@ -111,9 +128,8 @@ impl LaneWriter {
 }
 
 /// The fields of a datagram, where these make it again.
-fn request(kind: FrameKind, datagram: &[u8]) -> Option<MotionRequest> {
+fn whole<'a>(kind: FrameKind, request: &'a MotionRequest, datagram: &[u8]) -> Option<&'a MotionRequest> {
     let FrameKind::Datagram(port) = kind else { return None };
-    let request = MotionRequest::parse_as(port, datagram).ok()?;
     (request.emit_as(port, &mut [0; MAX_LEN]) == datagram).then_some(request)
 }
 

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::chunk::{Chunk, Handed};
-use super::{AckChunk, AckRecord};
+use super::chunk::{Handed, SentFrame};
+use super::{AckChunk, AckRecord, TickHead};
 use crate::health::HealthState;
 use crate::state::State;
 use crate::time::MonoTime;
@@ -85,9 +85,8 @@ impl Watchman {
         Self { period, state: None, is_moving: false, clamps: vec![0; lanes], may_move: vec![false; lanes] }
     }
 
-    /// Looks at a tick; gives what it finds to `found`, and how often the limiter held a seat back since the last.
-    pub(crate) fn look(&mut self, chunk: &Chunk<'_>, found: &mut impl FnMut(IncidentCause, MonoTime)) -> u64 {
-        let (head, mut held_back) = (chunk.head, 0);
+    /// Looks at a tick that begins; gives what it finds to `found`.
+    pub(crate) fn begin(&mut self, head: &TickHead, found: &mut impl FnMut(IncidentCause, MonoTime)) {
         let before = self.state.replace(head.state);
         if before.is_some_and(|before| before != head.state) {
             match head.state {
@@ -104,22 +103,28 @@ impl Watchman {
             found(IncidentCause::Gap, head.deadline);
         }
         self.is_moving = false;
-        for frame in chunk.frames() {
-            self.is_moving = true;
-            if frame.handed == Handed::Refused {
-                found(IncidentCause::RefusedFrame, head.deadline);
-            }
-            let Some(clamps) = self.clamps.get_mut(frame.lane) else { continue };
-            // A frame that no tick asked for, and a show that was exchanged, begin anew.
-            if frame.asked.slots > 0 {
-                let more = frame.asked.clamps.saturating_sub(std::mem::replace(clamps, frame.asked.clamps));
-                held_back += more;
-                if more > 0 {
-                    found(IncidentCause::Clamp, head.deadline);
-                }
-            }
+    }
+
+    /// Looks at a frame of that tick; also gives how often the limiter held the seat back since its last.
+    pub(super) fn frame(
+        &mut self,
+        head: &TickHead,
+        frame: &SentFrame<'_>,
+        found: &mut impl FnMut(IncidentCause, MonoTime),
+    ) -> u64 {
+        self.is_moving = true;
+        if frame.handed == Handed::Refused {
+            found(IncidentCause::RefusedFrame, head.deadline);
         }
-        held_back
+        // A frame that no tick asked for, and a show that was exchanged, begin anew.
+        let Some(clamps) = self.clamps.get_mut(frame.lane).filter(|_| frame.asked.slots > 0) else {
+            return 0;
+        };
+        let more = frame.asked.clamps.saturating_sub(std::mem::replace(clamps, frame.asked.clamps));
+        if more > 0 {
+            found(IncidentCause::Clamp, head.deadline);
+        }
+        more
     }
 
     /// Looks at what the ack thread took.

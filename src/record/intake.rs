@@ -170,22 +170,38 @@ impl Intake {
         while let Some((chunk, behind)) = Chunk::parse(rest) {
             rest = behind;
             self.take_acks(&mut drains, Some(chunk.head.deadline));
-            let Self { seats, fold, margins, whole, counts, watchman, found, .. } = self;
-            counts.ticks += 1;
-            counts.dropped += u64::from(chunk.dropped);
-            counts.frames += chunk.frames().count() as u64;
-            counts.clamps += watchman.look(&chunk, &mut |cause, at| found.push((cause, at)));
-            margins.take(&chunk, seats, &mut |_, _, _| ());
-            fold.take(&chunk, tell);
-            if let Some(whole) = whole {
-                let block = whole.ticks.add(&chunk, seats);
-                // As of its last tick: by then its samples are told.
-                let last = std::mem::replace(&mut whole.last, chunk.head.deadline);
-                block.into_iter().for_each(|(_, block)| whole.tell(last, block, tell));
-            }
+            self.take_tick(&chunk, tell);
         }
         self.take_acks(&mut drains, None);
         (self.held, self.held_acks) = (held, held_acks);
+    }
+
+    fn take_tick(&mut self, chunk: &Chunk<'_>, tell: &mut impl FnMut(MonoTime, Message)) {
+        let Self { seats, fold, margins, whole, counts, watchman, found, .. } = self;
+        let head = &chunk.head;
+        let mut find = |cause, at| found.push((cause, at));
+        counts.ticks += 1;
+        counts.dropped += u64::from(chunk.dropped);
+        watchman.begin(head, &mut find);
+        margins.begin(chunk);
+        fold.begin(chunk, tell);
+        if let Some(whole) = whole {
+            let block = whole.ticks.begin(chunk, seats.len());
+            // As of its last tick: by then its samples are told.
+            let last = std::mem::replace(&mut whole.last, head.deadline);
+            block.into_iter().for_each(|(_, block)| whole.tell(last, block, tell));
+        }
+        for frame in chunk.frames() {
+            counts.frames += 1;
+            counts.clamps += watchman.frame(head, &frame, &mut find);
+            let Some(seat) = seats.get(frame.lane) else { continue };
+            let read = seat.read(frame);
+            margins.frame(head, &read, seat, &mut |_, _, _| ());
+            fold.frame(head, &read);
+            if let Some(whole) = whole {
+                whole.ticks.frame(&read, seat);
+            }
+        }
     }
 
     /// Takes the drains up to an instant, or all.

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::RecordedSeat;
 use super::chunk::{Chunk, Handed};
+use super::seat::{Motion, ReadFrame};
+use super::{RecordedSeat, TickHead};
 use crate::motion::{MeasurePlaces, MeasureTimes, Reading, Spacing};
 use crate::plain::escaped;
 use crate::time::{MonoTime, Rate, ShowTime};
@@ -114,47 +115,61 @@ impl Margins {
         Self { spacing, lanes: seats.iter().map(lane).collect() }
     }
 
-    /// Takes a tick. A seat is measured anew behind ticks that are not there, and behind a frame that no tick asked for.
+    /// Takes a tick.
     pub(crate) fn take(
         &mut self,
         chunk: &Chunk<'_>,
         seats: &[RecordedSeat],
         tell: &mut impl FnMut(usize, usize, Parts),
     ) {
-        let Self { spacing, lanes } = self;
-        let head = chunk.head;
-        if chunk.dropped > 0 {
-            lanes.iter_mut().for_each(|lane| lane.last = None);
-        }
+        self.begin(chunk);
         for frame in chunk.frames() {
-            let (Some(lane), Some(seat)) = (lanes.get_mut(frame.lane), seats.get(frame.lane)) else {
-                continue;
-            };
-            if frame.handed == Handed::Refused {
-                continue;
+            if let Some(seat) = seats.get(frame.lane) {
+                self.frame(&chunk.head, &seat.read(frame), seat, tell);
             }
-            if frame.asked.slots == 0 {
-                lane.last = None;
-                continue;
-            }
-            let is_next = |last: MonoTime| {
-                head.deadline > last && head.deadline.since(last).as_nanos() < APART_NS.into()
-            };
-            let goes_on = lane.last.replace(head.deadline).is_some_and(is_next);
-            let Some((places, timing, time_ms)) = seat.motion(&frame) else { continue };
-            let before = std::mem::replace(&mut lane.time_ms, time_ms);
-            let lasts = if timing == Timing::Relative { time_ms } else { time_ms.saturating_sub(before) };
-            lane.reached += Duration::from_millis(u64::from(lasts.max(1)));
-            if !goes_on {
-                lane.times = MeasureTimes::new(*spacing);
-            }
-            let (now, spans) = (lane.reached, lane.times.push(lane.reached));
-            for (index, (axis, place)) in lane.axes.iter_mut().zip(places.iter()).enumerate() {
-                let seen = axis.places.push(&spans, *place);
-                let shown = [seen.velocity, seen.acceleration, seen.jerk];
-                axis.keep(shown, now, head.film);
-                tell(frame.lane, index, parts(shown, now, head.film, seat.axes()[index].limits()));
-            }
+        }
+    }
+
+    /// A tick begins. A seat is measured anew behind ticks that are not there, and behind a frame that no tick asked for.
+    pub(super) fn begin(&mut self, chunk: &Chunk<'_>) {
+        if chunk.dropped > 0 {
+            self.lanes.iter_mut().for_each(|lane| lane.last = None);
+        }
+    }
+
+    /// Takes a frame of that tick.
+    pub(super) fn frame(
+        &mut self,
+        head: &TickHead,
+        read: &ReadFrame<'_>,
+        seat: &RecordedSeat,
+        tell: &mut impl FnMut(usize, usize, Parts),
+    ) {
+        let frame = &read.frame;
+        let Some(lane) = self.lanes.get_mut(frame.lane) else { return };
+        if frame.handed == Handed::Refused {
+            return;
+        }
+        if frame.asked.slots == 0 {
+            lane.last = None;
+            return;
+        }
+        let is_next =
+            |last: MonoTime| head.deadline > last && head.deadline.since(last).as_nanos() < APART_NS.into();
+        let goes_on = lane.last.replace(head.deadline).is_some_and(is_next);
+        let Some(Motion { places, timing, time_ms, .. }) = &read.motion else { return };
+        let before = std::mem::replace(&mut lane.time_ms, *time_ms);
+        let lasts = if *timing == Timing::Relative { *time_ms } else { time_ms.saturating_sub(before) };
+        lane.reached += Duration::from_millis(u64::from(lasts.max(1)));
+        if !goes_on {
+            lane.times = MeasureTimes::new(self.spacing);
+        }
+        let (now, spans) = (lane.reached, lane.times.push(lane.reached));
+        for (index, (axis, place)) in lane.axes.iter_mut().zip(places.iter()).enumerate() {
+            let seen = axis.places.push(&spans, *place);
+            let shown = [seen.velocity, seen.acceleration, seen.jerk];
+            axis.keep(shown, now, head.film);
+            tell(frame.lane, index, parts(shown, now, head.film, seat.axes()[index].limits()));
         }
     }
 

@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::ack_record::{AckRecord, standing_number};
 use super::acks::AckChunk;
-use super::chunk::{Chunk, Handed, SentFrame};
+use super::chunk::{Chunk, Handed};
 use super::notes::Note;
+use super::seat::ReadFrame;
 use super::{RecordedSeat, TickHead};
 use crate::state::State;
 use crate::time::MonoTime;
@@ -149,6 +150,16 @@ impl Sampled {
 
     /// Takes a tick, and tells what is over by it.
     pub(crate) fn take(&mut self, chunk: &Chunk<'_>, tell: &mut impl FnMut(MonoTime, Message)) {
+        self.begin(chunk, tell);
+        for frame in chunk.frames() {
+            if let Some(read) = self.seats.get(frame.lane).map(|seat| seat.read(frame)) {
+                self.frame(&chunk.head, &read);
+            }
+        }
+    }
+
+    /// A tick begins: tells what is over by it.
+    pub(super) fn begin(&mut self, chunk: &Chunk<'_>, tell: &mut impl FnMut(MonoTime, Message)) {
         let head = chunk.head;
         if self.last.is_some_and(|last| self.window(last.deadline) != self.window(head.deadline)) {
             self.close(tell);
@@ -165,9 +176,6 @@ impl Sampled {
             dropped: self.tick.dropped + u64::from(chunk.dropped),
         };
         self.last = Some(head);
-        for frame in chunk.frames() {
-            self.frame(&head, &frame);
-        }
     }
 
     /// Tells of the window that is not over, and of acks that came since there was one.
@@ -233,16 +241,15 @@ impl Sampled {
         u128::from(at.as_nanos()) * u128::from(self.hz) / 1_000_000_000
     }
 
-    fn frame(&mut self, head: &TickHead, frame: &SentFrame<'_>) {
-        let (Some(seat), Some(window)) = (self.seats.get(frame.lane), self.windows.get_mut(frame.lane))
-        else {
-            return;
-        };
+    /// Takes a frame of that tick.
+    pub(super) fn frame(&mut self, head: &TickHead, read: &ReadFrame<'_>) {
+        let frame = &read.frame;
+        let Some(window) = self.windows.get_mut(frame.lane) else { return };
         let SeatWindow { worst, sample, clamps, .. } = window;
         let is_taken = frame.handed != Handed::Refused;
         sample.sent += u32::from(is_taken);
         sample.unsent += u32::from(!is_taken);
-        let (asked, sent) = (seat.asked(&frame.asked), seat.sent(frame));
+        let (asked, sent) = (read.asked, read.sent());
         if !asked.is_empty() {
             sample.clamps += frame.asked.clamps.saturating_sub(std::mem::replace(clamps, frame.asked.clamps));
         }

@@ -56,6 +56,35 @@ pub struct RecordedSeat {
     axes: Vec<RecordedAxis>,
 }
 
+/// A frame with what it says, found out once for all who look at it.
+#[derive(Debug)]
+pub(crate) struct ReadFrame<'a> {
+    pub(super) frame: SentFrame<'a>,
+    /// Where its axes were asked to be, millimetres or degrees; none where no tick asked.
+    pub(super) asked: PerAxis<f64>,
+    /// What its octets say; none where that is no frame of its kind.
+    pub(super) motion: Option<Motion>,
+}
+
+impl ReadFrame<'_> {
+    /// Where its axes were sent, millimetres or degrees; none where that is no frame of its kind.
+    pub(super) fn sent(&self) -> PerAxis<f64> {
+        self.motion.as_ref().map(|motion| motion.places).unwrap_or_default()
+    }
+}
+
+/// What the octets of a frame say.
+#[derive(Debug)]
+pub(super) struct Motion {
+    /// Where its axes are sent, millimetres or degrees.
+    pub(super) places: PerAxis<f64>,
+    /// What its Time counts from, and that Time in ms.
+    pub(super) timing: Timing,
+    pub(super) time_ms: u32,
+    /// All of it; none of a pose for a link.
+    pub(super) request: Option<MotionRequest>,
+}
+
 /// One of its axes; lengths in its unit, speeds in that a second, and so on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RecordedAxis {
@@ -192,15 +221,21 @@ impl RecordedSeat {
 
     /// Where its axes were sent, millimetres or degrees; none where that is no frame of its kind.
     pub(crate) fn sent(&self, frame: &SentFrame<'_>) -> PerAxis<f64> {
-        self.motion(frame).map(|(places, ..)| places).unwrap_or_default()
+        self.motion(frame).map(|motion| motion.places).unwrap_or_default()
     }
 
-    /// The same, with what its Time counts from, and that Time in ms.
-    pub(super) fn motion(&self, frame: &SentFrame<'_>) -> Option<(PerAxis<f64>, Timing, u32)> {
+    /// One of its frames, with what it says.
+    pub(super) fn read<'a>(&self, frame: SentFrame<'a>) -> ReadFrame<'a> {
+        ReadFrame { asked: self.asked(&frame.asked), motion: self.motion(&frame), frame }
+    }
+
+    fn motion(&self, frame: &SentFrame<'_>) -> Option<Motion> {
         match self.frames {
             FrameKind::Datagram(port) => {
                 let request = MotionRequest::parse_as(port, frame.datagram).ok()?;
-                Some((self.measured(&request.positions), request.timing, request.time_ms))
+                let places = self.measured(&request.positions);
+                let MotionRequest { timing, time_ms, .. } = request;
+                Some(Motion { places, timing, time_ms, request: Some(request) })
             }
             FrameKind::Pose => {
                 let pose = LinkPose::parse(frame.datagram.try_into().ok()?);
@@ -208,7 +243,8 @@ impl RecordedSeat {
                     let RecordedAxis { slot, low, stroke, .. } = self.axes[axis];
                     low + pose.axes[slot] * stroke
                 };
-                Some((PerAxis::from_fn(self.axes.len(), place), Timing::Relative, pose.lasts_ms))
+                let places = PerAxis::from_fn(self.axes.len(), place);
+                Some(Motion { places, timing: Timing::Relative, time_ms: pose.lasts_ms, request: None })
             }
         }
     }
