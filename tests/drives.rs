@@ -204,6 +204,29 @@ fn a_cue_is_played_to_drives_that_are_home_with_an_ack_for_each_frame_and_to_no_
 }
 
 #[test]
+fn drives_that_never_answered_are_named_as_silent_and_not_as_not_home() {
+    let dead = "16@dead=1, 17@dead=1, 18@dead=1";
+    for (dialect, numbers, rate_hz, dead) in
+        [("silvermax", "16,17,18", 20, dead), ("sixpack2", "1", 40, "1@dead=1")]
+    {
+        let folder = tempfile::tempdir().expect("a folder");
+        let port = folder.path().join("stalls");
+        let tty = port.to_str().expect("text");
+        let sim = ["sim", "--dialect", dialect, "--tty", tty, "--units", numbers, "--faults", dead];
+        let mut sim = Guarded::start(&sim);
+        let mut ready = String::new();
+        sim.stderr().read_line(&mut ready).expect("text");
+        let link = seat_of("A1", &port, dialect, rate_hz);
+        let hall = write(folder.path(), &format!("[show]\nbind = \"127.0.0.1:0\"\n{link}"));
+        let run = kinocue(&["play", &cue(folder.path()), "--config", &hall]);
+        assert!(run.stderr.contains("A1: nobody answers, so nothing is played"), "{dialect}: {}", run.stderr);
+        assert_eq!(run.code, Some(69), "{dialect}");
+        sim.signal(Signal::TERM);
+        sim.finish();
+    }
+}
+
+#[test]
 fn a_hall_of_both_families_and_a_controller_on_the_network_plays_one_cue() {
     let folder = tempfile::tempdir().expect("a folder");
     let [one, other] = ["one", "other"].map(|name| folder.path().join(name));

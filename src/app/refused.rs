@@ -44,8 +44,8 @@ pub enum PlayError {
     Runtime(#[from] RuntimeError),
     /// These controllers answer nothing: all there are, or some of a play that needs all.
     #[error(
-        "{}: nobody answers, so nothing is played; check address, power, cable, PA15 and PA20 to PA24, and ask `kinocue preflight`. \
-         Controllers that cannot answer are played to with --no-acks",
+        "{}: nobody answers, so nothing is played; check address, power, cable, PA15 and PA20 to PA24, of drives baud and number, \
+         and ask `kinocue preflight`. Controllers that cannot answer are played to with --no-acks",
         .0.join(", ")
     )]
     Silent(Vec<String>),

@@ -236,9 +236,11 @@ impl PlayScript {
         if !moving.is_empty() {
             return Err(PlayError::Moving(moving));
         }
-        let untold: Vec<usize> = (0..self.lanes.len()).filter(|&lane| self.known(lane).is_none()).collect();
-        let on_link = |lane: usize| self.handle.config.controllers[lane].drives().is_some();
-        let not_home = self.names(|lane| untold.contains(&lane) && on_link(lane));
+        let untold = (0..self.lanes.len()).filter(|&lane| self.known(lane).is_none());
+        let on_link = |&lane: &usize| self.handle.config.controllers[lane].drives().is_some();
+        let (drives, untold): (Vec<_>, Vec<_>) = untold.partition(on_link);
+        // Those of which nothing was heard are named as silent.
+        let not_home = self.names(|lane| drives.contains(&lane) && self.handle.live.has_heard(lane));
         if !not_home.is_empty() {
             return Err(PlayError::NotHome(not_home));
         }

@@ -32,7 +32,9 @@ impl HealthState {
             Self::Ok => "nothing",
             Self::Rejoining => "park, or start a show: it joins slowly",
             Self::Degraded => "check the network",
-            Self::Lost => "check its power and network; it rejoins by itself unless it rebooted",
+            Self::Lost => {
+                "check its power and its cable, network or serial line; it rejoins by itself unless it rebooted"
+            }
             Self::Stopped => "release its emergency-stop button, then clear",
             Self::Error => {
                 "clear the error at the controller; then, with the seats parked or stopped, clear the hall"

@@ -337,7 +337,8 @@ impl Records<'_> {
         now: MonoTime,
     ) {
         for (controller, event) in link.take() {
-            if let Some(live) = self.live {
+            // That a unit does not answer, its thread says.
+            if let Some(live) = self.live.as_ref().filter(|_| !matches!(event, StreamEvent::Lost { .. })) {
                 live.on_heard(controller);
             }
             match event {

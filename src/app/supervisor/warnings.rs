@@ -99,15 +99,18 @@ impl StatusParts<'_> {
         self.hall.now.since(self.hall.mirror.since) < FIRST_LOOK
     }
 
-    /// A hall may play and park with all its seats out; what its state says is true of none of them then.
+    /// A hall may play and park with all its seats out; what its state says is true of none of them then. All others say that seats are
+    /// not looked for yet, move by themselves, or wait for a person.
     fn of_nobody(&self, table: &[Row]) -> Option<Warning> {
         let (settings, state) = (&self.hall.settings, self.hall.mirror.state);
-        // Nobody takes part in anything while seats home, and that ends with a word of its own.
-        if state == State::Homing {
+        let is_of_seats = matches!(
+            state,
+            State::Parked | State::Armed | State::Playing(_) | State::Paused | State::Parking
+        );
+        if !is_of_seats {
             return None;
         }
-        let is_early = self.has_begun() || state == State::Boot;
-        let is_looked_for = |row: &Row| is_early && row.why == Why::NotSeenYet;
+        let is_looked_for = |row: &Row| self.has_begun() && row.why == Why::NotSeenYet;
         let takes_part = |(lane, row): (usize, &Row)| settings.is_on(lane) && row.standing.may_move();
         if table.iter().all(is_looked_for) || table.iter().enumerate().any(takes_part) {
             return None;

@@ -26,9 +26,13 @@ fn seats_that_home_and_those_that_have_just_come_home_are_nobodys_error() {
         errors.map(|one| one.id).collect()
     };
     rig.supervisor.hall.mirror.since = MonoTime::default();
-    assert_eq!(wrong(&rig), ["controller-excluded", "controller-lost", "no-seat"], "in any other state");
+    assert_eq!(wrong(&rig), ["controller-excluded", "controller-lost", "no-seat"], "parked is nobody");
     rig.supervisor.hall.mirror.state = State::Homing;
     assert_eq!(wrong(&rig), ["controller-excluded"], "which goes once it is home");
+    for state in [State::Boot, State::Recovering, State::Stopping, State::Stopped, State::Fault] {
+        rig.supervisor.hall.mirror.state = state;
+        assert_eq!(wrong(&rig), ["controller-excluded", "controller-lost"], "{state} says nothing of seats");
+    }
 }
 
 #[test]

@@ -203,6 +203,59 @@ fn one_bad_digit_of_a_canary_puts_no_seat_out() {
     }
 }
 
+/// Has one question of a unit answered by a bare ACK, for as long as it stays.
+fn untold(unit: u8, register: u8) -> Damage {
+    Box::new(move |octets| {
+        if octets == format!("@{unit} 12 {register}\r").as_bytes() {
+            *octets = format!("@{unit} 0\r").into_bytes();
+        }
+        false
+    })
+}
+
+#[test]
+fn a_unit_that_takes_its_segments_and_tells_nothing_is_lost_after_two_seconds_and_its_seat_brakes() {
+    // Where it is, and whether it was restarted.
+    for register in [1, 40] {
+        let mut play = Play::with_ppm([0; 3]);
+        play.judged = false;
+        play.begin(ride);
+        play.play(10.0, 0);
+        assert!(!play.has("Lost"), "{register}: {:?}", play.rare());
+        play.stream.talk.port().damage = Some(untold(17, register));
+        let since = play.now();
+        let lost = (0..40).find_map(|_| {
+            play.play(0.1, 0);
+            let event = play.told.iter().find(|(_, event)| matches!(event, StreamEvent::Lost { .. }));
+            event.map(|(at, _)| at.since(since).as_secs_f64())
+        });
+        assert!(
+            lost.is_some_and(|after| (1.9..3.5).contains(&after)),
+            "{register}: {lost:?} {:?}",
+            play.rare()
+        );
+        // No hall that reads no seat leads it on.
+        play.wait(0.5);
+        let rest = [0, 1, 2].map(|axis| play.place(axis));
+        play.wait(0.5);
+        assert_eq!([0, 1, 2].map(|axis| play.place(axis)), rest, "{register}");
+        play.assert_gentle();
+    }
+}
+
+#[test]
+fn one_answer_that_tells_nothing_loses_no_unit() {
+    let mut play = Play::with_ppm([0; 3]);
+    play.begin(ride);
+    for _ in 0..4 {
+        play.play(2.5, 0);
+        let mut once = untold(17, 1);
+        play.stream.talk.port().damage =
+            Some(Box::new(move |octets| octets.starts_with(b"@17 12 1\r") && !once(octets)));
+    }
+    assert!(!play.has("Lost"), "{:?}", play.rare());
+}
+
 #[test]
 fn a_blocked_axis_is_killed_and_told_by_what() {
     let mut play = Play::with_ppm([0; 3]);
