@@ -330,7 +330,7 @@ pub struct ControllerStatus {
     pub send_failed: u64,
     /// How often the limiter held its motion back.
     pub clamps: u64,
-    /// True if it knows its position; null if it never told.
+    /// True if it knows its position; null if it has not told, as while it is homed.
     pub homed: Option<bool>,
     /// True if an emergency stop is in effect.
     pub emergency_stop: bool,

@@ -55,7 +55,14 @@ impl Standby {
         self.seen[controller] = Some(seen);
     }
 
-    /// Whether a controller knows its position; none where it never told.
+    /// Seats that take part home: what was seen of them is over.
+    pub(super) fn forget_seats(&mut self) {
+        for controller in (0..self.seen.len()).filter(|controller| self.desk.mix(*controller).on) {
+            self.seen[controller] = None;
+        }
+    }
+
+    /// Whether a controller knows its position; none where it has not told since it was homed.
     pub(super) fn homed(&self, controller: usize) -> Option<bool> {
         self.seen[controller].map(|seen| seen.sighting.homed)
     }

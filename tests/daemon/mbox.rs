@@ -135,6 +135,9 @@ fn an_emergency_stop_is_heard_of_while_seats_home() {
     hall.wait(|status| status["state"] == "parked" && all_stand(status, "ok"));
     hall.done(&["home", "--seats-empty"]);
     hall.comes_to("homing");
+    // What was known of their positions is over, and none is home before it was found at its zero.
+    let unknown = |one: &Value| one["homed"] != true;
+    hall.wait(|status| status["controllers"].as_array().expect("a list").iter().all(unknown));
     hall.happens("2@X1=1");
     let stopped = hall.comes_to("stopped");
     assert!(stopped["cause"].as_str().expect("text").contains("emergency stop"), "{stopped}");

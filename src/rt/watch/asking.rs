@@ -14,7 +14,11 @@ impl Watch {
     /// Whoever cleared the hall wants to know where its seats stand: nothing is taken on trust.
     pub(super) fn look_anew(&mut self, now: MonoTime) {
         let state = self.live.state();
-        let has_entered = std::mem::replace(&mut self.state, state) != state && state == State::Recovering;
+        let is_new = std::mem::replace(&mut self.state, state) != state;
+        if let Some(standby) = self.standby.as_mut().filter(|_| is_new && state == State::Homing) {
+            standby.forget_seats();
+        }
+        let has_entered = is_new && state == State::Recovering;
         let clears = self.live.clears();
         let is_cleared = std::mem::replace(&mut self.clears, clears) != clears;
         if !has_entered && !is_cleared {
