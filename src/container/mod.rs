@@ -196,16 +196,24 @@ pub(crate) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
     Some((name, map))
 }
 
-/// Attachment record: name and data.
-pub(crate) fn attachment(body: &[u8]) -> Option<(&str, &[u8])> {
-    let mut body = RecordBody(body);
-    body.u64()?; // log time
-    body.u64()?; // create time
-    let name = body.text()?;
-    body.text()?; // media type
-    let length = body.u64()?;
-    let (data, _) = body.0.split_at_checked(usize::try_from(length).ok()?)?;
-    Some((name, data))
+/// Attachment record.
+pub(crate) struct AttachmentRecord<'a> {
+    pub(crate) log_time: u64,
+    pub(crate) name: &'a str,
+    pub(crate) media_type: &'a str,
+    pub(crate) data: &'a [u8],
+}
+
+impl<'a> AttachmentRecord<'a> {
+    pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
+        let mut body = RecordBody(body);
+        let log_time = body.u64()?;
+        body.u64()?; // create time
+        let (name, media_type) = (body.text()?, body.text()?);
+        let length = body.u64()?;
+        let (data, _) = body.0.split_at_checked(usize::try_from(length).ok()?)?;
+        Some(Self { log_time, name, media_type, data })
+    }
 }
 
 /// What is left of a record's body; little-endian, texts behind their length (mcap.dev/spec).

@@ -10,7 +10,6 @@ use super::block::Block;
 use super::read::{Contents, ReadError, Told, Wanted};
 use super::reading::read;
 use super::scene::SeatScene;
-use super::summary::each_chunk;
 use super::{About, AckChunk, Chunk, EntryMaker, Message, Mode, Opening, RecordedSeat, Recording, Sampled};
 use crate::time::{MonoTime, ShowTime};
 
@@ -79,10 +78,12 @@ pub(crate) enum CutError {
 /// What is in a stretch.
 #[derive(Debug)]
 pub(crate) enum Piece<'a> {
-    /// A tick with all its frames.
-    Tick(Chunk<'a>),
-    /// Some of what the ack thread took after a tick and before the next, and its octets.
-    Drain(AckChunk<'a>, &'a [u8]),
+    /// A tick with all its frames, and its octets.
+    Tick(Chunk<'a>, &'a [u8]),
+    /// Some of what the ack thread took then, after a tick and before the next, and its octets.
+    Drain(MonoTime, AckChunk<'a>, &'a [u8]),
+    /// What was told then under another topic.
+    Note(MonoTime, &'a str, &'a [u8]),
 }
 
 /// Which of the ticks that are not over are in a stretch.
@@ -115,23 +116,29 @@ pub(crate) fn each_tick(
     let mut held =
         HeldTicks { ticks: VecDeque::new(), is_in: stretch.from == ShowTime::from_nanos(i64::MIN) };
     let wanted = Wanted { samples: false, ..Wanted::ALL };
-    let contents = read(input, wanted, &mut |contents, _, told| {
+    let contents = read(input, wanted, &mut |contents, at, told| {
         let chunks = match told {
             Told::Chunks(chunks) => chunks,
             Told::Drains(drains) => {
                 return each_drain(&drains, &mut held, &mut |piece| take(contents, piece));
             }
+            Told::Other(topic, data) if ticks > 0 && held.ticks.back().is_none_or(|(_, is_in)| *is_in) => {
+                return take(contents, Piece::Note(at, topic, data));
+            }
             _ => return,
         };
         is_whole = true;
-        each_chunk(&chunks, |chunk| {
+        let mut rest = chunks.as_slice();
+        while let Some((chunk, behind)) = Chunk::parse(rest) {
+            let octets = &rest[..rest.len() - behind.len()];
+            rest = behind;
             let is_in = stretch.holds(chunk.head.film);
             held.ticks.push_back((chunk.head.deadline, is_in));
             if is_in {
                 ticks += 1;
-                take(contents, Piece::Tick(*chunk));
+                take(contents, Piece::Tick(chunk, octets));
             }
-        });
+        }
     })?;
     if let Some(name) = stretch.seat.as_ref().filter(|name| contents.seat(name).is_none()) {
         let names: Vec<&str> = contents.seats.iter().map(|seat| seat.name.as_str()).collect();
@@ -155,7 +162,7 @@ fn each_drain(drains: &[u8], held: &mut HeldTicks, take: &mut dyn FnMut(Piece<'_
         while open.len() > rest.len() {
             let Some((chunk, behind)) = AckChunk::parse(open) else { return };
             if is_in {
-                take(Piece::Drain(chunk, &open[..open.len() - behind.len()]));
+                take(Piece::Drain(began, chunk, &open[..open.len() - behind.len()]));
             }
             open = behind;
         }
@@ -204,8 +211,12 @@ struct Cutting<W: Write + Seek> {
     maker: EntryMaker,
     scene: Option<SeatScene>,
     block: Option<Block>,
+    /// When its last tick was due.
+    last: MonoTime,
     /// Drains of the block that is not over.
     drains: Vec<u8>,
+    /// Ticks behind which what the ack thread took is still to come: of half a second all ticks stand before that.
+    open: VecDeque<Vec<u8>>,
     anonymous: Option<Anonymous>,
     film_time: bool,
     ticks: u64,
@@ -242,68 +253,103 @@ impl<W: Write + Seek> Cutting<W> {
         // A window for each tick, whatever the rate.
         let fold = Sampled::new(seats.clone(), 1_000_000);
         let block = manner.whole.then(Block::default);
-        let (film_time, drains, ticks) = (manner.film_time, Vec::new(), 0);
-        Ok(Self { file, fold, seats, taken, maker, scene, block, drains, anonymous, film_time, ticks })
+        Ok(Self {
+            file,
+            fold,
+            seats,
+            taken,
+            maker,
+            scene,
+            block,
+            last: MonoTime::default(),
+            drains: Vec::new(),
+            open: VecDeque::new(),
+            anonymous,
+            film_time: manner.film_time,
+            ticks: 0,
+        })
     }
 
     fn take(&mut self, piece: &Piece<'_>) -> Result<(), McapError> {
         match (piece, &self.anonymous) {
-            (Piece::Tick(chunk), None) => self.tick(chunk),
-            (Piece::Tick(chunk), Some(anonymous)) => {
-                let octets = anonymous.tick(chunk).unwrap_or_default();
-                Chunk::parse(&octets).map_or(Ok(()), |(chunk, _)| self.tick(&chunk))
+            (Piece::Tick(_, octets), None) => self.open.push_back(octets.to_vec()),
+            (Piece::Tick(chunk, _), Some(anonymous)) => self.open.extend(anonymous.tick(chunk)),
+            (Piece::Drain(began, chunk, octets), anonymous) => {
+                let octets = anonymous.as_ref().map_or_else(|| octets.to_vec(), |one| one.drain(chunk));
+                self.ticks_before(*began)?;
+                if let Some((chunk, _)) = AckChunk::parse(&octets) {
+                    self.fold.take_acks(&chunk);
+                }
+                if self.block.is_some() {
+                    self.drains.extend(octets);
+                }
             }
-            (Piece::Drain(..), _) if self.block.is_none() => Ok(()),
-            (Piece::Drain(_, octets), None) => {
-                self.drains.extend_from_slice(octets);
-                Ok(())
-            }
-            (Piece::Drain(chunk, _), Some(anonymous)) => {
-                self.drains.extend(anonymous.drain(chunk));
-                Ok(())
-            }
+            // On the clock alone, and nobody knows who is named in it.
+            (Piece::Note(at, topic, data), None) if !self.film_time => self.file.note(*at, topic, data)?,
+            (Piece::Note(..), _) => {}
         }
+        Ok(())
+    }
+
+    /// Takes the ticks that were due before an instant.
+    fn ticks_before(&mut self, until: MonoTime) -> Result<(), McapError> {
+        while let Some(octets) = self.open.pop_front() {
+            let Some((chunk, _)) = Chunk::parse(&octets) else { continue };
+            if chunk.head.deadline >= until {
+                self.open.push_front(octets);
+                break;
+            }
+            self.tick(&chunk)?;
+        }
+        Ok(())
     }
 
     fn tick(&mut self, chunk: &Chunk<'_>) -> Result<(), McapError> {
-        let Self { file, fold, seats, taken, maker, scene, block, drains, film_time, ticks, .. } = self;
+        let Self { file, fold, seats, taken, maker, scene, block, last, drains, film_time, ticks, .. } = self;
         *ticks += 1;
         let mut result = Ok(());
-        fold.take(chunk, &mut writer(file, taken, *film_time, &mut result));
-        result?;
         let film = MonoTime::from_nanos(chunk.head.film.as_nanos().max(0).cast_unsigned());
+        fold.take(chunk, &mut writer(file, taken, film_time.then_some(film), &mut result));
+        result?;
         let at = if *film_time { film } else { chunk.head.deadline };
         let of_scene = scene.iter_mut().flat_map(|scene| scene.take(chunk, seats, at, *maker));
         of_scene.into_iter().try_for_each(|entry| file.put(&entry))?;
-        match block.as_mut().and_then(|block| block.add(chunk, seats)) {
-            Some((at, block)) => {
-                file.write(at, &Message::Ticks(block))?;
-                file.write(at, &Message::Drains(std::mem::take(drains)))
-            }
-            None => Ok(()),
-        }
+        let full = block.as_mut().and_then(|block| block.add(chunk, seats));
+        // As of its last tick: by then its samples are told.
+        let at = std::mem::replace(last, chunk.head.deadline);
+        full.map_or(Ok(()), |(_, block)| put_block(file, at, block, drains))
     }
 
     fn finish(mut self) -> Result<W, McapError> {
-        let mut result = Ok(());
-        self.fold.close(&mut writer(&mut self.file, &self.taken, self.film_time, &mut result));
+        self.ticks_before(MonoTime::from_nanos(u64::MAX))?;
+        let (film, mut result) = (self.film_time.then(MonoTime::default), Ok(()));
+        self.fold.close(&mut writer(&mut self.file, &self.taken, film, &mut result));
         result?;
-        if let Some((at, block)) = self.block.as_mut().and_then(Block::close) {
-            self.file.write(at, &Message::Ticks(block))?;
-            self.file.write(at, &Message::Drains(std::mem::take(&mut self.drains)))?;
+        if let Some((_, block)) = self.block.as_mut().and_then(Block::close) {
+            put_block(&mut self.file, self.last, block, &mut self.drains)?;
         }
         self.file.finish(&[("ticks", self.ticks.to_string())], None)
     }
 }
 
-/// Writes what is of a seat that was asked for, on the axis of time that was.
+/// Writes a block whose last tick was then, and the drains so far.
+fn put_block<W: Write + Seek>(
+    file: &mut Recording<W>,
+    at: MonoTime,
+    block: Vec<u8>,
+    drains: &mut Vec<u8>,
+) -> Result<(), McapError> {
+    file.write(at, &Message::Ticks(block))?;
+    file.write(at, &Message::Drains(std::mem::take(drains)))
+}
+
+/// Writes what is of a seat that was asked for, by the clock or, where the film is given, by that.
 fn writer<'a, W: Write + Seek>(
     file: &'a mut Recording<W>,
     taken: &'a [bool],
-    film_time: bool,
+    mut film: Option<MonoTime>,
     result: &'a mut Result<(), McapError>,
 ) -> impl FnMut(MonoTime, Message) + 'a {
-    let mut film = MonoTime::default();
     move |at, message| {
         let film_s = match &message {
             Message::Seat(lane, _) if !taken[*lane] => return,
@@ -311,12 +357,12 @@ fn writer<'a, W: Write + Seek>(
             Message::Tick(sample) => Some(sample.film_s),
             _ => None,
         };
-        if let Some(film_s) = film_s {
+        if let (Some(film), Some(film_s)) = (&mut film, film_s) {
             let ns = ShowTime::from_secs_f64(film_s).as_nanos().max(0);
-            film = MonoTime::from_nanos(ns.cast_unsigned());
+            *film = MonoTime::from_nanos(ns.cast_unsigned());
         }
         if result.is_ok() {
-            *result = file.write(if film_time { film } else { at }, &message);
+            *result = file.write(film.unwrap_or(at), &message);
         }
     }
 }

@@ -74,6 +74,20 @@ pub(crate) struct LogNote {
     pub(crate) name: String,
 }
 
+/// A line as viewers want it: its time stands in it once more.
+#[derive(Serialize)]
+struct TimedLine<'a> {
+    timestamp: Timestamp,
+    #[serde(flatten)]
+    line: &'a LogNote,
+}
+
+#[derive(Serialize)]
+struct Timestamp {
+    sec: u64,
+    nsec: u64,
+}
+
 /// Where the film is that leads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct TimecodeNote {
@@ -117,14 +131,17 @@ impl Note {
         }
     }
 
-    /// As JSON.
-    pub(super) fn json(&self) -> serde_json::Result<Vec<u8>> {
+    /// As JSON, of that instant on the wall clock, ns since 1970.
+    pub(super) fn json(&self, wall: u64) -> serde_json::Result<Vec<u8>> {
         match self {
             Self::Hall(note) => serde_json::to_vec(note),
             Self::Event(note) => serde_json::to_vec(note),
             Self::Action(note) => serde_json::to_vec(note),
             Self::Mark(note) => serde_json::to_vec(note),
-            Self::Log(note) => serde_json::to_vec(note),
+            Self::Log(line) => {
+                let timestamp = Timestamp { sec: wall / 1_000_000_000, nsec: wall % 1_000_000_000 };
+                serde_json::to_vec(&TimedLine { timestamp, line })
+            }
             Self::Timecode(note) => serde_json::to_vec(note),
         }
     }
@@ -149,6 +166,8 @@ pub(crate) fn note_in_words(topic: &str, json: &str) -> Option<String> {
 pub(super) fn topics() -> [(&'static str, Value); 6] {
     let [text, number, count] = ["string", "number", "integer"].map(|kind| json!({"type": kind}));
     let names = json!({"type": "array", "items": {"type": "string"}});
+    let timestamp =
+        json!({"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}});
     let of = |title: &str, fields: &[(&str, &Value)]| {
         let fields: Vec<_> = fields.iter().map(|(name, kind)| (*name, (*kind).clone())).collect();
         schema(title, &fields, &[])
@@ -177,7 +196,13 @@ pub(super) fn topics() -> [(&'static str, Value); 6] {
             of("kinocue.action", &[("who", &text), ("what", &text), ("result", &text), ("state", &text)]),
         ),
         ("/mark", of("kinocue.mark", &[("film_s", &number), ("text", &text), ("who", &text)])),
-        ("/log", of("foxglove.Log", &[("level", &count), ("message", &text), ("name", &text)])),
+        (
+            "/log",
+            of(
+                "foxglove.Log",
+                &[("timestamp", &timestamp), ("level", &count), ("message", &text), ("name", &text)],
+            ),
+        ),
         (
             "/timecode",
             of(

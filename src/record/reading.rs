@@ -15,7 +15,7 @@ use super::read::{Contents, MOST, ReadError, Told, Wanted, owned};
 use super::recording::{ACKS, END, RECOVERED, REPORT, SENT};
 use super::sample_text::seat_sample;
 use super::seat::RecordedSeat;
-use crate::container::{self, ChannelRecord, SplitReader};
+use crate::container::{self, AttachmentRecord, ChannelRecord, SplitReader};
 use crate::plain::escaped;
 use crate::time::MonoTime;
 
@@ -217,7 +217,7 @@ impl<'a> Reading<'a> {
                 }
             }
             op::ATTACHMENT => {
-                if let Some((name, data)) = container::attachment(body) {
+                if let Some(AttachmentRecord { name, data, .. }) = AttachmentRecord::parse(body) {
                     self.contents.attachments.insert(name.to_owned(), data.len());
                     if name == REPORT && data.len() <= KEPT {
                         self.contents.report = Some(data.to_vec());

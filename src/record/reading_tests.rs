@@ -341,3 +341,117 @@ fn a_file_whose_disk_was_full_in_the_middle_of_a_chunk_is_cut_short_and_not_dama
     let (recovered, _) = recover(Cursor::new(&cut), Cursor::new(Vec::new())).unwrap();
     assert!(recovered.in_words() == "is cut short" && recovered.messages["/tick"] > 10, "{recovered:?}");
 }
+
+/// Viewers take the least log time of all chunks for that of the file, and a chunk without messages has 0.
+#[test]
+fn no_chunk_is_of_1970_whenever_the_first_message_comes_and_none_of_a_copy_is() {
+    let maker = EntryMaker::new(1, about().clocks);
+    let mut file =
+        Recording::open(Cursor::new(Vec::new()), &Opening::new(&about(), &[seat()]), maker).unwrap();
+    file.flush().unwrap();
+    file.attach("configuration.toml", "text/plain", b"[show]").unwrap();
+    for ms in (600..3_000).step_by(50) {
+        let note = EventNote { kind: "standing", seat: "A1".to_owned(), text: ms.to_string() };
+        file.write(MonoTime::from_nanos(ms * MS), &Message::Note(Note::Event(note))).unwrap();
+    }
+    let file = file.finish(&[], None).unwrap().into_inner();
+    let first = |file: &[u8]| chunks(file).into_iter().map(|(_, (from, _))| from).min().unwrap();
+    assert_eq!(first(&file), (1_000_000 + 600) * MS);
+    let mut changed = file.clone();
+    let (second, _) = chunks(&file)[1].clone();
+    changed[second.start + second.len() / 2] ^= 4;
+    for of in [&file, &changed] {
+        let copy = recover(Cursor::new(of), Cursor::new(Vec::new())).unwrap().1.into_inner();
+        assert_eq!(first(&copy), (1_000_000 + 600) * MS);
+        let attached = mcap::Summary::read(&copy).unwrap().unwrap().attachment_indexes;
+        assert_eq!(
+            (attached[0].media_type.as_str(), attached[0].name.as_str()),
+            ("text/plain", "configuration.toml")
+        );
+    }
+}
+
+/// A recording of three seconds in full, with a mark in its middle.
+fn marked() -> Vec<u8> {
+    let seats = [seat()];
+    let (Taps { ticks: mut tap, mut acks }, intake) =
+        Intake::new(seats.to_vec(), crate::time::Rate::from_hz(100.0), SAMPLE_HZ);
+    let mut intake = intake.in_full();
+    let about = About { mode: Mode::Full, ..about() };
+    let mut file = Recording::begin(Cursor::new(Vec::new()), &about, &seats).unwrap();
+    acks.take(&AckRecord::Standing(0, crate::health::HealthState::Ok));
+    for (tick, (wanted, sent)) in (0_u32..).zip(swing(300)) {
+        let at = MonoTime::from_nanos(u64::from(tick) * 10 * MS);
+        tap.asked(asked(wanted));
+        tap.frame(0, frame(sent, &mut [0; MAX_LEN]), at, crate::net::Delivery::Sent);
+        tap.tick(&head(u64::from(tick) * 10));
+        let running = crate::tracker::Fate::Answered(crate::wire::ReplyCode::Running);
+        match tick % 10 {
+            9 => acks.take(&AckRecord::Lost(0, u64::from(tick / 10 + 1))),
+            _ => acks.take(&AckRecord::Fate(0, FrameNo(tick), running, 2_000_000)),
+        }
+        acks.drained(at + std::time::Duration::from_millis(5));
+        intake.take(&mut |at, message| file.write(at, &message).unwrap());
+        if tick == 150 {
+            let mark = MarkNote { film_s: 1.5, text: "it jerked".to_owned(), who: "operator".to_owned() };
+            file.write(at, &Message::Note(Note::Mark(mark))).unwrap();
+        }
+    }
+    intake.close(&mut |at, message| file.write(at, &message).unwrap());
+    file.finish(&[], None).unwrap().into_inner()
+}
+
+/// The cut of a stretch of it, and its messages: topic, log time, and what it says as JSON.
+fn cut_of(from_ms: i64, manner: CutManner) -> (Vec<u8>, Vec<(String, u64, serde_json::Value)>) {
+    let until = ShowTime::from_millis(2_995);
+    let stretch = Stretch { from: ShowTime::from_millis(from_ms), until, seat: None };
+    let file = cut(marked().as_slice(), &stretch, manner, Cursor::new(Vec::new())).unwrap().0.into_inner();
+    let messages = mcap::MessageStream::new(&file).unwrap().map(Result::unwrap);
+    let all = messages.map(|one| {
+        let said = serde_json::from_slice(&one.data).unwrap_or_default();
+        (one.channel.topic.clone(), one.log_time, said)
+    });
+    let all = all.collect();
+    (file, all)
+}
+
+#[test]
+fn a_cut_has_what_became_of_its_frames_and_what_people_said_meanwhile() {
+    for anonymous in [false, true] {
+        let (_, all) = cut_of(0, CutManner { anonymous, ..CutManner::default() });
+        let seat: Vec<_> = all.iter().filter(|(topic, ..)| topic.starts_with("/seat/")).collect();
+        let sum = |key: &str| seat.iter().map(|(.., sample)| sample[key].as_u64().unwrap()).sum::<u64>();
+        assert_eq!([sum("sent"), sum("acked"), sum("lost")], [300, 270, 30], "anonymous: {anonymous}");
+        assert!(seat.iter().any(|(.., sample)| sample["standing"] == 0 && sample["ack_us"] == 2_000.0));
+        let marks = all.iter().filter(|(topic, _, mark)| topic == "/mark" && mark["text"] == "it jerked");
+        assert_eq!(marks.count(), usize::from(!anonymous));
+    }
+}
+
+#[test]
+fn a_cut_by_the_film_begins_where_its_stretch_does() {
+    let (_, all) = cut_of(1_000, CutManner { film_time: true, ..CutManner::default() });
+    let times: Vec<u64> = all.iter().map(|(_, at, _)| *at).collect();
+    assert_eq!((times.iter().min(), times.iter().max()), (Some(&(1_000 * MS)), Some(&(2_990 * MS))));
+}
+
+#[test]
+fn all_of_a_cut_stands_in_the_order_of_its_times() {
+    for anonymous in [false, true] {
+        let (file, all) = cut_of(0, CutManner { whole: true, anonymous, ..CutManner::default() });
+        assert!(all.iter().is_sorted_by_key(|(_, at, _)| *at), "anonymous: {anonymous}");
+        let contents = read(file.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
+        assert!(contents.faults.is_empty() && contents.trouble.is_none(), "{contents:?}");
+    }
+}
+
+#[test]
+fn a_line_of_the_log_has_its_time_as_viewers_want_it() {
+    let line = LogNote { level: 3, message: "late".to_owned(), name: "supervisor".to_owned() };
+    let entry = EntryMaker::new(1, about().clocks)
+        .entry(MonoTime::from_nanos(5 * MS), &Message::Note(Note::Log(line)))
+        .unwrap();
+    let told: serde_json::Value = serde_json::from_slice(&entry.data).unwrap();
+    assert_eq!(told["timestamp"], serde_json::json!({"sec": 1_000, "nsec": 5 * MS}));
+    assert_eq!((&told["level"], &told["message"]), (&3.into(), &"late".into()));
+}

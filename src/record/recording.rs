@@ -125,6 +125,19 @@ impl Opening {
         (self, first)
     }
 
+    /// Writes all channels with their schemas; gives their numbers.
+    fn declare<W: Write + Seek>(&self, writer: &mut Writer<W>) -> McapResult<Vec<u16>> {
+        let mut channels = Vec::new();
+        for (topic, schema, encoding) in &self.channels {
+            let schema = match self.schemas.get(*schema) {
+                Some((name, encoding, octets)) => writer.add_schema(name, encoding, octets)?,
+                None => 0,
+            };
+            channels.push(writer.add_channel(schema, topic, encoding, &BTreeMap::new())?);
+        }
+        Ok(channels)
+    }
+
     fn schema(&mut self, schema: &Value) -> usize {
         let name = schema["title"].as_str().unwrap_or_default().to_owned();
         self.schemas.push((name, "jsonschema".to_owned(), schema.to_string().into_bytes()));
@@ -190,7 +203,7 @@ impl EntryMaker {
             Message::State(state) => {
                 (self.seats + 1, serde_json::to_vec(&json!({"state": state_number(*state)}))?)
             }
-            Message::Note(note) => (self.seats + 1 + note.topic(), note.json()?),
+            Message::Note(note) => (self.seats + 1 + note.topic(), note.json(self.wall(at))?),
             Message::Ticks(block) => (self.seats + 1 + NOTE_TOPICS, block.clone()),
             Message::Drains(drains) => (self.seats + 2 + NOTE_TOPICS, packed(drains)),
         };
@@ -232,7 +245,11 @@ impl ChunkTime {
 pub(crate) struct Recording<W: Write + Seek> {
     writer: Writer<W>,
     written: ChunkTime,
+    /// Topics of all channels, and their numbers in the file.
+    topics: Vec<String>,
     channels: Vec<u16>,
+    /// What the first message is written behind: viewers take a chunk of channels alone for one of 1970.
+    undeclared: Option<Opening>,
     maker: EntryMaker,
     sequence: u32,
     last: u64,
@@ -260,19 +277,13 @@ impl<W: Write + Seek> Recording<W> {
         // By time alone, so that of a file that is cut short or damaged no more than a second is lost.
         let mut writer = options().chunk_size(None).create(out)?;
         write_metadata(&mut writer, "kinocue", opening.metadata.clone())?;
-        let mut channels = Vec::new();
-        for (topic, schema, encoding) in &opening.channels {
-            let schema = match opening.schemas.get(*schema) {
-                Some((name, encoding, octets)) => writer.add_schema(name, encoding, octets)?,
-                None => 0,
-            };
-            channels.push(writer.add_channel(schema, topic, encoding, &BTreeMap::new())?);
-        }
         let ticks = opening.channels.iter().position(|(topic, ..)| topic == "/tick");
         Ok(Self {
             writer,
             written: ChunkTime::default(),
-            channels,
+            topics: opening.channels.iter().map(|(topic, ..)| topic.clone()).collect(),
+            channels: Vec::new(),
+            undeclared: Some(opening.clone()),
             maker,
             sequence: 0,
             last: 0,
@@ -288,9 +299,16 @@ impl<W: Write + Seek> Recording<W> {
         self.put(&entry)
     }
 
+    /// Adds what was told under a topic in another file; under one that this lacks nothing.
+    pub(super) fn note(&mut self, at: MonoTime, topic: &str, data: &[u8]) -> McapResult<()> {
+        let channel = self.topics.iter().position(|one| one == topic).and_then(|at| u16::try_from(at).ok());
+        let Some(channel) = channel else { return Ok(()) };
+        self.put(&Entry { channel, log_time: self.maker.wall(at), data: data.to_vec() })
+    }
+
     /// Adds one that was made before; of a channel that the opening lacks nothing.
     pub(crate) fn put(&mut self, entry: &Entry) -> McapResult<()> {
-        if usize::from(entry.channel) >= self.channels.len() {
+        if usize::from(entry.channel) >= self.topics.len() {
             return Ok(());
         }
         self.last = self.last.max(entry.log_time);
@@ -303,13 +321,18 @@ impl<W: Write + Seek> Recording<W> {
 
     /// The log time up to which all is told; where there are no samples nothing waits for them.
     const fn told(&self) -> u64 {
-        if self.sampled == 0 { u64::MAX } else { self.sampled }
+        /// What a person or the hall tells comes so much later than the samples of that instant.
+        const LATE_NS: u64 = 50_000_000;
+        if self.sampled == 0 { u64::MAX } else { self.sampled.saturating_sub(LATE_NS) }
     }
 
     /// Writes what waits, in the order of its log times, up to one of these.
     fn settle(&mut self, until: u64) -> McapResult<()> {
-        let Self { writer, written, channels, sequence, waiting, .. } = self;
+        let Self { writer, written, channels, undeclared, sequence, waiting, .. } = self;
         waiting.hand_over(until, |channel, log_time, data| {
+            if let Some(opening) = undeclared.take() {
+                *channels = opening.declare(writer)?;
+            }
             if written.is_over(log_time) {
                 writer.flush()?;
             }

@@ -9,7 +9,7 @@ use mcap::{Attachment, McapError, Writer};
 
 use super::read::ReadError;
 use super::recording::{ChunkTime, RECOVERED, options};
-use crate::container::{self, ChannelRecord, LostChunk, Trouble};
+use crate::container::{self, AttachmentRecord, ChannelRecord, LostChunk, Trouble};
 
 /// Lost chunks that are kept account of.
 const LOST: usize = 10_000;
@@ -87,19 +87,18 @@ pub(crate) fn recover<W: Write + Seek>(
     let mut copy = Copy {
         writer: options().chunk_size(None).create(out)?,
         written: ChunkTime::default(),
+        undeclared: Vec::new(),
         schemas: BTreeMap::new(),
         channels: BTreeMap::new(),
         messages: BTreeMap::new(),
         is_recording: false,
     };
     // What a chunk that is lost said first stands in the summary again.
-    let mut known = Ok(());
     container::each_outside(&mut input, MOST, |opcode, body| {
-        if known.is_ok() && matches!(opcode, op::SCHEMA | op::CHANNEL) {
-            known = copy.record(opcode, body);
+        if matches!(opcode, op::SCHEMA | op::CHANNEL) {
+            copy.undeclared.push((opcode, body.to_vec()));
         }
     });
-    known?;
     input.seek(SeekFrom::Start(0))?;
     let mut lost = Vec::new();
     let saved = container::each_saved(
@@ -132,6 +131,8 @@ pub(crate) fn recover<W: Write + Seek>(
 struct Copy<W: Write + Seek> {
     writer: Writer<W>,
     written: ChunkTime,
+    /// Schemas and channels that the next message is written behind: viewers take a chunk of these alone for one of 1970.
+    undeclared: Vec<(u8, Vec<u8>)>,
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
     messages: BTreeMap<String, u64>,
@@ -143,6 +144,34 @@ impl<W: Write + Seek> Copy<W> {
     fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
         match opcode {
             op::METADATA => self.metadata(body),
+            op::SCHEMA | op::CHANNEL => {
+                self.undeclared.push((opcode, body.to_vec()));
+                Ok(())
+            }
+            op::MESSAGE => {
+                let declared = std::mem::take(&mut self.undeclared);
+                declared.iter().try_for_each(|(opcode, body)| self.declare(*opcode, body))?;
+                self.message(body)
+            }
+            op::ATTACHMENT => {
+                let Some(read) = AttachmentRecord::parse(body) else { return Ok(()) };
+                let AttachmentRecord { log_time, .. } = read;
+                let (name, media_type) = (read.name.to_owned(), read.media_type.to_owned());
+                let data = read.data.into();
+                Ok(self.writer.attach(&Attachment {
+                    log_time,
+                    create_time: log_time,
+                    name,
+                    media_type,
+                    data,
+                })?)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn declare(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
+        match opcode {
             op::SCHEMA => {
                 let Some((id, name, encoding, data)) = container::schema_of(body) else { return Ok(()) };
                 // The writer has the same number for the same.
@@ -150,7 +179,7 @@ impl<W: Write + Seek> Copy<W> {
                 self.schemas.insert(id, new);
                 Ok(())
             }
-            op::CHANNEL => {
+            _ => {
                 let Some(channel) = ChannelRecord::parse(body) else { return Ok(()) };
                 if self.channels.get(&channel.id).is_some_and(|(_, topic)| topic == channel.topic) {
                     return Ok(());
@@ -161,14 +190,6 @@ impl<W: Write + Seek> Copy<W> {
                 self.channels.insert(channel.id, (new, channel.topic.to_owned()));
                 Ok(())
             }
-            op::MESSAGE => self.message(body),
-            op::ATTACHMENT => {
-                let Some((name, data)) = container::attachment(body) else { return Ok(()) };
-                let (name, media_type) = (name.to_owned(), "application/json".to_owned());
-                let data = data.into();
-                Ok(self.writer.attach(&Attachment { log_time: 0, create_time: 0, name, media_type, data })?)
-            }
-            _ => Ok(()),
         }
     }
 

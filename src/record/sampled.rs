@@ -180,10 +180,8 @@ impl Sampled {
 
     /// Tells of the window that is not over, and of acks that came since there was one.
     pub(crate) fn close(&mut self, tell: &mut impl FnMut(MonoTime, Message)) {
-        if let Some(last) = self.last.take() {
-            self.closed = (last.deadline, last.film.as_secs_f64());
-            tell(last.deadline, Message::Tick(std::mem::take(&mut self.tick)));
-        }
+        let last = self.last.take();
+        self.closed = last.map_or(self.closed, |last| (last.deadline, last.film.as_secs_f64()));
         let (closed_at, closed_s) = self.closed;
         for (lane, window) in self.windows.iter_mut().enumerate() {
             let mut sample = std::mem::take(&mut window.sample);
@@ -202,6 +200,10 @@ impl Sampled {
                 window.told = window.standing;
                 tell(at, Message::Seat(lane, sample));
             }
+        }
+        // Last: by it a file knows that all samples up to then are told.
+        if let Some(last) = last {
+            tell(last.deadline, Message::Tick(std::mem::take(&mut self.tick)));
         }
     }
 

@@ -103,8 +103,7 @@ fn each<W: Write>(
 ) -> Result<(W, Contents), Failure> {
     let mut result = Ok(());
     let contents = each_tick(open(path)?, stretch, &mut |contents, piece| {
-        let Piece::Tick(chunk) = piece else { return };
-        let chunk = &chunk;
+        let Piece::Tick(chunk, _) = &piece else { return };
         if result.is_ok() {
             result = row(&mut out, contents, chunk);
         }

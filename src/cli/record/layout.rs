@@ -18,15 +18,17 @@ pub(in super::super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let seat = &args.seat;
+    let topic = topic_of(seat);
     let path = |value: String| json!({"value": value, "enabled": true, "timestampMethod": "receiveTime"});
-    let places = (0..args.axes)
-        .flat_map(|axis| ["asked", "sent"].map(|what| format!("/seat/{seat}.{what}_mm[{axis}]")));
+    let places =
+        (0..args.axes).flat_map(|axis| ["asked", "sent"].map(|what| format!("{topic}.{what}_mm[{axis}]")));
     let plot = |title: String, paths: Vec<_>| {
         json!({
             "foxglovePanelTitle": title, "lichtblickPanelTitle": title, "paths": paths, "xAxisVal": "timestamp",
+            "legendDisplay": "left", "sidebarDimension": 240,
         })
     };
-    let of_seat = |what: &str| format!("/seat/{seat}.{what}");
+    let of_seat = |what: &str| format!("{topic}.{what}");
     let late = ["/tick.late_max_us".to_owned(), of_seat("ack_max_us")];
     let wrong = ["clamps", "lost", "refused", "unsent"].map(of_seat);
     let states = ["/hall.state".to_owned(), of_seat("standing")]
@@ -59,4 +61,27 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         },
     }))?;
     Ok(Exit::Done)
+}
+
+/// The topic of a seat as paths of viewers have it: quoted where its name has more than letters, digits, `-` and `_`.
+fn topic_of(seat: &str) -> String {
+    let topic = format!("/seat/{seat}");
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '/');
+    if topic.chars().all(is_plain) {
+        topic
+    } else {
+        format!("\"{}\"", topic.replace('\\', "\\\\").replace('"', "\\\""))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_no_path_can_have_is_quoted() {
+        assert_eq!(topic_of("F4"), "/seat/F4");
+        assert_eq!(topic_of("Row A.2"), r#""/seat/Row A.2""#);
+        assert_eq!(topic_of(r#"a"b\c"#), r#""/seat/a\"b\\c""#);
+    }
 }
