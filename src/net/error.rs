@@ -1,7 +1,7 @@
 //! Why the sockets of a show cannot be opened.
 
 use std::io;
-use std::net::SocketAddrV4;
+use std::net::{Ipv4Addr, SocketAddrV4};
 
 use crate::sys::file::want_of_files;
 
@@ -16,6 +16,20 @@ pub enum NetError {
     /// An address that is no single controller's.
     #[error("{0} is not the address of one controller; give its own IPv4 address and a port from 1 to 65535")]
     NotUnicast(SocketAddrV4),
+
+    /// A broadcast would not come from where its controllers answer to.
+    #[error(
+        "what is broadcast to {network} would leave from {from}, and what goes to its controllers alone from {other}; bind that \
+         address in [show], or take the [broadcast] table out"
+    )]
+    OtherWay {
+        /// The broadcast address.
+        network: SocketAddrV4,
+        /// From where it would leave.
+        from: Ipv4Addr,
+        /// From where the rest does.
+        other: Ipv4Addr,
+    },
 
     /// The system refused.
     #[error("cannot {attempt} {address}; {remedy}")]

@@ -224,3 +224,29 @@ fn a_send_that_fails_says_why_and_what_to_do() {
     assert_eq!((fault.errno(), fault.refused()), (libc::EMSGSIZE, false));
     assert!(fault.to_string().contains("too long"), "{fault}");
 }
+
+#[test]
+fn one_datagram_reaches_all_of_a_network_from_where_its_controllers_answer_to_and_each_answer_is_that_of_its_own()
+ {
+    let any = UdpSocket::bind("0.0.0.0:0").unwrap();
+    any.set_read_timeout(Some(PATIENCE)).unwrap();
+    let port = any.local_addr().unwrap().port();
+    let address = SocketAddrV4::new(Ipv4Addr::LOCALHOST, port);
+    let whole = Whole { address: SocketAddrV4::new(Ipv4Addr::new(127, 255, 255, 255), port), lanes: vec![0] };
+    let ports = Ports::open_with(LOOPBACK, &[address], &[whole]).unwrap();
+    let local = ports.local();
+    assert!(bind_shared(local).is_err(), "nobody else can have the port");
+    let (sender, mut receiver) = ports.split();
+    assert_eq!(sender.send_to_all(0, b"all"), Delivery::Sent);
+    let mut buffer = [0; 10];
+    let (len, from) = any.recv_from(&mut buffer).unwrap();
+    assert_eq!((&buffer[..len], v4(from)), (&b"all"[..], local));
+    any.send_to(b"here", from).unwrap();
+    let got = collect(&mut receiver, 1);
+    assert_eq!((got[0].0, got[0].1.as_slice()), (Origin::Controller(0), &b"here"[..]));
+    assert_eq!(receiver.lanes(), 1);
+
+    let lead = std::sync::Arc::new(Lead::default());
+    let led = sender.led_by(Some(lead));
+    assert_eq!(led.send_to_all(0, b"no"), Delivery::Failed(SendFault::NOT_LEADING));
+}

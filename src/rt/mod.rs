@@ -4,6 +4,7 @@
 //! happened before it or happens on another thread; values cross in bounded single-producer mailboxes.
 
 mod acks;
+mod broadcast;
 mod conductor;
 mod desk;
 #[cfg(test)]
@@ -15,6 +16,7 @@ mod live;
 mod mail;
 mod places;
 mod planning;
+mod sending;
 mod spin;
 mod standby;
 mod table;
@@ -23,6 +25,7 @@ mod watch;
 mod withdrawn;
 
 pub use acks::{Accounts, AckLoop};
+pub use broadcast::Broadcasts;
 pub use conductor::Conductor;
 pub use desk::Desk;
 pub use film::FilmLead;
@@ -55,17 +58,26 @@ use crate::belief::Taken;
 use crate::drive::{Lane, Stamped};
 use crate::engine::{Ending, Engine, EngineEvent, Step};
 use crate::motion::Pose;
-use crate::net::{Delivery, Sender};
+use crate::net::{Delivery, SendFault, Sender};
 use crate::record::{Asked, TickHead};
 use crate::state::{Refusal, State, Transition, Why};
 use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};
 use crate::wire::MAX_LEN;
+use sending::Sending;
 use timed::StartTurn;
 
 /// Where the frames of a tick go.
 pub trait FrameSink {
     /// Hands one lane's datagram to the kernel, `at` being now; never blocks.
     fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery;
+
+    /// Hands the kernel one datagram for all controllers of a network ([`Broadcasts`]); never blocks.
+    fn send_to_all(&mut self, _network: usize, _datagram: &[u8]) -> Delivery {
+        Delivery::Failed(SendFault::of(libc::EOPNOTSUPP))
+    }
+
+    /// A lane's frame was that one, with this fate; for whoever records.
+    fn went_along(&mut self, _lane: usize, _datagram: &[u8], _at: MonoTime, _delivery: Delivery) {}
 
     /// The next frame comes of that; for whoever records.
     fn asked(&mut self, _asked: Asked) {}
@@ -282,25 +294,10 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     /// Sends to every lane that gets a frame; says how long after its deadline the first left, nanoseconds.
     fn send(&mut self, tick: Tick) -> u64 {
         let mut buf = [0; MAX_LEN];
-        let mut first = None;
         let Self { lanes, places, engine, mail, sink, clock, .. } = self;
-        for (index, lane) in lanes.iter_mut().enumerate() {
-            if !engine.lane(index).gets_a_frame() {
-                continue;
-            }
-            let at = clock.now();
-            let Some(beat) = places.admit(index, engine, at) else { continue };
-            let (motion, pose) = (engine.lane(index), engine.lane(index).pose());
-            let (stamped, datagram) = lane.encode(&beat, pose, motion.mix(), &mut buf);
-            first.get_or_insert(at);
-            let (lasts_ms, at_most_ms) = (beat.lasts_ms, beat.at_most_ms());
-            let (slots, level) = (lane.window.slots().len(), motion.level());
-            sink.asked(Asked { pose: *motion.asked(), slots, level, clamps: motion.clamps().clamps });
-            let sent = Outgoing { index, stamped, pose, lasts_ms, at_most_ms, at };
-            sent.hand_over(datagram, places, mail, sink);
-            mail.clamps(index, motion.clamps().clamps);
-        }
-        let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
+        let mut sending = Sending { lanes, places, engine, mail, sink, clock: *clock, first: None };
+        sending.send_all(&mut buf);
+        let late_ns = nanos(sending.first.unwrap_or(tick.deadline).since(tick.deadline));
         self.mail.report(TickReport { late_ns, missed: tick.missed });
         late_ns
     }
