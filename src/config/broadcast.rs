@@ -1,4 +1,4 @@
-//! `[broadcast.NAME]`: a network whose controllers may get one datagram together; without a table there is none.
+//! `[broadcast.NAME]`: the network whose controllers may get one datagram together; without a table there is none.
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
@@ -80,12 +80,14 @@ impl Network4 {
         ip.to_bits() & self.mask() == self.first.to_bits()
     }
 
-    const fn overlaps(self, other: Self) -> bool {
-        self.holds(other.first) || other.holds(self.first)
+    /// How many bits all of its addresses have in common.
+    pub(crate) const fn bits(self) -> u8 {
+        self.bits
     }
 }
 
-/// Reads the tables. What is reached together has to be of one kind, and all that the code means has to be in the network.
+/// Reads the table. What is reached together has to be of one kind, and the code has to mean all of the network and nobody else. There is
+/// one at the most: whoever is on a wire may take what is broadcast to any network on it, and whose answers are whose nobody could tell.
 pub(super) fn broadcasts(
     entry: Entry<'_>,
     controllers: &[Controller],
@@ -99,14 +101,19 @@ pub(super) fn broadcasts(
     for (name, value) in table {
         let entry = Entry::new(name.get_ref(), value);
         let Some((network, accept)) = one(entry, faults) else { continue };
-        if let Some(other) = read.iter().find(|other| other.network.overlaps(network)) {
-            entry
-                .fault(faults, &format!("shares addresses with broadcast.{}; give each its own", other.name));
+        if let Some(other) = read.first() {
+            let why = format!(
+                "broadcast.{} is there already, and a hall broadcasts to one network: what goes to one may be taken by whoever is on \
+                 the same wire; take one of them out",
+                other.name
+            );
+            entry.fault(faults, &why);
             continue;
         }
         let stations = all().filter_map(|one| Some((one, one.station()?)));
-        let members: Vec<_> = stations.filter(|(_, at)| network.holds(*at.address.ip())).collect();
-        match port_of(&members, network, accept, frame_port) {
+        let (members, others): (Vec<_>, Vec<_>) = stations.partition(|(_, at)| network.holds(*at.address.ip()));
+        let accept = accept.unwrap_or_else(|| narrowest(&members));
+        match port_of(&members, &others, network, accept, frame_port) {
             Err(why) => entry.fault(faults, &why),
             Ok(port) => read.push(BroadcastNetwork {
                 name: entry.key.to_owned(),
@@ -120,7 +127,15 @@ pub(super) fn broadcasts(
     read
 }
 
-fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<(Network4, Code)> {
+/// The code that means all of these, and as few others as can be.
+fn narrowest(members: &[(&Controller, &Station)]) -> Code {
+    let mut codes = members.iter().map(|(_, at)| Code::station(at.address.ip().octets()).0 | 0xff);
+    let first = codes.next().unwrap_or(Code::ALL.0);
+    if codes.all(|other| other == first) { Code(first) } else { Code::ALL }
+}
+
+/// The network, and the code where the table has one.
+fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<(Network4, Option<Code>)> {
     let table = entry.table(faults)?;
     let mut section = Section::new(format!("[broadcast.{}]", entry.key), entry.at, table, faults);
     section.require(&["network"]);
@@ -128,25 +143,28 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<(Network4, Code)> {
         let parsed = Network4::parse(entry.text(section.faults)?);
         parsed.map_err(|why| entry.fault(section.faults, &why)).ok()
     });
-    let accept = match section.get("accept") {
-        None => Some(Code::ALL),
-        Some(entry) => entry.code(section.faults).map(Code),
-    };
+    let accept = section.get("accept").map(|entry| entry.code(section.faults).map(Code));
+    if section.get("alone").and_then(|entry| entry.switch(section.faults)) != Some(true) {
+        let why = "needs alone = true: a controller that answers nobody, or another machine, is moved by broadcasts, and nobody here hears \
+                   of it; write that once a person has seen that no controller is on this wire but those of this file";
+        entry.fault(section.faults, why);
+    }
     section.finish();
-    Some((network?, accept?))
+    Some((network?, accept.map_or(Some(None), |code| code.map(Some))?))
 }
 
 /// The one port of these controllers; why one datagram cannot be for all of them, if so.
 fn port_of(
     members: &[(&Controller, &Station)],
+    others: &[(&Controller, &Station)],
     network: Network4,
     accept: Code,
     frame_port: u16,
 ) -> Result<u16, String> {
-    let [(first, station), others @ ..] = members else {
+    let [(first, station), rest @ ..] = members else {
         return Err("no controller is in this network; take the table out, or correct the network".to_owned());
     };
-    if others.is_empty() {
+    if rest.is_empty() {
         return Err(format!("{} is alone in this network; a broadcast is for two or more", first.name));
     }
     if station.address.port() == frame_port {
@@ -154,12 +172,21 @@ fn port_of(
             "port {frame_port} is that of [show] bind as well, so that this machine would hear its own broadcasts; bind another"
         ));
     }
+    let is_meant = |ip: Ipv4Addr| accept.matches(Code::station(ip.octets()));
+    if let Some((one, at)) = others.iter().find(|(_, at)| is_meant(*at.address.ip())) {
+        return Err(format!(
+            "accept {accept} means {} at {} as well, which is not in this network; give a code that means nobody but its controllers, or \
+             take the table out",
+            one.name,
+            at.address.ip()
+        ));
+    }
     for (one, at) in members {
         let (name, ip) = (&one.name, *at.address.ip());
         if ip == network.first || ip == network.broadcast() {
             return Err(format!("{ip} of {name} is no single address of this network; correct the network"));
         }
-        if !accept.matches(Code::station(ip.octets())) {
+        if !is_meant(ip) {
             return Err(format!(
                 "accept {accept} does not mean {name} at {ip}; every controller of the network has to take it"
             ));
@@ -174,7 +201,7 @@ fn port_of(
         ];
         if let Some((what, _)) = differs.iter().find(|(_, same)| !same) {
             return Err(format!(
-                "{name} has another {what} than {}, so that no frame is for both; give it a network of its own",
+                "{name} has another {what} than {}, so that no frame is for both; take it off this network, or the table out",
                 first.name
             ));
         }
@@ -210,7 +237,7 @@ mod tests {
         let hall = hall(
             "[[controller]]\nname = \"A3\"\nseat = \"s\"\naddress = \"192.168.15.3:7408\"\nenabled = false\n\
              [[controller]]\nname = \"B1\"\nseat = \"s\"\naddress = \"192.168.16.3:7408\"\n\
-             [broadcast.row_a]\nnetwork = \"192.168.15.0/24\"\naccept = \"0fff\"",
+             [broadcast.row_a]\nalone = true\nnetwork = \"192.168.15.0/24\"\naccept = \"0fff\"",
         );
         let [row] = &hall.unwrap().broadcasts[..] else { panic!("one") };
         assert_eq!(row.address(), "192.168.15.255:7408".parse().unwrap());
@@ -220,15 +247,15 @@ mod tests {
 
     #[test]
     fn a_network_that_is_none_or_holds_nobody_or_one_alone_is_refused() {
-        let with = |network: &str| fault(&format!("[broadcast.a]\nnetwork = \"{network}\""));
+        let with = |network: &str| fault(&format!("[broadcast.a]\nalone = true\nnetwork = \"{network}\""));
         for network in ["192.168.15.0", "192.168.15.0/31", "192.168.15.0/7", "all/24"] {
             assert!(with(network).contains("is not a network, such as 192.168.15.0/24"), "{network}");
         }
         assert!(with("192.168.15.1/24").contains("write 192.168.15.0/24"));
         assert!(with("10.0.0.0/8").contains("no controller is in this network"));
         assert!(with("192.168.15.2/31").contains("is not a network"));
-        assert!(hall("[broadcast.a]\nnetwork = \"192.168.15.0/30\"").is_ok());
-        assert!(fault("[broadcast.a]\naccept = \"0fff\"").contains("has no network, which is needed"));
+        assert!(hall("[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/30\"").is_ok());
+        assert!(fault("[broadcast.a]\nalone = true\naccept = \"0fff\"").contains("has no network, which is needed"));
     }
 
     #[test]
@@ -236,7 +263,7 @@ mod tests {
         let beside = |more: &str| {
             fault(&format!(
                 "[[controller]]\nname = \"A3\"\nseat = \"s\"\naddress = \"192.168.15.3:{more}\n\
-                 [broadcast.a]\nnetwork = \"192.168.15.0/24\""
+                 [broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\""
             ))
         };
         for (more, what) in [
@@ -253,7 +280,7 @@ mod tests {
     #[test]
     fn a_code_that_leaves_a_controller_of_the_network_out_is_refused() {
         let with = |accept: &str| {
-            hall(&format!("[broadcast.a]\nnetwork = \"192.168.15.0/24\"\naccept = \"{accept}\""))
+            hall(&format!("[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\naccept = \"{accept}\""))
         };
         assert!(with("ffff").is_ok());
         assert!(with("0eff").unwrap_err().contains("accept 0eff does not mean A1 at 192.168.15.1"));
@@ -263,10 +290,51 @@ mod tests {
     }
 
     #[test]
-    fn networks_that_share_addresses_and_the_port_of_this_machine_are_refused() {
-        let two = "[broadcast.a]\nnetwork = \"192.168.15.0/24\"\n[broadcast.b]\nnetwork = \"192.168.0.0/16\"";
-        assert!(fault(two).contains("b: shares addresses with broadcast.a"));
-        let own = fault("[broadcast.a]\nnetwork = \"192.168.15.0/24\"\n[show]\nbind = \"0.0.0.0:7408\"");
+    fn the_code_is_as_narrow_as_the_network_lets_it_be_unless_another_is_given() {
+        let code = |more: &str| hall(more).unwrap().broadcasts[0].accept;
+        assert_eq!(code("[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\""), Code(0x0fff));
+        let wide = "[[controller]]\nname = \"B1\"\nseat = \"s\"\naddress = \"192.168.14.3:7408\"\n[broadcast.a]\nalone = true\n\
+                    network = \"192.168.14.0/23\"";
+        assert_eq!(code(wide), Code::ALL);
+    }
+
+    #[test]
+    fn a_code_that_means_a_controller_outside_of_the_network_is_refused_be_it_enabled_or_not() {
+        for enabled in [true, false] {
+            for (address, accept) in [("192.168.16.3", "ffff"), ("192.168.16.3", "ff03"), ("10.0.15.7", "0fff")] {
+                let told = fault(&format!(
+                    "[[controller]]\nname = \"A3\"\nseat = \"s\"\naddress = \"192.168.15.3:7408\"\n\
+                     [[controller]]\nname = \"B1\"\nseat = \"s\"\naddress = \"{address}:7408\"\nenabled = {enabled}\n\
+                     [broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\naccept = \"{accept}\""
+                ));
+                let wanted = format!("accept {accept} means B1 at {address} as well");
+                assert!(told.contains(&wanted), "{told}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_second_network_is_refused_wherever_it_is() {
+        for other in ["192.168.15.0/24", "192.168.16.0/24", "10.0.0.0/8"] {
+            let two = format!(
+                "[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\n[broadcast.b]\nalone = true\nnetwork = \"{other}\""
+            );
+            assert!(fault(&two).contains("b: broadcast.a is there already"), "{other}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_broadcast_before_a_person_has_said_that_nobody_else_is_on_the_wire() {
+        for alone in ["", "alone = false"] {
+            let told = fault(&format!("[broadcast.a]\nnetwork = \"192.168.15.0/24\"\n{alone}"));
+            assert!(told.contains("a: needs alone = true"), "{told}");
+        }
+    }
+
+    #[test]
+    fn the_port_of_this_machine_is_refused() {
+        let own =
+            fault("[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\n[show]\nbind = \"0.0.0.0:7408\"");
         assert!(own.contains("would hear its own broadcasts"), "{own}");
     }
 }

@@ -193,7 +193,7 @@ impl Kind {
     fn network(&self) -> Vec<BroadcastNetwork> {
         let (axes, mbox) = (self.axes[0], self.dialect == Dialect::Mbox);
         let mut text = format!(
-            "[broadcast.all]\nnetwork = \"127.0.1.0/24\"\n[seat.s]\naxes = {axes}\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 10000\n\
+            "[broadcast.all]\nalone = true\nnetwork = \"127.0.1.0/24\"\n[seat.s]\naxes = {axes}\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 10000\n\
              max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n"
         );
         for seat in 1..=self.axes.len() {

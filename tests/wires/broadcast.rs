@@ -94,7 +94,7 @@ impl Town {
         let rows = (0..=seconds * 20).map(|row| (50 * row, height(50 * row)));
         let rows: String = rows.map(|(ms, at)| format!("{ms},{at:.6},{at:.6},{at:.6}\n")).collect();
         fs::write(&cue, format!("# kinocue-csv: 1\ntime_ms,a1,a2,a3\n{rows}")).expect("the folder is ours");
-        let mut text = "[show]\nrate_hz = 50\nbind = \"10.77.0.1:8410\"\n[broadcast.stalls]\nnetwork = \"10.77.0.0/24\"\naccept = \"00ff\"\n\
+        let mut text = "[show]\nrate_hz = 50\nbind = \"10.77.0.1:8410\"\n[broadcast.stalls]\nalone = true\nnetwork = \"10.77.0.0/24\"\n\
              [seat.bench3]\naxes = 3\nstroke_mm = 150.0\nlead_mm = 5.0\npulses_per_rev = 10000\nmax_velocity_mm_s = 240.0\n\
              max_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\n"
             .to_owned();
