@@ -31,6 +31,26 @@ pub enum NetError {
         other: Ipv4Addr,
     },
 
+    /// A broadcast would go to no network of this machine.
+    #[error(
+        "{0} is the broadcast address of no network of this machine; correct the network in [broadcast], or this machine's address and mask"
+    )]
+    NoBroadcast(SocketAddrV4),
+
+    /// A controller is not where a broadcast goes.
+    #[error(
+        "{controller} is not reached by the network of {bits} bits that {network} goes to; correct the network in [broadcast], or the \
+         addresses, masks and routes of this machine"
+    )]
+    OffTheWire {
+        /// The broadcast address.
+        network: SocketAddrV4,
+        /// How many bits the addresses of its network have in common.
+        bits: u8,
+        /// The controller.
+        controller: SocketAddrV4,
+    },
+
     /// The system refused.
     #[error("cannot {attempt} {address}; {remedy}")]
     Refused {

@@ -16,6 +16,7 @@ mod schedule;
 mod send;
 #[cfg(test)]
 mod tests;
+mod way;
 
 use std::net::SocketAddrV4;
 use std::sync::Arc;
@@ -52,6 +53,8 @@ pub struct Ports {
 pub(crate) struct Whole {
     /// Its broadcast address.
     pub(crate) address: SocketAddrV4,
+    /// How many bits all addresses of it have in common.
+    pub(crate) bits: u8,
     /// The controllers in it, by their places among the peers.
     pub(crate) lanes: Vec<usize>,
 }
@@ -81,8 +84,9 @@ impl Ports {
     /// answers does so to the socket of its own address.
     ///
     /// # Errors
-    /// As [`Ports::open`], and [`NetError::OtherWay`] where a broadcast would leave from another address than what goes to a
-    /// controller alone: its reply would not be taken for that controller's.
+    /// As [`Ports::open`]; [`NetError::NoBroadcast`] and [`NetError::OffTheWire`] where a broadcast would not go to the controllers of the
+    /// network and no farther; [`NetError::OtherWay`] where it would leave from another address than what goes to a controller alone:
+    /// its reply would not be taken for that controller's.
     pub(crate) fn open_with(
         bind: SocketAddrV4,
         peers: &[SocketAddrV4],

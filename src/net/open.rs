@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicU64;
 
 use socket2::{Domain, Protocol, Socket, Type};
 
+use super::way::way;
 use super::{Lane, NetError, Ports, Whole};
 use crate::sys::batch::{Batch, stamp_arrivals};
 use crate::sys::clock::Monotonic;
@@ -32,7 +33,7 @@ pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4], wholes: &[Whole])
     stamp_arrivals(&stray).map_err(at_bind)?;
 
     let lanes = peers.iter().map(|&peer| lane(local, peer)).collect::<Result<Vec<_>, _>>()?;
-    let broadcasts = wholes.iter().map(|one| whole(local, one, &lanes)).collect::<Result<Vec<_>, _>>()?;
+    let broadcasts = wholes.iter().map(|one| whole(local, one, peers, &lanes)).collect::<Result<Vec<_>, _>>()?;
 
     for socket in lanes.iter().chain(&broadcasts).map(|lane| &lane.socket).chain([&stray]) {
         socket.set_reuse_address(false).map_err(at_bind)?;
@@ -73,13 +74,28 @@ fn lane(local: SocketAddrV4, peer: SocketAddrV4) -> Result<Lane, NetError> {
     connected(local, peer, "reach the controller", |_| Ok(()))
 }
 
-/// The socket of a network that is sent to as a whole. What it sends has to come from where its controllers answer to.
-fn whole(local: SocketAddrV4, network: &Whole, lanes: &[Lane]) -> Result<Lane, NetError> {
-    let Whole { address, lanes: members } = network;
-    let whole = connected(local, *address, "broadcast to", |socket| socket.set_broadcast(true))?;
+/// The socket of a network that is sent to as a whole. What it sends has to go to where its controllers are, and nowhere else: no router
+/// carries it on, whatever becomes of the routes. And it has to come from where they answer to.
+fn whole(
+    local: SocketAddrV4,
+    network: &Whole,
+    peers: &[SocketAddrV4],
+    lanes: &[Lane],
+) -> Result<Lane, NetError> {
+    let Whole { address, bits, lanes: members } = network;
     let at = |cause| NetError::refused("broadcast to", *address, cause);
+    let to_all = way(*local.ip(), *address.ip()).map_err(at)?;
+    if !to_all.is_broadcast {
+        return Err(NetError::NoBroadcast(*address));
+    }
+    let set = |socket: &Socket| socket.set_broadcast(true).and_then(|()| socket.set_ttl_v4(1));
+    let whole = connected(local, *address, "broadcast to", set)?;
     let from = *local_address(&whole.socket).map_err(at)?.ip();
     for member in members {
+        let to_one = way(*local.ip(), *peers[*member].ip()).map_err(at)?;
+        if to_one.is_carried_on || to_one.bits != *bits || to_one.interface != to_all.interface {
+            return Err(NetError::OffTheWire { network: *address, bits: *bits, controller: peers[*member] });
+        }
         let other = *local_address(&lanes[*member].socket).map_err(at)?.ip();
         if other != from {
             return Err(NetError::OtherWay { network: *address, from, other });

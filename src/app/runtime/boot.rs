@@ -18,6 +18,7 @@ pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> 
     let peers: Vec<_> = stations.iter().map(|one| one.connection.address).collect();
     let whole = |one: &BroadcastNetwork| Whole {
         address: one.address(),
+        bits: one.network.bits(),
         lanes: (0..peers.len()).filter(|lane| one.network.holds(*peers[*lane].ip())).collect(),
     };
     let wholes: Vec<_> = config.broadcasts.iter().map(whole).collect();
