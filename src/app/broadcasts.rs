@@ -6,7 +6,7 @@ use crate::rt::Live;
 
 /// All of them, in the order of the configuration; none where it has none.
 pub(super) fn status(controllers: &[Controller], live: &Live) -> Vec<BroadcastStatus> {
-    let name = |lane: usize| controllers.get(lane).map_or("?", |one| one.name.as_str());
+    let name = |lane: usize| controllers.get(lane).map_or_else(String::new, name);
     let all = live.broadcasts().map_or(&[][..], |broadcasts| broadcasts.all());
     let status = all.iter().map(|one| {
         let [together, apart] = one.ticks();
@@ -24,7 +24,7 @@ pub(super) fn status(controllers: &[Controller], live: &Live) -> Vec<BroadcastSt
 
 /// Those for which somebody has to do something: sentences that end with what.
 pub(super) fn troubles(controllers: &[Controller], live: &Live) -> Vec<String> {
-    let name = |lane: usize| controllers.get(lane).map_or("?", |one| one.name.as_str());
+    let name = |lane: usize| controllers.get(lane).map_or_else(String::new, name);
     let all = live.broadcasts().map_or(&[][..], |broadcasts| broadcasts.all());
     let trouble = all.iter().filter_map(|one| {
         let permit = one.permit();
@@ -32,4 +32,10 @@ pub(super) fn troubles(controllers: &[Controller], live: &Live) -> Vec<String> {
         Some(format!("[broadcast.{}]: {words}; {remedy}", one.name))
     });
     trouble.collect()
+}
+
+/// What a controller is called, and where it is.
+fn name(controller: &Controller) -> String {
+    let at = controller.station().map(|station| format!(" ({})", station.address));
+    format!("{}{}", controller.name, at.unwrap_or_default())
 }

@@ -1,12 +1,18 @@
 //! Networks whose controllers may get one datagram together: who is in them, whether that may be now, and how often it was. The ack
-//! thread permits it and takes it back, the tick thread asks before each datagram, and whoever looks reads; nobody waits.
+//! thread permits it and takes it back, the tick thread asks before each datagram, and whoever looks reads; nobody waits. A permit is as
+//! old as the question that it rests on: it is none for what began after that, nor for longer than [`FRESH`], whoever has stopped asking.
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use crate::config::Config;
 use crate::published::SharedWord;
+use crate::time::MonoTime;
 use crate::wire::Code;
+
+/// How long who answered a question is taken for who is there.
+pub(crate) const FRESH: Duration = Duration::from_secs(10);
 
 /// All of them.
 #[derive(Debug)]
@@ -26,6 +32,10 @@ pub(crate) struct Broadcast {
     /// Who takes what goes to all, and answers where it asks.
     pub(crate) code: Code,
     permit: SharedWord,
+    /// When the question went out that the newest permit rests on, ns.
+    asked: SharedWord,
+    /// When frames were last not to leave as one, because the hall was not on the cue or a lane was out, ns. Tick thread.
+    rested: SharedWord,
     /// Ticks whose frames left as one datagram, and as one for each.
     together: AtomicU64,
     apart: AtomicU64,
@@ -39,7 +49,7 @@ pub(crate) enum Permit {
     /// Nobody has looked who answers.
     #[default]
     Unasked,
-    /// All and nobody else answered when that was asked, and take part since.
+    /// All and nobody else answered when that was asked last, each once, and take part since.
     Given,
     /// That controller does not take part.
     Out(usize),
@@ -49,6 +59,8 @@ pub(crate) enum Permit {
     Foreign(usize),
     /// Somebody else did: for good.
     Stranger(SocketAddrV4),
+    /// Two answered as that controller: for good.
+    Twice(usize),
     /// A controller of the network is out for good, and would take frames all the same.
     Absent,
     /// No frame asks for a reply, so that nobody would know who takes it.
@@ -58,7 +70,7 @@ pub(crate) enum Permit {
 /// Why the frames of a tick left one by one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Apart {
-    /// The permit is missing.
+    /// The permit is missing, or older than what it would be for.
     NoPermit,
     /// No frame of this tick goes to that lane, or one of its own.
     Out(usize),
@@ -80,6 +92,7 @@ impl Permit {
             Self::Stranger(at) => of(5, u64::from(at.ip().to_bits()) << 16 | u64::from(at.port())),
             Self::Absent => of(6, 0),
             Self::NoAcks => of(7, 0),
+            Self::Twice(lane) => of(8, lane as u64),
         }
     }
 
@@ -95,13 +108,14 @@ impl Permit {
             5 => Self::Stranger(SocketAddrV4::new(Ipv4Addr::from_bits((who >> 16) as u32), who as u16)),
             6 => Self::Absent,
             7 => Self::NoAcks,
+            8 => Self::Twice(lane),
             _ => Self::Unasked,
         }
     }
 
     /// True if nothing changes it any more.
     pub(crate) const fn is_final(self) -> bool {
-        matches!(self, Self::Foreign(_) | Self::Stranger(_) | Self::Absent | Self::NoAcks)
+        matches!(self, Self::Foreign(_) | Self::Stranger(_) | Self::Twice(_) | Self::Absent | Self::NoAcks)
     }
 }
 
@@ -122,6 +136,8 @@ impl Broadcasts {
                 lanes: members,
                 code: table.accept,
                 permit,
+                asked: SharedWord::default(),
+                rested: SharedWord::default(),
                 together: AtomicU64::default(),
                 apart: AtomicU64::default(),
                 why: SharedWord::default(),
@@ -137,6 +153,11 @@ impl Broadcasts {
         &self.all
     }
 
+    /// The hall is not on the cue in this tick: what begins after it is asked for anew. Tick thread alone.
+    pub(super) fn rest(&self, tick: MonoTime) {
+        self.all.iter().for_each(|one| one.rest(tick));
+    }
+
     /// One network of all controllers of that configuration, by a code of its own, which may get one datagram whoever answers.
     #[must_use]
     #[cfg(feature = "harness")]
@@ -144,7 +165,7 @@ impl Broadcasts {
         let names: Vec<_> = config.controllers.iter().map(|one| one.name.as_str()).collect();
         config.broadcasts = vec![crate::config::BroadcastNetwork::of_loopback(&names)];
         let all = Self::of(&config, false)?;
-        all.all[0].set(Permit::Given);
+        all.all[0].give(MonoTime::from_nanos(u64::MAX));
         Some(all)
     }
 
@@ -180,8 +201,34 @@ impl Broadcast {
         Permit::of_word(self.permit.get())
     }
 
-    /// Permits it, or takes that back. What is final stays. Ack thread alone.
-    pub(crate) fn set(&self, permit: Permit) {
+    /// Whether one datagram may go to all in the tick that woke up then.
+    pub(super) fn permits(&self, tick: MonoTime) -> bool {
+        let rests = self.rested.get() >= tick.as_nanos();
+        self.permit() == Permit::Given && !rests && !self.is_stale() && tick.since(self.asked()) <= FRESH
+    }
+
+    /// Whether the permit is older than what it would be for.
+    pub(super) fn is_stale(&self) -> bool {
+        self.asked.get() <= self.rested.get()
+    }
+
+    fn asked(&self) -> MonoTime {
+        MonoTime::from_nanos(self.asked.get())
+    }
+
+    /// Frames are not to leave as one in the tick that woke up then, nor later before all have answered anew. Tick thread alone.
+    pub(super) fn rest(&self, tick: MonoTime) {
+        self.rested.put(tick.as_nanos());
+    }
+
+    /// Permits it, by who answered what was asked then. Ack thread alone.
+    pub(super) fn give(&self, asked: MonoTime) {
+        self.asked.put(asked.as_nanos());
+        self.set(Permit::Given);
+    }
+
+    /// Takes the permit back, or says why there is none. What is final stays. Ack thread alone.
+    pub(super) fn set(&self, permit: Permit) {
         if !self.permit().is_final() {
             self.permit.put(permit.word());
         }
@@ -221,10 +268,10 @@ impl Broadcast {
     }
 
     /// Why frames left one by one last, in words; none where they never did. `name` has the names of lanes.
-    pub(crate) fn last_apart<'n>(&self, name: impl Fn(usize) -> &'n str) -> Option<String> {
+    pub(crate) fn last_apart(&self, name: impl Fn(usize) -> String) -> Option<String> {
         Some(match self.why_apart()? {
             Apart::NoPermit => {
-                self.permit().words(name).unwrap_or_else(|| "who answers was being asked".to_owned())
+                self.permit().words(name).unwrap_or_else(|| "who answers had not been asked since".to_owned())
             }
             Apart::Out(lane) => format!("{} got no frame, or one of its own", name(lane)),
             Apart::Differs(lane) => {
@@ -236,7 +283,7 @@ impl Broadcast {
 
 impl Permit {
     /// Why one datagram may not go to all, in words; none where it may. `name` has the names of lanes.
-    pub(crate) fn words<'n>(self, name: impl Fn(usize) -> &'n str) -> Option<String> {
+    pub(crate) fn words(self, name: impl Fn(usize) -> String) -> Option<String> {
         Some(match self {
             Self::Given => return None,
             Self::Unasked => "nobody has looked yet who answers a broadcast".to_owned(),
@@ -245,7 +292,8 @@ impl Permit {
             Self::Foreign(lane) => {
                 format!("{} is not of this network, and answers its broadcasts", name(lane))
             }
-            Self::Stranger(at) => format!("{at} is no controller of this hall, and answers its broadcasts"),
+            Self::Stranger(at) => format!("{at} is no controller that this hall plays, and answers its broadcasts"),
+            Self::Twice(lane) => format!("two answer as {}, or the network repeats what it carries", name(lane)),
             Self::Absent => "a controller of the network is disabled, or left out".to_owned(),
             Self::NoAcks => "no frame asks for an ack".to_owned(),
         })
@@ -257,6 +305,10 @@ impl Permit {
             Self::Foreign(_) | Self::Stranger(_) => Some(
                 "it may move with the frames of others: find it, take it off this network or set its accept code (PA12, PA13) apart, and \
                  restart the service; until then each seat gets its own frames",
+            ),
+            Self::Twice(_) => Some(
+                "two controllers with one address move as one: find the second, or what repeats datagrams, and restart the service; until \
+                 then each seat gets its own frames",
             ),
             Self::Silent(_) => Some(
                 "check that its mask is that of the network in [broadcast], its PA12 and PA13 its address, and PA15 not 0; until then \
@@ -290,6 +342,7 @@ mod tests {
             Permit::Silent(399),
             Permit::Foreign(0),
             Permit::Stranger(stranger),
+            Permit::Twice(7),
             Permit::Absent,
             Permit::NoAcks,
         ] {
@@ -306,15 +359,37 @@ mod tests {
         assert_eq!(one.ticks(), [1, 3]);
     }
 
+    const fn ms(ms: u64) -> MonoTime {
+        MonoTime::from_nanos(ms * 1_000_000)
+    }
+
     #[test]
-    fn nothing_permits_again_what_somebody_else_has_answered() {
+    fn nothing_permits_again_what_somebody_else_or_two_with_one_address_have_answered() {
+        for found in [Permit::Foreign(1), Permit::Twice(0), Permit::Stranger("10.0.0.9:7408".parse().unwrap())] {
+            let all = two(&["c1", "c2"], false);
+            let one = &all.all()[0];
+            one.give(ms(1));
+            assert!(one.permits(ms(2)));
+            one.set(found);
+            one.give(ms(3));
+            assert_eq!((one.permit(), one.permits(ms(4))), (found, false));
+        }
+    }
+
+    #[test]
+    fn a_permit_is_none_for_what_began_after_its_question_nor_once_that_is_ten_seconds_ago() {
         let all = two(&["c1", "c2"], false);
         let one = &all.all()[0];
-        one.set(Permit::Given);
-        assert_eq!(one.permit(), Permit::Given);
-        one.set(Permit::Foreign(1));
-        one.set(Permit::Given);
-        assert_eq!(one.permit(), Permit::Foreign(1));
+        assert!(!one.permits(ms(1)), "nobody was asked");
+        one.give(ms(1_000));
+        assert!(one.permits(ms(1_500)) && one.permits(ms(11_000)));
+        assert!(!one.permits(ms(11_001)), "too long ago");
+        all.rest(ms(2_000));
+        assert!(!one.permits(ms(2_001)) && one.is_stale(), "it rested since");
+        one.give(ms(2_500));
+        assert!(one.permits(ms(3_000)) && !one.is_stale());
+        one.rest(ms(3_000));
+        assert!(!one.permits(ms(3_000)), "it rests in this very tick");
     }
 
     #[test]
@@ -324,7 +399,7 @@ mod tests {
         {
             let all = two(members, silent);
             let one = &all.all()[0];
-            one.set(Permit::Given);
+            one.give(ms(1));
             assert_eq!(one.permit(), permit);
         }
         assert!(Broadcasts::of(&from_to_args(&["127.0.0.1:1".to_owned()], &[], 3).unwrap(), false).is_none());

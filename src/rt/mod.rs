@@ -60,7 +60,7 @@ use crate::engine::{Ending, Engine, EngineEvent, Step};
 use crate::motion::Pose;
 use crate::net::{Delivery, SendFault, Sender};
 use crate::record::{Asked, TickHead};
-use crate::state::{Refusal, State, Transition, Why};
+use crate::state::{PlayMode, Refusal, State, Transition, Why};
 use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};
 use crate::wire::MAX_LEN;
 use sending::Sending;
@@ -167,12 +167,13 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         self.places.look(&mut self.engine, &self.mail, now, moving);
         let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving, soon);
         let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
+        self.mind_broadcasts(now);
         let late_ns = match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
             Step::Send if self.conductor.machine().may_send_motion() => {
                 ticked.missed += tick.missed;
                 ticked.ticks += 1;
-                self.send(tick)
+                self.send(tick, now)
             }
             Step::Send | Step::Quiet | Step::Over => nanos(tick.late),
         };
@@ -291,11 +292,20 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         Ok(())
     }
 
+    /// One datagram is for many seats only while they all are on the cue: joins, holds, stops and ways to park rest on nobody's permit.
+    fn mind_broadcasts(&self, now: MonoTime) {
+        if let Some(broadcasts) = self.mail.live().broadcasts()
+            && self.conductor.machine().state() != State::Playing(PlayMode::Following)
+        {
+            broadcasts.rest(now);
+        }
+    }
+
     /// Sends to every lane that gets a frame; says how long after its deadline the first left, nanoseconds.
-    fn send(&mut self, tick: Tick) -> u64 {
+    fn send(&mut self, tick: Tick, now: MonoTime) -> u64 {
         let mut buf = [0; MAX_LEN];
         let Self { lanes, places, engine, mail, sink, clock, .. } = self;
-        let mut sending = Sending { lanes, places, engine, mail, sink, clock: *clock, first: None };
+        let mut sending = Sending { lanes, places, engine, mail, sink, clock: *clock, tick: now, first: None };
         sending.send_all(&mut buf);
         let late_ns = nanos(sending.first.unwrap_or(tick.deadline).since(tick.deadline));
         self.mail.report(TickReport { late_ns, missed: tick.missed });

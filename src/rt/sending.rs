@@ -1,7 +1,7 @@
 //! The frames of one tick on their way out: one datagram for each lane, or one for all lanes of a network whose frames are the same.
 //! Tick thread; allocates nothing.
 
-use super::broadcast::{Apart, Broadcast, Broadcasts, Permit};
+use super::broadcast::{Apart, Broadcast, Broadcasts};
 use super::mail::{Mail, Sent};
 use super::places::{self, Places};
 use super::{FrameSink, Outgoing};
@@ -21,6 +21,8 @@ pub(super) struct Sending<'t, C, S> {
     pub(super) mail: &'t mut Mail,
     pub(super) sink: &'t mut S,
     pub(super) clock: &'t C,
+    /// When the tick woke up.
+    pub(super) tick: MonoTime,
     /// When the first left.
     pub(super) first: Option<MonoTime>,
 }
@@ -50,7 +52,7 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
     /// Sends to one lane, if it gets a frame.
     #[inline]
     fn send(&mut self, index: usize, buf: &mut [u8; MAX_LEN]) {
-        let Self { lanes, places, engine, mail, sink, clock, first } = self;
+        let Self { lanes, places, engine, mail, sink, clock, first, .. } = self;
         if !engine.lane(index).gets_a_frame() {
             return;
         }
@@ -92,16 +94,22 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
     /// Writes the one frame that every lane of a network gets in this tick, to the bit, if it is so. A datagram reaches all of them or
     /// none: if any is not to be reached, or not like this, it is not sent. Looks only; what follows has its effects.
     fn same(&self, one: &Broadcast, at: MonoTime, buf: &mut [u8; MAX_LEN]) -> Result<Same, Apart> {
-        if one.permit() != Permit::Given {
+        let Self { lanes, places, engine, .. } = self;
+        let is_reached = |lane: &usize| {
+            let motion = engine.lane(*lane);
+            motion.gets_a_frame() && motion.is_in() && !motion.is_blind()
+        };
+        if let Some(out) = one.lanes.iter().find(|lane| !is_reached(lane)) {
+            // Whatever it comes back from, all are asked anew.
+            one.rest(self.tick);
+            return Err(Apart::Out(*out));
+        }
+        if !one.permits(self.tick) {
             return Err(Apart::NoPermit);
         }
-        let Self { lanes, places, engine, .. } = self;
         let mut number: Option<FrameNo> = None;
         for lane in &one.lanes {
-            let motion = engine.lane(*lane);
-            let is_reached = motion.gets_a_frame() && motion.is_in() && !motion.is_blind();
-            let lasts_ms = engine.beat_of(*lane).lasts_ms;
-            if !is_reached || !places.belief(*lane).allows(motion.pose(), lasts_ms, at) {
+            if !places.belief(*lane).allows(engine.lane(*lane).pose(), engine.beat_of(*lane).lasts_ms, at) {
                 return Err(Apart::Out(*lane));
             }
             let next = lanes[*lane].next_frame();

@@ -229,7 +229,7 @@ impl Watch {
         match fate {
             Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
             Fate::Answered(_) if is_refusal => self.judge(HealthInput::Refused(reply.controller)),
-            Fate::Duplicate | Fate::Stray => self.mind_foreign(reply.controller),
+            Fate::Duplicate | Fate::Stray => self.mind_foreign(reply.controller, fate),
             _ => {}
         }
     }

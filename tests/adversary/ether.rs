@@ -111,6 +111,10 @@ pub(crate) struct World {
     /// A seat that takes no broadcasts, and somebody else who answers them.
     pub(crate) deaf_to_all: Option<usize>,
     pub(crate) stranger_answers: Option<SocketAddrV4>,
+    /// A seat at whose address there is a second controller, which takes what goes to all.
+    pub(crate) twice: Option<usize>,
+    /// Frames of motion, and questions, that went to all.
+    pub(crate) to_all: [u64; 2],
 }
 
 /// The network, with its clock.
@@ -147,6 +151,8 @@ impl Ether {
             strangers: VecDeque::new(),
             deaf_to_all: None,
             stranger_answers: None,
+            twice: None,
+            to_all: [0; 2],
         };
         Self { now: Arc::new(AtomicU64::new(BEGIN)), world: Arc::new(Mutex::new(world)) }
     }
@@ -234,8 +240,8 @@ impl Ether {
 impl World {
     /// Brings what has arrived at the seats by then, and has them answer.
     fn deliver(&mut self, now: u64) {
-        let Self { lines, dice, asked_at, last_reply, .. } = self;
-        for line in lines.iter_mut() {
+        let Self { lines, dice, asked_at, last_reply, twice, .. } = self;
+        for (seat, line) in lines.iter_mut().enumerate() {
             while line.there.front().is_some_and(|packet| packet.at <= now) {
                 line.intrude(line.there[0].at, *asked_at);
                 let Some(Packet { at, sent, lost_since, asked, octets }) = line.there.pop_front() else {
@@ -244,6 +250,9 @@ impl World {
                 if let Some(reply) = line.seat.hear(&octets, Arrival { at, sent, lost_since, asked }) {
                     if matches!(reply[4], 0x13 | 0x14) {
                         *last_reply = Some(reply.clone());
+                    }
+                    if *twice == Some(seat) && words::is_to_all(&octets) {
+                        line.answer(reply.clone(), at, dice);
                     }
                     line.answer(reply, at, dice);
                 }
@@ -374,6 +383,7 @@ impl Network for Ether {
             self.take_in(lane, datagram, now);
         }
         let world = &mut *self.world();
+        world.to_all[usize::from(!matches!(words::hear(datagram), Heard::Motion(_)))] += 1;
         if let (Some(from), Heard::Read { .. }) = (world.stranger_answers, words::hear(datagram)) {
             world.strangers.push_back((from, words::register_reply(datagram, 2, 0, &[0, 99])));
         }

@@ -62,6 +62,11 @@ impl Town {
     /// The virtual controller of an address, which hears broadcasts as it listens at any address of its machine.
     fn simulate(&self, last: u8) -> Sim {
         let place = SEATS.iter().chain([&STRANGER]).position(|one| *one == last).expect("it has a machine");
+        self.simulate_at(place, last)
+    }
+
+    /// The same at the machine of that place, whose address it is.
+    fn simulate_at(&self, place: usize, last: u8) -> Sim {
         let own = [10, 77, 0, last]
             .into_iter()
             .zip(0x10..)
@@ -87,8 +92,25 @@ impl Town {
         counts.split(' ').next().and_then(|count| count.parse().ok()).expect("a count")
     }
 
+    /// The machine of the stranger gets another address.
+    fn disguise_stranger(&self, last: u8) {
+        self.hosts[SEATS.len()].run(&format!(
+            "ip address del 10.77.0.{STRANGER}/24 dev far{STRANGER}\nip address add 10.77.0.{last}/24 dev far{STRANGER}"
+        ));
+    }
+
+    /// Waits until a show is under way: what is asked before it is far less.
+    fn waits_for_the_show(&self) {
+        while self.datagrams(0) < 200 {}
+    }
+
     /// Begins to play so many seconds to the three seats.
     fn play(&self, seconds: u32) -> Guarded {
+        self.play_with(seconds, "")
+    }
+
+    /// The same with more in the configuration.
+    fn play_with(&self, seconds: u32, more: &str) -> Guarded {
         let (cue, config) = (self.dir.path().join("ride.csv"), self.dir.path().join("hall.toml"));
         let height = |ms: u32| (1.0 - (std::f64::consts::TAU * 0.4 * f64::from(ms) / 1e3).cos()) / 4.0;
         let rows = (0..=seconds * 20).map(|row| (50 * row, height(50 * row)));
@@ -103,6 +125,7 @@ impl Town {
                 "[[controller]]\nname = \"A{last}\"\nseat = \"bench3\"\naddress = \"10.77.0.{last}:7408\"\n"
             );
         }
+        text += more;
         fs::write(&config, text).expect("the folder is ours");
         let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
         Guarded::start_by(&self.show.enter(), &["play", cue, "--config", config, "--json"])
@@ -159,8 +182,7 @@ fn somebody_who_comes_onto_the_network_in_mid_show_ends_it_with_the_first_answer
     let Some(town) = Town::open() else { return };
     let _sims: Vec<Sim> = SEATS.iter().map(|last| town.simulate(*last)).collect();
     let play = town.play(12);
-    // What is asked before a show is far less.
-    while town.datagrams(0) < 200 {}
+    town.waits_for_the_show();
     let stranger = town.simulate(STRANGER);
     let report = report(&play.finish());
     let [together, apart] = ticks(&report);
@@ -175,4 +197,72 @@ fn somebody_who_comes_onto_the_network_in_mid_show_ends_it_with_the_first_answer
         report["broadcasts"][0]["not_now"].as_str().is_some_and(|why| why.contains("10.77.0.9")),
         "{report:#}"
     );
+}
+
+fn not_now(report: &Value) -> &str {
+    report["broadcasts"][0]["not_now"].as_str().unwrap_or("")
+}
+
+#[test]
+fn a_second_controller_with_the_address_of_one_is_found_before_anything_goes_to_both() {
+    let Some(town) = Town::open() else { return };
+    town.disguise_stranger(3);
+    let sims: Vec<Sim> = SEATS.iter().map(|last| town.simulate(*last)).collect();
+    let second = town.simulate_at(SEATS.len(), 3);
+    let mut play = town.play(3);
+    let stderr = play.stderr();
+    let run = play.finish();
+    let report = run.report();
+    assert_eq!(ticks(&report)[0], 0, "{report:#}");
+    assert!(not_now(&report).contains("two answer as A3 (10.77.0.3:7408)"), "{report:#}");
+    let said: Vec<String> = stderr.lines().map_while(Result::ok).collect();
+    assert!(said.iter().any(|line| line.contains("10.77.0.3:7408") && line.contains("find the second")), "{said:#?}");
+    // What goes to the address alone reaches one of them.
+    let [one, other] = [sims.into_iter().nth(1).expect("three").end(), second.end()];
+    let moves = [&one, &other].map(|sim| sim["motion"].as_u64().expect("a count"));
+    assert!(moves.contains(&0), "{moves:?}");
+}
+
+#[test]
+fn a_second_controller_with_the_address_of_one_that_comes_in_mid_show_ends_it_with_its_first_ack() {
+    let Some(town) = Town::open() else { return };
+    town.disguise_stranger(3);
+    town.hosts[SEATS.len()].run("ip link set far9 down");
+    let _sims: Vec<Sim> = SEATS.iter().map(|last| town.simulate(*last)).collect();
+    let second = town.simulate_at(SEATS.len(), 3);
+    let play = town.play(12);
+    town.waits_for_the_show();
+    town.hosts[SEATS.len()].run("ip link set far9 up");
+    let report = play.finish().report();
+    let reached = second.end()["motion"].as_u64().expect("a count");
+    println!("{:?}: {reached} frames reached the second", ticks(&report));
+    assert!(ticks(&report)[0] > 20 && not_now(&report).contains("two answer as A3 (10.77.0.3:7408)"), "{report:#}");
+}
+
+#[test]
+fn a_seat_that_is_disabled_is_reached_by_nothing_though_it_is_on_the_wire() {
+    let Some(town) = Town::open() else { return };
+    let sims: Vec<Sim> = SEATS.iter().chain([&STRANGER]).map(|last| town.simulate(*last)).collect();
+    let disabled =
+        "[[controller]]\nname = \"A9\"\nseat = \"bench3\"\naddress = \"10.77.0.9:7408\"\nenabled = false\n";
+    let report = report(&town.play_with(3, disabled).finish());
+    assert_eq!(ticks(&report)[0], 0, "{report:#}");
+    assert!(not_now(&report).contains("disabled"), "{report:#}");
+    let moves: Vec<Value> = sims.into_iter().map(Sim::end).collect();
+    assert_eq!(moves[3]["motion"], 0, "{}", moves[3]);
+}
+
+#[test]
+fn a_plug_that_is_moved_to_another_network_in_mid_show_ends_it_within_some_frames() {
+    let Some(town) = Town::open() else { return };
+    town.show.run(&format!("ip link set port{STRANGER} nomaster"));
+    let _sims: Vec<Sim> = SEATS.iter().map(|last| town.simulate(*last)).collect();
+    let stranger = town.simulate(STRANGER);
+    let play = town.play(12);
+    town.waits_for_the_show();
+    town.show.run(&format!("ip link set port3 nomaster\nip link set port{STRANGER} master hub"));
+    let report = play.finish().report();
+    let reached = stranger.end()["motion"].as_u64().expect("a count");
+    println!("{:?}: {reached} frames reached a stranger", ticks(&report));
+    assert!(ticks(&report)[0] > 20 && reached < 50, "{reached}: {report:#}");
 }

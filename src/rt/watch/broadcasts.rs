@@ -1,6 +1,7 @@
 //! Who takes a broadcast: asked by one, a read that all controllers of a network answer and nobody else. What is broadcast as motion
 //! reaches everybody that takes the code, so that without such a look, and once anybody else has answered anything that was sent so,
-//! each controller gets its own frames.
+//! each controller gets its own frames. All are asked again once they are on the cue, and from time to time, in a show and at rest: a
+//! permit is as old as its question.
 
 use std::net::SocketAddrV4;
 use std::sync::Arc;
@@ -10,44 +11,48 @@ use super::Watch;
 use crate::health::{HealthInput, HealthState};
 use crate::net::Delivery;
 use crate::rt::broadcast::{Broadcast, Broadcasts, Permit};
+use crate::state::{PlayMode, State};
 use crate::time::MonoTime;
+use crate::tracker::Fate;
 use crate::wire::{Access, FromController, MAX_LEN, ReadRequest, VibrationPort};
 
 /// PA12 and PA13, by which a controller knows whether a code means it (SMC manual 2.2.1). Nobody here asks for these two alone otherwise.
 const PARAMETERS: u16 = 1;
 const COLUMN_AND_ROW: u16 = 0x12;
 const BOTH: u16 = 2;
-/// How long answers are listened for: whoever is slow is to be heard as well.
-const LISTEN: Duration = Duration::from_millis(500);
-/// After how long a network is asked again of which one did not answer.
-const AGAIN: Duration = Duration::from_secs(2);
+/// One look asks so often, so far apart: of somebody else each question or answer may be lost.
+const QUESTIONS: u32 = 3;
+const APART: Duration = Duration::from_millis(50);
+/// How long answers are listened for from the first on: whoever is slow is to be heard as well.
+const LISTEN: Duration = Duration::from_millis(300);
+/// From one look to the next: of a network that waits for a permit, on the cue, and at rest.
+const AGAIN: Duration = Duration::from_secs(1);
+const ON_CUE: Duration = Duration::from_secs(4);
+const AT_REST: Duration = Duration::from_secs(30);
 
-/// How far a look at one network is.
+/// How far the look at one network is.
 #[derive(Debug)]
 pub(super) struct BroadcastLook {
-    state: LookState,
-    /// Which of its lanes have answered, in their order there.
-    answered: Vec<bool>,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum LookState {
-    /// To be asked, not before then.
-    Due(MonoTime),
-    /// Asked then.
-    Asked(MonoTime),
-    /// All have answered, and nobody else.
-    Passed,
+    /// When the last one ended, or was broken off.
+    ended: Option<MonoTime>,
+    /// The one that is under way: when it began, and how many questions were due, and have left.
+    under_way: Option<(MonoTime, u32, u32)>,
+    /// How often each of its lanes has answered, in their order there.
+    answers: Vec<u32>,
 }
 
 impl BroadcastLook {
     /// One for each network.
     pub(super) fn of(broadcasts: Option<&Arc<Broadcasts>>) -> Vec<Self> {
-        let one = |one: &Broadcast| Self {
-            state: LookState::Due(MonoTime::default()),
-            answered: vec![false; one.lanes.len()],
-        };
+        let one =
+            |one: &Broadcast| Self { ended: None, under_way: None, answers: vec![0; one.lanes.len()] };
         broadcasts.map_or_else(Vec::new, |all| all.all().iter().map(one).collect())
+    }
+
+    /// Ends what is under way. What is still answered then is over before the next one.
+    const fn end(&mut self, now: MonoTime) {
+        self.under_way = None;
+        self.ended = Some(now);
     }
 }
 
@@ -61,6 +66,8 @@ impl Watch {
     /// Looks who takes broadcasts, and takes the permit back where a controller does not take part.
     pub(super) fn mind_broadcasts(&mut self, now: MonoTime) {
         let Some(broadcasts) = self.live.broadcasts().cloned() else { return };
+        // Preflight counts every datagram, and takes answers for its own.
+        let others_ask = self.is_hushed() || self.is_asked_otherwise();
         for (network, one) in broadcasts.all().iter().enumerate() {
             if one.permit().is_final() {
                 continue;
@@ -69,51 +76,59 @@ impl Watch {
                 let standing = self.stands(**lane);
                 !matches!(standing, HealthState::Ok | HealthState::Degraded) || !self.takes_part(**lane)
             };
-            if let Some(lane) = one.lanes.iter().find(is_out) {
-                one.set(Permit::Out(*lane));
-                self.looks[network].state = LookState::Due(now);
-                continue;
+            let out = one.lanes.iter().find(is_out).copied();
+            if let Some(lane) = out {
+                one.set(Permit::Out(lane));
             }
-            self.look_at(network, one, now);
+            if out.is_some() || others_ask {
+                self.looks[network].end(now);
+            } else {
+                self.look_at(network, one, now);
+            }
         }
     }
 
     fn look_at(&mut self, network: usize, one: &Broadcast, now: MonoTime) {
-        // Preflight counts every datagram, and takes answers for its own.
-        let others_ask = self.is_hushed() || self.is_asked_otherwise();
-        match self.looks[network].state {
-            LookState::Asked(_) if others_ask => self.looks[network].state = LookState::Due(now),
-            LookState::Due(at) if now >= at && !others_ask => self.ask_all(network, one, now),
-            LookState::Asked(since) if now.since(since) >= LISTEN => {
-                let BroadcastLook { state, answered } = &mut self.looks[network];
-                let silent = one.lanes.iter().zip(answered.iter()).find(|(_, answered)| !**answered);
-                if let Some((lane, _)) = silent {
-                    one.set(Permit::Silent(*lane));
-                    *state = LookState::Due(now + AGAIN);
-                } else {
-                    one.set(Permit::Given);
-                    *state = LookState::Passed;
-                }
+        let every = match (self.live.state(), one.permit()) {
+            (State::Playing(PlayMode::Following), Permit::Given) if !one.is_stale() => ON_CUE,
+            (State::Playing(PlayMode::Following), _) | (_, Permit::Unasked | Permit::Out(_)) => AGAIN,
+            _ => AT_REST,
+        };
+        let look = &mut self.looks[network];
+        match look.under_way {
+            None if look.ended.is_none_or(|ended| now.since(ended) >= every) => {
+                look.answers.fill(0);
+                look.under_way = Some((now, 0, 0));
             }
-            LookState::Due(_) | LookState::Asked(_) | LookState::Passed => {}
+            None => return,
+            Some((began, _, asked)) if now.since(began) >= LISTEN => {
+                look.end(now);
+                let silent = one.lanes.iter().zip(&look.answers).find(|(_, answers)| **answers == 0);
+                match silent {
+                    _ if asked == 0 => {}
+                    Some((lane, _)) => one.set(Permit::Silent(*lane)),
+                    None => one.give(began),
+                }
+                return;
+            }
+            Some(_) => {}
         }
+        self.ask_all(network, one, now);
     }
 
+    /// Asks the next question of the look that is under way, if it is due.
     fn ask_all(&mut self, network: usize, one: &Broadcast, now: MonoTime) {
-        let (accept, reply) = (one.code, one.code);
-        let read = ReadRequest { channel: PARAMETERS, accept, reply, start: COLUMN_AND_ROW, num: BOTH };
-        let delivery = self.sender.send_to_all(network, read.emit(&mut [0; MAX_LEN]));
-        let look = &mut self.looks[network];
-        look.answered.fill(false);
-        if let Delivery::Failed(_) = delivery {
-            look.state = LookState::Due(now + AGAIN);
+        let Some((began, due, asked)) = &mut self.looks[network].under_way else { return };
+        if *due >= QUESTIONS || now.since(*began) < *due * APART {
             return;
         }
-        look.state = LookState::Asked(now);
-        // One that sees its first again keeps what was said of it meanwhile.
-        if one.permit() != Permit::Given && !matches!(one.permit(), Permit::Silent(_)) {
-            one.set(Permit::Unasked);
+        *due += 1;
+        let (accept, reply) = (one.code, one.code);
+        let read = ReadRequest { channel: PARAMETERS, accept, reply, start: COLUMN_AND_ROW, num: BOTH };
+        if let Delivery::Failed(_) = self.sender.send_to_all(network, read.emit(&mut [0; MAX_LEN])) {
+            return;
         }
+        *asked += 1;
         one.lanes.iter().for_each(|lane| self.judge(HealthInput::OtherSent(*lane, 1)));
     }
 
@@ -123,15 +138,17 @@ impl Watch {
         if !is_answer(message) || self.is_asked_otherwise() {
             return false;
         }
-        let mut is_member = false;
-        for (one, look) in broadcasts.all().iter().zip(&mut self.looks) {
-            if let Some(place) = one.lanes.iter().position(|lane| *lane == controller) {
-                is_member = true;
-                look.answered[place] = true;
-            }
-        }
-        if !is_member {
+        if !broadcasts.has(controller) {
             broadcasts.all().iter().for_each(|one| one.set(Permit::Foreign(controller)));
+            return true;
+        }
+        for (one, look) in broadcasts.all().iter().zip(&mut self.looks) {
+            let place = one.lanes.iter().position(|lane| *lane == controller);
+            let Some((place, (_, _, asked))) = place.zip(look.under_way) else { continue };
+            look.answers[place] += 1;
+            if look.answers[place] > asked {
+                one.set(Permit::Twice(controller));
+            }
         }
         true
     }
@@ -146,10 +163,15 @@ impl Watch {
     }
 
     /// A controller answered a frame that it was not sent, or one frame twice: one that is in no network of broadcasts may have taken
-    /// the frames of one.
-    pub(super) fn mind_foreign(&self, controller: usize) {
-        let Some(broadcasts) = self.live.broadcasts().filter(|all| !all.has(controller)) else { return };
+    /// the frames of one, and where one of a network answers twice there may be two.
+    pub(super) fn mind_foreign(&self, controller: usize, fate: Fate) {
+        let Some(broadcasts) = self.live.broadcasts() else { return };
+        let found = match fate {
+            _ if !broadcasts.has(controller) => Permit::Foreign(controller),
+            Fate::Duplicate => Permit::Twice(controller),
+            _ => return,
+        };
         let given = broadcasts.all().iter().filter(|one| one.permit() == Permit::Given);
-        given.for_each(|one| one.set(Permit::Foreign(controller)));
+        given.for_each(|one| one.set(found));
     }
 }
