@@ -111,7 +111,8 @@ pub(super) fn broadcasts(
             continue;
         }
         let stations = all().filter_map(|one| Some((one, one.station()?)));
-        let (members, others): (Vec<_>, Vec<_>) = stations.partition(|(_, at)| network.holds(*at.address.ip()));
+        let (members, others): (Vec<_>, Vec<_>) =
+            stations.partition(|(_, at)| network.holds(*at.address.ip()));
         let accept = accept.unwrap_or_else(|| narrowest(&members));
         match port_of(&members, &others, network, accept, frame_port) {
             Err(why) => entry.fault(faults, &why),
@@ -255,7 +256,10 @@ mod tests {
         assert!(with("10.0.0.0/8").contains("no controller is in this network"));
         assert!(with("192.168.15.2/31").contains("is not a network"));
         assert!(hall("[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/30\"").is_ok());
-        assert!(fault("[broadcast.a]\nalone = true\naccept = \"0fff\"").contains("has no network, which is needed"));
+        assert!(
+            fault("[broadcast.a]\nalone = true\naccept = \"0fff\"")
+                .contains("has no network, which is needed")
+        );
     }
 
     #[test]
@@ -280,7 +284,9 @@ mod tests {
     #[test]
     fn a_code_that_leaves_a_controller_of_the_network_out_is_refused() {
         let with = |accept: &str| {
-            hall(&format!("[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\naccept = \"{accept}\""))
+            hall(&format!(
+                "[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\naccept = \"{accept}\""
+            ))
         };
         assert!(with("ffff").is_ok());
         assert!(with("0eff").unwrap_err().contains("accept 0eff does not mean A1 at 192.168.15.1"));
@@ -301,7 +307,9 @@ mod tests {
     #[test]
     fn a_code_that_means_a_controller_outside_of_the_network_is_refused_be_it_enabled_or_not() {
         for enabled in [true, false] {
-            for (address, accept) in [("192.168.16.3", "ffff"), ("192.168.16.3", "ff03"), ("10.0.15.7", "0fff")] {
+            for (address, accept) in
+                [("192.168.16.3", "ffff"), ("192.168.16.3", "ff03"), ("10.0.15.7", "0fff")]
+            {
                 let told = fault(&format!(
                     "[[controller]]\nname = \"A3\"\nseat = \"s\"\naddress = \"192.168.15.3:7408\"\n\
                      [[controller]]\nname = \"B1\"\nseat = \"s\"\naddress = \"{address}:7408\"\nenabled = {enabled}\n\
@@ -333,8 +341,9 @@ mod tests {
 
     #[test]
     fn the_port_of_this_machine_is_refused() {
-        let own =
-            fault("[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\n[show]\nbind = \"0.0.0.0:7408\"");
+        let own = fault(
+            "[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\n[show]\nbind = \"0.0.0.0:7408\"",
+        );
         assert!(own.contains("would hear its own broadcasts"), "{own}");
     }
 }

@@ -33,7 +33,8 @@ pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4], wholes: &[Whole])
     stamp_arrivals(&stray).map_err(at_bind)?;
 
     let lanes = peers.iter().map(|&peer| lane(local, peer)).collect::<Result<Vec<_>, _>>()?;
-    let broadcasts = wholes.iter().map(|one| whole(local, one, peers, &lanes)).collect::<Result<Vec<_>, _>>()?;
+    let broadcasts =
+        wholes.iter().map(|one| whole(local, one, peers, &lanes)).collect::<Result<Vec<_>, _>>()?;
 
     for socket in lanes.iter().chain(&broadcasts).map(|lane| &lane.socket).chain([&stray]) {
         socket.set_reuse_address(false).map_err(at_bind)?;

@@ -248,7 +248,10 @@ fn one_datagram_reaches_all_of_a_network_from_where_its_controllers_answer_to_an
 
     for (peer, address, bits) in [([127, 0, 0, 2], all, 24), ([127, 0, 0, 1], all, 8)] {
         let refused = open(at(peer), whole(address, bits)).unwrap_err();
-        assert!(matches!(refused, NetError::OffTheWire { controller, .. } if controller == at(peer)), "{refused}");
+        assert!(
+            matches!(refused, NetError::OffTheWire { controller, .. } if controller == at(peer)),
+            "{refused}"
+        );
     }
     let refused = open(at([127, 0, 0, 2]), whole(at([127, 0, 0, 255]), 24)).unwrap_err();
     assert!(matches!(refused, NetError::NoBroadcast(_)), "{refused}");

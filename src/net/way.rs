@@ -45,7 +45,8 @@ pub(super) fn way(from: Ipv4Addr, to: Ipv4Addr) -> io::Result<Way> {
 
 fn question(from: Ipv4Addr, to: Ipv4Addr) -> Vec<u8> {
     let from = Some(from).filter(|from| !from.is_unspecified());
-    let addresses: Vec<(u16, Ipv4Addr)> = [Some((1, to)), from.map(|from| (2, from))].into_iter().flatten().collect();
+    let addresses: Vec<(u16, Ipv4Addr)> =
+        [Some((1, to)), from.map(|from| (2, from))].into_iter().flatten().collect();
     let len = u32::try_from(ATTRIBUTES_AT + 8 * addresses.len()).expect("at most two");
     let mut octets = Vec::new();
     octets.extend_from_slice(&len.to_ne_bytes());
@@ -63,7 +64,8 @@ fn question(from: Ipv4Addr, to: Ipv4Addr) -> Vec<u8> {
 
 fn read(octets: &[u8]) -> io::Result<Way> {
     let word = |at: usize| octets.get(at..at + 2).map(|two| u16::from_ne_bytes([two[0], two[1]]));
-    let long = |at: usize| Some(octets.get(at..at + 4)?.try_into().map(u32::from_ne_bytes).expect("they are four"));
+    let long =
+        |at: usize| Some(octets.get(at..at + 4)?.try_into().map(u32::from_ne_bytes).expect("they are four"));
     if word(4) != Some(NEW_ROUTE) {
         // Of an error, which is all else there is, the number is next.
         let errno = long(HEADER_LEN).map_or(libc::EPROTO, |errno| errno.cast_signed().wrapping_neg());
@@ -110,7 +112,10 @@ mod tests {
         let way = Way { interface: Some(7), is_broadcast: false, is_carried_on: true, bits: 24 };
         assert_eq!(read(&whole).unwrap(), way);
         for len in 0..whole.len() {
-            assert!(read(&whole[..len]).is_err() || read(&whole[..len]).unwrap().interface.is_none(), "{len}");
+            assert!(
+                read(&whole[..len]).is_err() || read(&whole[..len]).unwrap().interface.is_none(),
+                "{len}"
+            );
         }
         // A length of 0 is no step.
         whole[28] = 0;

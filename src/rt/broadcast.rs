@@ -292,8 +292,12 @@ impl Permit {
             Self::Foreign(lane) => {
                 format!("{} is not of this network, and answers its broadcasts", name(lane))
             }
-            Self::Stranger(at) => format!("{at} is no controller that this hall plays, and answers its broadcasts"),
-            Self::Twice(lane) => format!("two answer as {}, or the network repeats what it carries", name(lane)),
+            Self::Stranger(at) => {
+                format!("{at} is no controller that this hall plays, and answers its broadcasts")
+            }
+            Self::Twice(lane) => {
+                format!("two answer as {}, or the network repeats what it carries", name(lane))
+            }
             Self::Absent => "a controller of the network is disabled, or left out".to_owned(),
             Self::NoAcks => "no frame asks for an ack".to_owned(),
         })
@@ -365,7 +369,9 @@ mod tests {
 
     #[test]
     fn nothing_permits_again_what_somebody_else_or_two_with_one_address_have_answered() {
-        for found in [Permit::Foreign(1), Permit::Twice(0), Permit::Stranger("10.0.0.9:7408".parse().unwrap())] {
+        for found in
+            [Permit::Foreign(1), Permit::Twice(0), Permit::Stranger("10.0.0.9:7408".parse().unwrap())]
+        {
             let all = two(&["c1", "c2"], false);
             let one = &all.all()[0];
             one.give(ms(1));

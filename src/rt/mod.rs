@@ -305,7 +305,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     fn send(&mut self, tick: Tick, now: MonoTime) -> u64 {
         let mut buf = [0; MAX_LEN];
         let Self { lanes, places, engine, mail, sink, clock, .. } = self;
-        let mut sending = Sending { lanes, places, engine, mail, sink, clock: *clock, tick: now, first: None };
+        let mut sending =
+            Sending { lanes, places, engine, mail, sink, clock: *clock, tick: now, first: None };
         sending.send_all(&mut buf);
         let late_ns = nanos(sending.first.unwrap_or(tick.deadline).since(tick.deadline));
         self.mail.report(TickReport { late_ns, missed: tick.missed });

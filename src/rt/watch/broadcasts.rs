@@ -44,8 +44,7 @@ pub(super) struct BroadcastLook {
 impl BroadcastLook {
     /// One for each network.
     pub(super) fn of(broadcasts: Option<&Arc<Broadcasts>>) -> Vec<Self> {
-        let one =
-            |one: &Broadcast| Self { ended: None, under_way: None, answers: vec![0; one.lanes.len()] };
+        let one = |one: &Broadcast| Self { ended: None, under_way: None, answers: vec![0; one.lanes.len()] };
         broadcasts.map_or_else(Vec::new, |all| all.all().iter().map(one).collect())
     }
 
