@@ -222,9 +222,7 @@ impl AckLoop {
                 Origin::Controller(controller) => controller,
                 Origin::Stranger(from) => {
                     copy(tap, &AckRecord::Heard(origin, at, octets));
-                    if let Some(watch) = watch {
-                        watch.hear_stranger(from, octets);
-                    }
+                    watch.iter().for_each(|watch| watch.hear_stranger(from, octets));
                     *strangers += u64::from(!observer.hear_elsewhere(from, octets, at));
                     return;
                 }
