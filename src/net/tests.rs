@@ -226,8 +226,8 @@ fn a_send_that_fails_says_why_and_what_to_do() {
 }
 
 #[test]
-fn one_datagram_reaches_all_of_a_network_from_where_its_controllers_answer_to_and_each_answer_is_that_of_its_own()
- {
+fn one_datagram_reaches_all_of_a_network_from_where_its_controllers_answer_to_and_a_way_elsewhere_is_refused()
+{
     let any = UdpSocket::bind("0.0.0.0:0").unwrap();
     any.set_read_timeout(Some(PATIENCE)).unwrap();
     let port = any.local_addr().unwrap().port();
