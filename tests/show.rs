@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use kinocue::harness::engine::Ending;
+use kinocue::harness::engine::{Ending, Mix};
 use kinocue::harness::rt::Alarm;
 use kinocue::harness::state::{self, Transition};
-use kinocue::harness::time::ShowTime;
+use kinocue::harness::time::{MonoTime, ShowTime};
 use kinocue::harness::timeline::Hint;
-use kinocue::harness::{Event, Played, Virtual, Worst, swell};
+use kinocue::harness::{Event, Frame, Played, Virtual, Worst, swell};
 use kinocue::wire::Timing;
 
 /// Within the limits where only pulses are seen.
@@ -324,4 +324,73 @@ fn seats_that_are_led_ahead_keep_the_limits_through_stops_pauses_seeks_and_late_
             assert_eq!(played.clamps[lane].clamps, 0, "{script:?}, lane {lane}");
         }
     }
+}
+
+/// Three seats that may get one datagram together, by a code that no single frame has.
+fn together(cue: impl Into<String>) -> Virtual {
+    let to = (1..4).map(|seat| format!("127.0.0.{seat}:7408")).collect();
+    Virtual { to, together: true, ..Virtual::new(cue) }
+}
+
+fn is_one(frame: &Frame) -> bool {
+    frame.bytes[8..10] == [0, 0xff]
+}
+
+/// How many of the frames that left before an instant were for all, and whether any from it on was.
+fn ones(played: &Played, instant: MonoTime) -> (usize, bool) {
+    let before = played.frames.iter().filter(|frame| frame.at < instant && is_one(frame)).count();
+    (before, played.frames.iter().any(|frame| frame.at >= instant && is_one(frame)))
+}
+
+#[test]
+fn a_lane_that_is_cut_off_gets_no_datagram_from_that_tick_on_whatever_permits_one_for_all() {
+    let played = together(swell(3, 6, 40.0, 0.4)).with(300, Event::Alarm(Alarm::Cut(1))).play();
+    let (cut_at, _) = played.happened[0];
+    let (before, after) = ones(&played, cut_at);
+    assert!(before > 3 * 100 && !after, "{before}");
+    assert!(played.lane(1).all(|frame| frame.at < cut_at), "nothing reaches it");
+    assert!(played.lane(1).count() > 290);
+    assert!(played.lane(0).filter(|frame| frame.at >= cut_at).count() > 300);
+    assert!(played.lane(0).zip(1..).all(|(frame, number)| frame.request.frame.0 == number));
+}
+
+#[test]
+fn a_seat_that_is_out_gets_frames_of_its_own_to_park_even_where_all_are_there() {
+    let out = Event::Mix(1, Mix { on: false, ..Mix::FULL });
+    let played = together("time_ms,a1,a2,a3\n0,0,0,0\n6000,0,0,0\n").with(300, out).play();
+    let (before, after) = ones(&played, played.happened[0].0);
+    assert!(before > 3 * 250 && !after, "{before}");
+}
+
+#[test]
+fn seats_that_go_together_are_led_through_what_they_would_be_alone_and_stop_each_by_its_own_frames() {
+    let cue = swell(3, 6, 40.0, 0.4);
+    let stops = |show: Virtual| show.with(200, Event::Stop).with(500, Event::Leave).play();
+    let (one, each) = (together(cue.clone()), Virtual { together: false, ..together(cue) });
+    let (one, each) = (stops(one), stops(each));
+    let (before, after) = ones(&one, one.happened[0].0);
+    assert!(before > 100 && !after, "{before}");
+    assert!(!each.frames.iter().any(is_one));
+    assert_eq!(one.frames.len(), each.frames.len());
+    for (one, each) in one.frames.iter().zip(&each.frames) {
+        assert_eq!(
+            (one.lane, one.at, &one.bytes[..8], &one.bytes[12..]),
+            (each.lane, each.at, &each.bytes[..8], &each.bytes[12..])
+        );
+    }
+}
+
+#[test]
+fn a_pause_what_goes_on_after_it_and_the_way_to_park_are_each_seats_own_until_all_are_on_the_cue() {
+    let played = together(swell(3, 8, 40.0, 0.4))
+        .with(200, Event::Ask(Transition::Pause))
+        .with(500, Event::Ask(Transition::Resume))
+        .with(900, Event::Ask(Transition::Park))
+        .play();
+    let [paused, resumed, parked] = [0, 1, 2].map(|event| played.happened[event].0);
+    let between = |from, to| played.frames.iter().filter(move |frame| frame.at >= from && frame.at < to);
+    assert!(between(paused, resumed).count() > 3 && !between(paused, resumed).any(is_one));
+    let mut goes_on = between(resumed, parked).map(is_one);
+    assert!(!goes_on.next().expect("there is one") && goes_on.any(|one| one));
+    assert!(!ones(&played, parked).1);
 }

@@ -1,5 +1,6 @@
 //! Wiring: opens everything, starts and stops the threads, and sums up. Knows every room; no room knows it.
 
+mod broadcasts;
 pub(crate) mod buttons;
 mod company;
 pub(crate) mod film;

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::thread::{self, Builder};
 use std::time::Duration;
 
-use super::links;
 use super::recording::{self, PlayRecording};
 use super::refused::PlayError;
 use super::roll_call::RollCall;
@@ -14,6 +13,7 @@ use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeErr
 use super::script::{PlayHandle, PlayScript, off_park};
 use super::staged::{StagedShow, at_any_pace, chasing};
 use super::sum_up::{Played, SumUp, sum_up};
+use super::{broadcasts, links};
 use crate::config::{Config, Misfit};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
@@ -204,6 +204,8 @@ impl Play {
         let about = SumUp { cue, rate, ending: ending.into(), silent };
         let mut played = sum_up(about, &config.controllers, &led.prepared, &run);
         played.report.links = links::status(&config, &ends, &links);
+        played.report.broadcasts = broadcasts::status(&config.controllers, &live);
+        played.notes.extend(broadcasts::troubles(&config.controllers, &live));
         played.miss(roll.silent());
         if ending == Ending::Completed {
             let off_park = off_park(&lanes, &live, run.closed_at).into_iter();

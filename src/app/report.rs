@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::Controller;
 use crate::control::model::{Ending, FrameCounts, InMicros, Percentiles};
-use crate::control::{LinkAxisStatus, LinkStatus};
+use crate::control::{BroadcastStatus, LinkAxisStatus, LinkStatus};
 use crate::motion::{AxisGeometry, AxisUnit, Pulses};
 use crate::observe::ControllerState;
 use crate::rt::Spun;
@@ -43,6 +43,9 @@ pub struct PlayReport {
     /// One entry for each serial link; left out where there is none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub links: Vec<LinkStatus>,
+    /// One entry for each network of `[broadcast]`; left out where there is none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) broadcasts: Vec<BroadcastStatus>,
     /// What happened to the controllers, oldest first.
     pub(crate) events: Vec<EventReport>,
     /// Why its recording ended early, in a sentence; left out where it did not, or there was none.
@@ -241,6 +244,9 @@ impl PlayReport {
         for link in &self.links {
             write!(text, "\n{}", of_link(link)).expect("a String takes what is written to it");
         }
+        for one in &self.broadcasts {
+            write!(text, "\n{}", of_broadcast(one)).expect("a String takes what is written to it");
+        }
         for event in &self.events {
             let EventReport { controller, at_s, what } = event;
             write!(text, "\n{at_s:>9.3} s  {controller}: {what}")
@@ -268,6 +274,15 @@ impl PlayReport {
         }
         table
     }
+}
+
+/// How often one datagram was for all of a network, and why it was not the last time that it was not.
+fn of_broadcast(one: &BroadcastStatus) -> String {
+    let BroadcastStatus { name, controllers, together, apart, last_apart, .. } = one;
+    let why = last_apart.as_ref().map(|why| format!(", the last of them because {why}")).unwrap_or_default();
+    format!(
+        "broadcast {name}: {together} ticks as one datagram for {controllers} controllers, {apart} as one for each{why}"
+    )
 }
 
 /// A link, and its axes that did not take all that was made for them.

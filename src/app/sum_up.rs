@@ -99,6 +99,7 @@ pub(super) fn sum_up(about: SumUp, controllers: &[Controller], prepared: &Prepar
             .map(|index| entry(index, &controllers[index], prepared, run))
             .collect(),
         links: Vec::new(),
+        broadcasts: Vec::new(),
         events: events(controllers, run),
         recording_trouble: None,
     };

@@ -8,7 +8,7 @@ use super::drives::{self, DriveArgs, DriveReport, DriveVerdict};
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, metres, print};
-use crate::config::{self, Config, ConfigFault, ConfigFaults, parse_level};
+use crate::config::{self, Config, ConfigFault, ConfigFaults, line_load, parse_level};
 use crate::cue::{self, CueFaults, Fault, Place};
 use crate::drive::terms;
 use crate::plain;
@@ -235,7 +235,8 @@ impl CheckReport {
     /// Notes how often the links of a hall play, and those that are to play more often than they can.
     fn links(&mut self, path: &Path, hall: &Config) {
         let (told, faults) = terms::in_words(hall);
-        told.iter().chain(&metres::of_hall(hall)).for_each(|text| self.note(path, text));
+        let of_lines = line_load::in_words(hall);
+        told.iter().chain(&metres::of_hall(hall)).chain(&of_lines).for_each(|text| self.note(path, text));
         for fault in faults {
             self.fault(Exit::CheckFailed, FaultReport::new(path, &Place::File, fault));
         }

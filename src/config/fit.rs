@@ -15,7 +15,7 @@ use super::section::did_you_mean;
 use super::{Config, Controller, Dialect};
 
 /// The most axes of a frame with vibration (SMC manual 2.2.2.9).
-const MAX_VIBRATING_AXES: usize = 6;
+pub(super) const MAX_VIBRATING_AXES: usize = 6;
 
 /// One thing of a cue that the hall cannot do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -12,6 +12,7 @@ use crate::motion::{MAX_AXES, SeatType};
 mod accept;
 mod api;
 mod axis;
+mod broadcast;
 mod buttons;
 mod controller;
 pub(crate) mod drive;
@@ -25,6 +26,7 @@ mod gear;
 mod keys;
 mod level;
 mod library;
+pub(crate) mod line_load;
 pub(crate) mod link;
 mod log;
 mod notify;
@@ -46,6 +48,7 @@ mod text;
 pub(crate) use crate::wire::{Dialect, Timing, VibrationPort};
 pub(crate) use api::api;
 pub use api::{Api, ApiToken, Role};
+pub use broadcast::BroadcastNetwork;
 pub(crate) use buttons::{ButtonPad, PadDevice, PadLamp, PadWord};
 pub(crate) use controller::{Accept, Connection, FanOut, FansOut, cue_axes};
 pub use controller::{Controller, Station};
@@ -103,6 +106,8 @@ pub struct Config {
     pub(crate) absent: Vec<Absent>,
     /// The serial lines and buses that drives share, in the order of their names.
     pub(crate) links: Vec<Link>,
+    /// The networks whose controllers may get one datagram together, in the order of their names.
+    pub broadcasts: Vec<BroadcastNetwork>,
     /// The port that takes OSC, where there is one.
     pub(crate) osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.

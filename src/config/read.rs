@@ -12,6 +12,7 @@ use crate::motion::MAX_AXES;
 
 use super::accept::acceptances;
 use super::api::api;
+use super::broadcast::broadcasts;
 use super::buttons::buttons;
 use super::drive::{DriveEntry, seat_drives};
 use super::drive_controller::{
@@ -90,8 +91,9 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; add at least one");
     }
-    let [preset_at, library_at, log_at, osc_at, text_at, sync_at, film_at, pair_at] =
-        ["preset", "library", "log", "osc", "text", "sync", "film", "pair"].map(|key| section.get(key));
+    let [preset_at, library_at, log_at, osc_at, text_at, sync_at, film_at, pair_at, broadcast_at] =
+        ["preset", "library", "log", "osc", "text", "sync", "film", "pair", "broadcast"]
+            .map(|key| section.get(key));
     section.finish();
     let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
     let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
@@ -104,6 +106,9 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let stated = Stated { show: show_at, seat: seat_at, controller: controller_at, link: link_at };
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let (controllers, absent, links) = stated.controllers(&site, faults);
+    let frame_port = show.as_ref().map_or(0, |show| show.bind.port());
+    let broadcasts = broadcast_at
+        .map_or_else(Vec::new, |entry| broadcasts(entry, &controllers, &absent, frame_port, faults));
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
@@ -127,6 +132,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         controllers,
         absent,
         links,
+        broadcasts,
         osc,
         text,
         buttons,
@@ -424,17 +430,10 @@ fn accept(section: &mut Section<'_, '_, '_>) -> Option<Accept> {
     if text == "station" {
         return Some(Accept::Station);
     }
-    let hex = text.len() == 4 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
-    match u16::from_str_radix(text, 16).ok().filter(|_| hex) {
-        Some(0) => entry.fault(section.faults, "0000 means that no station accepts the frame; use \"ffff\""),
-        Some(0xffff) => return Some(Accept::All),
-        Some(code) => return Some(Accept::Code(code)),
-        None => entry.fault(
-            section.faults,
-            &format!("{text:?} is neither \"station\" nor four hex digits, such as \"ffff\""),
-        ),
+    match entry.code(section.faults)? {
+        0xffff => Some(Accept::All),
+        code => Some(Accept::Code(code)),
     }
-    None
 }
 
 fn effects_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Vec<String>> {

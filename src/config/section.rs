@@ -36,6 +36,22 @@ impl<'t> Entry<'t> {
         Self { key, at: value.span().start, value: value.get_ref() }
     }
 
+    /// A code of four hex digits that means somebody.
+    pub(super) fn code(&self, faults: &mut Faults<'_>) -> Option<u16> {
+        let text = self.text(faults)?;
+        let hex = text.len() == 4 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+        match u16::from_str_radix(text, 16).ok().filter(|_| hex) {
+            Some(0) => self.fault(faults, "0000 means that no station accepts the frame; use \"ffff\""),
+            Some(code) => return Some(code),
+            None => {
+                let message =
+                    format!("{text:?} is neither \"station\" nor four hex digits, such as \"ffff\"");
+                self.fault(faults, &message);
+            }
+        }
+        None
+    }
+
     /// Notes what is wrong with it.
     pub(crate) fn fault(&self, faults: &mut Faults<'_>, message: &str) {
         faults.note(self.at, format!("{}: {message}", self.key));

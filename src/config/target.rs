@@ -96,6 +96,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         controllers,
         absent: Vec::new(),
         links: Vec::new(),
+        broadcasts: Vec::new(),
         osc: None,
         text: None,
         buttons: Vec::new(),

@@ -3,6 +3,7 @@
 //! touches the tick thread but by [`Handle::stop`], which sets a flag that is read every tick.
 
 mod ask;
+mod broadcasts;
 mod clock;
 mod handle;
 mod links;
@@ -17,6 +18,7 @@ pub use crate::config::Role;
 pub(crate) use ask::Levels;
 pub use ask::StartOrder;
 pub use ask::{Command, LevelsChange};
+pub(crate) use broadcasts::BroadcastStatus;
 pub(crate) use clock::{ClockReading, SharedClock};
 pub(crate) use handle::{Asked, FRESH, Posted, asked_at, overtaken};
 pub use handle::{Desired, Handle, Inbox, StatusSource, handle};

@@ -17,6 +17,7 @@ pub(crate) use fleet::{ArmedForStatus, ClockStatus, FleetStatus, StartPhase, Sta
 pub(crate) use margin::{MarginOf, MarginStatus};
 
 use super::Levels;
+use super::broadcasts::BroadcastStatus;
 use super::links::LinkStatus;
 use super::model::{Coded, FrameCounts, Health, Severity, Then, Times, Word};
 use crate::state::{Cause, Next, State};
@@ -105,6 +106,9 @@ pub struct Status {
     /// Every serial link that has seats; left out where there is none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub links: Vec<LinkStatus>,
+    /// Every network of `[broadcast]`; left out where there is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub broadcasts: Vec<BroadcastStatus>,
     /// The last preflight.
     pub preflight: Option<PreflightStatus>,
     /// The test of axes and effects that runs, or the last one.

@@ -5,7 +5,7 @@ use super::link::LinkPose;
 use super::mbox::MotionCodec;
 use crate::engine::{Beat, Mix};
 use crate::motion::{Pose, Window};
-use crate::wire::{FrameNo, MAX_LEN, Timing};
+use crate::wire::{Code, FrameNo, MAX_LEN, Timing};
 
 /// Our state for one controller, as far as sending goes.
 #[derive(Debug, Clone)]
@@ -54,13 +54,42 @@ impl Lane {
     ) -> (Stamped, &'b [u8]) {
         let mut stamped = self.stamp();
         let octets = match &self.codec {
-            Codec::Mbox(codec) => codec.write(&self.window, beat, pose, mix, &mut stamped, buf),
+            Codec::Mbox(codec) => codec.write(&self.window, (beat, pose), mix, codec.code, &mut stamped, buf),
             Codec::Link { shake } => {
                 let mix = Mix { vibration: shake * mix.vibration, ..mix };
                 LinkPose::of(&self.window, beat, pose, mix, &mut stamped).emit(buf)
             }
         };
         (stamped, octets)
+    }
+
+    /// Writes the frame of this tick as it would be under that number, for whoever that code means, and takes no number for it; none
+    /// where its family has no such code.
+    pub(crate) fn draft<'b>(
+        &self,
+        frame: FrameNo,
+        code: Code,
+        beat: &Beat,
+        pose: &Pose,
+        mix: Mix,
+        buf: &'b mut [u8; MAX_LEN],
+    ) -> Option<(Stamped, &'b [u8])> {
+        let Codec::Mbox(codec) = &self.codec else { return None };
+        let mut stamped = Stamped { frame, asked: frame.asks(self.ack_every), shakes: 0.0 };
+        let octets = codec.write(&self.window, (beat, pose), mix, code, &mut stamped, buf);
+        Some((stamped, octets))
+    }
+
+    /// The number of its next frame.
+    pub(crate) const fn next_frame(&self) -> FrameNo {
+        self.next_frame
+    }
+
+    /// Takes that number, which is no earlier than its next, for a frame that was drafted; says whether others before it are left out.
+    pub(crate) fn take(&mut self, frame: FrameNo) -> bool {
+        let skips = frame != self.next_frame;
+        self.next_frame = frame.next();
+        skips
     }
 
     /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, plain, effects and outputs off.

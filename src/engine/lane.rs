@@ -142,6 +142,12 @@ impl LaneMotion {
         self.is_there() && self.ahead == 0
     }
 
+    /// Whether it is wanted, and neither out nor on its way there.
+    #[must_use]
+    pub(crate) const fn is_in(&self) -> bool {
+        self.wanted.on && !self.out
+    }
+
     /// Whether nobody knows which frames reach it.
     #[must_use]
     pub(crate) const fn is_blind(&self) -> bool {

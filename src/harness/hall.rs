@@ -23,8 +23,8 @@ use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::motion::{AxisGeometry, MAX_AXES, Pose, Window};
 use crate::net::Delivery;
 use crate::rt::{
-    Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places, PlanLoop, Planning,
-    Task, TickLoop, mailboxes,
+    Alarm, Answer, Broadcasts, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places,
+    PlanLoop, Planning, Task, TickLoop, mailboxes,
 };
 use crate::state::Transition;
 use crate::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
@@ -86,6 +86,8 @@ pub struct Virtual {
     pub chases: bool,
     /// True if the hall is armed, and starts by what it is asked; else it goes at once.
     pub armed: bool,
+    /// True if one datagram may go to all of its seats.
+    pub together: bool,
     /// Whoever tells of it, where it is not the script.
     pub film: Option<ShownFilm>,
     /// What happens at the wake-up of that number, counted from 0.
@@ -108,6 +110,7 @@ impl Virtual {
             level: 1.0,
             chases: false,
             armed: false,
+            together: false,
             film: None,
             script: Vec::new(),
             at_most: 1_000_000,
@@ -161,7 +164,8 @@ impl Virtual {
         if self.chases || self.armed {
             engine = engine.waiting();
         }
-        let live = Arc::new(Live::new(lanes.len()));
+        let broadcasts = self.together.then(|| Broadcasts::permitted(self.config())).flatten();
+        let live = Arc::new(Live::new(lanes.len()).with_broadcasts(broadcasts));
         (0..lanes.len()).for_each(|lane| read_at_rest(&live, lane, [0.0; MAX_AXES], ORIGIN));
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
         let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } = ends;
@@ -396,6 +400,14 @@ struct Link<'a> {
 }
 
 impl FrameSink for Link<'_> {
+    fn send_to_all(&mut self, _network: usize, datagram: &[u8]) -> Delivery {
+        let lanes = self.stands.borrow().len();
+        for lane in 0..lanes {
+            self.send(lane, datagram, self.now.get());
+        }
+        Delivery::Sent
+    }
+
     fn send(&mut self, lane: usize, datagram: &[u8], _at: MonoTime) -> Delivery {
         let request = MotionRequest::parse(datagram).expect("only frames are sent");
         self.live.evidence(lane).expect("there is such a lane").on_ack(request.frame);

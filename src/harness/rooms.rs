@@ -19,7 +19,9 @@ pub mod channel {
     pub use crate::channel::Sample;
 }
 pub mod config {
-    pub use crate::config::{Api, ApiToken, Config, Controller, LossPolicy, Station, from_to_args, load};
+    pub use crate::config::{
+        Api, ApiToken, BroadcastNetwork, Config, Controller, LossPolicy, Station, from_to_args, load,
+    };
 }
 pub mod control {
     pub use crate::control::{
@@ -93,9 +95,9 @@ pub mod record {
 }
 pub mod rt {
     pub use crate::rt::{
-        Accounts, AckLoop, Alarm, Answer, Command, Conductor, Desk, Ended, FilmLead, FrameSink, Line, Live,
-        Loaded, MailEnds, News, NewsIn, Order, Outlets, Places, PlanLoop, Planning, Sent, Spinning, Task,
-        TickLoop, TickReport, Ticked, mailboxes,
+        Accounts, AckLoop, Alarm, Answer, Broadcasts, Command, Conductor, Desk, Ended, FilmLead, FrameSink,
+        Line, Live, Loaded, MailEnds, News, NewsIn, Order, Outlets, Places, PlanLoop, Planning, Sent,
+        Spinning, Task, TickLoop, TickReport, Ticked, mailboxes,
     };
 }
 pub mod sim {

@@ -96,6 +96,7 @@ fn playing() -> Status {
         ..Warning::default()
     };
     Status {
+        broadcasts: vec![],
         buttons: vec![],
         notify: vec![],
         test: None,

@@ -1,7 +1,7 @@
 //! Why the sockets of a show cannot be opened.
 
 use std::io;
-use std::net::SocketAddrV4;
+use std::net::{Ipv4Addr, SocketAddrV4};
 
 use crate::sys::file::want_of_files;
 
@@ -16,6 +16,40 @@ pub enum NetError {
     /// An address that is no single controller's.
     #[error("{0} is not the address of one controller; give its own IPv4 address and a port from 1 to 65535")]
     NotUnicast(SocketAddrV4),
+
+    /// A broadcast would not come from where its controllers answer to.
+    #[error(
+        "what is broadcast to {network} would leave from {from}, and what goes to its controllers alone from {other}; bind that \
+         address in [show], or take the [broadcast] table out"
+    )]
+    OtherWay {
+        /// The broadcast address.
+        network: SocketAddrV4,
+        /// From where it would leave.
+        from: Ipv4Addr,
+        /// From where the rest does.
+        other: Ipv4Addr,
+    },
+
+    /// A broadcast would go to no network of this machine.
+    #[error(
+        "{0} is the broadcast address of no network of this machine; correct the network in [broadcast], or this machine's address and mask"
+    )]
+    NoBroadcast(SocketAddrV4),
+
+    /// A controller is not where a broadcast goes.
+    #[error(
+        "{controller} is not reached by the network of {bits} bits that {network} goes to; correct the network in [broadcast], or the \
+         addresses, masks and routes of this machine"
+    )]
+    OffTheWire {
+        /// The broadcast address.
+        network: SocketAddrV4,
+        /// How many bits the addresses of its network have in common.
+        bits: u8,
+        /// The controller.
+        controller: SocketAddrV4,
+    },
 
     /// The system refused.
     #[error("cannot {attempt} {address}; {remedy}")]

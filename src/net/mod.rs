@@ -16,6 +16,7 @@ mod schedule;
 mod send;
 #[cfg(test)]
 mod tests;
+mod way;
 
 use std::net::SocketAddrV4;
 use std::sync::Arc;
@@ -40,9 +41,22 @@ pub use send::{Delivery, SendFault, Sender};
 pub struct Ports {
     local: SocketAddrV4,
     lanes: Vec<Lane>,
+    /// One for each network that is sent to as a whole.
+    broadcasts: Vec<Lane>,
     stray: Socket,
     /// Nothing that came before this can be read.
     quiet: MonoTime,
+}
+
+/// A network that is sent to as a whole.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Whole {
+    /// Its broadcast address.
+    pub(crate) address: SocketAddrV4,
+    /// How many bits all addresses of it have in common.
+    pub(crate) bits: u8,
+    /// The controllers in it, by their places among the peers.
+    pub(crate) lanes: Vec<usize>,
 }
 
 /// One controller's socket, and how often the kernel reported that its port is closed, be it to the sender or to the
@@ -63,7 +77,22 @@ impl Ports {
     /// [`NetError::Twice`] and [`NetError::NotUnicast`] for peers that cannot have a socket of their own;
     /// [`NetError::Refused`] where the system refuses, even if another program has the port.
     pub fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Self, NetError> {
-        open::open(bind, peers)
+        Self::open_with(bind, peers, &[])
+    }
+
+    /// The same, with a socket for each of these networks that sends to all of it at its broadcast address, and hears nothing: whoever
+    /// answers does so to the socket of its own address.
+    ///
+    /// # Errors
+    /// As [`Ports::open`]; [`NetError::NoBroadcast`] and [`NetError::OffTheWire`] where a broadcast would not go to the controllers of the
+    /// network and no farther; [`NetError::OtherWay`] where it would leave from another address than what goes to a controller alone:
+    /// its reply would not be taken for that controller's.
+    pub(crate) fn open_with(
+        bind: SocketAddrV4,
+        peers: &[SocketAddrV4],
+        broadcasts: &[Whole],
+    ) -> Result<Self, NetError> {
+        open::open(bind, peers, broadcasts)
     }
 
     /// The local address, with the port that was taken.
@@ -76,6 +105,7 @@ impl Ports {
     #[must_use]
     pub fn split(self) -> (Sender, Receiver) {
         let lanes: Arc<[Lane]> = self.lanes.into();
-        (Sender::new(Arc::clone(&lanes)), Receiver::new(lanes, self.stray, self.quiet))
+        let sender = Sender::new(Arc::clone(&lanes), self.broadcasts.into());
+        (sender, Receiver::new(lanes, self.stray, self.quiet))
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::{Delivery, Origin, Receiver, Sender};
+use super::{Delivery, Origin, Receiver, SendFault, Sender};
 use crate::time::MonoTime;
 
 /// A network and its clock.
@@ -13,6 +13,11 @@ pub trait Network: fmt::Debug + Send + Sync {
 
     /// Takes a datagram to a controller, or does not.
     fn send(&self, lane: usize, datagram: &[u8]) -> Delivery;
+
+    /// Takes a datagram to all of a network, counted from 0 in the order in which these were opened, or does not.
+    fn send_to_all(&self, _network: usize, _datagram: &[u8]) -> Delivery {
+        Delivery::Failed(SendFault::of(libc::EOPNOTSUPP))
+    }
 
     /// Gives every datagram that has arrived; as [`Receiver::drain`].
     fn drain(&self, on: &mut dyn FnMut(Origin, &[u8], MonoTime)) -> MonoTime;

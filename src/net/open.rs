@@ -8,7 +8,8 @@ use std::sync::atomic::AtomicU64;
 
 use socket2::{Domain, Protocol, Socket, Type};
 
-use super::{Lane, NetError, Ports};
+use super::way::way;
+use super::{Lane, NetError, Ports, Whole};
 use crate::sys::batch::{Batch, stamp_arrivals};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock;
@@ -22,7 +23,7 @@ const QUIET_BATCHES: usize = 1_024;
 
 /// The socket for strangers binds first and alone, which fails if anyone has the port. Only then may the port be
 /// shared, and only until all of ours are bound: a permission left on any socket would let another program in.
-pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Ports, NetError> {
+pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4], wholes: &[Whole]) -> Result<Ports, NetError> {
     check(peers)?;
     let at_bind = |cause| NetError::refused("bind UDP address", bind, cause);
     let stray = socket().map_err(at_bind)?;
@@ -32,8 +33,10 @@ pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Ports, 
     stamp_arrivals(&stray).map_err(at_bind)?;
 
     let lanes = peers.iter().map(|&peer| lane(local, peer)).collect::<Result<Vec<_>, _>>()?;
+    let broadcasts =
+        wholes.iter().map(|one| whole(local, one, peers, &lanes)).collect::<Result<Vec<_>, _>>()?;
 
-    for socket in lanes.iter().map(|lane| &lane.socket).chain([&stray]) {
+    for socket in lanes.iter().chain(&broadcasts).map(|lane| &lane.socket).chain([&stray]) {
         socket.set_reuse_address(false).map_err(at_bind)?;
     }
     let quiet_from = Monotonic.now();
@@ -41,7 +44,7 @@ pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Ports, 
     for socket in lanes.iter().map(|lane| &lane.socket).chain([&stray]) {
         quiet(&mut batch, socket);
     }
-    Ok(Ports { local, lanes, stray, quiet: quiet_from })
+    Ok(Ports { local, lanes, broadcasts, stray, quiet: quiet_from })
 }
 
 fn check(peers: &[SocketAddrV4]) -> Result<(), NetError> {
@@ -69,13 +72,51 @@ fn local_address(socket: &Socket) -> io::Result<SocketAddrV4> {
 }
 
 fn lane(local: SocketAddrV4, peer: SocketAddrV4) -> Result<Lane, NetError> {
+    connected(local, peer, "reach the controller", |_| Ok(()))
+}
+
+/// The socket of a network that is sent to as a whole. What it sends has to go to where its controllers are, and nowhere else: no router
+/// carries it on, whatever becomes of the routes. And it has to come from where they answer to.
+fn whole(
+    local: SocketAddrV4,
+    network: &Whole,
+    peers: &[SocketAddrV4],
+    lanes: &[Lane],
+) -> Result<Lane, NetError> {
+    let Whole { address, bits, lanes: members } = network;
+    let at = |cause| NetError::refused("broadcast to", *address, cause);
+    let to_all = way(*local.ip(), *address.ip()).map_err(at)?;
+    if !to_all.is_broadcast {
+        return Err(NetError::NoBroadcast(*address));
+    }
+    let set = |socket: &Socket| socket.set_broadcast(true).and_then(|()| socket.set_ttl_v4(1));
+    let whole = connected(local, *address, "broadcast to", set)?;
+    let from = *local_address(&whole.socket).map_err(at)?.ip();
+    for member in members {
+        let to_one = way(*local.ip(), *peers[*member].ip()).map_err(at)?;
+        if to_one.is_carried_on || to_one.bits != *bits || to_one.interface != to_all.interface {
+            return Err(NetError::OffTheWire { network: *address, bits: *bits, controller: peers[*member] });
+        }
+        let other = *local_address(&lanes[*member].socket).map_err(at)?.ip();
+        if other != from {
+            return Err(NetError::OtherWay { network: *address, from, other });
+        }
+    }
+    Ok(whole)
+}
+
+fn connected(
+    local: SocketAddrV4,
+    peer: SocketAddrV4,
+    attempt: &'static str,
+    set: impl Fn(&Socket) -> io::Result<()>,
+) -> Result<Lane, NetError> {
     let at_bind = |cause| NetError::refused("bind UDP address", local, cause);
     let socket = socket().map_err(at_bind)?;
-    prepare(&socket).map_err(at_bind)?;
+    prepare(&socket).and_then(|()| set(&socket)).map_err(at_bind)?;
     socket.bind(&local.into()).map_err(at_bind)?;
-    socket
-        .connect(&SocketAddr::V4(peer).into())
-        .map_err(|cause| NetError::refused("reach the controller", peer, cause))?;
+    let connected = socket.connect(&SocketAddr::V4(peer).into());
+    connected.map_err(|cause| NetError::refused(attempt, peer, cause))?;
     Ok(Lane { socket, refusals: AtomicU64::new(0) })
 }
 

@@ -91,13 +91,13 @@ pub struct Sender {
 /// Where datagrams go.
 #[derive(Debug, Clone)]
 enum SendWay {
-    Kernel(Arc<[Lane]>),
+    Kernel { lanes: Arc<[Lane]>, broadcasts: Arc<[Lane]> },
     Network(Arc<dyn Network>),
 }
 
 impl Sender {
-    pub(super) const fn new(lanes: Arc<[Lane]>) -> Self {
-        Self { way: SendWay::Kernel(lanes), lead: None }
+    pub(super) const fn new(lanes: Arc<[Lane]>, broadcasts: Arc<[Lane]>) -> Self {
+        Self { way: SendWay::Kernel { lanes, broadcasts }, lead: None }
     }
 
     pub(super) const fn over(network: Arc<dyn Network>) -> Self {
@@ -134,9 +134,27 @@ impl Sender {
             return Delivery::Failed(SendFault::NOT_LEADING);
         }
         let lane = match &self.way {
-            SendWay::Kernel(lanes) => &lanes[lane],
+            SendWay::Kernel { lanes, .. } => &lanes[lane],
             SendWay::Network(network) => return network.send(lane, datagram),
         };
+        self.send_by(lane, datagram)
+    }
+
+    /// Sends one datagram to all of a network, counted from 0 in the order in which these were opened; as [`Sender::send`].
+    ///
+    /// # Panics
+    /// If there is no such network.
+    pub(crate) fn send_to_all(&self, network: usize, datagram: &[u8]) -> Delivery {
+        if self.is_over() {
+            return Delivery::Failed(SendFault::NOT_LEADING);
+        }
+        match &self.way {
+            SendWay::Kernel { broadcasts, .. } => self.send_by(&broadcasts[network], datagram),
+            SendWay::Network(over) => over.send_to_all(network, datagram),
+        }
+    }
+
+    fn send_by(&self, lane: &Lane, datagram: &[u8]) -> Delivery {
         match lane.send(datagram) {
             Ok(()) => Delivery::Sent,
             Err(Errno::CONNREFUSED) if self.is_over() => Delivery::Failed(SendFault::NOT_LEADING),

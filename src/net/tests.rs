@@ -224,3 +224,39 @@ fn a_send_that_fails_says_why_and_what_to_do() {
     assert_eq!((fault.errno(), fault.refused()), (libc::EMSGSIZE, false));
     assert!(fault.to_string().contains("too long"), "{fault}");
 }
+
+#[test]
+fn one_datagram_reaches_all_of_a_network_from_where_its_controllers_answer_to_and_a_way_elsewhere_is_refused()
+{
+    let any = UdpSocket::bind("0.0.0.0:0").unwrap();
+    any.set_read_timeout(Some(PATIENCE)).unwrap();
+    let port = any.local_addr().unwrap().port();
+    let at = |ip: [u8; 4]| SocketAddrV4::new(ip.into(), port);
+    let whole = |address, bits| Whole { address, bits, lanes: vec![0] };
+    let open = |peer, whole| Ports::open_with(LOOPBACK, &[peer], &[whole]);
+    let all = at([127, 255, 255, 255]);
+    let (sender, receiver) = {
+        let ports = open(at([127, 0, 0, 2]), whole(all, 8)).unwrap();
+        assert!(bind_shared(ports.local()).is_err(), "nobody else can have the port");
+        ports.split()
+    };
+    assert_eq!(sender.send_to_all(0, b"all"), Delivery::Sent);
+    let mut buffer = [0; 10];
+    let (len, from) = any.recv_from(&mut buffer).unwrap();
+    assert_eq!((&buffer[..len], *v4(from).ip()), (&b"all"[..], *LOOPBACK.ip()));
+    assert_eq!(receiver.lanes(), 1);
+
+    for (peer, address, bits) in [([127, 0, 0, 2], all, 24), ([127, 0, 0, 1], all, 8)] {
+        let refused = open(at(peer), whole(address, bits)).unwrap_err();
+        assert!(
+            matches!(refused, NetError::OffTheWire { controller, .. } if controller == at(peer)),
+            "{refused}"
+        );
+    }
+    let refused = open(at([127, 0, 0, 2]), whole(at([127, 0, 0, 255]), 24)).unwrap_err();
+    assert!(matches!(refused, NetError::NoBroadcast(_)), "{refused}");
+
+    let lead = std::sync::Arc::new(Lead::default());
+    let led = sender.led_by(Some(lead));
+    assert_eq!(led.send_to_all(0, b"no"), Delivery::Failed(SendFault::NOT_LEADING));
+}

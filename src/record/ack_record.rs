@@ -40,6 +40,8 @@ pub(crate) enum AckRecord<'a> {
     Posted(u32, usize, FrameNo),
     /// The kernel did not take that frame of a controller.
     Failed(usize, FrameNo),
+    /// The next frame of a controller has that number, and none has those between it and the last.
+    Skipped(usize, FrameNo),
     /// The lane of a controller is where the others are again.
     Joined(usize),
     /// Nothing goes to the lane of a controller any more; and the amplitude with which its seat may vibrate on, strokes.
@@ -85,10 +87,9 @@ impl<'a> AckRecord<'a> {
                 out.extend_from_slice(&frames.to_le_bytes());
                 out.extend_from_slice(&last.0.to_le_bytes());
             }
-            Self::Failed(controller, frame) | Self::First(controller, frame) => {
-                of(out, if matches!(self, Self::Failed(..)) { 4 } else { 14 }, controller);
-                out.extend_from_slice(&frame.0.to_le_bytes());
-            }
+            Self::Failed(controller, frame) => write_numbered(out, 4, controller, frame),
+            Self::First(controller, frame) => write_numbered(out, 14, controller, frame),
+            Self::Skipped(controller, next) => write_numbered(out, 21, controller, next),
             Self::Joined(controller) => of(out, 5, controller),
             Self::FellOut(controller, why, shakes) => {
                 of(out, 6, controller);
@@ -160,6 +161,7 @@ impl<'a> AckRecord<'a> {
         Some(match kind {
             3 => Self::Posted(from.u32()?, controller, from.frame_no()?),
             14 => Self::First(controller, from.frame_no()?),
+            21 => Self::Skipped(controller, from.frame_no()?),
             18 => Self::Code(controller, ReplyCode::from_byte(from.u8()?)?, from.time()?),
             19 => Self::Look(controller, read_look(from)?, from.time()?),
             0 => {
@@ -197,6 +199,11 @@ impl<'a> AckRecord<'a> {
             _ => Self::Health(read_input(kind, controller, from)?),
         })
     }
+}
+
+fn write_numbered(out: &mut Vec<u8>, kind: u8, controller: usize, frame: FrameNo) {
+    of(out, kind, controller);
+    out.extend_from_slice(&frame.0.to_le_bytes());
 }
 
 fn write_reply(out: &mut Vec<u8>, Reply { controller, frame, code, error, inputs, at }: Reply) {

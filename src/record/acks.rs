@@ -280,6 +280,7 @@ mod tests {
             AckRecord::Code(1, ReplyCode::EmergencyStop, AT),
             AckRecord::Look(1, Look { stop: StopSign::Held, inputs: Some(513) }, AT),
             AckRecord::Failed(1, FrameNo(3)),
+            AckRecord::Skipped(1, FrameNo(9)),
             AckRecord::Joined(1),
             AckRecord::FellOut(0, Fall::Stopped, 0.125),
             AckRecord::Unread(2),

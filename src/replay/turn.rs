@@ -182,6 +182,9 @@ impl Ledger for Turn<'_> {
                 AckRecord::Failed(controller, frame) if self.bench.knows(controller, frame) => {
                     tracker.on_send_failed(controller, frame);
                 }
+                AckRecord::Skipped(controller, next) if self.bench.knows(controller, next) => {
+                    tracker.on_skipped(controller, next);
+                }
                 AckRecord::Joined(controller) if controller < controllers => self.bench.on_joined(controller),
                 AckRecord::FellOut(controller, why, _) if controller < controllers => {
                     self.bench.health.on_fell_out(controller, why);
@@ -190,6 +193,7 @@ impl Ledger for Turn<'_> {
                     self.bench.health.on_unread(controller);
                 }
                 AckRecord::Failed(..)
+                | AckRecord::Skipped(..)
                 | AckRecord::Joined(_)
                 | AckRecord::FellOut(..)
                 | AckRecord::Unread(_) => {}

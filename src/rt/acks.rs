@@ -222,6 +222,7 @@ impl AckLoop {
                 Origin::Controller(controller) => controller,
                 Origin::Stranger(from) => {
                     copy(tap, &AckRecord::Heard(origin, at, octets));
+                    watch.iter().for_each(|watch| watch.hear_stranger(from, octets));
                     *strangers += u64::from(!observer.hear_elsewhere(from, octets, at));
                     return;
                 }
@@ -244,6 +245,7 @@ impl AckLoop {
             copy(tap, &AckRecord::Heard(origin, at, octets));
             let is_report = observer.hear(controller, &message, at);
             let is_known = is_report
+                || watch.as_mut().is_some_and(|watch| watch.hear_look(controller, &message))
                 || watch.as_mut().is_some_and(|watch| {
                     // Another thread has a conversation of its own: it is handed what nobody here takes for a report.
                     let others_ask = watch.pass_on(controller, octets, at);
@@ -429,6 +431,7 @@ fn copy_judged(tap: &mut Option<AckTap>, watch: &mut Option<Watch>) {
 fn copy_of(sent: Sent) -> AckRecord<'static> {
     match sent {
         Sent::Posted { lane, frame, .. } => AckRecord::Posted(1, usize::from(lane), frame),
+        Sent::Skipped { lane, next } => AckRecord::Skipped(usize::from(lane), next),
         Sent::Failed { lane, frame } => AckRecord::Failed(usize::from(lane), frame),
         Sent::Joined { lane } => AckRecord::Joined(usize::from(lane)),
         Sent::FellOut { lane, why, shakes } => AckRecord::FellOut(usize::from(lane), why, shakes),
@@ -442,6 +445,7 @@ fn record(sent: Sent, tracker: &mut Tracker, last_sent: &mut MonoTime) {
             tracker.on_sent(usize::from(lane), frame, asked, at);
             *last_sent = at.max(*last_sent);
         }
+        Sent::Skipped { lane, next } => tracker.on_skipped(usize::from(lane), next),
         Sent::Failed { lane, frame } => tracker.on_send_failed(usize::from(lane), frame),
         Sent::Joined { .. } | Sent::FellOut { .. } | Sent::Unread { .. } => {}
     }

@@ -101,6 +101,16 @@ impl FrameSink for Outlets {
         delivery
     }
 
+    fn send_to_all(&mut self, network: usize, datagram: &[u8]) -> Delivery {
+        self.sender.send_to_all(network, datagram)
+    }
+
+    fn went_along(&mut self, lane: usize, datagram: &[u8], at: MonoTime, delivery: Delivery) {
+        if let Some(tap) = &mut self.tap {
+            tap.frame(lane, datagram, at, delivery);
+        }
+    }
+
     fn asked(&mut self, asked: Asked) {
         if let Some(tap) = &mut self.tap {
             tap.asked(asked);

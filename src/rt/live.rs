@@ -2,10 +2,11 @@
 //! are behind a lock, which the ack thread and whoever looks share, never the tick thread.
 
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::TickReport;
+use super::broadcast::Broadcasts;
 use super::table::Row;
 use crate::belief::{EvidenceTable, LaneEvidence};
 use crate::engine::Engine;
@@ -94,6 +95,8 @@ pub struct Live {
     /// By when it is to have told more.
     due_ns: AtomicU64,
     table: Mutex<Vec<Row>>,
+    /// Networks whose controllers may get one datagram together, where there are any.
+    broadcasts: Option<Arc<Broadcasts>>,
 }
 
 impl Live {
@@ -106,6 +109,18 @@ impl Live {
             heard: (0..lanes).map(|_| AtomicBool::new(false)).collect(),
             ..Self::default()
         }
+    }
+
+    /// The same of one with such networks.
+    #[must_use]
+    pub fn with_broadcasts(self, broadcasts: Option<Broadcasts>) -> Self {
+        Self { broadcasts: broadcasts.map(Arc::new), ..self }
+    }
+
+    /// Networks whose controllers may get one datagram together, where there are any.
+    #[must_use]
+    pub const fn broadcasts(&self) -> Option<&Arc<Broadcasts>> {
+        self.broadcasts.as_ref()
     }
 
     /// What the ack thread has seen of a lane; none where there is no such lane.

@@ -41,6 +41,13 @@ pub enum Sent {
         /// The instant before it is sent.
         at: MonoTime,
     },
+    /// The next frame of a lane has another number than the one after its last: none has those between.
+    Skipped {
+        /// The controller.
+        lane: u16,
+        /// The number of the next.
+        next: FrameNo,
+    },
     /// The kernel did not take it.
     Failed {
         /// The controller.
@@ -264,7 +271,7 @@ pub struct MailEnds {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 2,000 ticks")]
 pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) {
     let held = (HELD_S * rate.hz()).ceil() as usize;
-    // Each frame may be followed by word of its failure.
+    // Each frame may be followed by word of its failure. One whose number is not the next has word of that instead, once.
     let (sent, sent_end) = RingBuffer::new((2 * lanes * held).max(1024));
     let (reports, reports_end) = RingBuffer::new(held.max(64));
     let (tasks, tasks_end) = RingBuffer::new(2 * PLANS);

@@ -4,6 +4,7 @@
 //! happened before it or happens on another thread; values cross in bounded single-producer mailboxes.
 
 mod acks;
+mod broadcast;
 mod conductor;
 mod desk;
 #[cfg(test)]
@@ -15,6 +16,7 @@ mod live;
 mod mail;
 mod places;
 mod planning;
+mod sending;
 mod spin;
 mod standby;
 mod table;
@@ -23,6 +25,7 @@ mod watch;
 mod withdrawn;
 
 pub use acks::{Accounts, AckLoop};
+pub use broadcast::Broadcasts;
 pub use conductor::Conductor;
 pub use desk::Desk;
 pub use film::FilmLead;
@@ -55,17 +58,26 @@ use crate::belief::Taken;
 use crate::drive::{Lane, Stamped};
 use crate::engine::{Ending, Engine, EngineEvent, Step};
 use crate::motion::Pose;
-use crate::net::{Delivery, Sender};
+use crate::net::{Delivery, SendFault, Sender};
 use crate::record::{Asked, TickHead};
-use crate::state::{Refusal, State, Transition, Why};
+use crate::state::{PlayMode, Refusal, State, Transition, Why};
 use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};
 use crate::wire::MAX_LEN;
+use sending::Sending;
 use timed::StartTurn;
 
 /// Where the frames of a tick go.
 pub trait FrameSink {
     /// Hands one lane's datagram to the kernel, `at` being now; never blocks.
     fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery;
+
+    /// Hands the kernel one datagram for all controllers of a network ([`Broadcasts`]); never blocks.
+    fn send_to_all(&mut self, _network: usize, _datagram: &[u8]) -> Delivery {
+        Delivery::Failed(SendFault::of(libc::EOPNOTSUPP))
+    }
+
+    /// A lane's frame was that one, with this fate; for whoever records.
+    fn went_along(&mut self, _lane: usize, _datagram: &[u8], _at: MonoTime, _delivery: Delivery) {}
 
     /// The next frame comes of that; for whoever records.
     fn asked(&mut self, _asked: Asked) {}
@@ -155,12 +167,13 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         self.places.look(&mut self.engine, &self.mail, now, moving);
         let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving, soon);
         let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
+        self.mind_broadcasts(now);
         let late_ns = match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
             Step::Send if self.conductor.machine().may_send_motion() => {
                 ticked.missed += tick.missed;
                 ticked.ticks += 1;
-                self.send(tick)
+                self.send(tick, now)
             }
             Step::Send | Step::Quiet | Step::Over => nanos(tick.late),
         };
@@ -279,28 +292,23 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         Ok(())
     }
 
-    /// Sends to every lane that gets a frame; says how long after its deadline the first left, nanoseconds.
-    fn send(&mut self, tick: Tick) -> u64 {
-        let mut buf = [0; MAX_LEN];
-        let mut first = None;
-        let Self { lanes, places, engine, mail, sink, clock, .. } = self;
-        for (index, lane) in lanes.iter_mut().enumerate() {
-            if !engine.lane(index).gets_a_frame() {
-                continue;
-            }
-            let at = clock.now();
-            let Some(beat) = places.admit(index, engine, at) else { continue };
-            let (motion, pose) = (engine.lane(index), engine.lane(index).pose());
-            let (stamped, datagram) = lane.encode(&beat, pose, motion.mix(), &mut buf);
-            first.get_or_insert(at);
-            let (lasts_ms, at_most_ms) = (beat.lasts_ms, beat.at_most_ms());
-            let (slots, level) = (lane.window.slots().len(), motion.level());
-            sink.asked(Asked { pose: *motion.asked(), slots, level, clamps: motion.clamps().clamps });
-            let sent = Outgoing { index, stamped, pose, lasts_ms, at_most_ms, at };
-            sent.hand_over(datagram, places, mail, sink);
-            mail.clamps(index, motion.clamps().clamps);
+    /// One datagram is for many seats only while they all are on the cue: joins, holds, stops and ways to park rest on nobody's permit.
+    fn mind_broadcasts(&self, now: MonoTime) {
+        if let Some(broadcasts) = self.mail.live().broadcasts()
+            && self.conductor.machine().state() != State::Playing(PlayMode::Following)
+        {
+            broadcasts.rest(now);
         }
-        let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
+    }
+
+    /// Sends to every lane that gets a frame; says how long after its deadline the first left, nanoseconds.
+    fn send(&mut self, tick: Tick, now: MonoTime) -> u64 {
+        let mut buf = [0; MAX_LEN];
+        let Self { lanes, places, engine, mail, sink, clock, .. } = self;
+        let mut sending =
+            Sending { lanes, places, engine, mail, sink, clock: *clock, tick: now, first: None };
+        sending.send_all(&mut buf);
+        let late_ns = nanos(sending.first.unwrap_or(tick.deadline).since(tick.deadline));
         self.mail.report(TickReport { late_ns, missed: tick.missed });
         late_ns
     }

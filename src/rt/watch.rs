@@ -2,6 +2,7 @@
 //! hear of that, and whose registers are read.
 
 mod asking;
+mod broadcasts;
 mod hearing;
 mod notes;
 
@@ -27,6 +28,7 @@ use crate::state::{Event, State};
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
 use crate::wire::ReplyCode;
+use broadcasts::BroadcastLook;
 use notes::Notes;
 
 /// Changes that are kept for the report.
@@ -80,6 +82,8 @@ pub(crate) struct Watch {
     /// What a hall has beside a play.
     standby: Option<Standby>,
     turns: Turns,
+    /// How far the look at each network of broadcasts is.
+    looks: Vec<BroadcastLook>,
     /// What is told to `health`, where somebody records.
     records: Option<Notes>,
 }
@@ -120,6 +124,7 @@ impl Watch {
             health,
             sender,
             alarms,
+            looks: BroadcastLook::of(live.broadcasts()),
             live,
             silent,
             untold: false,
@@ -185,7 +190,7 @@ impl Watch {
                 self.peers[usize::from(lane)].on_sent(at);
                 self.lit[usize::from(lane)] = DARKENED;
             }
-            Sent::Failed { .. } => {}
+            Sent::Failed { .. } | Sent::Skipped { .. } => {}
             Sent::Joined { lane } => {
                 self.on_joined(self.health.groups().group_of(usize::from(lane)));
             }
@@ -224,6 +229,7 @@ impl Watch {
         match fate {
             Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
             Fate::Answered(_) if is_refusal => self.judge(HealthInput::Refused(reply.controller)),
+            Fate::Duplicate | Fate::Stray => self.mind_foreign(reply.controller, fate),
             _ => {}
         }
     }
@@ -321,6 +327,7 @@ impl Watch {
             self.tell(self.notices[index]);
         }
         self.notices.clear();
+        self.mind_broadcasts(now);
         self.tell_of_zeros();
         self.end_look_anew(now);
         self.send_alarms();

@@ -88,6 +88,22 @@ impl Account {
         self.counts.send_failed += 1;
     }
 
+    /// No frame has the numbers before `next` that are not on record.
+    pub(super) fn on_skipped(&mut self, next: FrameNo) {
+        let count = self.ring.ahead(FrameNo(next.0.wrapping_sub(1)));
+        let forgotten = count.saturating_sub(KEPT);
+        if forgotten > 0 {
+            // As in `record_unrecorded`: the rest takes the place of every frame remembered now.
+            self.ring.skip(forgotten);
+            self.oldest_open = self.ring.next();
+        }
+        let (at, wanted) = (self.recorded_at, self.wanted);
+        for _ in forgotten..count {
+            let before = self.ring.push(FrameEntry { state: FrameState::Failed, at, wanted });
+            self.counts.lost += u64::from(before.state.open());
+        }
+    }
+
     pub(super) fn on_last(&mut self, last: FrameNo, at: MonoTime) {
         if !self.recorded(last) {
             self.recorded_at = at;

@@ -23,7 +23,7 @@ pub(super) enum FrameState {
     Lost,
     /// Whoever was to execute it was told to stop first.
     Withdrawn,
-    /// Not taken by the kernel.
+    /// Not taken by the kernel, or a number that no frame has.
     Failed,
 }
 

@@ -85,6 +85,11 @@ impl Tracker {
         self.accounts[controller].on_send_failed(frame);
     }
 
+    /// The next frame of a controller has the number `next`, and none has those before it that are not on record: they count as nothing.
+    pub(crate) fn on_skipped(&mut self, controller: usize, next: FrameNo) {
+        self.accounts[controller].on_skipped(next);
+    }
+
     /// `last` was the last frame of the show, sent or not, at `at` at the latest: frames up to it of which no record came
     /// count as [`Tracker::on_sent`] has it.
     pub fn on_last(&mut self, controller: usize, last: FrameNo, at: MonoTime) {

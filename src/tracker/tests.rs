@@ -36,6 +36,26 @@ fn each_frame_ends_acked_refused_or_lost() {
 }
 
 #[test]
+fn numbers_that_no_frame_has_count_as_nothing_however_many_they_are() {
+    for next in [5, 900, 6_000, 3_000_000_000] {
+        let mut tracker = Tracker::starting_at(&[FrameNo(next - 4)], 1);
+        let first = next - 4;
+        tracker.on_sent(0, FrameNo(first), true, ms(1));
+        tracker.on_reply(0, FrameNo(first), Running, ms(2));
+        tracker.on_sent(0, FrameNo(first + 1), true, ms(3));
+        let far = FrameNo(next.wrapping_add(next / 3));
+        tracker.on_skipped(0, far);
+        assert_eq!(tracker.on_reply(0, FrameNo(far.0.wrapping_sub(1)), Running, ms(4)), Fate::Stray);
+        tracker.on_sent(0, far, true, ms(5));
+        assert_eq!(tracker.on_reply(0, far, Running, ms(6)), Fate::Answered(Running));
+        tracker.expire(ms(5_000));
+        let counts = tracker.counts(0);
+        assert_eq!((counts.sent, counts.asked, counts.acked, counts.lost), (3, 3, 2, 1), "{next}");
+        assert_balanced(&tracker);
+    }
+}
+
+#[test]
 fn frames_that_are_withdrawn_are_not_lost_whatever_else_is_told_of_them() {
     let mut tracker = sent(6);
     tracker.on_reply(0, FrameNo(3), Running, ms(9));

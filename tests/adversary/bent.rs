@@ -1,6 +1,8 @@
 //! What happens in halls beside what always may.
 
-use super::cues::{FEWER, KINDS, Kind, MBOXES, RELOADED, TURNTABLES};
+use kinocue::harness::engine::Mix;
+
+use super::cues::{FEWER, KINDS, Kind, MBOXES, RELOADED, TOGETHER, TURNTABLES};
 use super::dice::Dice;
 use super::ether::Weather;
 use super::hall::Hall;
@@ -36,6 +38,8 @@ pub(crate) enum Bent {
     Table,
     /// In a show as well seats are jogged at their keys, or home by themselves: they ack frames and do not execute them.
     Deaf,
+    /// All seats may get one datagram together, and one is out or levelled now and then.
+    Together,
 }
 
 impl Bent {
@@ -47,6 +51,7 @@ impl Bent {
             Self::Reload => &RELOADED[dice.range(0, RELOADED.len() as u64) as usize],
             Self::Fewer => &FEWER[dice.range(0, FEWER.len() as u64) as usize],
             Self::Mbox => &MBOXES,
+            Self::Together => &TOGETHER,
             Self::Table => &TURNTABLES,
             Self::Lie => dice.pick(&[&KINDS[..], &MBOXES]),
         }
@@ -68,6 +73,7 @@ impl Bent {
             Self::Exchange | Self::Lie => 12,
             Self::Reload | Self::Fewer | Self::Deaf => 8,
             Self::Table => 20,
+            Self::Together => 6,
             Self::Mbox => 25,
         }
     }
@@ -96,6 +102,11 @@ impl Bent {
                 hall.ether.exchange();
             }
             Self::Reload | Self::Fewer => hall.leave(),
+            Self::Together => {
+                let mix = hall.runtime.desk.mix(seat);
+                let motion = dice.pick(&[1.0, 1.0, 0.5]);
+                hall.set(seat, Mix { on: !mix.on, motion, ..mix });
+            }
             Self::Mbox | Self::Lie => {
                 let dark = dice.pick(&[1_000, 1_500]);
                 hall.note(|| format!("seat {}: its power goes for {dark} ms", seat + 1));

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use kinocue::cue::{self, Source};
 use kinocue::harness::app::staged::headroom;
-use kinocue::harness::config::{Config, LossPolicy, from_to_args, load};
+use kinocue::harness::config::{BroadcastNetwork, Config, LossPolicy, from_to_args, load};
 use kinocue::harness::engine::Headroom;
 use kinocue::harness::motion::AxisGeometry;
 use kinocue::harness::time::Rate;
@@ -29,6 +29,8 @@ pub(crate) struct Kind {
     /// The last axis of each seat is a turntable.
     pub(crate) turns: bool,
     ack_every: u32,
+    /// All seats may get one datagram together.
+    together: bool,
 }
 
 const PLAIN: Kind = Kind {
@@ -42,6 +44,7 @@ const PLAIN: Kind = Kind {
     far: 1.0,
     turns: false,
     ack_every: 1,
+    together: false,
 };
 const MBOX: Kind = Kind { dialect: Dialect::Mbox, ..PLAIN };
 
@@ -126,6 +129,17 @@ pub(crate) const TURNTABLES: [Kind; 5] = [
     Kind { axes: &[4], turns: true, park: 0.5, hz: 200.0, policy: LossPolicy::Park, ..MBOX },
 ];
 
+/// Halls whose seats may get one datagram together.
+pub(crate) const TOGETHER: [Kind; 4] = [
+    Kind { axes: &[3, 3, 3], hz: 50.0, together: true, ..PLAIN },
+    Kind { axes: &[6, 6], timing: Timing::Absolute, together: true, ..PLAIN },
+    Kind { axes: &[3, 3], ack_every: 4, together: true, ..PLAIN },
+    Kind { axes: &[3, 3], hz: 50.0, policy: LossPolicy::Continue, together: true, ..MBOX },
+];
+
+/// The same whose seats get their own.
+const ALONE: [Kind; 4] = [TOGETHER[0].alone(), TOGETHER[1].alone(), TOGETHER[2].alone(), TOGETHER[3].alone()];
+
 /// A cue that is ready to be staged.
 pub(crate) type Ready = (Arc<Timeline>, Headroom);
 
@@ -137,6 +151,11 @@ pub(crate) struct Book {
 }
 
 impl Kind {
+    /// The same where each gets its own.
+    pub(crate) const fn alone(self) -> Self {
+        Self { together: false, ..self }
+    }
+
     pub(crate) fn period_ms(&self) -> f64 {
         1_000.0 / self.hz
     }
@@ -163,8 +182,30 @@ impl Kind {
             // Its replies tell nothing of an emergency stop.
             controller.estop_inputs = u16::from(self.dialect == Dialect::Mbox);
         }
+        if self.together {
+            config.broadcasts = self.network();
+        }
         config.seats = config.controllers.iter().map(|controller| Arc::clone(&controller.seat)).collect();
         config
+    }
+
+    /// The network of all seats, as a configuration has it.
+    fn network(&self) -> Vec<BroadcastNetwork> {
+        let (axes, mbox) = (self.axes[0], self.dialect == Dialect::Mbox);
+        let mut text = format!(
+            "[broadcast.all]\nalone = true\nnetwork = \"127.0.1.0/24\"\n[seat.s]\naxes = {axes}\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 10000\n\
+             max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n"
+        );
+        for seat in 1..=self.axes.len() {
+            let dialect = if mbox { "mbox" } else { "smc" };
+            text += &format!(
+                "[[controller]]\nname = \"c{seat}\"\nseat = \"s\"\naddress = \"127.0.1.{seat}:7408\"\ndialect = \"{dialect}\"\n"
+            );
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("hall.toml");
+        std::fs::write(&path, text).expect("the folder is ours");
+        load(&path).expect("it is sound").broadcasts
     }
 
     fn most(&self) -> usize {
@@ -173,13 +214,16 @@ impl Kind {
 
     /// What there is for halls of this kind; made once.
     pub(crate) fn book(&self) -> &'static Book {
-        const ALL: usize = KINDS.len() + MBOXES.len() + 24 + OTHERS.len() + TURNTABLES.len();
+        const ALL: usize =
+            KINDS.len() + MBOXES.len() + 24 + OTHERS.len() + TURNTABLES.len() + 2 * TOGETHER.len();
         static BOOKS: [OnceLock<Book>; ALL] = [const { OnceLock::new() }; ALL];
         let mut all = KINDS
             .iter()
             .chain(&OTHERS)
             .chain(&MBOXES)
             .chain(&TURNTABLES)
+            .chain(&TOGETHER)
+            .chain(&ALONE)
             .chain(RELOADED.iter().flatten())
             .chain(FEWER.iter().flatten());
         let index = all.position(|kind| kind == self).expect("it is one of them");

@@ -1,6 +1,7 @@
 //! The network of a virtual hall, and its clock: what it does to the datagrams of each seat, in either direction.
 
 use std::collections::VecDeque;
+use std::net::SocketAddrV4;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -101,6 +102,19 @@ pub(crate) struct World {
     pub(crate) frames: Option<Vec<String>>,
     /// Recordings of the halls that were, where somebody wants them.
     pub(crate) recordings: Option<Vec<Vec<u8>>>,
+    /// The frames of motion that each seat was sent, but for their numbers and who was to take them, where somebody wants them.
+    pub(crate) executed: Option<Vec<Vec<Vec<u8>>>>,
+    /// The newest reply to a frame of motion.
+    pub(crate) last_reply: Option<Vec<u8>>,
+    /// What somebody else has sent.
+    pub(crate) strangers: VecDeque<(SocketAddrV4, Vec<u8>)>,
+    /// A seat that takes no broadcasts, and somebody else who answers them.
+    pub(crate) deaf_to_all: Option<usize>,
+    pub(crate) stranger_answers: Option<SocketAddrV4>,
+    /// A seat at whose address there is a second controller, which takes what goes to all.
+    pub(crate) twice: Option<usize>,
+    /// Frames of motion, and questions, that went to all.
+    pub(crate) to_all: [u64; 2],
 }
 
 /// The network, with its clock.
@@ -124,8 +138,22 @@ impl Ether {
         };
         let lines = seats.iter().enumerate().map(line).collect();
         let dice = Dice::new(!seed);
-        let world =
-            World { lines, dice, asked: false, asked_at: 0, asked_until: 0, frames: None, recordings: None };
+        let world = World {
+            lines,
+            dice,
+            asked: false,
+            asked_at: 0,
+            asked_until: 0,
+            frames: None,
+            recordings: None,
+            executed: None,
+            last_reply: None,
+            strangers: VecDeque::new(),
+            deaf_to_all: None,
+            stranger_answers: None,
+            twice: None,
+            to_all: [0; 2],
+        };
         Self { now: Arc::new(AtomicU64::new(BEGIN)), world: Arc::new(Mutex::new(world)) }
     }
 
@@ -153,9 +181,12 @@ impl Ether {
     /// Takes a datagram that was sent at that instant.
     pub(crate) fn take_in(&self, lane: usize, datagram: &[u8], sent: u64) -> Delivery {
         let now = self.ns();
-        let World { lines, dice, asked, asked_until, frames, .. } = &mut *self.world();
+        let World { lines, dice, asked, asked_until, frames, executed, .. } = &mut *self.world();
         let asked = *asked || sent <= *asked_until;
         let delivery = lines[lane].take(datagram, (now, sent), asked, dice);
+        if let (Some(executed), Heard::Motion(_)) = (executed, words::hear(datagram)) {
+            executed[lane].push([&datagram[..8], &datagram[16..]].concat());
+        }
         if let (Some(frames), Heard::Motion(frame)) = (frames, words::hear(datagram)) {
             let places: Vec<i32> = frame.positions[..frame.axes].iter().map(|at| at / 200).collect();
             let (at, number, ms) = (now as f64 * 1e-9, frame.number, frame.time_ms);
@@ -209,14 +240,20 @@ impl Ether {
 impl World {
     /// Brings what has arrived at the seats by then, and has them answer.
     fn deliver(&mut self, now: u64) {
-        let Self { lines, dice, asked_at, .. } = self;
-        for line in lines.iter_mut() {
+        let Self { lines, dice, asked_at, last_reply, twice, .. } = self;
+        for (seat, line) in lines.iter_mut().enumerate() {
             while line.there.front().is_some_and(|packet| packet.at <= now) {
                 line.intrude(line.there[0].at, *asked_at);
                 let Some(Packet { at, sent, lost_since, asked, octets }) = line.there.pop_front() else {
                     break;
                 };
                 if let Some(reply) = line.seat.hear(&octets, Arrival { at, sent, lost_since, asked }) {
+                    if matches!(reply[4], 0x13 | 0x14) {
+                        *last_reply = Some(reply.clone());
+                    }
+                    if *twice == Some(seat) && words::is_to_all(&octets) {
+                        line.answer(reply.clone(), at, dice);
+                    }
                     line.answer(reply, at, dice);
                 }
             }
@@ -336,6 +373,23 @@ impl Network for Ether {
         self.take_in(lane, datagram, self.ns())
     }
 
+    fn send_to_all(&self, _network: usize, datagram: &[u8]) -> Delivery {
+        let now = self.ns();
+        let deaf = self.world().deaf_to_all;
+        if self.world().lines.iter().any(|line| line.is(now, Weather::Refused).is_some()) {
+            return Delivery::Failed(SendFault::of(libc::ENOBUFS));
+        }
+        for lane in (0..self.lanes()).filter(|lane| deaf != Some(*lane)) {
+            self.take_in(lane, datagram, now);
+        }
+        let world = &mut *self.world();
+        world.to_all[usize::from(!matches!(words::hear(datagram), Heard::Motion(_)))] += 1;
+        if let (Some(from), Heard::Read { .. }) = (world.stranger_answers, words::hear(datagram)) {
+            world.strangers.push_back((from, words::register_reply(datagram, 2, 0, &[0, 99])));
+        }
+        Delivery::Sent
+    }
+
     fn drain(&self, on: &mut dyn FnMut(Origin, &[u8], MonoTime)) -> MonoTime {
         let now = self.ns();
         for lane in 0..self.lanes() {
@@ -348,6 +402,11 @@ impl Network for Ether {
                 drop(world);
                 on(Origin::Controller(lane), &packet.octets, MonoTime::from_nanos(packet.at));
             }
+        }
+        loop {
+            let next = self.world().strangers.pop_front();
+            let Some((from, octets)) = next else { break };
+            on(Origin::Stranger(from), &octets, MonoTime::from_nanos(now));
         }
         MonoTime::from_nanos(now)
     }

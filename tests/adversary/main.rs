@@ -47,5 +47,6 @@ mod processes;
 mod rules;
 mod seat;
 mod soak;
+mod together;
 mod town;
 mod words;

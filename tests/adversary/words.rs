@@ -32,6 +32,12 @@ fn u32_at(octets: &[u8], at: usize) -> u32 {
     octets.get(at..at + 4).map_or(0, |four| u32::from_be_bytes([four[0], four[1], four[2], four[3]]))
 }
 
+/// Whether it is for all of a network rather than for one or for whoever gets it.
+pub(crate) fn is_to_all(octets: &[u8]) -> bool {
+    let accept = u16_at(octets, 8);
+    accept != 0xffff && accept & 0xff == 0xff
+}
+
 /// Whether the sender wants an answer.
 pub(crate) fn wants_reply(octets: &[u8]) -> bool {
     u16_at(octets, 10) != 0

@@ -18,7 +18,7 @@ use crate::serving::{self, Serving};
 use crate::statuses;
 
 /// One hall at a time: beside others its frames would be late by themselves.
-static ALONE: Mutex<()> = Mutex::new(());
+pub(crate) static ALONE: Mutex<()> = Mutex::new(());
 
 /// Where the service is, and its controllers.
 pub(crate) const SHOW: [u8; 4] = [10, 77, 0, 1];

@@ -14,6 +14,7 @@ mod serving;
 mod statuses;
 
 mod answers;
+mod broadcast;
 mod cable;
 mod forger;
 mod hall;

@@ -3,19 +3,26 @@
 
 use super::super::StagedShow;
 use super::{Numbers, RuntimeError};
-use crate::config::{Config, cue_axes};
+use crate::config::{BroadcastNetwork, Config, cue_axes};
 use crate::cue::CueBuilder;
 use crate::drive::Manner;
 use crate::engine::Show;
-use crate::net::{Ports, Receiver, SendCost, Sender};
+use crate::net::{Ports, Receiver, SendCost, Sender, Whole};
 use crate::sys::clock::Monotonic;
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
 /// Binds the frame port.
 pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> {
-    let peers: Vec<_> = config.stations().iter().map(|one| one.connection.address).collect();
-    Ok(Ports::open(config.show.bind, &peers).map_err(RuntimeError::Net)?.split())
+    let stations = config.stations();
+    let peers: Vec<_> = stations.iter().map(|one| one.connection.address).collect();
+    let whole = |one: &BroadcastNetwork| Whole {
+        address: one.address(),
+        bits: one.network.bits(),
+        lanes: (0..peers.len()).filter(|lane| one.network.holds(*peers[*lane].ip())).collect(),
+    };
+    let wholes: Vec<_> = config.broadcasts.iter().map(whole).collect();
+    Ok(Ports::open_with(config.show.bind, &peers, &wholes).map_err(RuntimeError::Net)?.split())
 }
 
 /// What to do where frames to the controllers take too much of the time between ticks. Where that cannot be measured nothing is said.

@@ -30,8 +30,9 @@ use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::record::{Judging, Taps};
 use crate::rt::{
-    AckLoop, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds, NewsIn,
-    Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line, mailboxes,
+    AckLoop, Broadcasts, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds,
+    NewsIn, Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line,
+    mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
@@ -213,7 +214,8 @@ impl Runtime {
         let manner = Manner { level: 0.0, silent: purpose.is_silent() };
         let (engine, lanes, planner, timeline) = boot::open(&config, numbers, manner)?.split();
         let desk = Arc::new(Desk::new(lanes.iter().map(|_| Mix::FULL)).ended_by(Arc::clone(signals)));
-        let live = Arc::new(Live::new(lanes.len()));
+        let broadcasts = Broadcasts::of(&config, purpose.is_silent());
+        let live = Arc::new(Live::new(lanes.len()).with_broadcasts(broadcasts));
         let rate = Rate::from_hz(config.show.rate_hz);
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
         let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = ends;

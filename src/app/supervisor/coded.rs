@@ -53,6 +53,8 @@ words! {
         NotRealTime = "not-real-time",
         /// What frames take of the time between ticks.
         Sending = "sending",
+        /// Of a network that is broadcast to.
+        Broadcast = "broadcast",
         /// Of the film.
         Film = "film",
         /// The cue follows none.

@@ -10,8 +10,8 @@ use super::seat_places::SeatPlaces;
 use super::standing::standing_words;
 use super::{belts, film};
 use crate::app::buttons::PadTable;
-use crate::app::links;
 use crate::app::notify::NotifyTable;
+use crate::app::{broadcasts, links};
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
@@ -112,6 +112,7 @@ impl StatusParts<'_> {
                 &hall.links,
                 hall.cued.as_ref().map_or(&[], |cued| &cued.links),
             ),
+            broadcasts: broadcasts::status(&hall.config.controllers, live),
             preflight: preflighted.as_ref().map(|it| it.status(now, |lane| hall.settings.is_on(lane))),
             warnings,
             test: features.seats.test.as_ref().map(|test| test.status.clone()),

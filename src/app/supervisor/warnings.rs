@@ -8,9 +8,9 @@ use super::readiness::CORRECT;
 use super::standing::standing_words;
 use super::status::StatusParts;
 use super::{belts, player, recorded};
-use crate::app::links;
 use crate::app::notify::NotifyTable;
 use crate::app::pair::PairWatch;
+use crate::app::{broadcasts, links};
 use crate::control::{Coded, Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -59,6 +59,8 @@ impl StatusParts<'_> {
         warnings
             .extend(links::troubles(&hall.links).map(|trouble| in_two(WarningCode::Link.word(), &trouble)));
         warnings.extend(hall.buttons.iter().flat_map(|pads| pads.warnings(WarningCode::Buttons.word())));
+        let of_broadcasts = broadcasts::troubles(&hall.config.controllers, &hall.live);
+        warnings.extend(of_broadcasts.iter().map(|trouble| in_two(WarningCode::Broadcast.word(), trouble)));
         let of_pair = hall.pair.iter().flat_map(PairWatch::troubles);
         warnings.extend(of_pair.map(|trouble| in_two(WarningCode::Pair.word(), &trouble)));
         let untold = hall.notify.iter().flat_map(NotifyTable::status).filter_map(|way| {

@@ -69,6 +69,32 @@ fn frames_ask_for_replies_unless_the_play_is_silent() {
 }
 
 #[test]
+fn a_frame_for_a_whole_network_is_that_of_one_to_the_bit_but_for_the_codes_and_takes_no_number() {
+    let mut config = hall(&["127.0.0.1:1"], 3);
+    config.show.ack_every = 2;
+    let mut lane = lanes(&config, &cue("time_ms,a1,a2,a3\n0,0,0,0\n1000,0.1,0.2,0.3\n"), FULL).remove(0);
+    let (beat, pose) = (Beat::still(Timing::Relative, 10), [0.1; MAX_AXES]);
+    let draft = |lane: &Lane, frame| {
+        let mut buf = [0xa5; MAX_LEN];
+        let (stamped, octets) = lane.draft(frame, Code(0x0fff), &beat, &pose, Mix::FULL, &mut buf).unwrap();
+        (stamped.asked, octets.to_vec())
+    };
+    let (asked, octets) = draft(&lane, FrameNo::FIRST);
+    let head = [0x55, 0xaa, 0, 0, 0x14, 0x01, 0, 0, 0x0f, 0xff, 0x0f, 0xff, 0, 0, 0, 1, 0, 0, 0, 10];
+    assert_eq!((asked, &octets[..20]), (true, &head[..]));
+    let (asked, silent) = draft(&lane, FrameNo(2));
+    assert_eq!((asked, &silent[8..16]), (false, &[0x0f, 0xff, 0, 0, 0, 0, 0, 2][..]));
+
+    let mut buf = [0xa5; MAX_LEN];
+    let (stamped, own) = lane.encode(&beat, &pose, Mix::FULL, &mut buf);
+    assert_eq!(stamped.frame, FrameNo::FIRST, "a draft takes no number");
+    assert_eq!((&own[..8], &own[12..]), (&octets[..8], &octets[12..]));
+    assert!(!lane.take(FrameNo(2)), "it is the next");
+    assert!(lane.take(FrameNo(7)), "numbers are left out");
+    assert_eq!(lane.next_frame(), FrameNo(8));
+}
+
+#[test]
 fn raw_words_reach_only_the_outputs_a_controller_has() {
     let config = hall(&["127.0.0.1:1"], 4);
     assert_eq!(frames(&config, &four_axes(), FULL)[0].outputs, 0x0fff);

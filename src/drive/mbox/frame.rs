@@ -55,13 +55,13 @@ pub(crate) struct MotionCodec {
 }
 
 impl MotionCodec {
-    /// Writes a frame that is numbered already.
+    /// Writes a frame that is numbered already, for whoever that code means.
     pub(crate) fn write<'b>(
         &self,
         window: &Window,
-        beat: &Beat,
-        pose: &Pose,
+        (beat, pose): (&Beat, &Pose),
         mix: Mix,
+        code: Code,
         stamped: &mut Stamped,
         buf: &'b mut [u8; MAX_LEN],
     ) -> &'b [u8] {
@@ -82,8 +82,8 @@ impl MotionCodec {
         let motion = Motion {
             timing: beat.timing,
             channel: self.channel,
-            accept: self.code,
-            reply: if stamped.asked { self.code } else { Code::NONE },
+            accept: code,
+            reply: if stamped.asked { code } else { Code::NONE },
             frame: stamped.frame,
             time_ms: beat.time_ms,
             positions: &positions[..slots.len()],

@@ -626,6 +626,7 @@ export default {
   "warning.another-master": "{0} ACKs in einer Minute auf Frames, die nicht von hier gesendet wurden",
   "warning.belt-open": "nicht angeschnallt: {0}",
   "warning.belt-untold": "meldet seine Gurte nicht",
+  "warning.broadcast": "Broadcast",
   "warning.buttons": "Tasten",
   "warning.film": "Film",
   "warning.journal": "Journal nicht geschrieben",

@@ -626,6 +626,7 @@ export default {
   "warning.another-master": "{0} ACK en un minuto de tramas que no se enviaron desde aquí",
   "warning.belt-open": "sin abrochar: {0}",
   "warning.belt-untold": "no indica sus cinturones",
+  "warning.broadcast": "Difusión",
   "warning.buttons": "Botones",
   "warning.film": "Película",
   "warning.journal": "Registro no escrito",

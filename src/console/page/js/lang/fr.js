@@ -626,6 +626,7 @@ export default {
   "warning.another-master": "{0} ACK en une minute pour des trames qui n’ont pas été envoyées d’ici",
   "warning.belt-open": "ceinture non bouclée : {0}",
   "warning.belt-untold": "n’indique pas ses ceintures",
+  "warning.broadcast": "Diffusion",
   "warning.buttons": "Boutons",
   "warning.film": "Film",
   "warning.journal": "Journal non écrit",

@@ -626,6 +626,7 @@ export default {
   "warning.another-master": "こちらから送っていないフレームへの ACK が 1 分間に {0} 件",
   "warning.belt-open": "ベルト未装着：{0}",
   "warning.belt-untold": "ベルトの状態を報告していません",
+  "warning.broadcast": "ブロードキャスト",
   "warning.buttons": "ボタン",
   "warning.film": "映画",
   "warning.journal": "操作ログに書き込めません",

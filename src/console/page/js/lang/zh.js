@@ -626,6 +626,7 @@ export default {
   "warning.another-master": "一分钟内有 {0} 个 ACK 对应非本机所发的帧",
   "warning.belt-open": "未系安全带：{0}",
   "warning.belt-untold": "未报告安全带状态",
+  "warning.broadcast": "广播",
   "warning.buttons": "按钮",
   "warning.film": "影片",
   "warning.journal": "日志未写入",
