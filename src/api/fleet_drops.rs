@@ -78,7 +78,10 @@ pub(super) fn drop_all(
         let may = || check_rest(&shared.handle.status(), one);
         let dropped = match kind {
             DroppedKind::Cue => shared.library.drop_brought(&id, may),
-            DroppedKind::Playlist => shared.shelf.drop_brought(&id, may),
+            DroppedKind::Playlist => {
+                let _changing = shared.library.changing();
+                shared.shelf.drop_brought(&id, may)
+            }
         };
         match dropped {
             Ok(()) => {

@@ -58,13 +58,12 @@ impl Wished {
         Err(Problem::new(Code::State, detail, remedy))
     }
 
-    /// That the hall rests, unarmed.
+    /// That the hall rests, unarmed, and is about nothing by which another cue or playlist may be loaded than its status says.
     pub(super) fn check_parked(self, status: &Status) -> Result<(), Problem> {
-        if status.state == State::Parked {
-            Ok(())
-        } else {
-            self.waits(format!("the hall is {}", status.state))
+        if status.state != State::Parked {
+            return self.waits(format!("the hall is {}", status.state));
         }
+        status.job.as_ref().map_or(Ok(()), |job| self.waits(format!("{job} is under way in the hall")))
     }
 }
 

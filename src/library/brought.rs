@@ -162,6 +162,7 @@ impl Library {
         may: impl FnOnce() -> Result<(), Problem>,
     ) -> Result<(), Problem> {
         let folder = self.folder()?;
+        let _changing = self.changing();
         let mut brought = lock(&self.inner.brought);
         may()?;
         let removed = brought.files.remove(&folder, &names(id));
@@ -204,6 +205,7 @@ impl Upload {
                 let _ = brought.write(&folder); // where it is not kept, it is brought and refused again
             }
         })?;
+        let _changing = library.changing();
         let mut brought = lock(&library.inner.brought);
         may()?;
         let no_other = brought.has_no_other(&folder, id);

@@ -82,6 +82,8 @@ pub(super) enum Act {
     AwaitStop,
     /// Begins slow work. What was asked is answered when it is done.
     Start(Job),
+    /// It is over: something else that is slow may begin.
+    EndJob,
     /// Takes what it came to.
     Take(JobResult),
     /// Makes ready for the next show: the one before is over, or the seats were brought to park between shows.

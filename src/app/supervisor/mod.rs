@@ -251,8 +251,9 @@ impl Supervisor {
             self.on_asked(asked);
         }
         if let Some((result, asked)) = self.jobs.take_done() {
-            self.hall.job = None;
-            self.procedures.add_for(asked, result.map(|result| vec![Act::Take(result)]));
+            // Not told as over before what it came to is taken up: between the two a status would say that nothing is loaded.
+            let take = result.map_or_else(Act::Fail, Act::Take);
+            self.procedures.add_for(asked, Ok(vec![Act::EndJob, take]));
         }
         self.on_time();
         self.go_on();

@@ -74,6 +74,7 @@ impl Supervisor {
                 self.happens(&SupervisorEvent::Begun(&begun));
             }
             Act::Start(job) => self.start(job)?,
+            Act::EndJob => self.hall.job = None,
             Act::Take(result) => {
                 let acts = self.features.take(result, &self.hall)?;
                 self.procedures.first().go_on_with(acts);
@@ -111,10 +112,11 @@ impl Supervisor {
     /// Starts what takes longer than the supervisor waits, one at a time.
     fn start(&mut self, job: Job) -> Result<(), Problem> {
         self.hall.is_free()?;
-        let word = job.word();
-        self.jobs.start(job, || self.procedures.first().asked.take())?;
-        self.hall.job = Some(word);
-        Ok(())
+        self.hall.job = Some(job.word());
+        // Before it reads anything: from now on the fleet changes none of what may be loaded by it.
+        self.publish();
+        let started = self.jobs.start(job, || self.procedures.first().asked.take());
+        started.inspect_err(|_| self.hall.job = None)
     }
 
     /// Lets the show go. By itself none begins in a hall that closes.

@@ -116,6 +116,45 @@ fn what_was_loaded_is_loaded_after_a_restart_and_nothing_starts() {
     assert_eq!(rig.state(), State::Boot);
 }
 
+/// Has the supervisor look after all until it has loaded a cue, while each status says that it does, or that it has.
+#[track_caller]
+fn loads_without_a_gap(rig: &mut Rig, cue: &str) {
+    let is_loaded = |status: &Status| status.show.as_ref().is_some_and(|show| show.cue == cue);
+    while rig.supervisor.hall.job.is_some() || !is_loaded(&rig.handle.status()) {
+        let status = rig.handle.status();
+        assert!(status.job.as_deref() == Some("loading") || is_loaded(&status), "{status:?}");
+        rig.supervisor.told = MonoTime::default(); // a status is due at once
+        rig.supervisor.turn();
+    }
+}
+
+#[test]
+fn from_before_a_cue_is_read_until_it_is_loaded_each_status_says_that_it_is_being_loaded() {
+    let mut rig = Rig::parked();
+    let changing = rig.library.clone();
+    let changing = changing.changing();
+    let asked = rig.post(Command::Load { cue: "two".to_owned() });
+    rig.hear();
+    assert_eq!(rig.handle.status().job.as_deref(), Some("loading"), "before anything else is looked after");
+    // What a fleet was about to change is changed before it is read.
+    let path = rig.folder.path().join("cues/two.csv");
+    let before = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, before.replace("0.6", "0.55")).unwrap();
+    drop(changing);
+    loads_without_a_gap(&mut rig, "two");
+    rig.settle();
+    asked.join().unwrap().unwrap();
+    let wanted = rig.library.read(&"two".parse().unwrap()).unwrap().1;
+    assert_eq!(rig.handle.status().show.as_ref().unwrap().sha256, wanted);
+    let mut next = Rig::starting_in(|folder| {
+        std::fs::create_dir(folder.join("cues")).unwrap();
+        std::fs::copy(&path, folder.join("cues/two.csv")).unwrap();
+        after_a_restart(rig)
+    });
+    next.supervisor.turn();
+    loads_without_a_gap(&mut next, "two");
+}
+
 #[test]
 fn what_was_loaded_before_is_taken_up_once_the_seats_rest() {
     let mut rig = Rig::playing();
