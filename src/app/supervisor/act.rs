@@ -98,6 +98,8 @@ pub(super) enum Act {
     Reload,
     /// Notes what no state says, for the log and the warnings.
     Note(String),
+    /// The same of what is over once the next show has begun.
+    Passing(String),
     /// Writes a line of the log.
     Log(Line),
     /// Adds to the record of the show that is under way.

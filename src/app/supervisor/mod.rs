@@ -20,6 +20,7 @@ mod job;
 mod lasting;
 mod list;
 mod margins;
+mod notes;
 mod perform;
 mod player;
 mod playlist;
@@ -49,7 +50,6 @@ mod warnings;
 pub(crate) use reload::{Carryover, SystemSignals};
 pub(crate) use service_log::ServiceLog;
 
-use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -71,7 +71,6 @@ use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, Stat
 use crate::journal::Journal;
 use crate::library::Library;
 use crate::osc::Counts;
-use crate::record::{LogNote, Note};
 use crate::rt::{News, Ticket};
 use crate::settings::{Settings, SettingsFile};
 use crate::state::State;
@@ -82,6 +81,7 @@ use features::Features;
 use hall::HallContext;
 use job::{Jobs, Tools};
 use list::List;
+use notes::NoteBoard;
 use procedures::Procedures;
 use record::ShowRecords;
 use recorded::AsksTold;
@@ -92,8 +92,6 @@ use status::StatusParts;
 const TELL: Duration = Duration::from_millis(100);
 /// How long whoever has the configuration read anew waits for controllers that do not answer.
 const OPENS: Duration = Duration::from_secs(10);
-/// Notes that are kept.
-const NOTES: usize = 5;
 
 /// What a supervisor has whatever the configuration is.
 #[derive(Debug)]
@@ -159,8 +157,7 @@ pub(crate) struct Supervisor {
     jobs: Jobs,
     /// When the status was told last.
     told: MonoTime,
-    /// What went wrong lately and no state says, newest last.
-    notes: VecDeque<String>,
+    notes: NoteBoard,
     asks_told: AsksTold,
     reload: Option<Arc<Config>>,
     /// Who asked for another configuration, this one or the next, and what came of it.
@@ -374,17 +371,6 @@ impl Supervisor {
         let until = self.procedures.waits_until().map_or(told, |until| until.min(told));
         let starts = self.features.onward.list.as_ref().and_then(|list| list.starts_in(&Zoned::now()));
         starts.map_or(until, |wait| until.min(Monotonic.now() + wait))
-    }
-
-    /// Notes what no state says, for the log and the warnings.
-    fn note(&mut self, note: String) {
-        self.ports.service_log.say_note(&note);
-        let line = LogNote { level: 3, message: note.clone(), name: "supervisor".to_owned() };
-        self.hall.recorder.keep(Note::Log(line));
-        self.notes.push_back(note);
-        if self.notes.len() > NOTES {
-            self.notes.pop_front();
-        }
     }
 
     /// Writes down what somebody asked, and what came of it.

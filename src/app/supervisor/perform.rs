@@ -8,6 +8,7 @@ use super::reload::{not_taken, reload};
 use super::state_mirror::{ANSWER, busy};
 use super::{Supervisor, belts, player};
 use crate::control::{Problem, Surface};
+use crate::record::{LogNote, Note};
 use crate::rt::Command as TickCommand;
 use crate::state::{Event, Transition};
 use crate::time::ShowTime;
@@ -71,6 +72,7 @@ impl Supervisor {
             Act::RewindStart => self.stage(ShowChange::Start(ShowTime::ZERO)),
             Act::Begin(begun) => {
                 self.hall.forget_place();
+                self.notes.begin_show();
                 self.happens(&SupervisorEvent::Begun(&begun));
             }
             Act::Start(job) => self.start(job)?,
@@ -103,6 +105,7 @@ impl Supervisor {
                 self.hall.close();
             }
             Act::Note(note) => self.note(note),
+            Act::Passing(note) => self.note_for(note, true),
             Act::Log(line) => self.ports.service_log.put(line),
             Act::Record(event) => self.features.records.event(event),
         }
@@ -177,5 +180,18 @@ impl Supervisor {
             Undo::Readiness => return self.features.readiness.forget(),
         }
         self.procedures.first().fail(problem);
+    }
+
+    /// Notes what no state says, for the log and the warnings.
+    pub(super) fn note(&mut self, note: String) {
+        self.note_for(note, false);
+    }
+
+    /// The same, of what is over once the next show has begun or not.
+    pub(super) fn note_for(&mut self, note: String, passes: bool) {
+        self.ports.service_log.say_note(&note);
+        let line = LogNote { level: 3, message: note.clone(), name: "supervisor".to_owned() };
+        self.hall.recorder.keep(Note::Log(line));
+        self.notes.add(note, passes);
     }
 }

@@ -1,6 +1,5 @@
 //! Signals of the system: to end, and to reload the configuration, for which another hall is opened.
 
-use std::collections::VecDeque;
 use std::error::Error as _;
 use std::path::Path;
 use std::sync::Arc;
@@ -9,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::hall::HallContext;
 use super::hall_settings::HallSettings;
 use super::lasting::Lasting;
+use super::notes::NoteBoard;
 use crate::config::{self, Api, Config};
 use crate::control::{Asked, Code, Problem};
 use crate::rt::Desk;
@@ -27,7 +27,7 @@ pub(crate) struct Carryover {
     /// What was latched: another configuration clears nothing.
     pub(super) latched: bool,
     /// What a person should know of the hall before.
-    pub(super) notes: VecDeque<String>,
+    pub(super) notes: NoteBoard,
     /// What happened between the halls, and was not said yet.
     pub(super) untold: Vec<String>,
     /// Who asked for another configuration, and what came of it.
@@ -60,7 +60,7 @@ impl Carryover {
 
     /// Another configuration was taken: what is said of those before that were not is over.
     pub(crate) fn forget_refusals(&mut self) {
-        self.notes.retain(|note| !note.starts_with(NOT_OPENED));
+        self.notes.forget(NOT_OPENED);
     }
 
     /// The hall did not open with another configuration: a person should know that, whoever asked for it first.
