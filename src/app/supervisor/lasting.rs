@@ -44,6 +44,7 @@ impl Lasting {
     pub(super) fn settings(&self, hall: &HallContext, playlist: Option<PlaylistPlace>) -> Settings {
         Settings {
             levels: hall.settings.levels.clone(),
+            ceiling: Some(&hall.settings.ceiling).filter(|most| **most != hall.settings.levels).cloned(),
             trim_ms: hall.settings.trim_ms,
             out: hall.settings.out.clone(),
             show: self.loading.clone().or_else(|| loaded(hall, playlist)),
