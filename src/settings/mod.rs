@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-pub(crate) use file::{Kept, SettingsFile, keep, text as text_of};
+pub(crate) use file::{Kept, SettingsFile, keep};
 pub(crate) use words::seats_out;
 
 use crate::control::{Levels, Surface};

@@ -208,6 +208,7 @@ impl Supervisor {
             reloading: carryover.reloading,
         };
         carryover.untold.into_iter().for_each(|note| supervisor.note(note));
+        carryover.took_over.into_iter().for_each(|note| supervisor.note_for(note, true));
         supervisor.hall.set_desk();
         if carryover.latched {
             supervisor.hall.desk.stop();
@@ -390,7 +391,8 @@ impl Supervisor {
     /// Has it kept.
     fn keep_settings(&mut self) {
         let settings = self.settings();
-        self.ports.settings_file.put(settings);
+        let text = self.ports.settings_file.put(settings);
+        text.into_iter().zip(&self.ports.pair).for_each(|(text, pair)| pair.set(text));
     }
 
     /// How all of it stands.
@@ -436,6 +438,7 @@ impl Supervisor {
             latched,
             notes: std::mem::take(&mut self.notes),
             untold: Vec::new(),
+            took_over: None,
             reloading: self.reloading.take(),
         }
     }

@@ -30,16 +30,19 @@ pub(crate) struct Carryover {
     pub(super) notes: NoteBoard,
     /// What happened between the halls, and was not said yet.
     pub(super) untold: Vec<String>,
+    /// The same of a machine that led before.
+    pub(super) took_over: Option<String>,
     /// Who asked for another configuration, and what came of it.
     pub(super) reloading: Option<(Asked, Result<(), Problem>)>,
 }
 
 impl Carryover {
-    /// Of a program that has just started, and found that.
+    /// Of a program that has just started, and found that; of one that took over from another machine, with what to tell of that.
     #[must_use]
-    pub(crate) fn of(kept: Kept) -> Self {
-        let lasting = Lasting::since_start(kept.settings.as_ref().and_then(Settings::words));
-        Self { settings: kept.settings, lasting, untold: kept.said, ..Self::default() }
+    pub(crate) fn of(kept: Kept, took_over: Option<String>) -> Self {
+        let came_back = kept.settings.as_ref().and_then(Settings::words);
+        let lasting = Lasting::since_start(came_back, took_over.is_some());
+        Self { settings: kept.settings, lasting, untold: kept.said, took_over, ..Self::default() }
     }
 
     /// What is set goes to the desk of a hall before its first look at the controllers: nobody waits for a seat that is out.
