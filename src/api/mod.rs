@@ -244,6 +244,8 @@ fn shared(
         access,
         fleet,
         fleet_failed: Default::default(),
+        fleet_settling: Default::default(),
+        wishes: shared::one_at_a_time(),
         tries: Default::default(),
         once: Default::default(),
         streams: Streams::default(),

@@ -26,7 +26,7 @@ use super::sum_up::{Played, SumUp, sum_up};
 use super::supervisor::{Carryover, ServiceLog, Supervisor, SupervisorEnd, SupervisorPorts, SystemSignals};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::api::Pages;
-use crate::config::Config;
+use crate::config::{Config, ONE_FOLDER};
 use crate::control::model::Ending;
 use crate::control::{Handle, Status, handle};
 use crate::health::Why;
@@ -86,6 +86,9 @@ pub(crate) enum ServeError {
         #[source]
         cause: io::Error,
     },
+    /// Cues and playlists are in one folder.
+    #[error("{}: {ONE_FOLDER}, by playlists of [library]", .0.display())]
+    OneFolder(PathBuf),
     /// Somebody else sends to controllers, though this machine leads its hall.
     #[error("another master sends to {0}; end it, and start this service again")]
     OtherMaster(String),
@@ -256,6 +259,17 @@ fn serve_halls(
     surfaces.close();
     log.close();
     Ok(served)
+}
+
+/// The library of a hall, and the folder of its playlists beside it, which is another one, by whatever way both are named.
+fn open_library(config: &Config, path: &Path) -> Result<Library, ServeError> {
+    let library = Library::open(&config.show.library, library::Hall::new(path, &config.store))?;
+    // A person puts playlists there. Where it cannot be made, whoever loads one is told.
+    let _ = fs::create_dir_all(config.playlists());
+    match [config.show.library.clone(), config.playlists()].map(fs::canonicalize) {
+        [Ok(cues), Ok(playlists)] if cues == playlists => Err(ServeError::OneFolder(config.playlists())),
+        _ => Ok(library),
+    }
 }
 
 /// Ends what is recorded; says where that could not be waited for.
