@@ -69,6 +69,7 @@ pub(crate) use fleet::Letterbox;
 pub(crate) use fleet::{try_letter, try_order};
 #[cfg(feature = "harness")]
 pub(crate) use fleet_wishes::try_wish;
+pub(crate) use gate::FLEET_STOP;
 pub(crate) use serving::ServingThread;
 pub(crate) use socket::unix as unix_socket;
 pub(crate) use stop::fleet_stop_socket;
