@@ -53,7 +53,7 @@ const ROWS: &[Row] = &[
     // 30 more with fleets, nearly all of them lists of fields and of imports beside lists of as many in other rooms.
     // 39 more with what came to fleets, pairs and the doors of the fuzzer in one day; not taken apart yet.
     // Ten more with what a fleet brings and drops, and pulls; not taken apart yet.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 184.0, 43.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 183.0, 43.0),
     // Three more, likewise; one more with what a fleet drops beside what it brings.
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 11.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
@@ -90,7 +90,8 @@ const ROWS: &[Row] = &[
     // drives and recordings, the page of halls, doors of the fuzzer, and the sandbox of what takes files apart.
     // 1,830 more: playlists, deletion and a pull by a fleet (1,250), recordings that are read by all processors and
     // written in their order (480), and what attackers found in homing, starts and the engine's answers.
-    ("lines of code", counts::lines_of_code, Less, 102_855.0, 39_800.0),
+    // 480 more: what a second machine takes over and what it says of that, wishes that are bounded and put nothing over people's files, what a hall is about.
+    ("lines of code", counts::lines_of_code, Less, 103_331.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
@@ -101,7 +102,8 @@ const ROWS: &[Row] = &[
     // 16 more: buttons and their lamps, and alarms, in the status, which tests make.
     // Four more: what a lane's evidence is a part of, and what an upload is awaited by, which benches and tests make.
     // Ten more: the lead of one of two machines, and doors of the fuzzer.
-    ("public items and fields", counts::public_items, Less, 1_265.0, 400.0),
+    // One more for what a hall is about, in the status.
+    ("public items and fields", counts::public_items, Less, 1_266.0, 400.0),
     // A table: a row for each reason why a seat stands as it does.
     // The parts that a service opens, one after the other.
     ("lines of the longest function", counts::longest_function, Less, 65.0, 48.0),
