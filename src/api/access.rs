@@ -92,6 +92,11 @@ impl Access {
         Err(Problem::new(Code::Origin, detail, "open the page from this server, or list its origin in [api]"))
     }
 
+    /// Whoever asks from `address` without a token, where that is let in.
+    pub(super) fn whoever(&self, address: IpAddr) -> Option<Who> {
+        self.open_role.map(|role| Who { role, surface: Surface::Http, name: address.to_string() })
+    }
+
     /// Who asks from `address`.
     pub(super) fn who(
         &self,
@@ -101,11 +106,10 @@ impl Access {
         now: MonoTime,
     ) -> Result<Who, Problem> {
         let Some(authorization) = one(headers, &AUTHORIZATION)? else {
-            let role = self.open_role.ok_or_else(|| {
+            return self.whoever(address).ok_or_else(|| {
                 let remedy = "send the header Authorization: Bearer TOKEN; `kinocue token` makes one";
                 Problem::new(Code::Token, "this server requires a token", remedy)
-            })?;
-            return Ok(Who { role, surface: Surface::Http, name: address.to_string() });
+            });
         };
         // First of all: whoever has the right one is kept waiting by nobody, least of all behind the same address.
         let token = authorization.split_once(' ').filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));

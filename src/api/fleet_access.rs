@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::problem::bad_value;
 use crate::config::{self, FleetKey, FleetWord, Role};
 use crate::control::{self, Code, FRESH, Problem, Surface, Who};
-use crate::fleet::{Letter, Order, Wish};
+use crate::fleet::{AHEAD, Letter, Order, Wish};
 use crate::time::MonoTime;
 
 /// How long the id of an order is remembered; far longer than one may be under way, for clocks may be set.
@@ -29,9 +29,6 @@ struct AskedOrder {
     id: String,
     at: MonoTime,
 }
-
-/// How far the rev of a wish may be ahead of our clock.
-const AHEAD: Duration = Duration::from_secs(86_400);
 
 /// What a letter asks, for whom, and when it was asked.
 type Opened<T> = (Who, T, MonoTime);
@@ -84,8 +81,7 @@ impl FleetAccess {
             return Err(Problem::new(Code::Origin, detail, "wish for the hall that is meant"));
         }
         // Else one wish of long after would outlast all others.
-        let most = Duration::from_nanos(wall_ns) + AHEAD;
-        if u128::from(wish.rev) > most.as_millis() {
+        if !is_of_now(wish.rev, wall_ns) {
             let detail = format!("the rev of the wish, {}, is of more than a day from now", wish.rev);
             return Err(Problem::new(Code::Late, detail, "set the clocks of desk and hall, and push again"));
         }
@@ -151,6 +147,11 @@ impl FleetAccess {
         asked.push_back(AskedOrder { key: letter.key.clone(), id: order.id.clone(), at: now });
         Ok(())
     }
+}
+
+/// True of the rev of a wish that is of no later time than tomorrow.
+pub(super) fn is_of_now(rev: u64, wall_ns: u64) -> bool {
+    u128::from(rev) <= (Duration::from_nanos(wall_ns) + AHEAD).as_millis()
 }
 
 /// When an order was given, by our own clock.

@@ -76,6 +76,7 @@ pub(super) fn bring(
     for (name, _) in all.iter().filter(|(_, had)| had.state == HadState::Missing) {
         let id = id(name)?;
         let may = || check_rest(&shared.handle.status(), &id);
+        let _changing = shared.library.changing();
         match shared.shelf.bring(&id, &wish.playlists[name].text, may) {
             Ok(()) => {
                 let text = format!("the playlist {id} was brought by the fleet, as {} wishes", who.name);

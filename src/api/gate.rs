@@ -35,6 +35,8 @@ use crate::time::Clock as _;
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 /// Our wall clock in every reply, unix milliseconds, so that a page can tell how far its own is off.
 const TIME: HeaderName = HeaderName::from_static("x-kinocue-time");
+/// The stop of the page of a desk.
+pub(crate) const FLEET_STOP: &str = "/api/v1/fleet/stop";
 /// Nothing but what this server itself serves, and in nobody's frame.
 const POLICY: &str =
     "default-src 'self'; img-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
@@ -101,8 +103,18 @@ pub(super) fn admit(access: &Access, tries: &Tries, request: &Request) -> Result
         Peer::Socket(name) => Some(peer::local(name)),
         Peer::Fleet(name) => Some(peer::link(name)),
         Peer::Tcp(_) if in_the_open => None,
-        Peer::Tcp(address) => Some(access.who(headers, *address, tries, Monotonic.now())?),
+        Peer::Tcp(address) => {
+            let who = access.who(headers, *address, tries, Monotonic.now());
+            // A page with a token of another day must not be kept from what it could do without one.
+            let stops = access.whoever(*address).filter(|_| is_stop(path));
+            Some(who.or_else(|problem| stops.ok_or(problem))?)
+        }
     })
+}
+
+/// True of a stop: of this hall, or of those of a desk.
+fn is_stop(path: &str) -> bool {
+    path == STOP || path == FLEET_STOP
 }
 
 /// Has a request, and the connection that it came by, know who asks. True of who has shown a token, or may open the control socket: they

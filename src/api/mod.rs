@@ -69,6 +69,7 @@ pub(crate) use fleet::Letterbox;
 pub(crate) use fleet::{try_letter, try_order};
 #[cfg(feature = "harness")]
 pub(crate) use fleet_wishes::try_wish;
+pub(crate) use gate::FLEET_STOP;
 pub(crate) use serving::ServingThread;
 pub(crate) use socket::unix as unix_socket;
 pub(crate) use stop::fleet_stop_socket;
@@ -244,6 +245,8 @@ fn shared(
         access,
         fleet,
         fleet_failed: Default::default(),
+        fleet_settling: Default::default(),
+        wishes: shared::one_at_a_time(),
         tries: Default::default(),
         once: Default::default(),
         streams: Streams::default(),

@@ -44,7 +44,7 @@ pub(super) struct Select {
 )]
 pub(super) async fn all(State(shared): State<Arc<Shared>>) -> Result<JsonReply<Vec<PlaylistInfo>>, Problem> {
     let shelf = shared.shelf.clone();
-    shared.blocking(move || Ok(shelf.list())).await.map(JsonReply)
+    shared.blocking(move || shelf.all()).await.map(JsonReply)
 }
 
 /// Loads a playlist, or drops the one that is loaded.

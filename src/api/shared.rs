@@ -40,8 +40,12 @@ pub(super) struct Shared {
     pub(super) access: Access,
     /// Who of the fleet may ask.
     pub(super) fleet: FleetAccess,
-    /// Why what the fleet wishes could not be done when that was tried last; held by whoever tries it.
+    /// Why what the fleet wishes could not be done when that was tried last.
     pub(super) fleet_failed: Mutex<BTreeMap<String, Problem>>,
+    /// Held by whoever does what the fleet wishes. Nobody waits for it.
+    pub(super) fleet_settling: Mutex<()>,
+    /// Held by whoever takes a wish, or tells what the hall has of it: whatever is in it, the others have the rest of the threads.
+    pub(super) wishes: Arc<Semaphore>,
     /// Wrong tokens.
     pub(super) tries: Tries,
     /// Requests that may come twice.

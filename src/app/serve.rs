@@ -26,7 +26,7 @@ use super::sum_up::{Played, SumUp, sum_up};
 use super::supervisor::{Carryover, ServiceLog, Supervisor, SupervisorEnd, SupervisorPorts, SystemSignals};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::api::Pages;
-use crate::config::Config;
+use crate::config::{Config, ONE_FOLDER};
 use crate::control::model::Ending;
 use crate::control::{Handle, Status, handle};
 use crate::health::Why;
@@ -86,6 +86,9 @@ pub(crate) enum ServeError {
         #[source]
         cause: io::Error,
     },
+    /// Cues and playlists are in one folder.
+    #[error("{}: {ONE_FOLDER}, by playlists of [library]", .0.display())]
+    OneFolder(PathBuf),
     /// Somebody else sends to controllers, though this machine leads its hall.
     #[error("another master sends to {0}; end it, and start this service again")]
     OtherMaster(String),
@@ -204,12 +207,10 @@ fn serve_halls(
     let Parts { config, places, pages, signals, log, mut pair } = parts;
     let began = Monotonic.now();
     let mut config = Arc::new(config);
-    let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
-    // A person puts playlists there. Where it cannot be made, whoever loads one is told.
-    let _ = fs::create_dir_all(config.playlists());
+    let library = open_library(&config, &places.config)?;
     let (mut numbers, took_over) = before(pair.as_ref(), &config);
     let mut film = HallFilm::default();
-    let opening = Opening { leave: &signals.leave, pair: pair.as_ref() };
+    let opening = Opening { config: &places.config, leave: &signals.leave, pair: pair.as_ref() };
     let mut runtime = opening.first(&config, crashed || took_over.is_some(), &numbers, &mut film)?;
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let (settings_file, kept) = SettingsFile::open(&places.state);
@@ -225,7 +226,7 @@ fn serve_halls(
         began,
         signals,
         service_log: ServiceLog::new(log.clone(), alarms),
-        carryover: Carryover::of(kept),
+        carryover: Carryover::of(kept, took_over),
         settings_file,
         film: None,
         player: None,
@@ -234,7 +235,6 @@ fn serve_halls(
         recorder: RecordLink::default(),
         pair: pair.as_ref().map(Pair::watch),
     };
-    ports.carryover.tell(took_over);
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
     mark.leave()?;
@@ -252,13 +252,24 @@ fn serve_halls(
         };
         // Also of controllers that come back with a later configuration.
         numbers.extend(left.closed.numbers.clone());
-        let opening = Opening { leave: &ports.signals.leave, pair: pair.as_ref() };
+        let opening = Opening { config: &ports.config, leave: &ports.signals.leave, pair: pair.as_ref() };
         (runtime, config) = opening.reopen(next, config, &numbers, &mut ports.carryover, &mut film)?;
         surfaces.take_tokens(&config);
     };
     surfaces.close();
     log.close();
     Ok(served)
+}
+
+/// The library of a hall, and the folder of its playlists beside it, which is another one, by whatever way both are named.
+fn open_library(config: &Config, path: &Path) -> Result<Library, ServeError> {
+    let library = Library::open(&config.show.library, library::Hall::new(path, &config.store))?;
+    // A person puts playlists there. Where it cannot be made, whoever loads one is told.
+    let _ = fs::create_dir_all(config.playlists());
+    match [config.show.library.clone(), config.playlists()].map(fs::canonicalize) {
+        [Ok(cues), Ok(playlists)] if cues == playlists => Err(ServeError::OneFolder(config.playlists())),
+        _ => Ok(library),
+    }
 }
 
 /// Ends what is recorded; says where that could not be waited for.
@@ -275,6 +286,8 @@ fn before(pair: Option<&Pair>, config: &Config) -> (Numbers, Option<String>) {
 
 /// How halls are opened.
 struct Opening<'a> {
+    /// The file of the configuration.
+    config: &'a Path,
     leave: &'a Arc<AtomicBool>,
     pair: Option<&'a Pair>,
 }
@@ -325,6 +338,10 @@ impl Opening<'_> {
         match self.open(&next, false, numbers, film) {
             Ok(runtime) => {
                 carryover.forget_refusals();
+                if let Some(Err(error)) = self.pair.map(|pair| pair.set_config(self.config)) {
+                    let why = "the other machine takes this for another one, and does not take over";
+                    carryover.tell(Some(format!("the configuration cannot be read again: {error}; {why}")));
+                }
                 Ok((runtime, next))
             }
             Err(error) => {
@@ -410,7 +427,7 @@ mod tests {
         let mut carryover = Carryover::default();
         let mut film = HallFilm::default();
         let leave = Arc::default();
-        let opening = Opening { leave: &leave, pair: None };
+        let opening = Opening { config: Path::new("hall.toml"), leave: &leave, pair: None };
         let (_house, config) =
             opening.reopen(next, Arc::clone(&before), &Numbers::new(), &mut carryover, &mut film).unwrap();
         assert!(Arc::ptr_eq(&config, &before));

@@ -113,6 +113,7 @@ impl From<ServeError> for Failure {
         let exit = match &error {
             ServeError::Surface(SurfaceError::Api(ApiError::Served { .. })) => Exit::TryAgain,
             ServeError::OtherMaster(_) => Exit::OtherMaster,
+            ServeError::OneFolder(_) => Exit::Config,
             _ => exit::of_system(&error),
         };
         Self { exit, error: error.into() }

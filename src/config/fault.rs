@@ -9,6 +9,8 @@ use crate::plain;
 
 /// How much of a fault is told, bytes.
 const TOLD: usize = 1_000;
+/// So many are noted; whoever corrects these sees the others then.
+const MOST: usize = 200;
 
 /// One fault of a configuration file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -65,9 +67,14 @@ impl<'t> Faults<'t> {
 
     /// Notes a fault at byte `at` of the text.
     pub(crate) fn note(&mut self, at: usize, message: impl Into<String>) {
-        if !self.broken.contains(&self.line(at)) {
+        if !self.is_full() && !self.broken.contains(&self.line(at)) {
             self.found.push((at, message.into()));
         }
+    }
+
+    /// True if no more are noted: what comes is not looked at, as a text may have a fault in each of its lines.
+    pub(crate) fn is_full(&self) -> bool {
+        self.found.len() >= MOST
     }
 
     /// Notes that something is not there, unless a line that is no TOML may have held it.
@@ -79,6 +86,9 @@ impl<'t> Faults<'t> {
 
     /// Notes that the text is no TOML; further faults of that line are not noted.
     pub(crate) fn note_syntax(&mut self, error: &toml::de::Error) {
+        if self.is_full() {
+            return;
+        }
         let span = error.span().unwrap_or(0..0);
         let from = self.text[..span.start].rfind('\n').map_or(0, |end| end + 1);
         let line = self.text[from..].lines().next().unwrap_or_default();
@@ -111,7 +121,12 @@ impl<'t> Faults<'t> {
             let message = plain::escaped(&message, TOLD).into_owned();
             ConfigFault { path: path.to_owned(), line, column, message }
         };
-        self.found.into_iter().map(at_place).collect()
+        let is_full = self.is_full();
+        let mut faults: Vec<_> = self.found.into_iter().map(at_place).collect();
+        if let Some(last) = faults.last_mut().filter(|_| is_full) {
+            last.message.push_str("; there may be more: correct these first");
+        }
+        faults
     }
 }
 

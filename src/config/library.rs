@@ -1,9 +1,13 @@
 //! `[library]`: what the cue library takes in, and where the playlists are.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::fault::Faults;
 use super::section::{Entry, Section};
+
+/// Why playlists are not kept among the cues: of both it is noted beside them what a fleet brought, and under one name.
+pub(crate) const ONE_FOLDER: &str =
+    "the playlists cannot be in the folder of the cues (library of [show]); name another folder";
 
 /// What the library and the playlists are kept in.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,14 +28,21 @@ impl Default for Store {
     }
 }
 
-/// Reads the table.
-pub(super) fn store(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Store> {
+/// Reads the table; the folder of the cues is that one.
+pub(super) fn store(entry: Entry<'_>, library: &Path, faults: &mut Faults<'_>) -> Option<Store> {
     let default = Store::default();
     let mut section = Section::new("[library]", entry.at, entry.table(faults)?, faults);
+    let playlists_at = section.get("playlists");
+    let playlists = playlists_at.and_then(|entry| entry.text(section.faults)).map(PathBuf::from);
+    if let (Some(entry), Some(folder)) = (playlists_at, &playlists)
+        && folder == library
+    {
+        entry.fault(section.faults, ONE_FOLDER);
+    }
     let store = Store {
         max_cue_mib: section.whole_in("max_cue_mib", 1..=2048).unwrap_or(default.max_cue_mib),
         max_memory_mib: section.whole_in("max_memory_mib", 64..=8192).unwrap_or(default.max_memory_mib),
-        playlists: section.text("playlists").map(PathBuf::from),
+        playlists,
         kept_in: None,
     };
     section.finish();
@@ -60,5 +71,7 @@ mod tests {
         let faults = faults_of("[library]\nmax_cue_mib = 4096\npath = \"x\"\n");
         assert!(faults[0].ends_with("max_cue_mib: 4096 is outside 1..=2048"), "{faults:?}");
         assert!(faults[1].contains("path: unknown key in [library]"), "{faults:?}");
+        let faults = faults_of("[show]\nlibrary = \"/srv/cues\"\n[library]\nplaylists = \"/srv/./cues/\"\n");
+        assert!(faults[0].contains("the playlists cannot be in the folder of the cues"), "{faults:?}");
     }
 }

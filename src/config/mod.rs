@@ -61,7 +61,7 @@ pub(crate) use fleet::{Fleet, FleetKey, FleetWord, is_fleet_id};
 pub(crate) use gear::GearWord;
 pub(crate) use keys::{key_name, lamp_name};
 pub(crate) use level::{level, no_level, parse_level, switches, trim};
-pub(crate) use library::Store;
+pub(crate) use library::{ONE_FOLDER, Store};
 pub(crate) use link::Link;
 pub(crate) use log::{Log, journal_in};
 pub(crate) use notify::{Mail, Notify, WebHook};

@@ -100,7 +100,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let effects = effects_at.map_or_else(Vec::new, |entry| effects(entry, faults));
     let effect_limits = limits_at.map_or_else(Vec::new, |entry| effect_limits(entry, &effects, faults));
     let presets = preset_at.map_or_else(Vec::new, |entry| presets(entry, &effects, faults));
-    let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, faults));
+    let library = show.as_ref().map(|show| show.library.clone()).unwrap_or_default();
+    let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, &library, faults));
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let record = record_at.map_or_else(|| Some(Record::default()), |entry| record(entry, faults));
     let stated = Stated { show: show_at, seat: seat_at, controller: controller_at, link: link_at };

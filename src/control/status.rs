@@ -60,6 +60,9 @@ pub struct Status {
     pub lapses_s: Option<f64>,
     /// True if motion frames leave.
     pub moving: bool,
+    /// What takes long and is under way: `loading`, `playlist`, `test`, `preflight` or `homing`; null if nothing is. While something is
+    /// loaded, or seats are tested, `show` and `playlist` say nothing of what is loaded afterwards.
+    pub job: Option<String>,
     /// What is loaded.
     pub show: Option<ShowStatus>,
     /// The playlist that is loaded.

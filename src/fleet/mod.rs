@@ -3,20 +3,22 @@
 //! by the hall: signatures in `api`, words and states in `app::supervisor`.
 
 mod brief;
+mod have;
 mod letter;
 mod ntp;
 mod proof;
 mod wish;
 
 pub(crate) use brief::BriefStatus;
+#[cfg(test)]
+pub(crate) use brief::SeatCounts;
+pub(crate) use have::{HadState, HaveReport, WishHad};
 pub(crate) use letter::{Letter, Order};
 #[cfg(feature = "harness")]
 pub(crate) use ntp::try_answer as try_ntp;
 pub(crate) use ntp::{ClockSample, LEN as NTP_LEN, answer as ntp_answer, question as ntp_question};
 pub(crate) use proof::LogRecord;
-pub(crate) use wish::{
-    CHUNK, CuePiece, Drops, HadState, HaveReport, LONGEST_WISH, Wish, WishHad, WishedCue, WishedPlaylist,
-};
+pub(crate) use wish::{AHEAD, CHUNK, CuePiece, Drops, LONGEST_WISH, Wish, WishedCue, WishedPlaylist};
 
 /// The JetStream domain that has all streams and buckets.
 pub(crate) const DOMAIN: &str = "hub";

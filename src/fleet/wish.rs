@@ -1,6 +1,7 @@
-//! What a hall shall have in its library and among its playlists, as a desk wishes it, and what it has, as the hall says it.
+//! What a hall shall have in its library and among its playlists, as a desk wishes it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -9,10 +10,14 @@ use super::Letter;
 
 /// The longest wish as it is sent, signature and all, bytes.
 pub(crate) const LONGEST_WISH: usize = 256 << 10;
+/// Cues and playlists that it names at the most, those among them that shall go: what a hall has of each is told in one message.
+pub(crate) const MOST_NAMED: usize = 1_000;
+/// How far the rev of a wish may be ahead of the clock of a hall.
+pub(crate) const AHEAD: Duration = Duration::from_secs(86_400);
 /// Bytes of a cue in a message of the engine.
 pub(crate) const CHUNK: u64 = 128 << 10;
 /// Digits of a SHA-256.
-const DIGITS: usize = 64;
+pub(super) const DIGITS: usize = 64;
 
 /// What a hall shall have: the text of a letter. It names all of it, each time.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -76,53 +81,6 @@ pub(crate) struct WishedCue {
     pub(crate) bytes: u64,
 }
 
-/// What a hall has of what was wished: its key of `kc_have`.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
-pub(crate) struct HaveReport {
-    /// When it was so, RFC 3339, by the clock of the hall.
-    pub(crate) at: String,
-    /// The version of its program.
-    pub(crate) version: String,
-    /// SHA-256 of the file of its configuration, hexadecimal.
-    pub(crate) config: String,
-    /// The wish that it keeps; 0 if there is none.
-    pub(crate) rev: u64,
-    /// Which message of the engine it was shown last as its wish; 0 if none.
-    pub(crate) seen: u64,
-    /// Why it does not take what the engine has as its wish; null if it does.
-    pub(crate) refused: Option<String>,
-    /// What it has of its wish, by the ids of cues.
-    pub(crate) cues: BTreeMap<String, WishHad>,
-    /// The same by the ids of playlists.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub(crate) playlists: BTreeMap<String, WishHad>,
-    /// How far it is with cues that shall go; `ready` once none is there that was brought.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub(crate) dropped_cues: BTreeMap<String, WishHad>,
-    /// The same with playlists.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub(crate) dropped_playlists: BTreeMap<String, WishHad>,
-}
-
-/// What a hall has of one file.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
-pub(crate) struct WishHad {
-    /// The file that is wished, its SHA-256.
-    pub(crate) sha256: String,
-    /// How long that is.
-    pub(crate) bytes: u64,
-    /// How far it is.
-    pub(crate) state: HadState,
-    /// How much of it was fetched, while it is.
-    pub(crate) percent: Option<u8>,
-    /// Why it waits, is refused, or comes later.
-    pub(crate) why: Option<String>,
-    /// Every fault that stands against it, with its place.
-    pub(crate) faults: Vec<String>,
-}
-
 /// A piece of a cue that a hall gives out, the reply to `pull`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct CuePiece {
@@ -136,30 +94,11 @@ pub(crate) struct CuePiece {
     pub(crate) data: String,
 }
 
-/// How far a wished file is.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum HadState {
-    /// It is there, and proved or checked for the seats of the hall.
-    Ready,
-    /// Nothing stands against it, and it comes at its time.
-    Due,
-    /// It is to be fetched or taken in, and nothing stands against that.
-    Missing,
-    /// It is being fetched.
-    Fetching,
-    /// The hall does not take it.
-    Refused,
-    /// It has to wait; what is unknown to this program counts as that.
-    #[default]
-    #[serde(other)]
-    Waiting,
-}
-
 impl Wish {
     /// The wish of a letter, whoever has signed that; why it is none.
     pub(crate) fn of(letter: &Letter) -> Result<Self, String> {
         let wish: Self = serde_json::from_str(&letter.body).map_err(|error| error.to_string())?;
+        wish.check_count()?;
         for (id, cue) in &wish.cues {
             if !cue.is_named() {
                 let sha256 = &cue.sha256;
@@ -174,6 +113,15 @@ impl Wish {
         match both.or_else(|| playlists.iter().find(|id| wish.playlists.contains_key(*id))) {
             Some(id) => Err(format!("{id:?} shall come and go")),
             None => Ok(wish),
+        }
+    }
+
+    /// That it names no more than a hall answers for.
+    pub(crate) fn check_count(&self) -> Result<(), String> {
+        let Drops { cues, playlists } = &self.drops;
+        match self.cues.len() + self.playlists.len() + cues.len() + playlists.len() {
+            0..=MOST_NAMED => Ok(()),
+            named => Err(format!("it names {named} cues and playlists, more than {MOST_NAMED}")),
         }
     }
 
@@ -229,54 +177,6 @@ impl WishedCue {
     #[must_use]
     pub(crate) fn chunk_len(&self, n: u64) -> u64 {
         CHUNK.min(self.bytes.saturating_sub(n.saturating_mul(CHUNK)))
-    }
-}
-
-impl WishHad {
-    /// Of that file.
-    #[must_use]
-    pub(crate) fn new(file: &WishedCue, state: HadState, why: Option<String>) -> Self {
-        let WishedCue { sha256, bytes } = file.clone();
-        Self { sha256, bytes, state, percent: None, why, faults: Vec::new() }
-    }
-
-    /// True if nothing more comes of it until somebody does something, or its time has come.
-    #[must_use]
-    pub(crate) fn is_settled(&self) -> bool {
-        matches!(self.state, HadState::Ready | HadState::Refused | HadState::Due)
-    }
-
-    /// It in words: `ready`, `fetching 61 %`, `waiting: the hall is armed`.
-    #[must_use]
-    pub(crate) fn said(&self) -> String {
-        let why = self.why.as_deref().unwrap_or("it does not say why");
-        match self.state {
-            HadState::Ready => "ready".to_owned(),
-            HadState::Due => format!("checked; {why}"),
-            HadState::Missing => "not fetched yet".to_owned(),
-            HadState::Fetching if self.percent.is_some_and(|percent| percent >= 100) => {
-                "fetched, and being proved".to_owned()
-            }
-            HadState::Fetching => format!("fetching {} %", self.percent.unwrap_or(0)),
-            HadState::Waiting => format!("waiting: {why}"),
-            HadState::Refused => format!("refused: {why}"),
-        }
-    }
-}
-
-impl HaveReport {
-    /// As it is sent, with as many faults of each cue as fit into so many bytes.
-    #[must_use]
-    pub(crate) fn text_within(&self, most: usize) -> String {
-        let text = |report: &Self| serde_json::to_string(report).expect("text and numbers are written");
-        let (mut report, mut kept) = (self.clone(), 32);
-        while text(&report).len() > most && kept > 0 {
-            kept /= 2;
-            for had in report.cues.values_mut().chain(report.playlists.values_mut()) {
-                had.faults.truncate(kept);
-            }
-        }
-        text(&report)
     }
 }
 
@@ -370,30 +270,14 @@ mod tests {
     }
 
     #[test]
-    fn a_report_that_is_too_long_loses_faults_and_no_cue() {
-        let mut report = HaveReport::default();
-        for id in 0..100 {
-            let cue = WishedCue { sha256: "0".repeat(DIGITS), bytes: 1 };
-            let mut had = WishHad::new(&cue, HadState::Refused, Some("it does not pass".to_owned()));
-            had.faults = vec!["a1 moves 260 mm/s, limit 240".to_owned(); 21];
-            report.cues.insert(id.to_string(), had);
-        }
-        assert_eq!(serde_json::from_str::<HaveReport>(&report.text_within(1 << 20)).unwrap(), report);
-        let text = report.text_within(30_000);
-        let short: HaveReport = serde_json::from_str(&text).unwrap();
-        assert!(
-            text.len() <= 30_000 && short.cues.len() == 100 && !short.cues["7"].faults.is_empty(),
-            "{text}"
-        );
-    }
-
-    #[test]
-    fn what_a_newer_hall_says_is_read_as_far_as_it_is_known() {
-        let report = r#"{"rev":5,"cues":{"a":{"state":"dreaming","percent":255},"b":{"state":"fetching","percent":61},"c":{"state":"fetching","percent":200}},"x":1}"#;
-        let report: HaveReport = serde_json::from_str(report).unwrap();
-        assert_eq!(report.cues["a"].said(), "waiting: it does not say why");
-        assert_eq!(report.cues["b"].said(), "fetching 61 %");
-        assert_eq!(report.cues["c"].said(), "fetched, and being proved");
+    fn a_wish_names_no_more_than_a_hall_answers_for() {
+        let drops = |count: usize| {
+            let ids: Vec<_> = (0..count).map(|n| format!("\"{n}\"")).collect();
+            wish(&format!("{{}},\"drops\":{{\"cues\":[{}]}}", ids.join(",")))
+        };
+        assert_eq!(drops(MOST_NAMED).unwrap().drops.cues.len(), MOST_NAMED);
+        let why = drops(MOST_NAMED + 1).unwrap_err();
+        assert_eq!(why, "it names 1001 cues and playlists, more than 1000");
     }
 
     proptest! {

@@ -1,6 +1,6 @@
 //! What a fleet brought into the library, and what it wishes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use serde::{Deserialize, Serialize};
@@ -27,6 +27,8 @@ pub(super) struct Brought {
     files: BroughtFiles,
     /// Cues that did not pass.
     refused: BTreeMap<String, RefusedCue>,
+    /// What of the wish shall go, and was not there when that was wished.
+    absent: BTreeSet<String>,
 }
 
 /// A cue that did not pass, so that it is not brought again and again.
@@ -96,15 +98,26 @@ impl Library {
         lock(&self.inner.brought).wish.clone()
     }
 
-    /// Keeps what the fleet wishes, on the disk; `names` says which cues it has.
+    /// True if that of the wish shall go, and was not there when that was wished.
+    pub(crate) fn was_absent(&self, what: &str) -> bool {
+        lock(&self.inner.brought).absent.contains(what)
+    }
+
+    /// Keeps what the fleet wishes, on the disk; `names` says which cues it has, and what of it shall go is not there.
     ///
     /// # Errors
     /// [`Problem`] where the disk does not take it; what was kept before is kept on.
-    pub(crate) fn keep_wish(&self, wish: String, names: impl Fn(&str) -> bool) -> Result<(), Problem> {
+    pub(crate) fn keep_wish(
+        &self,
+        wish: String,
+        names: impl Fn(&str) -> bool,
+        absent: BTreeSet<String>,
+    ) -> Result<(), Problem> {
         let folder = self.folder()?;
         let mut brought = lock(&self.inner.brought);
         let before = brought.wish.replace(wish);
         brought.refused.retain(|id, _| names(id));
+        brought.absent = absent;
         brought.write(&folder).inspect_err(|_| brought.wish = before)
     }
 
@@ -162,6 +175,7 @@ impl Library {
         may: impl FnOnce() -> Result<(), Problem>,
     ) -> Result<(), Problem> {
         let folder = self.folder()?;
+        let _changing = self.changing();
         let mut brought = lock(&self.inner.brought);
         may()?;
         let removed = brought.files.remove(&folder, &names(id));
@@ -204,6 +218,7 @@ impl Upload {
                 let _ = brought.write(&folder); // where it is not kept, it is brought and refused again
             }
         })?;
+        let _changing = library.changing();
         let mut brought = lock(&library.inner.brought);
         may()?;
         let no_other = brought.has_no_other(&folder, id);
@@ -213,7 +228,12 @@ impl Upload {
         let (name, stamp) = proved.file()?;
         brought.refused.remove(&id.to_string());
         brought.note(&folder, name, stamp)?;
-        proved.put()
+        proved.put_by(|folder, from, name, other| {
+            if !brought.files.put(folder, from, name).map_err(|error| unwritten(&error))? {
+                return Err(theirs(id));
+            }
+            brought.files.remove_one(folder, other).map_err(|error| unwritten(&error))
+        })
     }
 }
 
@@ -289,6 +309,30 @@ mod tests {
         fs::write(path("storm.csv"), "1").unwrap();
         brought.files.remove(&folder, &names(&id("storm"))).unwrap();
         assert!(path("storm.csv").exists(), "the same name, and not the file that came");
+    }
+
+    #[test]
+    fn what_people_put_there_after_it_was_noted_that_a_file_comes_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let (folder, path) = (Folder::open(dir.path()).unwrap(), |name: &str| dir.path().join(name));
+        let mut brought = Brought::default();
+        for came in ["1", "2"] {
+            fs::write(path("new"), came).unwrap();
+            noted(&folder, &mut brought, "new", "storm.csv");
+            assert!(brought.files.put(&folder, "new", "storm.csv").unwrap());
+            assert_eq!(fs::read_to_string(path("storm.csv")).unwrap(), came);
+        }
+        fs::write(path("new"), "3").unwrap();
+        noted(&folder, &mut brought, "new", "storm.csv");
+        fs::write(path("own"), "theirs").unwrap();
+        fs::rename(path("own"), path("storm.csv")).unwrap();
+        assert!(!brought.files.put(&folder, "new", "storm.csv").unwrap(), "over what was brought");
+        fs::write(path("calm.csv"), "theirs").unwrap();
+        noted(&folder, &mut brought, "new", "calm.csv");
+        assert!(!brought.files.put(&folder, "new", "calm.csv").unwrap(), "where nothing was");
+        for name in ["storm.csv", "calm.csv"] {
+            assert_eq!(fs::read_to_string(path(name)).unwrap(), "theirs");
+        }
     }
 
     #[test]

@@ -56,16 +56,26 @@ impl BroughtFiles {
         Ok(left)
     }
 
+    /// Gives a file its name, where nothing is there but what was brought; false where people have put something there meanwhile, which
+    /// stays. Whatever was looked at before, people may do that until the very last.
+    pub(crate) fn put(&self, folder: &Folder, from: &str, to: &str) -> io::Result<bool> {
+        Ok(folder.rename_new(from, to)? || folder.rename_over(from, to, |stamp| self.has(to, stamp))?)
+    }
+
     /// Removes what was brought of these names, and forgets it.
     pub(crate) fn remove(&mut self, folder: &Folder, names: &[String]) -> io::Result<()> {
         for name in names {
-            if folder.stamp(name)?.is_some_and(|stamp| self.has(name, stamp)) {
-                folder.remove(name)?;
-            }
+            self.remove_one(folder, name)?;
         }
         folder.sync()?;
         self.forget_gone(folder);
         Ok(())
+    }
+
+    /// Removes what was brought of a name.
+    pub(crate) fn remove_one(&self, folder: &Folder, name: &str) -> io::Result<()> {
+        let is_brought = folder.stamp(name)?.is_some_and(|stamp| self.has(name, stamp));
+        if is_brought { folder.remove(name) } else { Ok(()) }
     }
 
     fn forget_gone(&mut self, folder: &Folder) {

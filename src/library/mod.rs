@@ -33,7 +33,7 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, AtomicUsize};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use serde::de::DeserializeOwned;
@@ -132,6 +132,8 @@ struct Inner {
     index: Mutex<Index>,
     /// What a fleet brought; held while a cue is put into its place.
     brought: Mutex<Brought>,
+    /// Held while a cue or a playlist is put into its place, or removed, as a fleet wishes.
+    changing: Mutex<()>,
     /// Held while a cue is checked: one at a time.
     proving: Mutex<()>,
     /// Uploads that have begun.
@@ -178,6 +180,7 @@ impl Library {
             hall,
             index: Mutex::new(index),
             brought: Mutex::new(brought),
+            changing: Mutex::new(()),
             proving: Mutex::new(()),
             uploads: AtomicUsize::new(0),
             serial: AtomicU64::new(0),
@@ -347,6 +350,12 @@ impl Library {
     #[must_use]
     pub(crate) fn config_digest(&self) -> String {
         hex(&Sha256::digest(self.inner.hall.text()))
+    }
+
+    /// To be held from the last look at what the hall does until a cue or a playlist is changed for a fleet. Whoever loads one waits for
+    /// it, once that can be seen, before anything is read: so either it reads the new file, or the change waits for it.
+    pub(crate) fn changing(&self) -> MutexGuard<'_, ()> {
+        lock(&self.inner.changing)
     }
 
     /// The longest file that is taken in, bytes.

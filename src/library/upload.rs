@@ -142,12 +142,21 @@ impl ProvedUpload {
 
     /// Puts it into its place, while nobody else does: whoever calls this holds what was brought.
     pub(super) fn put(self) -> Result<CueInfo, Problem> {
+        // From the old whole to the new whole: never a name with half a file.
+        self.put_by(|folder, from, name, other| {
+            folder.rename(from, name).and_then(|()| folder.remove(other)).map_err(|error| unwritten(&error))
+        })
+    }
+
+    /// The same by what gives it its name, and removes the one of the same cue in the other form.
+    pub(super) fn put_by(
+        self,
+        place_it: impl FnOnce(&Folder, &str, &str, &str) -> Result<(), Problem>,
+    ) -> Result<CueInfo, Problem> {
         let Self { place, id, print, verdict } = self;
         let name = file_name(&id, verdict.mcap);
-        // From the old whole to the new whole: never a name with half a file.
-        let placed = place.folder.rename(&place.name, &name);
-        let placed = placed.and_then(|()| place.folder.remove(&file_name(&id, !verdict.mcap)));
-        placed.and_then(|()| place.folder.sync()).map_err(|error| unwritten(&error))?;
+        place_it(&place.folder, &place.name, &name, &file_name(&id, !verdict.mcap))?;
+        place.folder.sync().map_err(|error| unwritten(&error))?;
         let stamp = place.folder.stamp(&name).map_err(|error| file_problem("read the cue", &error))?;
         let stamp = stamp.ok_or_else(gone)?;
         let info = CueInfo::new(&id, stamp.size, Some((&verdict, true)));

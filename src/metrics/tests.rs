@@ -120,6 +120,7 @@ fn playing() -> Status {
         since_s: 5.0,
         lapses_s: None,
         moving: true,
+        job: None,
         film: Some(film()),
         osc: Some([("received".to_owned(), 12), ("refused".to_owned(), 3)].into()),
         show: Some(ShowStatus {

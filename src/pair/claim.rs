@@ -36,6 +36,8 @@ pub(crate) struct Beat {
     pub(crate) wants: bool,
     /// The word not to lead, in answer to the beat of that number; 0 for none.
     pub(crate) word: u64,
+    /// What tells its configuration from another one.
+    pub(crate) print: u64,
 }
 
 /// Who wrote the key, and the how-manieth time: no two writes are the same.
@@ -46,6 +48,18 @@ pub(crate) struct Holder {
     pub(crate) session: u64,
     /// Its count of what it asked.
     pub(crate) count: u64,
+    /// What tells its configuration from another one; 0 where it does not say.
+    #[serde(default)]
+    pub(crate) print: u64,
+}
+
+/// Why a machine does not begin to lead by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PairMisfit {
+    /// The other machine, which is heard, has another configuration.
+    Other,
+    /// Whoever led last had another one.
+    Leader,
 }
 
 /// What is asked of the engine.
@@ -102,6 +116,7 @@ struct Partner {
     unanswered: u64,
     leads: bool,
     wants: bool,
+    print: u64,
     heard: Option<MonoTime>,
 }
 
@@ -131,6 +146,8 @@ enum Lease {
 #[derive(Debug, Clone)]
 pub(crate) struct Claim {
     session: u64,
+    /// What tells its configuration from another one.
+    print: u64,
     /// Of two that start together this one leads.
     is_first: bool,
     role: Role,
@@ -145,10 +162,8 @@ pub(crate) struct Claim {
     open: bool,
     /// When the newest request left that was granted.
     granted: Option<MonoTime>,
-    /// Until then it makes the key where there is none: a person has said that the other machine is off.
-    may_make_until: MonoTime,
-    /// True unless the other machine has another configuration: then nothing is taken over.
-    is_fit: bool,
+    /// Until then it takes the lead also where nothing says that it may: a person has said that the other machine is off.
+    is_told_until: MonoTime,
 }
 
 impl Claim {
@@ -156,6 +171,7 @@ impl Claim {
     pub(crate) fn new(session: u64, is_first: bool, now: MonoTime) -> Self {
         Self {
             session,
+            print: 0,
             is_first,
             role: Role::Follows,
             bound_until: now + KEPT,
@@ -167,19 +183,35 @@ impl Claim {
             asked: MonoTime::default(),
             open: false,
             granted: None,
-            may_make_until: MonoTime::default(),
-            is_fit: true,
+            is_told_until: MonoTime::default(),
         }
     }
 
-    /// A person says that the other machine is off: for a while it may make the key where the engine has none.
+    /// A person says that the other machine is off, and that this one is to lead: for a while it may make the key where the engine has
+    /// none, and take that of a machine with another configuration.
     pub(crate) fn is_alone(&mut self, now: MonoTime) {
-        self.may_make_until = now + ALONE;
+        self.is_told_until = now + ALONE;
     }
 
-    /// Says whether the other machine has the same configuration.
-    pub(crate) fn set_fit(&mut self, is_fit: bool) {
-        self.is_fit = is_fit;
+    /// It has that configuration from now on.
+    pub(crate) fn set_print(&mut self, print: u64) {
+        self.print = print;
+    }
+
+    /// Why it does not begin to lead, or the other one does not, if their configurations are no longer the same.
+    pub(crate) fn misfit(&self, now: MonoTime) -> Option<PairMisfit> {
+        if self.hears(now) {
+            return (self.partner.print != self.print).then_some(PairMisfit::Other);
+        }
+        match self.lease {
+            Lease::Seen(key) if !self.fits(&key) => Some(PairMisfit::Leader),
+            _ => None,
+        }
+    }
+
+    /// True if whoever wrote a key had the same configuration, or did not say.
+    fn fits(&self, key: &SeenKey) -> bool {
+        key.holder.print == 0 || key.holder.print == self.print
     }
 
     /// What it is.
@@ -227,12 +259,14 @@ impl Claim {
             leads: matches!(self.role, Role::Leads { .. }),
             wants: self.wants(now),
             word,
+            print: self.print,
         }
     }
 
     /// True if it asks for the other's word so as to begin to lead.
     fn wants(&self, now: MonoTime) -> bool {
-        self.is_first && self.role == Role::Follows && now >= self.bound_until && !self.partner.leads
+        let may_begin = self.is_first && self.role == Role::Follows && now >= self.bound_until;
+        may_begin && !self.partner.leads && self.misfit(now).is_none()
     }
 
     /// Takes a heartbeat that is authentic. One that is old, or from before we or the other machine started, says nothing; true of others.
@@ -252,9 +286,9 @@ impl Claim {
         if beat.to != self.session {
             return false;
         }
-        let Beat { number, leads, wants, word, .. } = *beat;
-        self.partner =
-            Partner { session: beat.from, number, unanswered: number, leads, wants, heard: Some(now) };
+        let Beat { number, leads, wants, word, print, .. } = *beat;
+        let (session, unanswered, heard) = (beat.from, number, Some(now));
+        self.partner = Partner { session, number, unanswered, leads, wants, print, heard };
         self.take_word(word, now);
         true
     }
@@ -284,7 +318,7 @@ impl Claim {
         if revision.is_some() && self.role == Role::Follows {
             self.role = Role::Claims { ticket: self.ticket, left: now };
         }
-        let holder = Holder { session: self.session, count: self.ticket };
+        let holder = Holder { session: self.session, count: self.ticket, print: self.print };
         let want = revision.map_or(Want::Read, |revision| Want::Swap { revision, holder });
         Ask { ticket: self.ticket, want }
     }
@@ -302,7 +336,8 @@ impl Claim {
 
     /// The revision that a machine replaces to lead from now on: one that nobody has renewed for long enough.
     fn to_claim(&self, now: MonoTime) -> Option<u64> {
-        if now < self.bound_until || self.hears_leader(now) || !self.is_fit {
+        let is_told = now < self.is_told_until;
+        if now < self.bound_until || self.hears_leader(now) || !is_told && self.misfit(now).is_some() {
             return None;
         }
         match self.lease {
@@ -313,7 +348,7 @@ impl Claim {
             {
                 Some(key.revision)
             }
-            Lease::Missing if now < self.may_make_until => Some(0),
+            Lease::Missing if is_told => Some(0),
             _ => None,
         }
     }

@@ -5,15 +5,17 @@ use super::mac::CODE;
 use super::{Beat, PairKey};
 
 /// What it begins with, the version among it.
-const MAGIC: &[u8; 4] = b"kcp1";
+const MAGIC: &[u8; 4] = b"kcp2";
 /// The octets before the settings.
-const HEAD: usize = 4 + 4 * 8 + 1 + 4 + 8 + CODE;
+const HEAD: usize = 4 + 5 * 8 + 1 + 4 + 8 + 4;
 /// The longest text of settings that is carried: a datagram takes no more.
 pub(crate) const LONGEST: usize = 48 << 10;
 
 const LEADS: u8 = 1;
 const WANTS: u8 = 2;
 const MOVES: u8 = 4;
+const ON_CUE: u8 = 8;
+const RUNS: u8 = 16;
 
 /// What a machine that leads tells beside its beat.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -24,8 +26,12 @@ pub(crate) struct Carried {
     pub(crate) film_ms: i64,
     /// True if its seats move or may.
     pub(crate) moves: bool,
-    /// The digest of its configuration.
-    pub(crate) digest: [u8; CODE],
+    /// True if a show is under way, paused or not: then it may go on at `film_ms`.
+    pub(crate) is_on_cue: bool,
+    /// True if its film runs.
+    pub(crate) runs: bool,
+    /// How often people have set something there since it started.
+    pub(crate) revision: u32,
     /// What people have set, the text of the file; not in each beat.
     pub(crate) settings: Option<String>,
 }
@@ -45,14 +51,20 @@ impl Message {
         let Self { beat, carried } = self;
         let mut octets = Vec::with_capacity(HEAD + CODE);
         octets.extend(MAGIC);
-        for number in [beat.from, beat.to, beat.number, beat.word] {
+        for number in [beat.from, beat.to, beat.number, beat.word, beat.print] {
             octets.extend(number.to_be_bytes());
         }
-        let flags = [(beat.leads, LEADS), (beat.wants, WANTS), (carried.moves, MOVES)];
+        let flags = [
+            (beat.leads, LEADS),
+            (beat.wants, WANTS),
+            (carried.moves, MOVES),
+            (carried.is_on_cue, ON_CUE),
+            (carried.runs, RUNS),
+        ];
         octets.push(flags.into_iter().filter(|(is, _)| *is).map(|(_, flag)| flag).sum());
         octets.extend(carried.frame.to_be_bytes());
         octets.extend(carried.film_ms.to_be_bytes());
-        octets.extend(carried.digest);
+        octets.extend(carried.revision.to_be_bytes());
         let settings = carried.settings.as_deref().filter(|text| text.len() <= LONGEST);
         octets.extend(settings.unwrap_or_default().as_bytes());
         octets.extend(key.code(&octets));
@@ -70,15 +82,16 @@ impl Message {
             return None;
         }
         let mut number = || Some(u64::from_be_bytes(take(rest)?));
-        let (from, to, nth, word) = (number()?, number()?, number()?, number()?);
+        let (from, to, nth, word, print) = (number()?, number()?, number()?, number()?, number()?);
         let [flags] = take(rest)?;
         let is = |flag: u8| flags & flag != 0;
-        let beat = Beat { from, to, number: nth, leads: is(LEADS), wants: is(WANTS), word };
+        let beat = Beat { from, to, number: nth, leads: is(LEADS), wants: is(WANTS), word, print };
         let (frame, film_ms) = (u32::from_be_bytes(take(rest)?), i64::from_be_bytes(take(rest)?));
-        let digest = take(rest)?;
+        let revision = u32::from_be_bytes(take(rest)?);
         let settings = str::from_utf8(rest).ok()?;
         let settings = (!settings.is_empty()).then(|| settings.to_owned());
-        Some(Self { beat, carried: Carried { frame, film_ms, moves: is(MOVES), digest, settings } })
+        let (moves, is_on_cue, runs) = (is(MOVES), is(ON_CUE), is(RUNS));
+        Some(Self { beat, carried: Carried { frame, film_ms, moves, is_on_cue, runs, revision, settings } })
     }
 }
 
@@ -99,9 +112,10 @@ mod tests {
     }
 
     fn message() -> Message {
-        let beat = Beat { from: 1, to: 2, number: 3, leads: true, wants: false, word: 4 };
+        let beat = Beat { from: 1, to: 2, number: 3, leads: true, wants: false, word: 4, print: 5 };
         let settings = Some("{\"levels\":1}".to_owned());
-        let carried = Carried { frame: 70, film_ms: -5, moves: true, digest: [9; CODE], settings };
+        let (moves, is_on_cue, runs) = (true, true, false);
+        let carried = Carried { frame: 70, film_ms: -5, moves, is_on_cue, runs, revision: 6, settings };
         Message { beat, carried }
     }
 
@@ -125,7 +139,7 @@ mod tests {
         let read = Message::parse(&long.emit(&key("a1")), &key("a1")).unwrap();
         assert_eq!(read.carried, Carried { settings: None, ..message().carried });
         for text in
-            [&b""[..], b"kcp1", b"kcp2 and more than that, much more than there has to be in such a message"]
+            [&b""[..], b"kcp2", b"kcp1 and more than that, much more than there has to be in such a message"]
         {
             let mut octets = text.to_vec();
             octets.extend(key("a1").code(text));

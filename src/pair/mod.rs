@@ -18,7 +18,7 @@ mod message;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use claim::{Answer, Answered, Ask, Beat, Claim, Holder, Role, Want};
+pub(crate) use claim::{Answer, Answered, Ask, Beat, Claim, Holder, PairMisfit, Role, Want};
 pub(crate) use mac::PairKey;
 pub(crate) use message::{Carried, LONGEST, Message};
 

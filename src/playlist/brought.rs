@@ -81,7 +81,9 @@ impl Shelf {
             let mut brought: BroughtFiles = kept(&folder, FILE);
             brought.note(&folder, name.clone(), stamp);
             note(&folder, &brought).map_err(unwritten)?;
-            folder.rename(NEW_LIST, &name).and_then(|()| folder.sync()).map_err(unwritten)
+            let is_put = brought.put(&folder, NEW_LIST, &name).map_err(unwritten)?;
+            folder.sync().map_err(unwritten)?;
+            if is_put { Ok(()) } else { Err(theirs(id)) }
         };
         put().inspect_err(|_| drop(folder.remove(NEW_LIST))) // what is left is written over by the next one
     }
@@ -170,7 +172,7 @@ mod tests {
         shelf.bring(&id, TWO, || Err(theirs(&id))).unwrap_err();
         assert_eq!(fs::read_to_string(&path).unwrap(), ONE, "the hall said no at last");
         shelf.bring(&id, TWO, || Ok(())).unwrap();
-        assert_eq!(shelf.list().len(), 1, "what is noted beside it is no playlist");
+        assert_eq!(shelf.all().unwrap().len(), 1, "what is noted beside it is no playlist");
         fs::write(&path, TWO.replace("Two", "Own")).unwrap();
         assert_eq!(stands(ONE), WishedText::Theirs, "somebody changed it");
         shelf.bring(&id, ONE, || Ok(())).unwrap_err();

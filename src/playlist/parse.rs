@@ -1,6 +1,6 @@
 //! From the text of a playlist to its entries, noting every fault.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use jiff::civil::Time;
@@ -29,9 +29,7 @@ impl Playlist {
     pub fn parse(path: &Path, text: &str) -> Result<Self, ConfigFaults> {
         let mut faults = Faults::of(text);
         let (tree, errors) = DeTable::parse_recoverable(text);
-        for error in errors {
-            faults.note_syntax(&error);
-        }
+        errors.iter().for_each(|error| faults.note_syntax(error));
         let playlist = root(path, tree.get_ref(), &mut faults);
         match playlist {
             Some(playlist) if faults.is_empty() => Ok(playlist),
@@ -71,9 +69,12 @@ fn entries(entry: Entry<'_>, faults: &mut Faults<'_>) -> Vec<PlaylistEntry> {
     if tables.is_empty() || tables.len() > MAX_ENTRIES {
         entry.fault(faults, &format!("{} entries are outside 1..={MAX_ENTRIES}", tables.len()));
     }
-    let mut taken = Vec::new();
+    let mut taken = BTreeMap::new();
     let mut sound = Vec::new();
     for table in tables.iter().take(MAX_ENTRIES) {
+        if faults.is_full() {
+            break;
+        }
         let Some(read) = one(*table, faults) else { continue };
         for day in read.at.iter().flat_map(|at| at.days.iter().map(|day| (at.time, *day))) {
             refuse_repeat(table, day, &mut taken, faults);
@@ -87,17 +88,14 @@ fn entries(entry: Entry<'_>, faults: &mut Faults<'_>) -> Vec<PlaylistEntry> {
 fn refuse_repeat(
     entry: &Entry<'_>,
     day: (Time, i8),
-    taken: &mut Vec<((Time, i8), usize)>,
+    taken: &mut BTreeMap<(Time, i8), usize>,
     faults: &mut Faults<'_>,
 ) {
-    match taken.iter().find(|(before, _)| *before == day) {
-        None => taken.push((day, entry.at)),
-        Some(&(_, first)) if first != entry.at => {
-            let line = faults.line(first);
-            let weekday = DAYS[usize::from(day.1.unsigned_abs())].0;
-            entry.fault(faults, &format!("starts at {} on {weekday}, as the one on line {line} does", day.0));
-        }
-        Some(_) => {}
+    let first = *taken.entry(day).or_insert(entry.at);
+    if first != entry.at {
+        let line = faults.line(first);
+        let weekday = DAYS[usize::from(day.1.unsigned_abs())].0;
+        entry.fault(faults, &format!("starts at {} on {weekday}, as the one on line {line} does", day.0));
     }
 }
 

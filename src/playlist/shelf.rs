@@ -42,26 +42,34 @@ impl Shelf {
     }
 
     /// All playlists by their ids, also those with faults.
-    #[must_use]
-    pub(crate) fn list(&self) -> Vec<PlaylistInfo> {
-        self.ids()
-            .into_iter()
-            .filter_map(|id| match self.read(&id) {
-                Ok(Playlist { title, entries, .. }) => Some(PlaylistInfo {
-                    id: id.to_string(),
-                    title: Some(title),
-                    cues: entries.iter().map(|entry| entry.cue.to_string()).collect(),
-                    faults: Vec::new(),
-                }),
-                Err(problem) if problem.code == Code::Unknown => None, // a folder, a symbolic link, or gone since
-                Err(problem) => Some(PlaylistInfo {
-                    id: id.to_string(),
-                    title: None,
-                    cues: Vec::new(),
-                    faults: if problem.faults.is_empty() { vec![problem.detail] } else { problem.faults },
-                }),
-            })
-            .collect()
+    ///
+    /// # Errors
+    /// Where the folder is there and cannot be read: then nobody knows which there are.
+    pub(crate) fn all(&self) -> Result<Vec<PlaylistInfo>, Problem> {
+        let ids = self.ids().map_err(|error| {
+            let detail = format!("cannot read the playlists in {}: {error}", self.dir.display());
+            Problem::new(
+                Code::File,
+                detail,
+                "let the service read that folder, or name another in [library] playlists",
+            )
+        })?;
+        let all = ids.into_iter().filter_map(|id| match self.read(&id) {
+            Ok(Playlist { title, entries, .. }) => Some(PlaylistInfo {
+                id: id.to_string(),
+                title: Some(title),
+                cues: entries.iter().map(|entry| entry.cue.to_string()).collect(),
+                faults: Vec::new(),
+            }),
+            Err(problem) if problem.code == Code::Unknown => None, // a folder, a symbolic link, or gone since
+            Err(problem) => Some(PlaylistInfo {
+                id: id.to_string(),
+                title: None,
+                cues: Vec::new(),
+                faults: if problem.faults.is_empty() { vec![problem.detail] } else { problem.faults },
+            }),
+        });
+        Ok(all.collect())
     }
 
     /// Reads a playlist.
@@ -83,13 +91,18 @@ impl Shelf {
         read_as(id, &path, &text)
     }
 
-    fn ids(&self) -> Vec<PlaylistId> {
-        let names = Folder::open(&self.dir).and_then(|folder| folder.names()).unwrap_or_default();
-        names.iter().filter_map(|name| name.strip_suffix(ENDING)?.parse().ok()).collect()
+    /// None where there is no such folder.
+    fn ids(&self) -> io::Result<Vec<PlaylistId>> {
+        let names = match Folder::open(&self.dir).and_then(|folder| folder.names()) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+            names => names?,
+        };
+        Ok(names.iter().filter_map(|name| name.strip_suffix(ENDING)?.parse().ok()).collect())
     }
 
     fn unknown(&self, id: &PlaylistId) -> Problem {
-        let ids: Vec<_> = self.ids().iter().map(ToString::to_string).collect();
+        // Where they cannot be read, none is near it.
+        let ids: Vec<_> = self.ids().unwrap_or_default().iter().map(ToString::to_string).collect();
         Problem::unknown(
             "playlist",
             &id.to_string(),

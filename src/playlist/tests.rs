@@ -8,6 +8,7 @@ use proptest::prelude::*;
 
 use super::schedule::due;
 use super::*;
+use crate::config::ConfigFaults;
 use crate::config::from_to_args;
 use crate::control::Code;
 use crate::library::{Bounds, Hall, Library};
@@ -156,13 +157,29 @@ fn a_shelf_lists_all_playlists_and_names_the_faults_of_bad_ones() {
     write("notes.txt", "");
     std::os::unix::fs::symlink("/etc/passwd", dir.path().join("link.toml")).unwrap();
     let shelf = Shelf::new(dir.path());
-    let [bad, day] = &shelf.list()[..] else { panic!("two playlists") };
+    let [bad, day] = &shelf.all().unwrap()[..] else { panic!("two playlists") };
     assert_eq!((day.id.as_str(), day.title.as_deref()), ("day", Some("Saturday")));
     assert_eq!(day.cues, ["seat-demo", "storm"]);
     assert!(bad.faults[0].contains("bad.toml:1:9: title: expected a string"), "{bad:?}");
     assert_eq!(shelf.read(&"link".parse().unwrap()).unwrap_err().code, Code::Unknown);
     assert_eq!(shelf.read(&"bad".parse().unwrap()).unwrap_err().code, Code::Check);
-    assert!(Shelf::new(&dir.path().join("none")).list().is_empty());
+    assert!(Shelf::new(&dir.path().join("none")).all().unwrap().is_empty());
+    let problem = Shelf::new(&dir.path().join("notes.txt")).all().unwrap_err();
+    assert!(problem.code == Code::File && problem.detail.contains("notes.txt"), "{problem}");
+}
+
+#[test]
+fn of_a_playlist_with_a_fault_in_each_of_its_lines_some_hundred_are_told_and_the_rest_is_not_looked_at() {
+    let many = "[[entry]]\nx=1\n".repeat(18_000);
+    let broken = "= 1\n".repeat(60_000);
+    let alike = "[[entry]]\ncue = \"c\"\nat = \"19:00\"\n".repeat(900);
+    for (text, most) in [(many, 200), (broken, 200), (alike, 200)] {
+        let Err(ConfigFaults::Bad(faults)) = Playlist::parse(Path::new("day.toml"), &text) else {
+            panic!("it has faults")
+        };
+        assert_eq!(faults.len(), most);
+        assert!(faults[most - 1].message.ends_with("; there may be more: correct these first"), "{faults:?}");
+    }
 }
 
 #[test]

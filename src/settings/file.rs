@@ -92,14 +92,16 @@ impl SettingsFile {
         (Self { folder: folder.to_owned(), given: None, exchange, thread }, kept)
     }
 
-    /// Has it kept, where it is another than before. Waits for nothing.
-    pub(crate) fn put(&mut self, settings: Settings) {
+    /// Has it kept, where it is another than before; gives the text of it then. Waits for nothing.
+    pub(crate) fn put(&mut self, settings: Settings) -> Option<String> {
         if self.given.as_ref() == Some(&settings) {
-            return;
+            return None;
         }
-        self.exchange.lock().due = Some(settings.text());
+        let text = settings.text();
+        self.exchange.lock().due = Some(text.clone());
         self.exchange.come.notify_one();
         self.given = Some(settings);
+        Some(text)
     }
 
     /// Marks that what was loaded before the start is being loaded; to be called on a thread that may wait for the disk.
@@ -231,7 +233,7 @@ pub(crate) fn keep(folder: &Path, settings: &Settings) -> io::Result<()> {
 ///
 /// # Errors
 /// Why it cannot be read.
-pub(crate) fn text(folder: &Path) -> Result<Option<String>, String> {
+fn text(folder: &Path) -> Result<Option<String>, String> {
     let read = || -> io::Result<Option<String>> {
         let folder = Folder::open(folder)?;
         let Some((file, _)) = folder.file(FILE)? else {

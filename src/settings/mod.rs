@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-pub(crate) use file::{Kept, SettingsFile, keep, text as text_of};
+pub(crate) use file::{Kept, SettingsFile, keep};
 pub(crate) use words::seats_out;
 
 use crate::control::{Levels, Surface};
@@ -30,6 +30,9 @@ pub(crate) const LONGEST_WHY: usize = 200;
 pub(crate) struct Settings {
     /// Levels and effects.
     pub(crate) levels: Levels,
+    /// The same as people have set them, where gear or a fleet has set less since.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) ceiling: Option<Levels>,
     /// How much later than the film the motion is, ms.
     pub(crate) trim_ms: i32,
     /// The groups of seats that are out.
@@ -42,7 +45,7 @@ impl Default for Settings {
     /// All of everything, and nothing loaded.
     fn default() -> Self {
         let levels = Levels { motion: 1.0, vibration: 1.0, effects: BTreeMap::new(), rows: BTreeMap::new() };
-        Self { levels, trim_ms: 0, out: BTreeMap::new(), show: None }
+        Self { levels, ceiling: None, trim_ms: 0, out: BTreeMap::new(), show: None }
     }
 }
 
@@ -109,8 +112,10 @@ impl Settings {
 
     /// What nobody can have set.
     fn fault(&self) -> Option<String> {
-        let Levels { motion, vibration, rows, .. } = &self.levels;
-        let mut levels = [motion, vibration].into_iter().chain(rows.values());
+        let all = [Some(&self.levels), self.ceiling.as_ref()].into_iter().flatten();
+        let mut levels = all.flat_map(|Levels { motion, vibration, rows, .. }| {
+            [motion, vibration].into_iter().chain(rows.values())
+        });
         if let Some(level) = levels.find(|level| !(0.0..=1.0).contains(*level)) {
             return Some(format!("a level of {level} is outside 0..=1"));
         }

@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{AtFlags, CWD, Dir, FileType, FlockOperation, Mode, OFlags};
+use rustix::fs::{AtFlags, CWD, Dir, FileType, FlockOperation, Mode, OFlags, RenameFlags, renameat_with};
 use rustix::io::Errno;
 use serde::{Deserialize, Serialize};
 
@@ -150,6 +150,40 @@ impl Folder {
         Ok(rustix::fs::renameat(&self.fd, from, &self.fd, to)?)
     }
 
+    /// Gives a file a name that nothing has; false where something has it, which stays.
+    pub(crate) fn rename_new(&self, from: &str, to: &str) -> io::Result<bool> {
+        match renameat_with(&self.fd, from, &self.fd, to, RenameFlags::NOREPLACE) {
+            Ok(()) => Ok(true),
+            Err(Errno::EXIST) => Ok(false),
+            // A file system that does not know how: a look before has to do.
+            Err(Errno::INVAL | Errno::NOSYS) if !self.has(to)? => self.rename(from, to).map(|()| true),
+            Err(Errno::INVAL | Errno::NOSYS) => Ok(false),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Puts a file in the place of one that is still that very one; false where something else is there by then, which stays.
+    pub(crate) fn rename_over(
+        &self,
+        from: &str,
+        to: &str,
+        is_it: impl Fn(Stamp) -> bool,
+    ) -> io::Result<bool> {
+        match renameat_with(&self.fd, from, &self.fd, to, RenameFlags::EXCHANGE) {
+            Ok(()) if self.stamp(from)?.is_some_and(&is_it) => self.remove(from).map(|()| true),
+            Ok(()) => {
+                renameat_with(&self.fd, from, &self.fd, to, RenameFlags::EXCHANGE)?;
+                Ok(false)
+            }
+            Err(Errno::NOENT) => self.rename_new(from, to),
+            Err(Errno::INVAL | Errno::NOSYS) if self.stamp(to)?.is_some_and(&is_it) => {
+                self.rename(from, to).map(|()| true)
+            }
+            Err(Errno::INVAL | Errno::NOSYS) => Ok(false),
+            Err(error) => Err(error.into()),
+        }
+    }
+
     /// Puts a file of those bytes in the place of another, by way of `unfinished`: from the old whole to the new whole, whatever crashes.
     /// The name is on the disk after [`Folder::sync`].
     ///
@@ -232,6 +266,32 @@ mod tests {
         drop(file);
         folder.remove_abandoned("new").unwrap();
         assert!(folder.stamp("new").unwrap().is_none());
+    }
+
+    #[test]
+    fn a_file_takes_the_place_of_nothing_or_of_the_very_one_that_was_there_and_of_no_other() {
+        let inside = tempfile::tempdir().unwrap();
+        let at = |name: &str| inside.path().join(name);
+        let folder = Folder::open(inside.path()).unwrap();
+        fs::write(at("new"), "1").unwrap();
+        fs::write(at("theirs"), "x").unwrap();
+        assert!(!folder.rename_new("new", "theirs").unwrap() && folder.rename_new("new", "own").unwrap());
+        assert_eq!(folder.names().unwrap(), ["own", "theirs"]);
+        let own = folder.stamp("own").unwrap().unwrap();
+        fs::write(at("next"), "2").unwrap();
+        for other in ["theirs", "link"] {
+            let _ = symlink("/dev/null", at("link"));
+            assert!(!folder.rename_over("next", other, |stamp| stamp == own).unwrap(), "{other}");
+        }
+        assert_eq!([fs::read(at("theirs")).unwrap(), fs::read(at("next")).unwrap()], [b"x", b"2"]);
+        assert!(folder.rename_over("next", "own", |stamp| stamp == own).unwrap());
+        fs::write(at("more"), "3").unwrap();
+        assert!(folder.rename_over("more", "gone", |_| true).unwrap(), "nothing is there by then");
+        assert_eq!(
+            (fs::read(at("own")).unwrap(), fs::read(at("gone")).unwrap()),
+            (b"2".to_vec(), b"3".to_vec())
+        );
+        assert_eq!(folder.names().unwrap(), ["gone", "link", "own", "theirs"]);
     }
 
     #[test]

@@ -82,6 +82,18 @@ fn who_may_look_without_a_token_may_stop_too_and_nothing_else() {
     assert_eq!(hall.port().post("/api/v1/show/pause").problem(), problem(403, "role"));
     assert_eq!(hall.port().post("/api/v1/show/stop").state(), "stopping");
     assert!(hall.desk.take_stop());
+    // Not even a token that is no more, nor too many of them, keep anybody from what they could do without one.
+    for n in 0..7 {
+        let stop = Request::new("POST", "/api/v1/show/stop").token("of-last-year").send(&hall.port());
+        assert_eq!(stop.state(), "stopping", "try {n}");
+        assert!(hall.desk.take_stop());
+    }
+    let look = Request::new("GET", "/api/v1/status").token("of-last-year").send(&hall.port());
+    assert_eq!(look.problem(), problem(429, "busy"));
+    let stop = Request::new("POST", "/api/v1/show/stop")
+        .token("of-last-year")
+        .header("Origin", "http://evil.example");
+    assert_eq!(stop.send(&hall.port()).problem(), problem(403, "origin"));
 }
 
 #[test]

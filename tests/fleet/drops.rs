@@ -56,6 +56,26 @@ fn what_the_fleet_brought_goes_between_shows_and_a_cue_once_it_is_not_loaded_and
 }
 
 #[test]
+fn a_name_that_no_hall_had_is_said_to_be_none() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", BOTH);
+    let _link = engine.link("h1", &hall);
+    push(&engine, "storm", &[]);
+    let drop = |names: &[&str]| {
+        let run = engine.desk(&[&["drop", "--to", "all", "--within", "50"][..], names].concat());
+        (run.code, run.stdout)
+    };
+    for _ in 0..2 {
+        let none = "no hall had it: dropped playlist sunday, dropped strom\n".to_owned();
+        assert_eq!(drop(&["strom", "--playlist", "sunday"]), (Some(66), none));
+    }
+    assert!(is_there(&hall, "storm.csv"));
+    for _ in 0..2 {
+        assert_eq!(drop(&["storm"]), (Some(0), "all halls are without it\n".to_owned()));
+    }
+}
+
+#[test]
 fn what_people_put_there_is_not_dropped_nor_is_what_no_wish_names_any_more() {
     let Some(engine) = Engine::start("h1") else { return };
     let hall = engine.hall("h1", BOTH);

@@ -113,6 +113,21 @@ fn who_has_no_token_sees_nothing_and_no_page_of_others_stops_a_hall() {
 }
 
 #[test]
+fn a_token_of_another_day_keeps_nobody_from_a_stop_that_needs_none() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", "[]");
+    let _link = engine.link("h1", &hall);
+    engine.hears_all();
+    let page = engine.page(OPEN);
+    let look = Request::new("GET", "/api/v1/fleet/halls").token("of-last-year").send(page.to());
+    assert_eq!(look.status, 401);
+    let all = json!({ "halls": ["all"] }).to_string();
+    let stop = Request::new("POST", "/api/v1/fleet/stop").token("of-last-year").json(all).send(page.to());
+    assert_eq!(stop.value()[0]["done"], true, "{}", stop.status);
+    hall.comes_to("stopped");
+}
+
+#[test]
 fn a_page_is_served_before_its_engine_is_there_and_hears_halls_once_it_is() {
     let Some(mut engine) = Engine::start("h1,h2") else { return };
     let hall = engine.hall("h1", "[]");

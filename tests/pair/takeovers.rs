@@ -87,6 +87,91 @@ fn a_machine_that_is_killed_is_replaced_and_its_seats_rest_until_a_person_parks_
     ));
 }
 
+/// What the second machine says of how it took over.
+fn note(house: &House) -> String {
+    let status = house.shows[1].wait(|status| status["warnings"].to_string().contains("took over from A"));
+    let warnings = status["warnings"].as_array().unwrap();
+    let notes = warnings.iter().map(|one| one["text"].as_str().unwrap_or_default());
+    notes
+        .filter(|text| text.contains("took over from A") || text.contains("is not loaded"))
+        .collect::<Vec<_>>()
+        .join("; ")
+}
+
+#[test]
+fn what_a_person_set_just_before_and_the_place_of_a_paused_show_are_those_of_the_machine_that_died() {
+    let Some(mut house) = House::playing() else { return };
+    house.shows[0].done(&["pause"]);
+    let paused = house.shows[0].comes_to("paused");
+    let place = paused["show"]["position_s"].as_f64().unwrap();
+    house.shows[0].done(&["effects", "off", "water"]);
+    house.shows[0].done(&["trim", "40ms"]);
+    house.shows[0].done(&["level", "35%"]);
+    house.shows[0].kill();
+    house.shows[1].leads("B", "recovering");
+    let status = house.shows[1].wait(|status| status["show"]["resume_s"].is_f64());
+    assert_eq!((&status["levels"]["motion"], &status["trim_ms"]), (&0.35.into(), &40.into()), "{status}");
+    assert_eq!(status["levels"]["effects"]["water"], false, "{status}");
+    let resumes = status["show"]["resume_s"].as_f64().unwrap();
+    assert!((resumes - place).abs() < 0.05, "{resumes} for {place}");
+    let note = note(&house);
+    let says = "are as A told them last, ";
+    assert!(note.contains(says) && note.contains(" ms before this machine led"), "{note}");
+    parks_and_ends(house);
+}
+
+#[test]
+fn another_file_under_the_name_of_the_cue_is_not_gone_on_with() {
+    let Some(mut house) = House::playing() else { return };
+    let cue = house.shows[1].path("state/cues/night.csv");
+    let text = std::fs::read_to_string(&cue).unwrap();
+    std::fs::write(&cue, text.replace("title: Swing", "title: Other")).unwrap();
+    house.shows[0].kill();
+    house.shows[1].leads("B", "recovering");
+    house.shows[1]
+        .wait(|status| status["warnings"].to_string().contains("night is not loaded: the file here"));
+    let note = note(&house);
+    assert!(note.contains("is another than the one that was played before, at 00:"), "{note}");
+    let status = house.shows[1].wait(|_| true);
+    assert!(status["show"].is_null(), "{status}");
+    parks_and_ends(house);
+}
+
+#[test]
+fn a_machine_with_another_configuration_does_not_lead_not_even_after_a_restart_unless_a_person_says_so() {
+    let Some(mut house) = House::playing() else { return };
+    house.shows[1].kill();
+    let config = house.shows[1].path("hall.toml");
+    let text = std::fs::read_to_string(&config).unwrap();
+    std::fs::write(&config, text.clone() + "# another one\n").unwrap();
+    house.start(1);
+    let heard = |house: &House, says: &str| {
+        house.shows[1].serving().heard(|line| line.contains(says).then_some(()));
+    };
+    heard(&house, "A has another configuration; B takes nothing over");
+    house.shows[0]
+        .wait(|status| pair_troubles(status).iter().any(|one| one.contains("B has another configuration")));
+    house.shows[0].kill();
+    heard(&house, "whoever led last had another configuration than B has now");
+    // Started again it knows of no other machine, and of the key alone.
+    house.shows[1].kill();
+    house.start(1);
+    heard(&house, "whoever led last had another configuration than B has now");
+    house.shows[1].kill();
+    std::fs::write(&config, text).unwrap();
+    house.start(1);
+    house.shows[1].leads("B", "recovering");
+    // And where another one is meant, a person says so.
+    house.shows[1].kill();
+    let other = std::fs::read_to_string(&config).unwrap() + "# another one\n";
+    std::fs::write(&config, other).unwrap();
+    house.start(1);
+    heard(&house, "whoever led last had another configuration than B has now");
+    std::fs::write(house.shows[1].path("state/alone"), "").unwrap();
+    house.shows[1].leads("B", "recovering");
+    house.ends();
+}
+
 #[test]
 fn a_machine_that_stands_still_for_long_ends_without_a_frame_once_it_wakes_up() {
     for trial in 0..trials(1) {

@@ -92,7 +92,9 @@ const ROWS: &[Row] = &[
     // 1,830 more: playlists, deletion and a pull by a fleet (1,250), recordings that are read by all processors and
     // written in their order (480), and what attackers found in homing, starts and the engine's answers.
     // 1,080 more: one datagram for many seats, with who answers it, and which way it goes.
-    ("lines of code", counts::lines_of_code, Less, 103_935.0, 39_800.0),
+    // 480 more: what a second machine takes over and what it says of that, wishes that are bounded and put nothing over people's files,
+    // what a hall is about. 190 more for recordings that viewers read as they are meant, and frames that are read once.
+    ("lines of code", counts::lines_of_code, Less, 104_600.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
@@ -104,7 +106,8 @@ const ROWS: &[Row] = &[
     // Four more: what a lane's evidence is a part of, and what an upload is awaited by, which benches and tests make.
     // Ten more: the lead of one of two machines, and doors of the fuzzer.
     // 17 more: ticks that went as one datagram, in status and report, and their networks, which tests make.
-    ("public items and fields", counts::public_items, Less, 1_282.0, 400.0),
+    // One more for what a hall is about, in the status.
+    ("public items and fields", counts::public_items, Less, 1_283.0, 400.0),
     // A table: a row for each reason why a seat stands as it does.
     // The parts that a service opens, one after the other.
     ("lines of the longest function", counts::longest_function, Less, 65.0, 48.0),

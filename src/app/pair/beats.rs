@@ -4,61 +4,66 @@ use std::net::{SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use super::settings::PairSettings;
 use super::{Heard, PairError, PairShared, thread};
-use crate::log::Priority;
 use crate::pair::{BEAT, Carried, Message};
+use crate::state::State;
 use crate::sys::clock::Monotonic;
 use crate::sys::lock::lock;
 use crate::time::{Clock as _, ShowTime};
 
-/// What people have set goes with each so-manieth beat.
-const WITH_SETTINGS: u64 = 25;
 /// The longest datagram there is.
 const DATAGRAM: usize = 1 << 16;
 
+/// The sockets of this machine, each with the address of the other one in that network.
+pub(super) type Ways = Vec<(UdpSocket, SocketAddrV4)>;
+
 /// Starts the threads: one that sends, one that hears for each network.
-pub(super) fn start(
-    shared: &Arc<PairShared>,
-    sockets: Vec<UdpSocket>,
-    others: Vec<SocketAddrV4>,
-) -> Result<(), PairError> {
-    for socket in &sockets {
+pub(super) fn start(shared: &Arc<PairShared>) -> Result<(), PairError> {
+    for (socket, _) in &*lock(&shared.ways) {
+        // Whoever sends waits for no network that takes nothing.
+        socket.set_write_timeout(Some(BEAT)).map_err(PairError::System)?;
         let (shared, socket) = (Arc::clone(shared), socket.try_clone().map_err(PairError::System)?);
         thread("pair-hears", move || hear(&shared, &socket))?;
     }
     let shared = Arc::clone(shared);
-    let ways: Vec<_> = sockets.into_iter().zip(others).collect();
-    thread("pair-beats", move || beat(&shared, &ways))
+    thread("pair-beats", move || {
+        let mut next = Monotonic.now();
+        loop {
+            Monotonic.sleep_until(next);
+            // None is made up for that was slept through.
+            next = (next + BEAT).max(Monotonic.now());
+            beat(&shared);
+            shared.beats.fetch_add(1, Ordering::Relaxed);
+        }
+    })
 }
 
-fn beat(shared: &PairShared, ways: &[(UdpSocket, SocketAddrV4)]) {
-    let mut next = Monotonic.now();
-    loop {
-        Monotonic.sleep_until(next);
-        // None is made up for that was slept through.
-        next = (next + BEAT).max(Monotonic.now());
-        let beat = shared.act(|claim, now| claim.beat(now));
-        let carried = carried(shared, beat.number);
-        let octets = Message { beat, carried }.emit(&shared.key);
-        for (socket, other) in ways {
-            let _ = socket.send_to(&octets, other); // where a network is down there is another, or the next
-        }
-        shared.beats.fetch_add(1, Ordering::Relaxed);
+/// Sends a beat. One at a time: of two that overtake each other the first counts for nothing.
+pub(super) fn beat(shared: &PairShared) {
+    let ways = lock(&shared.ways);
+    let beat = shared.act(|claim, now| claim.beat(now));
+    let carried = carried(shared, beat.number);
+    let octets = Message { beat, carried }.emit(&shared.key);
+    for (socket, other) in &*ways {
+        let _ = socket.send_to(&octets, other); // where a network is down there is another, or the next
     }
 }
 
 /// How the show of this machine is, for the other one.
 fn carried(shared: &PairShared, number: u64) -> Carried {
-    let mut carried = Carried { digest: shared.digest, ..Carried::default() };
+    let mut carried = Carried::default();
     if let Some((live, first)) = &*lock(&shared.show) {
         // No lane sends more than a frame a tick.
         let ticks = u32::try_from(live.beats()).unwrap_or(u32::MAX);
         carried.frame = first.saturating_add(ticks).saturating_add(1);
         carried.film_ms = whole_ms(live.show());
         carried.moves = live.is_moving();
-        if number.is_multiple_of(WITH_SETTINGS) {
-            carried.settings = lock(&shared.settings).clone();
-        }
+        carried.runs = matches!(live.state(), State::Playing(_));
+        carried.is_on_cue = carried.runs || live.state() == State::Paused;
+        let mut settings = lock(&shared.settings);
+        carried.revision = settings.of.1;
+        carried.settings = settings.carried(number);
     }
     carried
 }
@@ -77,31 +82,17 @@ fn hear(shared: &PairShared, socket: &UdpSocket) {
             continue;
         };
         let Some(Message { beat, carried }) = Message::parse(&buf[..len], &shared.key) else { continue };
-        let differs = carried.digest != shared.digest;
-        let is_new = shared.act(|claim, now| {
-            let is_new = claim.hear(&beat, now);
-            if is_new {
-                claim.set_fit(!differs);
-            }
-            is_new
-        });
-        if !is_new {
-            continue;
-        }
-        if differs != shared.differs.swap(differs, Ordering::Relaxed) && differs {
-            let text = format!("{} has another configuration; nothing is taken over", shared.other);
-            shared.say(Priority::Warning, text);
-        }
-        if beat.leads {
-            note(shared, carried);
+        if shared.act(|claim, now| claim.hear(&beat, now)) && beat.leads {
+            note(shared, beat.from, carried);
         }
     }
 }
 
 /// Keeps what the machine that leads has told.
-fn note(shared: &PairShared, mut carried: Carried) {
-    if let Some(settings) = carried.settings.take() {
-        *lock(&shared.settings) = Some(settings);
+fn note(shared: &PairShared, session: u64, mut carried: Carried) {
+    let of = (session, carried.revision);
+    if let Some(text) = carried.settings.take() {
+        *lock(&shared.settings) = PairSettings::told(text, of);
     }
-    *lock(&shared.heard) = Some(Heard { carried, at: Monotonic.now() });
+    *lock(&shared.heard) = Some(Heard { session, carried, at: Monotonic.now() });
 }

@@ -12,7 +12,7 @@ use std::fs;
 use std::io::{self, Read as _};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::thread::Builder;
 
@@ -25,7 +25,7 @@ use crate::api::ApiError;
 use crate::config::{Config, Pair as PairConfig};
 use crate::log::{Line, Log, Priority};
 use crate::net::Lead;
-use crate::pair::{Carried, Claim, PairKey, Role};
+use crate::pair::{Carried, Claim, LONGEST, PairKey, PairMisfit, Role};
 use crate::rt::Live;
 use crate::sd::WatchdogThread;
 use crate::sys::clock::Monotonic;
@@ -33,6 +33,8 @@ use crate::sys::file::secret;
 use crate::sys::lock::lock;
 use crate::time::{Clock as _, MonoTime};
 use crate::wire::FrameNo;
+use beats::Ways;
+use settings::PairSettings;
 
 /// How the program ends once it has lost the lead: it is to be started again, and stands by then.
 const LOST: i32 = 75;
@@ -79,8 +81,16 @@ pub(crate) enum PairError {
 /// What was heard of the machine that led.
 #[derive(Debug, Clone)]
 struct Heard {
+    session: u64,
     carried: Carried,
     at: MonoTime,
+}
+
+impl Heard {
+    /// Which settings were the newest there.
+    const fn settings_of(&self) -> (u64, u32) {
+        (self.session, self.carried.revision)
+    }
 }
 
 /// What the threads of a pair share.
@@ -89,15 +99,14 @@ struct PairShared {
     claim: Mutex<Claim>,
     lead: Arc<Lead>,
     key: PairKey,
-    digest: [u8; 32],
+    /// Held while a beat is sent.
+    ways: Mutex<Ways>,
     /// The other machine, as people call it.
     other: String,
     /// The show of this machine, and the number of its first frame.
     show: Mutex<Option<(Arc<Live>, u32)>>,
     heard: Mutex<Option<Heard>>,
-    /// What people have set: here while this machine leads, else there.
-    settings: Mutex<Option<String>>,
-    differs: AtomicBool,
+    settings: Mutex<PairSettings>,
     beats: AtomicU64,
     lead_file: PathBuf,
     log: Log,
@@ -107,6 +116,8 @@ struct PairShared {
 #[derive(Debug)]
 pub(crate) struct Pair {
     shared: Arc<PairShared>,
+    /// What a person should know of whoever led before; `None` if nobody was heard.
+    took_over: Option<String>,
     feeder: Option<WatchdogThread>,
 }
 
@@ -170,13 +181,20 @@ impl Pair {
         next.flat_map(of_each).collect()
     }
 
-    /// True if the other machine led before; what a person should know of that.
+    /// What a person should know of whoever led before; `None` if nobody was heard.
     pub(crate) fn took_over(&self) -> Option<String> {
-        let other = &self.shared.other;
-        lock(&self.shared.heard).as_ref().map(|heard| {
-            let was = if heard.carried.moves { "its seats were moving" } else { "its seats did not move" };
-            format!("took over from {other}: {was}; look at the seats, then park, or home, and start the show again")
-        })
+        self.took_over.clone()
+    }
+
+    /// The hall has another configuration from now on.
+    ///
+    /// # Errors
+    /// Where it cannot be read any more: then no other machine takes over.
+    pub(crate) fn set_config(&self, path: &Path) -> io::Result<()> {
+        let print = print_of(path);
+        let told = print.as_ref().copied().unwrap_or(1); // that of no file
+        self.shared.act(|claim, _| claim.set_print(told));
+        print.map(drop)
     }
 
     /// What is to be told of it.
@@ -186,13 +204,20 @@ impl Pair {
 }
 
 impl PairWatch {
+    /// People have set something: it has left for the other machine when this returns, so that whoever is told that it is done may rely on
+    /// it.
+    pub(crate) fn set(&self, text: String) {
+        lock(&self.0.settings).set(text);
+        beats::beat(&self.0);
+    }
+
     /// What is wrong with it, each with what to do.
     pub(crate) fn troubles(&self) -> Vec<String> {
         let shared = &self.0;
         let now = Monotonic.now();
-        let (hears, has_lease) = {
+        let (hears, has_lease, misfit) = {
             let claim = lock(&shared.claim);
-            (claim.hears(now), claim.has_lease(now))
+            (claim.hears(now), claim.has_lease(now), claim.misfit(now))
         };
         let other = &shared.other;
         let mut troubles = Vec::new();
@@ -206,9 +231,16 @@ impl PairWatch {
                 "the engine does not answer: {other} does not take over; look at kinocue-link and at the engine"
             ));
         }
-        if shared.differs.load(Ordering::Relaxed) {
+        if misfit == Some(PairMisfit::Other) {
             troubles.push(format!(
-                "{other} has another configuration: it does not take over; give both the same, and restart them"
+                "{other} has another configuration: it does not take over; give both the same, and restart or reload them"
+            ));
+        }
+        if let Some(length) =
+            lock(&shared.settings).text.as_ref().map(String::len).filter(|length| *length > LONGEST)
+        {
+            troubles.push(format!(
+                "what people have set takes {length} bytes, more than {LONGEST}: {other} does not get it; shorten the reasons why seats are out"
             ));
         }
         troubles
@@ -247,8 +279,10 @@ fn session() -> io::Result<u64> {
     Ok(u64::from_be_bytes(octets).max(1))
 }
 
-fn digest(path: &Path) -> io::Result<[u8; 32]> {
-    Ok(Sha256::digest(fs::read(path)?).into())
+/// What tells the configuration of a file from another one; never 0.
+fn print_of(path: &Path) -> io::Result<u64> {
+    let [.., a, b, c, d, e, f, g, h] = <[u8; 32]>::from(Sha256::digest(fs::read(path)?));
+    Ok(u64::from_be_bytes([a, b, c, d, e, f, g, h]).max(1))
 }
 
 fn thread(name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), PairError> {

@@ -1,64 +1,74 @@
-//! What people have set, on both machines: whoever leads tells it, the other one keeps it where it will look for it once it leads.
+//! What people have set, on both machines: whoever leads tells it with the heartbeats, at once where it is another, the other one keeps it
+//! where it will look for it once it leads.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Duration;
+use std::path::Path;
 
-use super::{PairError, PairShared, thread};
-use crate::log::Priority;
-use crate::pair::{LONGEST, Role};
+use super::{Heard, PairShared};
 use crate::settings::{self, Settings};
-use crate::sys::clock::Monotonic;
 use crate::sys::lock::lock;
-use crate::time::Clock as _;
+use crate::time::MonoTime;
 
-/// How often it is looked at.
-const LOOK: Duration = Duration::from_millis(500);
+/// So many beats carry what has just been set: one may be lost.
+const AT_ONCE: u8 = 3;
+/// And each so-manieth after that.
+const AGAIN: u64 = 25;
 
-/// Starts the thread, which alone waits for the disk.
-pub(super) fn start(shared: &Arc<PairShared>, state: PathBuf) -> Result<(), PairError> {
-    let shared = Arc::clone(shared);
-    thread("pair-keeps", move || {
-        let mut is_told = false;
-        let mut next = Monotonic.now();
-        loop {
-            Monotonic.sleep_until(next);
-            next = Monotonic.now() + LOOK;
-            if !matches!(shared.act(|claim, now| claim.role(now)), Role::Leads { .. }) {
-                continue;
-            }
-            // What cannot be read is told where it is kept.
-            let Ok(Some(text)) = settings::text_of(&state) else { continue };
-            if text.len() > LONGEST && !std::mem::replace(&mut is_told, true) {
-                let text = format!(
-                    "what people have set takes {} bytes, more than {LONGEST}: {} does not get it",
-                    text.len(),
-                    shared.other
-                );
-                shared.say(Priority::Warning, text);
-            }
-            *lock(&shared.settings) = Some(text);
-        }
-    })
+/// What people have set: here while this machine leads, else there, as it was told last.
+#[derive(Debug, Default)]
+pub(super) struct PairSettings {
+    /// The text of the file; `None` if nothing was told.
+    pub(super) text: Option<String>,
+    /// In which session it was set, and the how-manieth time.
+    pub(super) of: (u64, u32),
+    /// So many of the next beats carry it.
+    due: u8,
 }
 
-/// Keeps what the machine that led has told last, with where its show would be now if it moved. Without a word of it, or where it is no
-/// settings, what was kept here stays.
-pub(super) fn keep(shared: &PairShared, state: &Path) {
-    let (Some(heard), Some(text)) = (lock(&shared.heard).clone(), lock(&shared.settings).clone()) else {
-        return;
+impl PairSettings {
+    /// What the other machine has told.
+    pub(super) const fn told(text: String, of: (u64, u32)) -> Self {
+        Self { text: Some(text), of, due: 0 }
+    }
+
+    /// People have set something here.
+    pub(super) fn set(&mut self, text: String) {
+        *self = Self { text: Some(text), of: (self.of.0, self.of.1.wrapping_add(1)), due: AT_ONCE };
+    }
+
+    /// What the beat of that number carries.
+    pub(super) fn carried(&mut self, number: u64) -> Option<String> {
+        let is_due = self.due > 0;
+        self.due = self.due.saturating_sub(1);
+        self.text.clone().filter(|_| is_due || number.is_multiple_of(AGAIN))
+    }
+}
+
+/// Keeps what the machine that led has told last, with where its show is by now. Says to people what is there of it, and what may not be.
+pub(super) fn keep(shared: &PairShared, heard: &Heard, now: MonoTime, state: &Path) -> String {
+    let told = lock(&shared.settings);
+    let other = &shared.other;
+    let Some(text) = &told.text else {
+        return format!(
+            "{other} told nothing of what was set there, and all is as it was here: check levels, trim and seats"
+        );
     };
-    let kept = Settings::parse(&text).and_then(|mut settings| {
-        if let Some(show) = settings.show.as_mut().filter(|_| heard.carried.moves) {
-            let since = Monotonic.now().since(heard.at).as_millis();
+    let kept = Settings::parse(text).and_then(|mut settings| {
+        if let Some(show) = settings.show.as_mut().filter(|_| heard.carried.is_on_cue) {
+            let since = if heard.carried.runs { now.since(heard.at).as_millis() } else { 0 };
             show.film_ms = Some(heard.carried.film_ms + i64::try_from(since).unwrap_or_default());
         }
         settings::keep(state, &settings).map_err(|error| error.to_string())
     });
-    if let Err(why) = kept {
-        shared.say(
-            Priority::Warning,
-            format!("what people have set at {} is not taken over: {why}", shared.other),
-        );
+    let age_ms = now.since(heard.at).as_millis();
+    match kept {
+        Err(why) => format!(
+            "what was set at {other} is not taken over ({why}), and all is as it was here: check levels, trim and seats"
+        ),
+        Ok(()) if told.of != heard.settings_of() => format!(
+            "{other} had set something else that did not come here, {age_ms} ms before this machine led: check levels, trim and seats"
+        ),
+        Ok(()) => format!(
+            "levels, trim, seats that are out and the place in the film are as {other} told them last, {age_ms} ms before this machine led"
+        ),
     }
 }

@@ -3,17 +3,18 @@
 use std::fs;
 use std::net::{SocketAddrV4, UdpSocket};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::{Pair, PairError, PairShared, beats, digest, find_machine, key, lease, session, settings};
+use super::{Pair, PairError, PairShared, beats, find_machine, key, lease, print_of, session, settings};
 use crate::config::{Config, Pair as PairConfig};
 use crate::log::{Log, Priority};
 use crate::net::Lead;
-use crate::pair::{BEAT, Claim, Role};
+use crate::pair::{BEAT, Claim, PairMisfit, Role};
 use crate::sd::{self, Notifier, WatchdogThread};
 use crate::sys::clock::Monotonic;
+use crate::sys::lock::lock;
 use crate::time::{Clock as _, MonoTime};
 
 /// How often it is looked whether this machine leads.
@@ -71,6 +72,7 @@ pub(crate) fn stand_by(
     let _ = notifier.ready(&format!("{name} stands by"), Monotonic.now());
     shared.say(Priority::Info, format!("{name} stands by, and sends nothing to the seats"));
     let alone = places.state.join(ALONE);
+    let mut misfit = None;
     loop {
         if leave.load(Ordering::Acquire) {
             return Ok(StoodBy::Ended);
@@ -82,15 +84,48 @@ pub(crate) fn stand_by(
         if matches!(shared.act(|claim, now| claim.role(now)), Role::Leads { .. }) {
             break;
         }
+        let found = shared.act(|claim, now| claim.misfit(now));
+        if found != std::mem::replace(&mut misfit, found)
+            && let Some(found) = found
+        {
+            shared.say(Priority::Warning, misfit_words(found, &name, &shared.other, &alone));
+        }
+        let why = found.map_or("", |_| ", and does not lead: its configuration is another");
+        notifier.status(&format!("{name} stands by{why}"), Monotonic.now());
         Monotonic.sleep_until(Monotonic.now() + LOOK);
     }
     shared.say(Priority::Notice, format!("{name} leads the hall"));
     let _ = fs::create_dir_all(places.state); // what cannot be kept there is told
-    settings::keep(&shared, places.state);
-    settings::start(&shared, places.state.to_owned())?;
+    let took_over = takes_over(&shared, places.state);
     fs::write(&shared.lead_file, format!("{name}\n")).map_err(PairError::System)?;
     await_address(config.show.bind, &shared.lead_file)?;
-    Ok(StoodBy::Leads(Pair { shared, feeder }))
+    Ok(StoodBy::Leads(Pair { shared, took_over, feeder }))
+}
+
+/// Keeps what the other machine has told, where it led; gives what a person should know of that.
+fn takes_over(shared: &PairShared, state: &Path) -> Option<String> {
+    let heard = lock(&shared.heard).clone()?;
+    let (other, kept) = (&shared.other, settings::keep(shared, &heard, Monotonic.now(), state));
+    let was = if heard.carried.moves { "its seats were moving" } else { "its seats did not move" };
+    Some(format!(
+        "took over from {other}: {was}; {kept}; look at the seats, then park, or home, and start the show again"
+    ))
+}
+
+/// Why this machine does not lead, and what to do.
+fn misfit_words(misfit: PairMisfit, name: &str, other: &str, alone: &Path) -> String {
+    match misfit {
+        PairMisfit::Other => {
+            format!(
+                "{other} has another configuration; {name} takes nothing over; give both the same, and restart or reload them"
+            )
+        }
+        PairMisfit::Leader => format!(
+            "whoever led last had another configuration than {name} has now; it does not lead by that; start {other} with the same one, or, \
+             where {other} is off and this one is meant: touch {}",
+            alone.display()
+        ),
+    }
 }
 
 /// The threads of this machine, and what it is called.
@@ -106,22 +141,23 @@ fn start(
     let lead_file = places.control.with_file_name(super::LEAD_FILE);
     let _ = fs::remove_file(&lead_file); // of a program that was killed while it led
     let session = session().map_err(PairError::System)?;
+    let mut claim = Claim::new(session, number == 0, Monotonic.now());
+    claim.set_print(print_of(places.config).map_err(PairError::System)?);
     let shared = Arc::new(PairShared {
-        claim: Claim::new(session, number == 0, Monotonic.now()).into(),
+        claim: claim.into(),
         lead: Arc::<Lead>::default(),
         key,
-        digest: digest(places.config).map_err(PairError::System)?,
+        ways: Mutex::new(sockets.into_iter().zip(other.addresses.clone()).collect()),
         other: other.name.clone(),
         show: None.into(),
         heard: None.into(),
-        settings: None.into(),
-        differs: false.into(),
+        settings: Mutex::default(),
         beats: 0.into(),
         lead_file,
         log: log.clone(),
     });
     lease::start(&shared, &places.fleet.with_file_name(SOCKET))?;
-    beats::start(&shared, sockets, other.addresses.clone())?;
+    beats::start(&shared)?;
     Ok((shared, own.name.clone()))
 }
 

@@ -82,6 +82,8 @@ pub(super) enum Act {
     AwaitStop,
     /// Begins slow work. What was asked is answered when it is done.
     Start(Job),
+    /// It is over: something else that is slow may begin.
+    EndJob,
     /// Takes what it came to.
     Take(JobResult),
     /// Makes ready for the next show: the one before is over, or the seats were brought to park between shows.
@@ -96,6 +98,8 @@ pub(super) enum Act {
     Reload,
     /// Notes what no state says, for the log and the warnings.
     Note(String),
+    /// The same of what is over once the next show has begun.
+    Passing(String),
     /// Writes a line of the log.
     Log(Line),
     /// Adds to the record of the show that is under way.

@@ -18,6 +18,7 @@ use super::seat_testing::SeatTesting;
 use super::starts::FleetStarts;
 use crate::control::{Desired, Problem, Surface};
 use crate::rt::News;
+use crate::settings::LoadedShow;
 use crate::time::ShowTime;
 
 /// All of them.
@@ -114,6 +115,12 @@ impl Features {
         if hall.cued.is_some() {
             return Vec::new(); // a person has loaded another meanwhile
         }
+        if let (Ok(cued), Some(before)) = (&cued, &before)
+            && self.lasting.is_taken_over
+            && before.sha256 != cued.sha256
+        {
+            return vec![Act::Note(another_file(before, &cued.sha256))];
+        }
         let mut acts = Vec::new();
         match list {
             Some(Ok(list)) => self.onward.list = Some(*list),
@@ -123,7 +130,9 @@ impl Features {
         acts.push(match cued {
             Ok(mut cued) => {
                 let same = before.filter(|before| before.sha256 == cued.sha256);
-                cued.left_at = same.and_then(|before| before.film_ms).map(ShowTime::from_millis);
+                let left_at = same.and_then(|before| before.film_ms).map(ShowTime::from_millis);
+                // Nobody knows what happened since a machine that led was heard last.
+                cued.left_at = left_at.filter(|film| *film < cued.timeline.duration());
                 Act::Stage(ShowChange::Cue(cued, None))
             }
             Err(problem) => Act::Fail(problem),
@@ -163,4 +172,17 @@ impl Features {
         hall.keep_place();
         self.onward.on_show_over(hall)
     }
+}
+
+/// That a cue of the machine that led before is another one here.
+fn another_file(before: &LoadedShow, sha256: &str) -> String {
+    let short = |sha256: &str| sha256.get(..8).unwrap_or(sha256).to_owned();
+    let place = before.film_ms.map(|ms| format!(", at {}", ShowTime::from_millis(ms))).unwrap_or_default();
+    let LoadedShow { cue, sha256: theirs, .. } = before;
+    format!(
+        "{cue} is not loaded: the file here (SHA-256 {}) is another than the one that was played before{place} (SHA-256 {}); bring that file \
+         here, or load {cue} as it is here",
+        short(sha256),
+        short(theirs)
+    )
 }

@@ -246,6 +246,16 @@ mod tests {
             }
             assert_eq!(rig.supervisor.hall.settings.levels.motion, is, "{asked} was asked");
         }
+        // Nor after a restart is what gear has set taken for what a person did.
+        rig.ask_as(Surface::Osc, motion(0.2)).unwrap();
+        let kept = crate::settings::Settings::parse(&rig.supervisor.settings().text()).unwrap();
+        let mut after =
+            crate::app::supervisor::hall_settings::HallSettings::with(&rig.supervisor.hall.config, &kept);
+        assert_eq!(
+            (after.levels.motion, after.within(&LevelsChange { motion: Some(1.0), ..<_>::default() }).1),
+            (0.2, vec!["motion is 60 %".to_owned()])
+        );
+        after.change_below(&LevelsChange { motion: Some(0.6), ..<_>::default() }).unwrap();
         let rows = |a: f64, b: f64| LevelsChange {
             rows: [("A".to_owned(), a), ("B".to_owned(), b)].into(),
             ..LevelsChange::default()

@@ -46,10 +46,9 @@ impl HallSettings {
     /// The same with what was set before, as far as this configuration knows it.
     pub(super) fn with(config: &Config, before: &Settings) -> Self {
         let mut settings = Self::new(config);
-        let Settings { levels, trim_ms, out, .. } = before;
+        let Settings { levels, ceiling, trim_ms, out, .. } = before;
         carry(&mut settings.levels, levels);
-        // Gear may have set less than a person did; a person raises it again.
-        settings.ceiling.clone_from(&settings.levels);
+        carry(&mut settings.ceiling, ceiling.as_ref().unwrap_or(levels));
         settings.trim_ms = *trim_ms;
         settings.out.clone_from(out);
         settings

@@ -97,6 +97,8 @@ impl Job {
     pub(super) fn run(self, tools: &Tools) -> JobResult {
         let Tools { config, library, line, links, live, settings } = tools;
         let on_devices = |job| Devices { line: &mut line.hold(), links, config, live }.run(job);
+        // What a fleet was about to change when this was told as under way is changed by then.
+        drop(library.changing());
         match self {
             Self::Load(id) => JobResult::Loaded(read(library, config, &id, &EntryFilm::default())),
             Self::List(id) => {

@@ -11,6 +11,7 @@ use crate::control::{Coded, Command, Desired, Severity, Warning, Who};
 use crate::journal::{PlaylistPlace, stamp};
 use crate::log::{Line, Priority};
 use crate::settings::{LoadedShow, Out, Settings, seats_out};
+use crate::state::State;
 use crate::time::ShowTime;
 
 /// How exactly it is known after a crash where a show was.
@@ -27,23 +28,26 @@ pub(super) struct Lasting {
     came_back: Option<String>,
     /// Nobody has armed the hall since the start of the program.
     unsaid: bool,
+    /// What was loaded before was so at another machine, whose files may be others.
+    pub(super) is_taken_over: bool,
 }
 
 impl Lasting {
-    /// After the start of a program, for which that came back, in words.
-    pub(super) fn since_start(came_back: Option<String>) -> Self {
-        Self { came_back, unsaid: true, ..Self::default() }
+    /// After the start of a program, for which that came back, in words; of this machine, or of the one that it took over from.
+    pub(super) fn since_start(came_back: Option<String>, is_taken_over: bool) -> Self {
+        Self { came_back, unsaid: true, is_taken_over, ..Self::default() }
     }
 
     /// The same for another hall, which loads anew what was loaded.
     pub(super) fn go_over(&mut self) -> Self {
-        Self { loading: None, ready: None, ..std::mem::take(self) }
+        Self { loading: None, ready: None, is_taken_over: false, ..std::mem::take(self) }
     }
 
     /// All that is to last, the playlist being there.
     pub(super) fn settings(&self, hall: &HallContext, playlist: Option<PlaylistPlace>) -> Settings {
         Settings {
             levels: hall.settings.levels.clone(),
+            ceiling: Some(&hall.settings.ceiling).filter(|most| **most != hall.settings.levels).cloned(),
             trim_ms: hall.settings.trim_ms,
             out: hall.settings.out.clone(),
             show: self.loading.clone().or_else(|| loaded(hall, playlist)),
@@ -131,10 +135,12 @@ impl Feature for Lasting {
 /// What is loaded; while seats are tested, what was before.
 fn loaded(hall: &HallContext, playlist: Option<PlaylistPlace>) -> Option<LoadedShow> {
     let cued = hall.aside.as_ref().map_or(hall.cued.as_ref(), |SetAside(before)| before.as_ref())?;
-    let film_ms = if hall.is_on_cue() && hall.aside.is_none() {
-        Some(millis(hall.live.show()) / KEPT_EVERY_MS * KEPT_EVERY_MS).filter(|ms| *ms > 0)
-    } else {
-        cued.left_at.map(millis)
+    let at = millis(hall.live.show());
+    let film_ms = match hall.mirror.state {
+        _ if hall.aside.is_some() => cued.left_at.map(millis),
+        State::Playing(_) => Some(at / KEPT_EVERY_MS * KEPT_EVERY_MS).filter(|ms| *ms > 0),
+        State::Paused => Some(at).filter(|ms| *ms > 0),
+        _ => hall.left_at.or(cued.left_at).map(millis), // the seats may be on their way to rest
     };
     Some(LoadedShow { cue: cued.id.clone(), sha256: cued.sha256.clone(), playlist, film_ms })
 }
@@ -161,12 +167,11 @@ mod tests {
     use super::*;
     use crate::app::supervisor::testing::{desired, hall, proved, told};
     use crate::control::Surface;
-    use crate::state::State;
 
     #[test]
     fn what_came_back_is_said_at_the_first_arm_after_a_start_and_not_again() {
         let hall = hall(State::Armed, "one");
-        let mut lasting = Lasting::since_start(Some("motion 60 %".to_owned()));
+        let mut lasting = Lasting::since_start(Some("motion 60 %".to_owned()), false);
         let asks = [Command::Pause, Command::Arm { seats_empty: false }, Command::Arm { seats_empty: true }];
         let said = asks
             .map(|ask| told(&mut lasting, &SupervisorEvent::Done(&desired(Surface::Http, ask)), &hall).len());
@@ -190,6 +195,17 @@ mod tests {
             panic!("it is taken up")
         };
         assert_eq!(lasting.take(again, &hall).unwrap().1, Some(before));
+    }
+
+    #[test]
+    fn the_place_of_a_show_that_is_paused_or_on_its_way_to_rest_is_kept_exactly() {
+        let mut hall = hall(State::Paused, "one");
+        hall.live.on_show(ShowTime::from_millis(2_345));
+        let place = |hall: &HallContext| loaded(hall, None).unwrap().film_ms;
+        assert_eq!(place(&hall), Some(2_345));
+        hall.note_place(State::Paused, State::Stopping);
+        hall.mirror.state = State::Stopping;
+        assert_eq!(place(&hall), Some(2_345));
     }
 
     #[test]

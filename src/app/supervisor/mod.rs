@@ -20,6 +20,7 @@ mod job;
 mod lasting;
 mod list;
 mod margins;
+mod notes;
 mod perform;
 mod player;
 mod playlist;
@@ -49,7 +50,6 @@ mod warnings;
 pub(crate) use reload::{Carryover, SystemSignals};
 pub(crate) use service_log::ServiceLog;
 
-use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -71,7 +71,6 @@ use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, Stat
 use crate::journal::Journal;
 use crate::library::Library;
 use crate::osc::Counts;
-use crate::record::{LogNote, Note};
 use crate::rt::{News, Ticket};
 use crate::settings::{Settings, SettingsFile};
 use crate::state::State;
@@ -82,6 +81,7 @@ use features::Features;
 use hall::HallContext;
 use job::{Jobs, Tools};
 use list::List;
+use notes::NoteBoard;
 use procedures::Procedures;
 use record::ShowRecords;
 use recorded::AsksTold;
@@ -92,8 +92,6 @@ use status::StatusParts;
 const TELL: Duration = Duration::from_millis(100);
 /// How long whoever has the configuration read anew waits for controllers that do not answer.
 const OPENS: Duration = Duration::from_secs(10);
-/// Notes that are kept.
-const NOTES: usize = 5;
 
 /// What a supervisor has whatever the configuration is.
 #[derive(Debug)]
@@ -159,8 +157,7 @@ pub(crate) struct Supervisor {
     jobs: Jobs,
     /// When the status was told last.
     told: MonoTime,
-    /// What went wrong lately and no state says, newest last.
-    notes: VecDeque<String>,
+    notes: NoteBoard,
     asks_told: AsksTold,
     reload: Option<Arc<Config>>,
     /// Who asked for another configuration, this one or the next, and what came of it.
@@ -211,6 +208,7 @@ impl Supervisor {
             reloading: carryover.reloading,
         };
         carryover.untold.into_iter().for_each(|note| supervisor.note(note));
+        carryover.took_over.into_iter().for_each(|note| supervisor.note_for(note, true));
         supervisor.hall.set_desk();
         if carryover.latched {
             supervisor.hall.desk.stop();
@@ -251,8 +249,9 @@ impl Supervisor {
             self.on_asked(asked);
         }
         if let Some((result, asked)) = self.jobs.take_done() {
-            self.hall.job = None;
-            self.procedures.add_for(asked, result.map(|result| vec![Act::Take(result)]));
+            // Not told as over before what it came to is taken up: between the two a status would say that nothing is loaded.
+            let take = result.map_or_else(Act::Fail, Act::Take);
+            self.procedures.add_for(asked, Ok(vec![Act::EndJob, take]));
         }
         self.on_time();
         self.go_on();
@@ -375,17 +374,6 @@ impl Supervisor {
         starts.map_or(until, |wait| until.min(Monotonic.now() + wait))
     }
 
-    /// Notes what no state says, for the log and the warnings.
-    fn note(&mut self, note: String) {
-        self.ports.service_log.say_note(&note);
-        let line = LogNote { level: 3, message: note.clone(), name: "supervisor".to_owned() };
-        self.hall.recorder.keep(Note::Log(line));
-        self.notes.push_back(note);
-        if self.notes.len() > NOTES {
-            self.notes.pop_front();
-        }
-    }
-
     /// Writes down what somebody asked, and what came of it.
     fn write_down(&mut self, desired: &Desired, result: &Result<(), Problem>) {
         let state = self.hall.mirror.state;
@@ -403,7 +391,8 @@ impl Supervisor {
     /// Has it kept.
     fn keep_settings(&mut self) {
         let settings = self.settings();
-        self.ports.settings_file.put(settings);
+        let text = self.ports.settings_file.put(settings);
+        text.into_iter().zip(&self.ports.pair).for_each(|(text, pair)| pair.set(text));
     }
 
     /// How all of it stands.
@@ -449,6 +438,7 @@ impl Supervisor {
             latched,
             notes: std::mem::take(&mut self.notes),
             untold: Vec::new(),
+            took_over: None,
             reloading: self.reloading.take(),
         }
     }

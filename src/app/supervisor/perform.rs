@@ -8,6 +8,7 @@ use super::reload::{not_taken, reload};
 use super::state_mirror::{ANSWER, busy};
 use super::{Supervisor, belts, player};
 use crate::control::{Problem, Surface};
+use crate::record::{LogNote, Note};
 use crate::rt::Command as TickCommand;
 use crate::state::{Event, Transition};
 use crate::time::ShowTime;
@@ -71,9 +72,11 @@ impl Supervisor {
             Act::RewindStart => self.stage(ShowChange::Start(ShowTime::ZERO)),
             Act::Begin(begun) => {
                 self.hall.forget_place();
+                self.notes.begin_show();
                 self.happens(&SupervisorEvent::Begun(&begun));
             }
             Act::Start(job) => self.start(job)?,
+            Act::EndJob => self.hall.job = None,
             Act::Take(result) => {
                 let acts = self.features.take(result, &self.hall)?;
                 self.procedures.first().go_on_with(acts);
@@ -102,6 +105,7 @@ impl Supervisor {
                 self.hall.close();
             }
             Act::Note(note) => self.note(note),
+            Act::Passing(note) => self.note_for(note, true),
             Act::Log(line) => self.ports.service_log.put(line),
             Act::Record(event) => self.features.records.event(event),
         }
@@ -111,10 +115,11 @@ impl Supervisor {
     /// Starts what takes longer than the supervisor waits, one at a time.
     fn start(&mut self, job: Job) -> Result<(), Problem> {
         self.hall.is_free()?;
-        let word = job.word();
-        self.jobs.start(job, || self.procedures.first().asked.take())?;
-        self.hall.job = Some(word);
-        Ok(())
+        self.hall.job = Some(job.word());
+        // Before it reads anything: from now on the fleet changes none of what may be loaded by it.
+        self.publish();
+        let started = self.jobs.start(job, || self.procedures.first().asked.take());
+        started.inspect_err(|_| self.hall.job = None)
     }
 
     /// Lets the show go. By itself none begins in a hall that closes.
@@ -175,5 +180,18 @@ impl Supervisor {
             Undo::Readiness => return self.features.readiness.forget(),
         }
         self.procedures.first().fail(problem);
+    }
+
+    /// Notes what no state says, for the log and the warnings.
+    pub(super) fn note(&mut self, note: String) {
+        self.note_for(note, false);
+    }
+
+    /// The same, of what is over once the next show has begun or not.
+    pub(super) fn note_for(&mut self, note: String, passes: bool) {
+        self.ports.service_log.say_note(&note);
+        let line = LogNote { level: 3, message: note.clone(), name: "supervisor".to_owned() };
+        self.hall.recorder.keep(Note::Log(line));
+        self.notes.add(note, passes);
     }
 }

@@ -226,7 +226,7 @@ impl Onward {
         if hall.mirror.state != State::Armed {
             let state = hall.mirror.state;
             let note = format!("{cue} was due to start, but nobody had armed the hall: it was {state}");
-            return vec![Act::Note(note)];
+            return vec![Act::Passing(note)];
         }
         let mut acts = vec![Act::Name(format!("{cue} was due to start"))];
         match hall.is_free() {

@@ -1,6 +1,5 @@
 //! Signals of the system: to end, and to reload the configuration, for which another hall is opened.
 
-use std::collections::VecDeque;
 use std::error::Error as _;
 use std::path::Path;
 use std::sync::Arc;
@@ -9,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::hall::HallContext;
 use super::hall_settings::HallSettings;
 use super::lasting::Lasting;
+use super::notes::NoteBoard;
 use crate::config::{self, Api, Config};
 use crate::control::{Asked, Code, Problem};
 use crate::rt::Desk;
@@ -27,19 +27,22 @@ pub(crate) struct Carryover {
     /// What was latched: another configuration clears nothing.
     pub(super) latched: bool,
     /// What a person should know of the hall before.
-    pub(super) notes: VecDeque<String>,
+    pub(super) notes: NoteBoard,
     /// What happened between the halls, and was not said yet.
     pub(super) untold: Vec<String>,
+    /// The same of a machine that led before.
+    pub(super) took_over: Option<String>,
     /// Who asked for another configuration, and what came of it.
     pub(super) reloading: Option<(Asked, Result<(), Problem>)>,
 }
 
 impl Carryover {
-    /// Of a program that has just started, and found that.
+    /// Of a program that has just started, and found that; of one that took over from another machine, with what to tell of that.
     #[must_use]
-    pub(crate) fn of(kept: Kept) -> Self {
-        let lasting = Lasting::since_start(kept.settings.as_ref().and_then(Settings::words));
-        Self { settings: kept.settings, lasting, untold: kept.said, ..Self::default() }
+    pub(crate) fn of(kept: Kept, took_over: Option<String>) -> Self {
+        let came_back = kept.settings.as_ref().and_then(Settings::words);
+        let lasting = Lasting::since_start(came_back, took_over.is_some());
+        Self { settings: kept.settings, lasting, untold: kept.said, took_over, ..Self::default() }
     }
 
     /// What is set goes to the desk of a hall before its first look at the controllers: nobody waits for a seat that is out.
@@ -60,7 +63,7 @@ impl Carryover {
 
     /// Another configuration was taken: what is said of those before that were not is over.
     pub(crate) fn forget_refusals(&mut self) {
-        self.notes.retain(|note| !note.starts_with(NOT_OPENED));
+        self.notes.forget(NOT_OPENED);
     }
 
     /// The hall did not open with another configuration: a person should know that, whoever asked for it first.

@@ -284,7 +284,7 @@ impl FleetStarts {
         let was_given = held.is_given();
         self.last = Some(held.status(StartPhase::CalledOff, why.to_owned()));
         let rewind = was_given.then_some(Act::RewindStart);
-        [Act::Note(note)].into_iter().chain(rewind).collect()
+        [Act::Passing(note)].into_iter().chain(rewind).collect()
     }
 
     /// As surfaces show it; none in a hall of no fleet.

@@ -84,6 +84,7 @@ impl StatusParts<'_> {
             since_s: now.since(mirror.since).as_secs_f64(),
             lapses_s: mirror.lapses(now),
             moving,
+            job: hall.job.or_else(|| hall.aside.is_some().then_some("test")).map(str::to_owned),
             show: hall.cued.as_ref().map(|cued| cued.status(position(cued))),
             playlist: features.onward.list.as_ref().map(|list| list.status(&Zoned::now())),
             film: hall.film.as_ref().map(|table| film::status(&table.read(), hall)),

@@ -151,8 +151,9 @@ impl Drop for Double {
 pub(super) struct Rig {
     pub(super) supervisor: Supervisor,
     pub(super) folder: TempDir,
+    pub(super) handle: Handle,
+    pub(super) library: Library,
     double: Double,
-    handle: Handle,
 }
 
 /// A hall of two rows of one seat each, whose library has three cues.
@@ -280,9 +281,9 @@ impl Rig {
         let journal = Journal::open(&folder.path().join("log"), limits, &Zoned::now());
         carryover.set_desk(&config, &desk);
         let (handle, ports) = ports(&desk, folder.path(), carryover);
-        let supervisor = Supervisor::new(ports, runtime, line, library, journal);
+        let supervisor = Supervisor::new(ports, runtime, line, library.clone(), journal);
         let double = Double::start(desk, commands_end, news);
-        Self { supervisor, folder, double, handle }
+        Self { supervisor, folder, handle, library, double }
     }
 
     /// Tells the state machine something, and waits until the supervisor knows.

@@ -16,6 +16,7 @@ use crate::health::HealthState;
 use crate::motion::Pulses;
 use crate::observe::Heard;
 use crate::rt::{News, Row};
+use crate::settings::Kept;
 use crate::state::{Event, Next, PlayMode, Trouble};
 use crate::time::ShowTime;
 use crate::wire::PerAxis;
@@ -60,7 +61,7 @@ fn after_a_restart(mut rig: Rig) -> Carryover {
     drop(supervisor);
     let (_store, found) = SettingsFile::open(&folder);
     drop(kept);
-    Carryover::of(found)
+    Carryover::of(found, None)
 }
 
 #[test]
@@ -114,6 +115,84 @@ fn what_was_loaded_is_loaded_after_a_restart_and_nothing_starts() {
     rig.settle();
     assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().id, "two");
     assert_eq!(rig.state(), State::Boot);
+}
+
+/// Has the supervisor look after all until it has loaded a cue, while each status says that it does, or that it has.
+#[track_caller]
+fn loads_without_a_gap(rig: &mut Rig, cue: &str) {
+    let is_loaded = |status: &Status| status.show.as_ref().is_some_and(|show| show.cue == cue);
+    while rig.supervisor.hall.job.is_some() || !is_loaded(&rig.handle.status()) {
+        let status = rig.handle.status();
+        assert!(status.job.as_deref() == Some("loading") || is_loaded(&status), "{status:?}");
+        rig.supervisor.told = MonoTime::default(); // a status is due at once
+        rig.supervisor.turn();
+    }
+}
+
+#[test]
+fn from_before_a_cue_is_read_until_it_is_loaded_each_status_says_that_it_is_being_loaded() {
+    let mut rig = Rig::parked();
+    let changing = rig.library.clone();
+    let changing = changing.changing();
+    let asked = rig.post(Command::Load { cue: "two".to_owned() });
+    rig.hear();
+    assert_eq!(rig.handle.status().job.as_deref(), Some("loading"), "before anything else is looked after");
+    // What a fleet was about to change is changed before it is read.
+    let path = rig.folder.path().join("cues/two.csv");
+    let before = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, before.replace("0.6", "0.55")).unwrap();
+    drop(changing);
+    loads_without_a_gap(&mut rig, "two");
+    rig.settle();
+    asked.join().unwrap().unwrap();
+    let wanted = rig.library.read(&"two".parse().unwrap()).unwrap().1;
+    assert_eq!(rig.handle.status().show.as_ref().unwrap().sha256, wanted);
+    let mut next = Rig::starting_in(|folder| {
+        std::fs::create_dir(folder.join("cues")).unwrap();
+        std::fs::copy(&path, folder.join("cues/two.csv")).unwrap();
+        after_a_restart(rig)
+    });
+    next.supervisor.turn();
+    loads_without_a_gap(&mut next, "two");
+}
+
+#[test]
+fn what_another_machine_played_is_taken_over_by_its_content_and_another_file_of_that_name_is_not_loaded() {
+    for is_same in [true, false] {
+        let mut before = Rig::parked();
+        before.ask(Command::Load { cue: "two".to_owned() }).unwrap();
+        let folder = before.folder.path().to_owned();
+        let mut rig = Rig::starting_in(|folder_of_next| {
+            std::fs::create_dir(folder_of_next.join("cues")).unwrap();
+            let cue = std::fs::read_to_string(folder.join("cues/two.csv")).unwrap();
+            let cue = if is_same { cue } else { cue.replace("0.6", "0.55") };
+            std::fs::write(folder_of_next.join("cues/two.csv"), cue).unwrap();
+            before.supervisor.keep_settings();
+            let mut settings = before.supervisor.settings();
+            settings.show.as_mut().unwrap().film_ms = Some(2_345);
+            Carryover::of(Kept { settings: Some(settings), said: Vec::new() }, Some("took over".to_owned()))
+        });
+        rig.settle();
+        let loaded = rig.supervisor.hall.cued.as_ref();
+        assert_eq!(loaded.is_some(), is_same);
+        assert_eq!(loaded.and_then(|cued| cued.left_at), is_same.then(|| ShowTime::from_millis(2_345)));
+        let notes: Vec<_> = rig.supervisor.notes.iter().map(String::as_str).collect();
+        assert_eq!(notes[0], "took over");
+        let says =
+            notes.get(1).is_some_and(|note| note.starts_with("two is not loaded: the file here (SHA-256 "));
+        assert!(
+            says != is_same && (is_same || notes[1].contains("played before, at 00:02.345")),
+            "{notes:?}"
+        );
+        rig.does(vec![Act::Begin(Box::new(act::ShowBegun {
+            who: "anna".to_owned(),
+            surface: Surface::Socket,
+            counted: rig.supervisor.hall.count(),
+            place: None,
+        }))]);
+        let is_told = |rig: &Rig| rig.supervisor.notes.iter().any(|note| note == "took over");
+        assert!(!is_told(&rig), "a show has begun since");
+    }
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! What a person should know, with what to do.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::coded::{RemedyCode, WarningCode};
+use super::notes::NoteBoard;
 use super::readiness::CORRECT;
 use super::standing::standing_words;
 use super::status::StatusParts;
@@ -39,7 +39,7 @@ impl StatusParts<'_> {
     pub(super) fn warnings(
         &self,
         table: &[Row],
-        notes: &VecDeque<String>,
+        notes: &NoteBoard,
         settings_file: Option<String>,
     ) -> Vec<Warning> {
         let Self { hall, features, .. } = *self;

@@ -16,7 +16,7 @@ Examples:
   kinocue fleet drop storm coaster --to 'berlin.*'
   kinocue fleet drop --playlist saturday --to all
 
-Exit codes: 0 all of it is gone, 1 a hall refuses, 66 no such hall, 69 the engine does not answer, 75 a hall has some of it yet")]
+Exit codes: 0 all of it is gone, 1 a hall refuses, 66 no such hall, or no hall had such a file, 69 the engine does not answer, 75 a hall has some of it yet")]
 pub(super) struct Args {
     /// The ids of cues.
     #[arg(value_name = "CUE", required_unless_present = "playlist")]

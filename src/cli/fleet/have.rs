@@ -43,6 +43,9 @@ pub(super) struct HallHas {
     is_foreign: bool,
 }
 
+/// What is said of a file that is not there any more; another thing is said of one that never was.
+const GONE: &str = "gone";
+
 /// What a wish names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FileKind {
@@ -105,9 +108,17 @@ pub(super) fn run(Args { of }: &Args) -> Result<Exit, Failure> {
     } else {
         print::out(&drawn(&halls, &stand))?;
     }
+    Ok(exit_of_halls(&halls, &stand))
+}
+
+/// The same of all that halls have, also of a hall that has all of a wish from before the one that it does not take.
+fn exit_of_halls(halls: &[HallHas], stand: &[FileStands]) -> Exit {
     let lags = halls.iter().any(|hall| hall.is_foreign || hall.is_unheard());
-    let exit = exit_of(&stand);
-    Ok(if lags && exit == Exit::Done { Exit::TryAgain } else { exit })
+    match exit_of(stand) {
+        _ if halls.iter().any(HallHas::refuses) => Exit::CheckFailed,
+        Exit::Done if lags => Exit::TryAgain,
+        exit => exit,
+    }
 }
 
 /// How it ends: what only waits ends well by itself, and what is refused does not.
@@ -147,6 +158,11 @@ impl HallHas {
         })
     }
 
+    /// The rev of the wish that it keeps; 0 if it told nothing.
+    pub(super) fn kept_rev(&self) -> u64 {
+        self.report.as_ref().map_or(0, |report| report.rev)
+    }
+
     /// How it stands to a file that it was wished by that message of the engine.
     pub(super) fn stands(&self, file: &WishedFile, seq: u64) -> FileStands {
         let stands = |state, text: String| {
@@ -168,7 +184,7 @@ impl HallHas {
         let had = had.filter(|had| had.sha256 == file.sha256);
         if let Some(had) = had.filter(|had| had.state == HadState::Ready || report.seen >= seq) {
             let said = match had.state {
-                HadState::Ready if file.is_dropped() => "gone".to_owned(),
+                HadState::Ready if file.is_dropped() => had.why.clone().unwrap_or_else(|| GONE.to_owned()),
                 HadState::Missing if file.is_dropped() => "to go".to_owned(),
                 _ => had.said(),
             };
@@ -219,6 +235,12 @@ impl HallHas {
         self.age_s.is_none_or(|age_s| age_s > UNHEARD.as_secs_f64())
     }
 
+    /// True if it has looked up what the engine has as its wish, and does not take that.
+    fn refuses(&self) -> bool {
+        let (Some(report), Some((seq, _))) = (&self.report, &self.wished) else { return false };
+        report.refused.is_some() && report.seen >= *seq
+    }
+
     fn row(&self) -> HallRow<'_> {
         let wished_rev = self.wished.as_ref().map(|(_, wish)| wish.rev);
         HallRow {
@@ -252,6 +274,11 @@ impl FileStands {
     /// True if nothing more comes of it by itself, but what comes at its time.
     pub(super) fn is_settled(&self) -> bool {
         matches!(self.state, HadState::Ready | HadState::Refused | HadState::Due)
+    }
+
+    /// True of a file that went because it was to go.
+    pub(super) fn is_gone(&self) -> bool {
+        self.state == HadState::Ready && self.file.is_dropped() && self.text.starts_with(GONE)
     }
 
     /// True if it is there.
@@ -289,6 +316,10 @@ fn drawn(halls: &[HallHas], stand: &[FileStands]) -> String {
     for one in stand.iter().filter(|one| !one.is_ready()) {
         text.push_str(&one.whole());
     }
+    for hall in halls.iter().filter(|hall| hall.refuses()) {
+        let why = hall.report.as_ref().and_then(|report| report.refused.as_deref()).unwrap_or_default();
+        text.push_str(&(said(&format!("{}: its wish: refused: {why}", hall.name)) + "\n"));
+    }
     text
 }
 
@@ -311,4 +342,44 @@ fn line(hall: &HallHas, stand: &[FileStands]) -> [String; 6] {
     let told = hall.age_s.map_or_else(|| "-".to_owned(), |age_s| age(age_s) + " ago");
     let has = format!("{ready} of {}", own().count());
     [&hall.name, &has, version, config, &told, know].map(said)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fleet::WishHad;
+
+    fn hall(refused: Option<&str>, seen: u64) -> HallHas {
+        let mut wish = Wish::default();
+        wish.drop_cue("strom");
+        let had = WishHad { state: HadState::Ready, ..WishHad::default() };
+        let report = HaveReport {
+            seen,
+            refused: refused.map(str::to_owned),
+            dropped_cues: [("strom".to_owned(), had)].into(),
+            ..HaveReport::default()
+        };
+        HallHas {
+            name: "berlin.h1".to_owned(),
+            age_s: Some(1.0),
+            report: Some(report),
+            wished: Some((7, wish)),
+            is_foreign: false,
+        }
+    }
+
+    #[test]
+    fn a_hall_that_has_all_of_it_and_does_not_take_its_wish_is_not_well() {
+        for (hall, exit) in [
+            (hall(None, 7), Exit::Done),
+            (hall(Some("allow of [fleet] does not name cues"), 7), Exit::CheckFailed),
+            (hall(Some("of the one before"), 6), Exit::Done),
+        ] {
+            let stand = hall.all();
+            assert_eq!(exit_of_halls(std::slice::from_ref(&hall), &stand), exit, "{hall:?}");
+            let says =
+                drawn(std::slice::from_ref(&hall), &stand).contains("its wish: refused: allow of [fleet]");
+            assert_eq!(says, exit == Exit::CheckFailed);
+        }
+    }
 }

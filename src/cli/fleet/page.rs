@@ -125,7 +125,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 fn routes(desk: Arc<Desk>) -> Router {
     Router::new()
         .route("/api/v1/fleet/halls", get(halls))
-        .route("/api/v1/fleet/stop", post(stop))
+        .route(api::FLEET_STOP, post(stop))
         .route("/metrics", get(figures))
         .fallback(get(page))
         .layer(DefaultBodyLimit::max(LONGEST))

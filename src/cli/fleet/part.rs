@@ -12,6 +12,7 @@ use rustix::fs::OFlags;
 
 use crate::fleet::{CHUNK, WishedCue};
 use crate::library::Hashed;
+use crate::sys::folder::Folder;
 
 /// What the name of one ends with, behind the digest of the whole.
 const ENDING: &str = ".part";
@@ -72,6 +73,17 @@ impl CuePart {
     pub(super) fn is_right(&mut self) -> io::Result<bool> {
         self.file.seek(SeekFrom::Start(0))?;
         Ok(Hashed::new(&self.file).finish()? == self.cue.sha256)
+    }
+
+    /// Has it on the disk under a name of its folder; false where that is taken, unless it may be replaced. Then it is not here any more.
+    pub(super) fn put(&self, name: &str, replaces: bool) -> io::Result<bool> {
+        self.file.sync_all()?;
+        let own = self.path.file_name().and_then(|own| own.to_str()).ok_or(io::ErrorKind::InvalidInput)?;
+        let folder = Folder::open(self.path.parent().unwrap_or(Path::new(".")))?;
+        let is_put =
+            if replaces { folder.rename(own, name).map(|()| true)? } else { folder.rename_new(own, name)? };
+        folder.sync()?;
+        Ok(is_put)
     }
 
     /// Removes it.
@@ -138,6 +150,24 @@ mod tests {
         fs::write(dir.path().join(format!("{}.part", cue.sha256)), vec![7; 300_000]).unwrap();
         let part = CuePart::open(dir.path(), &cue).unwrap();
         assert_eq!(part.next(8), 1..2, "its last message is fetched again");
+    }
+
+    #[test]
+    fn a_part_takes_a_name_that_is_free_or_may_be_replaced_and_no_other() {
+        let dir = tempfile::tempdir().unwrap();
+        let part = |bytes: &[u8]| {
+            let mut part = CuePart::open(dir.path(), &cue(bytes)).unwrap();
+            // What could not be put is here still.
+            if !part.next(1).is_empty() {
+                part.add(&[Bytes::copy_from_slice(bytes)]).unwrap();
+            }
+            part
+        };
+        assert!(part(b"one").put("storm.csv", false).unwrap());
+        assert!(!part(b"two").put("storm.csv", false).unwrap(), "somebody put it there meanwhile");
+        assert_eq!(fs::read(dir.path().join("storm.csv")).unwrap(), b"one");
+        assert!(part(b"two").put("storm.csv", true).unwrap());
+        assert_eq!(fs::read(dir.path().join("storm.csv")).unwrap(), b"two");
     }
 
     #[test]

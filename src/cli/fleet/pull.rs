@@ -1,6 +1,5 @@
 //! `kinocue fleet pull`: the file of a cue out of a hall's library to the desk, piece by piece, by signed orders as any other.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -162,8 +161,14 @@ impl Way<'_> {
             let _ = part.remove(); // nobody takes it for the file
             return Err(self.refused("what it sent is not the file that it names".to_owned()));
         }
-        exit::refuse_to_replace(out, force)?;
-        fs::rename(part.path(), out).with_context(unwritten).or_exit(Exit::Io)
+        let name = out.file_name().and_then(|name| name.to_str());
+        let name =
+            name.with_context(|| format!("{} is no name of a file", out.display())).or_exit(Exit::Usage)?;
+        if part.put(name, force).with_context(unwritten).or_exit(Exit::Io)? {
+            return Ok(());
+        }
+        let _ = part.remove();
+        exit::refuse_to_replace(out, force) // somebody put it there meanwhile
     }
 
     /// What this desk knows of that file.

@@ -43,7 +43,7 @@ Examples:
 The halls of a group are in [groups] of desk.toml:  trio = [\"berlin.h1\", \"berlin.h2\", \"berlin.h3\"]
 
 Exit codes: 0 all have started, or as many as --quorum asks for, 1 none has: one refused, 64 usage, 66 no such group, 69 the engine does
-not answer, 75 a hall did not answer, or only some have started")]
+not answer, 75 a hall did not answer, only some have started, or no seat took part in one")]
 pub(super) struct Args {
     #[command(flatten)]
     desk: DeskArgs,
@@ -255,11 +255,11 @@ impl Start<'_> {
     }
 
     fn exit(&self) -> Exit {
-        let started = self.halls.iter().filter(|member| member.has_started()).count();
-        if started >= self.needed {
+        let moving = self.halls.iter().filter(|member| member.moves()).count();
+        if moving >= self.needed {
             return Exit::Done;
         }
-        if started > 0 {
+        if self.halls.iter().any(Member::has_started) {
             return Exit::TryAgain;
         }
         act::exit(self.halls.iter().filter_map(|member| member.out.as_ref()))
@@ -283,6 +283,11 @@ impl Member {
         matches!(self.out, Some(Answer::Done(_)))
     }
 
+    /// True if seats follow what has started.
+    fn moves(&self) -> bool {
+        self.has_started() && self.status.seats.taking_part > 0
+    }
+
     /// How far its clock may have been off when it took over the instant, ms.
     fn bound_ms(&self) -> Option<f64> {
         Some(self.status.fleet.as_ref()?.start.as_ref()?.bound_us? / 1e3)
@@ -292,7 +297,13 @@ impl Member {
         let Some(out) = &self.out else { return "it does not say what came of it".to_owned() };
         let (Answer::Done(_), Some(bound_ms)) = (out, self.bound_ms()) else { return out.line() };
         let (cue, server) = likeness(&self.status);
-        format!("started {cue}, its clock within {bound_ms:.2} ms of {server}")
+        let seats = &self.status.seats;
+        let moved = match seats.taking_part {
+            0 => ", but no seat takes part".to_owned(),
+            some if some < seats.total => format!(" with {some} of {} seats", seats.total),
+            _ => String::new(),
+        };
+        format!("started {cue}{moved}, its clock within {bound_ms:.2} ms of {server}")
     }
 
     fn json(&self) -> serde_json::Value {
@@ -322,6 +333,9 @@ fn not_ready(status: &BriefStatus, group: &str) -> Option<String> {
         }
         Some(_) => {}
     }
+    if status.seats.taking_part == 0 {
+        return Some("no seat takes part there; enable seats, or see at each why it is out".to_owned());
+    }
     let Some(clock) = &fleet.clock else {
         return Some(
             "nobody has measured its clock lately; set time_server in its fleet.toml, and see that it runs"
@@ -342,6 +356,7 @@ fn not_ready(status: &BriefStatus, group: &str) -> Option<String> {
 mod tests {
     use super::*;
     use crate::control::{ArmedForStatus, ClockStatus, FleetStatus, StartStatus};
+    use crate::fleet::SeatCounts;
 
     fn status(group: Option<&str>, bound_us: Option<f64>) -> BriefStatus {
         let armed_for = group.map(|group| ArmedForStatus { group: group.to_owned(), ..Default::default() });
@@ -351,7 +366,12 @@ mod tests {
             start_bound_us: 2_000.0,
             ..ClockStatus::default()
         });
-        BriefStatus { fleet: Some(FleetStatus { clock, armed_for, start: None }), ..BriefStatus::default() }
+        let seats = SeatCounts { total: 4, taking_part: 4, lost: 0 };
+        BriefStatus {
+            fleet: Some(FleetStatus { clock, armed_for, start: None }),
+            seats,
+            ..BriefStatus::default()
+        }
     }
 
     #[test]
@@ -366,7 +386,10 @@ mod tests {
     #[test]
     fn a_hall_that_cannot_take_part_says_why_and_what_to_do() {
         assert_eq!(not_ready(&status(Some("trio"), Some(140.0)), "trio"), None);
+        let mut empty = status(Some("trio"), Some(140.0));
+        empty.seats.taking_part = 0;
         for (status, says) in [
+            (empty, "no seat takes part there"),
             (
                 BriefStatus::default(),
                 "nobody there has armed it for trio; ask somebody there: kinocue arm --fleet trio",
@@ -402,6 +425,12 @@ mod tests {
         member.hear(with("mine", StartPhase::Started, ""), "mine");
         assert!(member.has_started());
         assert_eq!(member.line(), "started no cue, its clock within 0.14 ms of ntp");
+        assert!(member.moves());
+        member.status.seats.taking_part = 3;
+        assert_eq!(member.line(), "started no cue with 3 of 4 seats, its clock within 0.14 ms of ntp");
+        member.status.seats.taking_part = 0;
+        assert_eq!(member.line(), "started no cue, but no seat takes part, its clock within 0.14 ms of ntp");
+        assert!(member.has_started() && !member.moves());
         member.hear(with("mine", StartPhase::CalledOff, "desk not heard"), "mine");
         assert_eq!(member.line(), "called off: desk not heard");
     }

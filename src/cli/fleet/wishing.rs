@@ -1,6 +1,6 @@
 //! A desk's wishes for halls: signed, beside what this desk wished before, and followed until the halls have what is wished.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{IsTerminal as _, stderr};
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use super::have::{FileStands, HallHas, WishedFile, exit_of};
 use super::settings::DeskSettings;
 use super::{DeskArgs, engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print};
-use crate::fleet::{self, LONGEST_WISH, Letter, Wish};
+use crate::fleet::{self, AHEAD, LONGEST_WISH, Letter, Wish};
 use crate::sys::clock::wall_now_ns;
 
 /// How often it is looked what halls have.
@@ -88,7 +88,9 @@ async fn wish(
         }
         before => before.unwrap_or_default(),
     };
-    let rev = before.as_ref().map_or(0, |wish| wish.rev).saturating_add(1).max(wall_now_ns() / 1_000_000);
+    // What a hall told of itself is looked up as well: it may keep a later one than the engine has.
+    let kept_there = HallHas::look_up(kept, hall).await.or_exit(Exit::Unavailable)?.kept_rev();
+    let rev = next_rev(before.as_ref().map_or(0, |wish| wish.rev), kept_there, wall_now_ns() / 1_000_000);
     let mut wish = before.filter(|_| !only).unwrap_or_default();
     (wish.to, wish.rev) = (hall.to_owned(), rev);
     change(&mut wish);
@@ -105,6 +107,14 @@ async fn wish(
     Ok(sent.await.with_context(told).or_exit(Exit::Unavailable)?.sequence)
 }
 
+/// The rev of the next wish, above that of the wish before and of the one that the hall keeps. One that is of more than a day from now
+/// no hall takes: where a clock was wrong, the next one is not so as well.
+fn next_rev(before: u64, kept: u64, now_ms: u64) -> u64 {
+    let most = now_ms.saturating_add(u64::try_from(AHEAD.as_millis()).unwrap_or(u64::MAX));
+    let known = [before, kept].into_iter().filter(|rev| *rev < most).max();
+    known.map_or(now_ms, |rev| (rev + 1).max(now_ms))
+}
+
 /// What this very desk wished before for that hall; why it is none of its wishes. Of others nothing is taken over: it would be signed
 /// anew here.
 pub(super) fn own_wish(payload: &[u8], settings: &DeskSettings, hall: &str) -> Result<Wish, &'static str> {
@@ -117,6 +127,8 @@ pub(super) fn own_wish(payload: &[u8], settings: &DeskSettings, hall: &str) -> R
 }
 
 fn signed(settings: &DeskSettings, wish: &Wish) -> Result<String, Failure> {
+    let too_many = |why: String| anyhow!("{}: {why}; wish for less with --only", wish.to);
+    wish.check_count().map_err(too_many).or_exit(Exit::Usage)?;
     let body = serde_json::to_string(wish).expect("text and numbers are written");
     let letter = Letter::sign(&settings.access.pair, body);
     let letter = letter.context("the key of this desk cannot sign").or_exit(Exit::Config)?;
@@ -169,6 +181,11 @@ async fn follow(
 
 fn conclude(all: &[FileStands]) -> Result<Exit, Failure> {
     let ready = all.iter().filter(|one| one.is_ready()).count();
+    let never = never_there(all);
+    if !never.is_empty() {
+        print::out(&format!("no hall had it: {}\n", never.join(", ")))?;
+        return Ok(Exit::NoInput);
+    }
     let mut text = if ready == all.len() && all.iter().all(|one| one.file.is_dropped()) {
         "all halls are without it\n".to_owned()
     } else if ready == all.len() {
@@ -181,4 +198,28 @@ fn conclude(all: &[FileStands]) -> Result<Exit, Failure> {
     }
     print::out(&text)?;
     Ok(exit_of(all))
+}
+
+/// What was to go, and was in none of the halls: the name may be a slip.
+fn never_there(all: &[FileStands]) -> Vec<String> {
+    let was_never = |one: &FileStands| one.file.is_dropped() && one.is_ready() && !one.is_gone();
+    let is_nowhere = |name: &String| all.iter().all(|one| one.file.name() != *name || was_never(one));
+    let names: BTreeSet<_> = all.iter().map(|one| one.file.name()).collect();
+    names.into_iter().filter(is_nowhere).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wish_is_later_than_all_that_a_hall_may_keep_and_a_wrong_clock_is_not_kept_for_ever() {
+        let (now, day) = (1_795_306_800_123, 86_400_000);
+        assert_eq!(next_rev(0, 0, now), now);
+        assert_eq!(next_rev(now + 5, 0, now), now + 6);
+        assert_eq!(next_rev(5, now + 7_000, now), now + 7_001, "the hall keeps a later one");
+        assert_eq!(next_rev(now + 2 * day, now + day, now), now, "no hall has taken these");
+        assert_eq!(next_rev(u64::MAX, u64::MAX, now), now);
+        assert_eq!(next_rev(now + day - 1, 0, now), now + day);
+    }
 }

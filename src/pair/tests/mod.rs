@@ -92,7 +92,7 @@ fn of_two_that_start_the_first_leads_and_one_that_is_alone_does_not_without_a_ke
 }
 
 fn beat(from: u64, to: u64, number: u64, leads: bool, word: u64) -> Beat {
-    Beat { from, to, number, leads, wants: false, word }
+    Beat { from, to, number, leads, wants: false, word, print: 0 }
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn a_word_is_given_once_for_each_beat_that_asks_and_by_no_machine_that_leads_or_
     claim.hear(&beat(9, 7, 6, false, 0), ms(140));
     assert_eq!(claim.beat(ms(150)).word, 0, "nobody asked");
     // It sees a key that nobody renews, and asks for it once its own word is over.
-    let holder = Holder { session: 9, count: 3 };
+    let holder = Holder { session: 9, count: 3, print: 0 };
     let (mut now, mut wanted) = (150, Want::Read);
     while wanted == Want::Read {
         now += 100;
@@ -165,7 +165,7 @@ fn claim_ticket(want: &Want) -> u64 {
 
 #[test]
 fn a_key_is_not_taken_by_an_old_look_nor_one_that_was_written_just_now() {
-    let holder = Holder { session: 9, count: 3 };
+    let holder = Holder { session: 9, count: 3, print: 0 };
     let look = |revision: u64, last: u64| {
         let mut claim = Claim::new(7, false, ms(0));
         for at in [100, last] {
@@ -179,4 +179,50 @@ fn a_key_is_not_taken_by_an_old_look_nor_one_that_was_written_just_now() {
     assert!(!takes(look(15, 1_250), 1_299), "seen for less than 1.2 s");
     assert!(!takes(look(14, 1_250), 1_350), "written too few times");
     assert!(!takes(look(15, 1_250), 1_551), "looked at too long ago");
+}
+
+/// A machine of that configuration that sees a key of another day, which nobody renews.
+fn alone_with(print: u64, key: u64) -> Claim {
+    let mut claim = Claim::new(7, true, ms(0));
+    claim.set_print(print);
+    for at in [100, 1_250] {
+        let ask = claim.ask(ms(at));
+        let holder = Holder { session: 9, count: 3, print: key };
+        claim.answer(ask.ticket, Answer::Key { holder, revision: 40 }, ms(at));
+    }
+    claim
+}
+
+#[test]
+fn a_machine_that_was_started_again_with_another_configuration_than_led_last_does_not_lead_unless_a_person_says_so()
+ {
+    for (key, is_fit) in [(5, true), (0, true), (6, false)] {
+        let mut claim = alone_with(5, key);
+        assert_eq!(claim.misfit(ms(1_300)), (!is_fit).then_some(PairMisfit::Leader));
+        let ask = claim.ask(ms(1_350));
+        assert_eq!(matches!(ask.want, Want::Swap { .. }), is_fit, "{ask:?}");
+        if let Want::Swap { holder, .. } = ask.want {
+            assert_eq!(holder.print, 5, "the next one is told which configuration leads now");
+        }
+    }
+    let mut claim = alone_with(5, 6);
+    claim.is_alone(ms(1_300));
+    assert!(matches!(claim.ask(ms(1_350)).want, Want::Swap { revision: 40, .. }));
+}
+
+#[test]
+fn of_two_with_different_configurations_neither_begins_to_lead_until_they_are_the_same() {
+    let other = |print| Beat { print, ..beat(9, 7, 1, false, 0) };
+    let mut claim = Claim::new(7, true, ms(0));
+    claim.set_print(5);
+    claim.hear(&other(6), ms(1_290));
+    assert_eq!((claim.beat(ms(1_310)).wants, claim.misfit(ms(1_310))), (false, Some(PairMisfit::Other)));
+    let mut by_word = claim.clone();
+    let number = by_word.beat(ms(1_320)).number;
+    by_word.hear(&Beat { print: 6, number: 2, ..beat(9, 7, 2, false, number) }, ms(1_330));
+    assert_eq!(by_word.role(ms(1_330)), Role::Follows);
+    // The one that is heard counts, whoever led on another day.
+    let mut claim = alone_with(5, 6);
+    claim.hear(&other(5), ms(1_290));
+    assert_eq!((claim.beat(ms(1_310)).wants, claim.misfit(ms(1_310))), (true, None));
 }

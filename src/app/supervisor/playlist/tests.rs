@@ -285,7 +285,7 @@ fn the_time_of_an_entry_starts_it_in_an_armed_hall_and_is_noted_in_any_other() {
     };
     for state in [State::Parked, State::Recovering, State::Stopped, State::Playing(PlayMode::Following)] {
         let acts = at_its_time(state);
-        let [Act::Note(note)] = &acts[..] else { panic!("{acts:?}") };
+        let [Act::Passing(note)] = &acts[..] else { panic!("{acts:?}") };
         assert!(note.contains("nobody had armed the hall"), "{note}");
     }
 }

@@ -76,7 +76,7 @@ fn given_in(acts: &[Act]) -> Option<MonoTime> {
 }
 
 fn notes(acts: &[Act]) -> Vec<&str> {
-    acts.iter().filter_map(|act| if let Act::Note(note) = act { Some(&**note) } else { None }).collect()
+    acts.iter().filter_map(|act| if let Act::Passing(note) = act { Some(&**note) } else { None }).collect()
 }
 
 fn called_off(starts: &FleetStarts, hall: &HallContext) -> String {
@@ -499,7 +499,7 @@ fn ten_thousand(case: Case, keys: &[KeyPair; 2], of_fleet: &Fleet) -> (usize, us
         for act in &acts {
             match act {
                 Act::Tick(TickCommand::StartAt(_)) => given += 1,
-                Act::Tick(TickCommand::CallOff) | Act::Note(_) | Act::RewindStart | Act::Name(_) => {}
+                Act::Tick(TickCommand::CallOff) | Act::Passing(_) | Act::RewindStart | Act::Name(_) => {}
                 Act::Stage(ShowChange::Start(_)) | Act::Otherwise(_) => {}
                 other => panic!("{case:?}: {other:?}"),
             }
