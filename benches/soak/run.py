@@ -89,7 +89,7 @@ class Soak(Hall):
         own, helpers = self.memory_kib()
         process = pathlib.Path(f"/proc/{self.server.pid}")
         status = self.status()
-        files = [path for path in self.folder.rglob("*") if path.is_file()]
+        files = self.folder.rglob("*")
         sums = {key: sum(one.get(key, 0) for one in status["controllers"]) for key in SUMS}
         return {
             "at": time.monotonic(),
@@ -99,11 +99,18 @@ class Soak(Hall):
             "fds": len(list((process / "fd").iterdir())),
             "threads": len(list((process / "task").iterdir())),
             "lines": self.lines(),
-            "files_mib": sum(path.stat().st_size for path in files) / 2**20,
+            "files_mib": sum(map(size, files)) / 2**20,
             "missed": status["missed_ticks"],
             "histogram": status["lateness"]["histogram"],
             **sums,
         }
+
+
+def size(path):
+    """Of a file, in octets; 0 of what is none, or has just been renamed."""
+    with contextlib.suppress(FileNotFoundError):
+        return path.stat().st_size if path.is_file() else 0
+    return 0
 
 
 def told(minutes, since, until, samples):
