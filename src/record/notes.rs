@@ -77,13 +77,13 @@ pub(crate) struct LogNote {
 /// A line as viewers want it: its time stands in it once more.
 #[derive(Serialize)]
 struct TimedLine<'a> {
-    timestamp: Timestamp,
+    timestamp: LineTime,
     #[serde(flatten)]
     line: &'a LogNote,
 }
 
 #[derive(Serialize)]
-struct Timestamp {
+struct LineTime {
     sec: u64,
     nsec: u64,
 }
@@ -139,7 +139,7 @@ impl Note {
             Self::Action(note) => serde_json::to_vec(note),
             Self::Mark(note) => serde_json::to_vec(note),
             Self::Log(line) => {
-                let timestamp = Timestamp { sec: wall / 1_000_000_000, nsec: wall % 1_000_000_000 };
+                let timestamp = LineTime { sec: wall / 1_000_000_000, nsec: wall % 1_000_000_000 };
                 serde_json::to_vec(&TimedLine { timestamp, line })
             }
             Self::Timecode(note) => serde_json::to_vec(note),
