@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::chunk::{Chunk, Handed};
-use super::seat::{Motion, ReadFrame};
+use super::seat::{FrameMotion, ReadFrame};
 use super::{RecordedSeat, TickHead};
 use crate::motion::{MeasurePlaces, MeasureTimes, Reading, Spacing};
 use crate::plain::escaped;
@@ -157,7 +157,7 @@ impl Margins {
         let is_next =
             |last: MonoTime| head.deadline > last && head.deadline.since(last).as_nanos() < APART_NS.into();
         let goes_on = lane.last.replace(head.deadline).is_some_and(is_next);
-        let Some(Motion { places, timing, time_ms, .. }) = &read.motion else { return };
+        let Some(FrameMotion { places, timing, time_ms, .. }) = &read.motion else { return };
         let before = std::mem::replace(&mut lane.time_ms, *time_ms);
         let lasts = if *timing == Timing::Relative { *time_ms } else { time_ms.saturating_sub(before) };
         lane.reached += Duration::from_millis(u64::from(lasts.max(1)));

@@ -63,7 +63,7 @@ pub(crate) struct ReadFrame<'a> {
     /// Where its axes were asked to be, millimetres or degrees; none where no tick asked.
     pub(super) asked: PerAxis<f64>,
     /// What its octets say; none where that is no frame of its kind.
-    pub(super) motion: Option<Motion>,
+    pub(super) motion: Option<FrameMotion>,
 }
 
 impl ReadFrame<'_> {
@@ -75,7 +75,7 @@ impl ReadFrame<'_> {
 
 /// What the octets of a frame say.
 #[derive(Debug)]
-pub(super) struct Motion {
+pub(super) struct FrameMotion {
     /// Where its axes are sent, millimetres or degrees.
     pub(super) places: PerAxis<f64>,
     /// What its Time counts from, and that Time in ms.
@@ -229,13 +229,13 @@ impl RecordedSeat {
         ReadFrame { asked: self.asked(&frame.asked), motion: self.motion(&frame), frame }
     }
 
-    fn motion(&self, frame: &SentFrame<'_>) -> Option<Motion> {
+    fn motion(&self, frame: &SentFrame<'_>) -> Option<FrameMotion> {
         match self.frames {
             FrameKind::Datagram(port) => {
                 let request = MotionRequest::parse_as(port, frame.datagram).ok()?;
                 let places = self.measured(&request.positions);
                 let MotionRequest { timing, time_ms, .. } = request;
-                Some(Motion { places, timing, time_ms, request: Some(request) })
+                Some(FrameMotion { places, timing, time_ms, request: Some(request) })
             }
             FrameKind::Pose => {
                 let pose = LinkPose::parse(frame.datagram.try_into().ok()?);
@@ -244,7 +244,7 @@ impl RecordedSeat {
                     low + pose.axes[slot] * stroke
                 };
                 let places = PerAxis::from_fn(self.axes.len(), place);
-                Some(Motion { places, timing: Timing::Relative, time_ms: pose.lasts_ms, request: None })
+                Some(FrameMotion { places, timing: Timing::Relative, time_ms: pose.lasts_ms, request: None })
             }
         }
     }
