@@ -95,7 +95,7 @@ fn a_plug_pulled_in_mid_show_is_named_the_others_play_on_and_put_back_it_joins_a
     assert!(lost["state"] == "playing" && plays_on(&lost, 0), "{lost}");
     let told = warning(&lost, "A2").expect("it is told");
     assert!(told["text"].as_str().unwrap().contains("missing for over 50 ms"), "{told}");
-    assert!(told["remedy"].as_str().unwrap().contains("power and network"), "{told}");
+    assert!(told["remedy"].as_str().unwrap().contains("power and its cable"), "{told}");
     hall.serving().heard(|line| (line.contains("controller-lost") && line.contains("A2")).then_some(()));
     let acked = |status: &Value| status["controllers"][0]["acked"].as_u64();
     let later = hall.lives_on(100);

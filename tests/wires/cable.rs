@@ -9,7 +9,7 @@ use crate::hall::{Hall, MISSED, all, count, health, plays_on, warning};
 fn is_missed(status: &Value, seat: usize) -> bool {
     status["state"] == "playing"
         && warning(status, "controller-lost", Some(seat)).is_some_and(|(text, remedy)| {
-            text == MISSED && remedy.contains("power and network") && remedy.contains("rejoins by itself")
+            text == MISSED && remedy.contains("power and its cable") && remedy.contains("rejoins by itself")
         })
 }
 
