@@ -18,7 +18,7 @@ use kinocue::harness::rt::{
     Alarm, Command, Conductor, Desk, FrameSink, Live, Loaded, MailEnds, News, NewsIn, Places, PlanLoop,
     Planning, TickLoop, mailboxes,
 };
-use kinocue::harness::state::{Event, Finding, PlayMode, Readiness, State, Transition};
+use kinocue::harness::state::{Event, Finding, LedBefore, PlayMode, Readiness, State, Transition};
 use kinocue::harness::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::harness::timeline::Timeline;
 use kinocue::harness::{ORIGIN, swell};
@@ -50,7 +50,7 @@ const PARKED: Pose = [0.0; MAX_AXES];
 const READY: Deed = Tell(Event::Readiness(Readiness::Ready));
 
 const fn found(homed: bool, at_park: bool) -> Deed {
-    Tell(Event::Identified(Finding { homed, at_park, crashed: false }))
+    Tell(Event::Identified(Finding { homed, at_park, before: LedBefore::Ended }))
 }
 
 /// Four seconds for one seat of one axis.

@@ -21,7 +21,7 @@ use crate::health::Why;
 use crate::motion::Slot;
 use crate::plan::slow_park_time;
 use crate::rt::{Command, Live, News, NewsIn, Row};
-use crate::state::{Event, Finding, Readiness, State, Transition};
+use crate::state::{Event, Finding, LedBefore, Readiness, State, Transition};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock as _, MonoTime};
@@ -131,7 +131,7 @@ impl PlayScript {
             self.leave_out_silent(reads)?;
         }
         if !self.is_called_off() {
-            let found = Finding { homed: true, at_park: true, crashed: false };
+            let found = Finding { homed: true, at_park: true, before: LedBefore::Ended };
             self.ask(vec![Command::Event(Event::Identified(found))]);
             if !holds {
                 self.park();

@@ -18,7 +18,7 @@ use signal_hook::flag;
 
 use super::film::HallFilm;
 use super::notify::AlarmTeller;
-use super::pair::Pair;
+use super::pair::{Pair, TookOver};
 use super::recorder::{HallRecorder, RecordLink, RecordPlaces};
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
@@ -35,6 +35,7 @@ use crate::library::{self, Library, LibraryError};
 use crate::log::{Line, Log, Priority};
 use crate::sd::{self, WatchdogThread};
 use crate::settings::SettingsFile;
+use crate::state::LedBefore;
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
@@ -211,7 +212,13 @@ fn serve_halls(
     let (mut numbers, took_over) = before(pair.as_ref(), &config);
     let mut film = HallFilm::default();
     let opening = Opening { config: &places.config, leave: &signals.leave, pair: pair.as_ref() };
-    let mut runtime = opening.first(&config, crashed || took_over.is_some(), &numbers, &mut film)?;
+    let ended = match &took_over {
+        Some(TookOver { ride: Some(_), .. }) => LedBefore::OnCue,
+        Some(_) => LedBefore::Crashed,
+        None if crashed => LedBefore::Crashed,
+        None => LedBefore::Ended,
+    };
+    let mut runtime = opening.first(&config, ended, &numbers, &mut film)?;
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let record_places = places.of_recordings(&config);
@@ -280,7 +287,7 @@ fn end_recording(recorder: HallRecorder, log: &Log) {
 }
 
 /// From where frame numbers go on, and what to tell of whoever led before.
-fn before(pair: Option<&Pair>, config: &Config) -> (Numbers, Option<String>) {
+fn before(pair: Option<&Pair>, config: &Config) -> (Numbers, Option<TookOver>) {
     pair.map_or_else(Default::default, |pair| (pair.numbers(config), pair.took_over()))
 }
 
@@ -297,11 +304,11 @@ impl Opening<'_> {
     fn first(
         &self,
         config: &Arc<Config>,
-        crashed: bool,
+        ended: LedBefore,
         numbers: &Numbers,
         film: &mut HallFilm,
     ) -> Result<Runtime, ServeError> {
-        let mut runtime = self.open(config, crashed, numbers, film)?;
+        let mut runtime = self.open(config, ended, numbers, film)?;
         let others = if self.pair.is_some() { runtime.find_other_masters() } else { Vec::new() };
         let names: Vec<_> = others.iter().map(|(lane, _)| config.controllers[*lane].name.as_str()).collect();
         if names.is_empty() { Ok(runtime) } else { Err(ServeError::OtherMaster(names.join(", "))) }
@@ -311,11 +318,11 @@ impl Opening<'_> {
     fn open(
         &self,
         config: &Arc<Config>,
-        crashed: bool,
+        ended: LedBefore,
         numbers: &Numbers,
         film: &mut HallFilm,
     ) -> Result<Runtime, RuntimeError> {
-        let purpose = Purpose::Hall { crashed };
+        let purpose = Purpose::Hall { before: ended };
         let lead = self.pair.map(Pair::lead);
         let runtime = Runtime::open(Arc::clone(config), purpose, numbers, self.leave, lead)?;
         if let Some(pair) = self.pair {
@@ -335,7 +342,7 @@ impl Opening<'_> {
         film: &mut HallFilm,
     ) -> Result<(Runtime, Arc<Config>), RuntimeError> {
         // The seats are parked or at rest, so nothing tells of a crash.
-        match self.open(&next, false, numbers, film) {
+        match self.open(&next, LedBefore::Ended, numbers, film) {
             Ok(runtime) => {
                 carryover.forget_refusals();
                 if let Some(Err(error)) = self.pair.map(|pair| pair.set_config(self.config)) {
@@ -346,7 +353,7 @@ impl Opening<'_> {
             }
             Err(error) => {
                 carryover.refuse(&error.to_string());
-                Ok((self.open(&before, false, numbers, film)?, before))
+                Ok((self.open(&before, LedBefore::Ended, numbers, film)?, before))
             }
         }
     }

@@ -107,7 +107,8 @@ pub mod sim {
 }
 pub mod state {
     pub use crate::state::{
-        Cause, Event, Finding, Latch, Machine, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
+        Cause, Event, Finding, Latch, LedBefore, Machine, PlayMode, Readiness, Refusal, State, Transition,
+        Trouble, Why,
     };
 }
 pub mod sys {

@@ -11,7 +11,8 @@ use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, PlayProgr
 use crate::film::chase::{FilmLeave, ParkCause};
 use crate::net::Lead;
 use crate::state::{
-    Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
+    Cause, Event, Finding, LedBefore, Machine, Next, PlayMode, Readiness, Refusal, State, Transition,
+    Trouble, Why,
 };
 use crate::time::{MonoTime, ShowTime, Tick};
 
@@ -416,7 +417,7 @@ impl Conductor {
 /// A hall that is parked, ready and armed.
 fn armed(now: MonoTime) -> Machine {
     let mut machine = Machine::new(now);
-    machine.event(Event::Identified(Finding { homed: true, at_park: true, crashed: false }), now);
+    machine.event(Event::Identified(Finding { homed: true, at_park: true, before: LedBefore::Ended }), now);
     machine.event(Event::Readiness(Readiness::Ready), now);
     // It is not refused to a parked hall that is ready.
     let _ = machine.request(Transition::Arm, now);

@@ -10,7 +10,7 @@ use super::line::LineEnd;
 use crate::config::Controller;
 use crate::drive::Seen;
 use crate::health::{HealthState, HealthTable};
-use crate::state::Finding;
+use crate::state::{Finding, LedBefore};
 use crate::time::MonoTime;
 
 /// What the control plane tells the ack thread.
@@ -26,23 +26,23 @@ pub(crate) struct Standby {
     line: LineEnd,
     desk: Arc<Desk>,
     orders: Consumer<Order>,
-    /// Whether the program is still to find out where the seats stand, and whether it crashed the last time.
-    boot: Option<bool>,
+    /// How it ended before, while the program is still to find out where the seats stand.
+    boot: Option<LedBefore>,
     /// What each controller said of its zero, and whether its seat stands at park.
     seen: Vec<Option<Seen>>,
 }
 
 impl Standby {
-    /// For a hall that has just started; `crashed` says whether the mark of a crash was there.
+    /// For a hall that has just started.
     #[must_use]
     pub(crate) fn new(
         controllers: &[Controller],
         line: LineEnd,
         desk: Arc<Desk>,
         orders: Consumer<Order>,
-        crashed: bool,
+        before: LedBefore,
     ) -> Self {
-        Self { line, desk, orders, boot: Some(crashed), seen: vec![None; controllers.len()] }
+        Self { line, desk, orders, boot: Some(before), seen: vec![None; controllers.len()] }
     }
 
     /// Hands a datagram to the line; says whether somebody waits for one.
@@ -99,14 +99,14 @@ impl Standby {
 
     /// What the start has found, once every controller that is to take part has told; said once.
     pub(super) fn take_finding(&mut self, health: &HealthTable) -> Option<Finding> {
-        let crashed = self.boot?;
+        let before = self.boot?;
         let groups = health.groups();
         // What is latched was seen as well; it waits for a person, who may clear it only once all have told.
         let known = |controller: usize| {
             let standing = health.standing(groups.group_of(controller));
             self.seen[controller].filter(|_| standing != HealthState::Lost)
         };
-        let mut finding = Finding { homed: true, at_park: true, crashed };
+        let mut finding = Finding { homed: true, at_park: true, before };
         for controller in (0..self.seen.len()).filter(|controller| self.takes_part(*controller)) {
             let seen = known(controller)?;
             finding.homed &= seen.sighting.homed;

@@ -104,8 +104,22 @@ impl Machine {
                 self.enter(State::Playing(PlayMode::Joining), Cause::Asked(Transition::Resume), now);
             }
             State::Playing(_) => {}
+            State::Recovering if self.cause == Cause::TookOver => self.take_up(now)?,
             state => return Err(nothing_plays(state)),
         }
+        Ok(())
+    }
+
+    /// The show that the other machine led goes on here, as out of a pause: the seats join it from where they were read.
+    fn take_up(&mut self, now: MonoTime) -> Result<(), Why> {
+        self.known_position()?;
+        match self.facts.readiness {
+            Readiness::Ready => {}
+            Readiness::NotPreflighted => return Err(Why::NotPreflighted),
+            // What was played there is not loaded.
+            Readiness::NoCue | Readiness::NotProved => return Err(Why::SeatsAnywhere),
+        }
+        self.enter(State::Playing(PlayMode::Joining), Cause::Asked(Transition::Resume), now);
         Ok(())
     }
 

@@ -11,6 +11,8 @@ pub enum Cause {
     Started,
     /// The program ended without parking the last time.
     Crashed,
+    /// The other show machine died with a show under way.
+    TookOver,
     /// A seat is not at its park pose.
     AwayFromPark,
     /// All seats are at their park poses.

@@ -226,15 +226,28 @@ pub struct Finding {
     pub homed: bool,
     /// All seats are at their park poses.
     pub at_park: bool,
-    /// The mark that a start leaves and an orderly end takes away was there.
-    pub crashed: bool,
+    /// How it ended before.
+    pub before: LedBefore,
+}
+
+/// How the program ended that led the hall before this one started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum LedBefore {
+    /// In order.
+    #[default]
+    Ended,
+    /// Without parking: the mark that a start leaves and an orderly end takes away was there, or another machine led.
+    Crashed,
+    /// The other show machine died with a show under way, which may be gone on with.
+    OnCue,
 }
 
 impl Finding {
     /// The state that a start leads to, and why.
     pub(super) const fn leads_to(self) -> (State, Cause) {
         match self {
-            Self { crashed: true, .. } => (State::Recovering, Cause::Crashed),
+            Self { before: LedBefore::OnCue, .. } => (State::Recovering, Cause::TookOver),
+            Self { before: LedBefore::Crashed, .. } => (State::Recovering, Cause::Crashed),
             Self { at_park: false, .. } => (State::Recovering, Cause::AwayFromPark),
             Self { .. } => (State::Parked, Cause::FoundParked),
         }

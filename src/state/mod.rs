@@ -28,7 +28,7 @@ use std::time::Duration;
 pub(crate) use cause::Whose;
 pub use cause::{Cause, Trouble};
 pub(crate) use kinds::Demand;
-pub use kinds::{Event, Finding, Latch, PlayMode, Readiness, State, Transition};
+pub use kinds::{Event, Finding, Latch, LedBefore, PlayMode, Readiness, State, Transition};
 pub(crate) use next::Next;
 pub use refusal::{Refusal, Why};
 
@@ -169,7 +169,12 @@ impl Machine {
     /// When the state ends by itself; `None` if it does not. For a hall that is armed or paused, worth showing.
     #[must_use]
     pub(crate) fn lapses(&self) -> Option<MonoTime> {
-        Some(self.since + self.state.lasts()?)
+        let lasts = match (self.state, self.cause) {
+            // As a pause does: whoever sat there has got up.
+            (State::Recovering, Cause::TookOver) => PAUSED_FOR,
+            (state, _) => state.lasts()?,
+        };
+        Some(self.since + lasts)
     }
 
     /// Ends a state whose time is over. To be told every tick; a clock that goes back ends nothing.
@@ -180,6 +185,7 @@ impl Machine {
         match self.state {
             State::Armed => self.enter(State::Parked, Cause::ArmLapsed, now),
             State::Paused => self.enter(State::Parking, Cause::PausedTooLong, now),
+            State::Recovering => self.enter(State::Recovering, Cause::PausedTooLong, now),
             State::Homing => self.trouble(Trouble::HomingTime, now),
             State::Parking => self.trouble(Trouble::ParkingTime, now),
             State::Stopping => self.end_stopping(now),

@@ -125,6 +125,8 @@ impl Machine {
             Next::AwaitPositions
         } else if matches!(self.facts.latch, Latch::Over) {
             Next::Clear
+        } else if matches!((self.cause, self.facts.readiness), (Cause::TookOver, Readiness::Ready)) {
+            Next::Resume
         } else {
             Next::ParkOrHome
         }

@@ -1,7 +1,7 @@
 //! What may never happen to a hall, whoever asks and whatever comes: kept apart from the machine, which is held against it in tests and
 //! fuzzing.
 
-use super::{Event, Latch, Machine, Readiness, Refusal, State, Transition};
+use super::{Cause, Event, Latch, Machine, Readiness, Refusal, State, Transition};
 use crate::time::MonoTime;
 
 /// A request or an event.
@@ -114,8 +114,10 @@ impl HallRules {
             let way = (from, request);
             let parks =
                 from == State::Recovering || (from == State::Parked && (self.astray || before.is_homed()));
+            let takes_up =
+                way == (State::Recovering, Transition::Resume) && before.cause() == Cause::TookOver;
             assert!(
-                way == (State::Armed, Transition::Go) || (parks && request == Transition::Park),
+                way == (State::Armed, Transition::Go) || (parks && request == Transition::Park) || takes_up,
                 "{way:?}"
             );
         }

@@ -12,7 +12,7 @@ const fn s(seconds: u64) -> MonoTime {
     MonoTime::from_nanos(seconds * 1_000_000_000)
 }
 
-const PARKED: Finding = Finding { homed: true, at_park: true, crashed: false };
+const PARKED: Finding = Finding { homed: true, at_park: true, before: LedBefore::Ended };
 const MASTER: Trouble = Trouble::OtherMaster(3);
 
 /// What leads from the start of the program to a state.
@@ -90,7 +90,57 @@ fn a_start_leads_to_parked_only_where_the_seats_are_found_so_after_an_orderly_en
     };
     assert_eq!(found(PARKED), Some((State::Parked, Cause::FoundParked)));
     assert_eq!(found(Finding { at_park: false, ..PARKED }), Some((State::Recovering, Cause::AwayFromPark)));
-    assert_eq!(found(Finding { crashed: true, ..PARKED }), Some((State::Recovering, Cause::Crashed)));
+    let after = |before| found(Finding { before, ..PARKED });
+    assert_eq!(after(LedBefore::Crashed), Some((State::Recovering, Cause::Crashed)));
+    assert_eq!(after(LedBefore::OnCue), Some((State::Recovering, Cause::TookOver)));
+}
+
+/// A hall whose seats were found elsewhere than at park, after the other machine died with a show under way.
+fn taken_over(readiness: Readiness) -> Machine {
+    let mut hall = hall(State::Boot);
+    hall.event(Event::Identified(Finding { at_park: false, before: LedBefore::OnCue, ..PARKED }), s(0));
+    hall.event(Event::Readiness(readiness), s(0));
+    hall
+}
+
+#[test]
+fn a_show_that_was_taken_over_is_resumed_by_a_person_within_five_minutes_and_only_with_all_known() {
+    let resumed = |mut hall: Machine, at| {
+        let before = hall.next();
+        (
+            before,
+            hall.request(Transition::Resume, s(at)).map(|()| hall.state()).map_err(|refusal| refusal.why),
+        )
+    };
+    let joins = (Next::Resume, Ok(State::Playing(PlayMode::Joining)));
+    assert_eq!(resumed(taken_over(Readiness::Ready), 299), joins);
+
+    let mut late = taken_over(Readiness::Ready);
+    late.tick(s(300));
+    assert_eq!(
+        (late.state(), late.cause()),
+        (State::Recovering, Cause::PausedTooLong),
+        "nothing moves by itself"
+    );
+    assert_eq!(resumed(late, 301), (Next::ParkOrHome, Err(Why::SeatsAnywhere)));
+
+    for (readiness, why) in [
+        (Readiness::NoCue, Why::SeatsAnywhere),
+        (Readiness::NotProved, Why::SeatsAnywhere),
+        (Readiness::NotPreflighted, Why::NotPreflighted),
+    ] {
+        assert_eq!(resumed(taken_over(readiness), 1), (Next::ParkOrHome, Err(why)));
+    }
+    let mut rebooted = taken_over(Readiness::Ready);
+    rebooted.event(Event::Rebooted(1), s(1));
+    assert_eq!(resumed(rebooted, 1), (Next::Home, Err(Why::PositionUnknown)));
+    let mut stopped = taken_over(Readiness::Ready);
+    for request in [Transition::Stop, Transition::Clear] {
+        stopped.request(request, s(1)).unwrap();
+    }
+    stopped.event(Event::PositionsRead, s(1));
+    assert_eq!(resumed(stopped, 1), (Next::ParkOrHome, Err(Why::SeatsAnywhere)), "what was stopped stays so");
+    assert_eq!(resumed(hall(State::Recovering), 1).1, Err(Why::SeatsAnywhere));
 }
 
 #[test]

@@ -204,6 +204,7 @@ impl Cause {
         match self {
             Self::Started => ("started", "the program has started"),
             Self::Crashed => ("crashed", "the program ended without parking the last time"),
+            Self::TookOver => ("took-over", "the other show machine is gone, and its show was under way"),
             Self::AwayFromPark => ("away-from-park", "a seat is not at its park pose"),
             Self::FoundParked => ("found-parked", "all seats that take part were found at their park poses"),
             Self::Asked(request) => asked(request),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use kinocue::harness::state::{State, Transition};
+use kinocue::harness::state::{LedBefore, State, Transition};
 
 use super::cues::{KINDS, Kind};
 use super::ether::{Ether, Weather};
@@ -13,8 +13,8 @@ use super::seat::MS;
 /// Three axes, six, two seats, and one axis at 1,000 frames a second.
 const ALL: [Kind; 4] = [KINDS[0], KINDS[1], KINDS[6], KINDS[7]];
 
-fn lead(kind: Kind, ether: &Ether, crashed: bool, lead: impl FnOnce(&mut Hall<'_, '_>)) {
-    open(ether, kind, crashed, &BTreeMap::new(), |hall| {
+fn lead(kind: Kind, ether: &Ether, before: LedBefore, lead: impl FnOnce(&mut Hall<'_, '_>)) {
+    open(ether, kind, before, &BTreeMap::new(), |hall| {
         hall.load(0);
         assert!(hall.comes_to(|state| matches!(state, State::Parked | State::Recovering), 1_500));
         lead(hall);
@@ -32,14 +32,14 @@ fn an_ack_from_before_a_crash_is_not_taken_for_one_of_the_frame_of_that_number_a
     for kind in [KINDS[0], KINDS[7]] {
         let ether = ether(kind, |_| {});
         ether.world().lines[0].seat.put(0, 120.0);
-        lead(kind, &ether, false, |hall| {
+        lead(kind, &ether, LedBefore::Ended, |hall| {
             hall.ask(Transition::Park);
             hall.pass(380);
             hall.ether.turns(0, Weather::HeldBack, 30);
             hall.pass(20);
         });
         ether.pass_to(ether.ns() + 50 * MS);
-        lead(kind, &ether, true, |hall| {
+        lead(kind, &ether, LedBefore::Crashed, |hall| {
             hall.ask(Transition::Park);
             // About the time of the frame that was the last before.
             hall.pass(350);
@@ -54,7 +54,7 @@ fn an_ack_from_before_a_crash_is_not_taken_for_one_of_the_frame_of_that_number_a
 fn a_seat_that_was_moved_while_its_answers_were_held_back_is_not_led_from_where_it_was_before() {
     for (kind, request) in ALL.iter().flat_map(|kind| [(*kind, Transition::Park), (*kind, Transition::Go)]) {
         let ether = ether(kind, |_| {});
-        lead(kind, &ether, false, |hall| {
+        lead(kind, &ether, LedBefore::Ended, |hall| {
             hall.pass(400);
             if request == Transition::Go {
                 hall.ask(Transition::HomeAndArm);
@@ -77,7 +77,7 @@ fn nor_is_one_that_was_moved_while_its_way_was_planned() {
     for kind in ALL {
         let ether = ether(kind, |_| {});
         ether.world().lines.iter_mut().for_each(|line| line.seat.put(0, 60.0));
-        lead(kind, &ether, false, |hall| {
+        lead(kind, &ether, LedBefore::Ended, |hall| {
             hall.planner_ns = 700 * MS;
             hall.ask(Transition::Park);
             hall.pass(450);
@@ -94,7 +94,7 @@ fn nor_is_one_that_was_moved_while_its_way_was_planned() {
 fn whoever_closes_a_hall_in_a_pause_has_asked_for_its_park() {
     for kind in ALL {
         let ether = ether(kind, |_| {});
-        open(&ether, kind, false, &BTreeMap::new(), |hall| {
+        open(&ether, kind, LedBefore::Ended, &BTreeMap::new(), |hall| {
             hall.ride(0);
             hall.pass(1_000);
             hall.ask(Transition::Pause);
@@ -111,7 +111,7 @@ fn whoever_is_refused_one_thing_has_asked_for_the_next_all_the_same() {
     for kind in ALL {
         let ether = ether(kind, |_| {});
         ether.world().lines[0].seat.put(0, 60.0);
-        lead(kind, &ether, false, |hall| {
+        lead(kind, &ether, LedBefore::Ended, |hall| {
             hall.ask(Transition::Pause);
             hall.ask(Transition::Park);
             hall.pass(3_000);

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
+use kinocue::harness::state::LedBefore;
 use kinocue::harness::sys::clock::wall_now_ns;
 
 use super::bent::Bent;
@@ -51,7 +52,9 @@ pub(crate) fn live_through(seed: u64, bent: Option<Bent>, deeds: u64, keeps: Kee
     let ether = Ether::new(&seats(&kind), seed);
     let mut person = Person::new(seed, deeds, ether.ns() + (ms + 800) * MS, bent);
     person.furnish(&ether);
-    let (mut numbers, mut crashed) = (BTreeMap::new(), dice.one_in(3));
+    let crashed = dice.one_in(3);
+    let (mut numbers, mut before) =
+        (BTreeMap::new(), if crashed { LedBefore::Crashed } else { LedBefore::Ended });
     let mut diary = Vec::new();
     ether.world().recordings = (keeps == Keeps::Recordings).then(Vec::new);
     ether.world().frames = setting("KINOCUE_FRAMES").filter(|_| told).map(|_| Vec::new());
@@ -64,16 +67,16 @@ pub(crate) fn live_through(seed: u64, bent: Option<Bent>, deeds: u64, keeps: Kee
         }
     }
     loop {
-        let (close, next) = open(&ether, kind, crashed, &numbers, |hall| {
+        let (close, next) = open(&ether, kind, before, &numbers, |hall| {
             hall.diary = told.then(|| std::mem::take(&mut diary));
             let close = person.lead(hall);
             diary = hall.diary.take().unwrap_or_default();
             close
         });
-        let Close::Again { crashed: again } = close else { break };
+        let Close::Again(again) = close else { break };
         ether.world().asked = false;
         ether.pass_to(ether.ns() + 50 * MS);
-        (numbers, crashed) = (if again { BTreeMap::new() } else { next }, again);
+        (numbers, before) = (if again == LedBefore::Ended { next } else { BTreeMap::new() }, again);
         if bent.is_some_and(Bent::reloads) {
             kind = dice.pick(kinds);
             diary.push(format!("it opens anew: {kind:?}"));

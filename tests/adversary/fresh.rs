@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use kinocue::harness::engine::Mix;
-use kinocue::harness::state::{PlayMode, State, Transition};
+use kinocue::harness::state::{LedBefore, PlayMode, State, Transition};
 
 use super::cues::{KINDS, Kind, OTHERS};
 use super::dice::Dice;
@@ -20,7 +20,7 @@ const WET: usize = 3;
 const WET_AT_REST: usize = 4;
 
 fn lead<T>(kind: Kind, ether: &Ether, lead: impl FnOnce(&mut Hall<'_, '_>) -> T) -> T {
-    open(ether, kind, false, &BTreeMap::new(), lead).0
+    open(ether, kind, LedBefore::Ended, &BTreeMap::new(), lead).0
 }
 
 fn frames(hall: &Hall<'_, '_>, seat: usize) -> u64 {

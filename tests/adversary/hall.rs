@@ -6,7 +6,7 @@ use kinocue::harness::engine::{Mix, Show};
 use kinocue::harness::net::{DrainGrid, over};
 use kinocue::harness::recording::HallRecording;
 use kinocue::harness::rt::{Command, Line, News, Order, Ticked};
-use kinocue::harness::state::{Event, Readiness, State, Transition, Trouble};
+use kinocue::harness::state::{Event, LedBefore, Readiness, State, Transition, Trouble};
 use kinocue::harness::time::{MonoTime, Rate, ShowTime};
 use kinocue::wire::Dialect;
 
@@ -86,7 +86,7 @@ pub(crate) struct Hall<'h, 'l> {
 pub(crate) fn open<T>(
     ether: &Ether,
     kind: Kind,
-    crashed: bool,
+    before: LedBefore,
     numbers: &Numbers,
     lead: impl FnOnce(&mut Hall<'_, '_>) -> T,
 ) -> (T, Numbers) {
@@ -94,7 +94,7 @@ pub(crate) fn open<T>(
     ether.world().lines.iter_mut().for_each(|line| line.seat.settings.period_ms = kind.period_ms());
     let halves = over(Arc::new(ether.clone()));
     let mut runtime =
-        Runtime::over(Arc::clone(&book.config), Purpose::Hall { crashed }, numbers, &Arc::default(), halves)
+        Runtime::over(Arc::clone(&book.config), Purpose::Hall { before }, numbers, &Arc::default(), halves)
             .expect("the hall opens");
     let recording = ether.world().recordings.is_some().then(|| HallRecording::tap(&mut runtime));
     let origin = MonoTime::from_nanos(ether.ns() + 20 * MS);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use kinocue::harness::engine::Mix;
-use kinocue::harness::state::{PlayMode, State, Transition};
+use kinocue::harness::state::{LedBefore, PlayMode, State, Transition};
 
 use super::cues::{KINDS, Kind};
 use super::ether::{Ether, Weather};
@@ -27,8 +27,8 @@ pub(super) fn ether(kind: Kind, set: impl Fn(&mut Settings)) -> Ether {
 }
 
 /// A hall that opens and is led; what the seats executed is left.
-fn lead<T>(kind: Kind, ether: &Ether, crashed: bool, lead: impl FnOnce(&mut Hall<'_, '_>) -> T) -> T {
-    let (led, _) = open(ether, kind, crashed, &BTreeMap::new(), lead);
+fn lead<T>(kind: Kind, ether: &Ether, before: LedBefore, lead: impl FnOnce(&mut Hall<'_, '_>) -> T) -> T {
+    let (led, _) = open(ether, kind, before, &BTreeMap::new(), lead);
     ether.world().asked = false;
     ether.pass_to(ether.ns() + 50 * MS);
     led
@@ -106,7 +106,7 @@ impl Hall<'_, '_> {
 #[test]
 fn a_three_axis_cue_that_is_loaded_while_six_axes_are_up_parks_all_six_of_them_from_where_they_are() {
     let ether = ether(SIX, |_| {});
-    lead(SIX, &ether, false, |hall| {
+    lead(SIX, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
         hall.pass(1_500);
         hall.stops();
@@ -121,11 +121,11 @@ fn a_three_axis_cue_that_is_loaded_while_six_axes_are_up_parks_all_six_of_them_f
 #[test]
 fn after_a_crash_in_a_six_axis_show_a_three_axis_cue_parks_all_six_axes_from_where_they_are() {
     let ether = ether(SIX, |_| {});
-    lead(SIX, &ether, false, |hall| {
+    lead(SIX, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
         hall.pass(1_500);
     });
-    lead(SIX, &ether, true, |hall| {
+    lead(SIX, &ether, LedBefore::Crashed, |hall| {
         hall.load(1);
         assert!(hall.comes_to(|state| state == State::Recovering, 5_000), "{:?}", hall.state);
         assert!(hall.parks(), "{:?}", hall.state);
@@ -137,7 +137,7 @@ fn after_a_crash_in_a_six_axis_show_a_three_axis_cue_parks_all_six_axes_from_whe
 #[test]
 fn an_axis_that_no_cue_has_and_that_is_jogged_between_shows_is_not_yanked_by_the_next_show() {
     let ether = ether(SIX, |_| {});
-    lead(SIX, &ether, false, |hall| {
+    lead(SIX, &ether, LedBefore::Ended, |hall| {
         hall.ride(1);
         assert!(hall.parks(), "{:?}", hall.state);
         hall.pass(1_000);
@@ -156,7 +156,7 @@ fn an_axis_that_no_cue_has_and_that_is_jogged_between_shows_is_not_yanked_by_the
 
 fn moved_while_recovering(jogs: &[(usize, f64)]) {
     let ether = ether(SIX, |_| {});
-    lead(SIX, &ether, false, |hall| {
+    lead(SIX, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
         hall.pass(1_500);
         hall.stops();
@@ -187,7 +187,7 @@ fn a_seat_that_sinks_bit_by_bit_after_a_stop_was_cleared_parks_from_where_it_san
 fn a_seat_that_is_jogged_after_it_was_found_up_at_the_start_parks_from_where_it_was_jogged_to() {
     let ether = ether(SIX, |_| {});
     ether.world().lines[0].seat.put(2, 100.0);
-    lead(SIX, &ether, false, |hall| {
+    lead(SIX, &ether, LedBefore::Ended, |hall| {
         hall.load(0);
         assert!(hall.comes_to(|state| state == State::Recovering, 5_000), "{:?}", hall.state);
         hall.pass(1_000);
@@ -204,7 +204,7 @@ fn a_seat_that_is_jogged_after_it_was_found_up_at_the_start_parks_from_where_it_
 fn a_seat_that_is_still_being_jogged_when_park_is_asked_for_is_not_yanked() {
     let ether = ether(SIX, |_| {});
     ether.world().lines[0].seat.put(2, 100.0);
-    lead(SIX, &ether, false, |hall| {
+    lead(SIX, &ether, LedBefore::Ended, |hall| {
         hall.load(0);
         assert!(hall.comes_to(|state| state == State::Recovering, 5_000), "{:?}", hall.state);
         hall.pass(1_000);
@@ -219,7 +219,7 @@ fn a_seat_that_is_still_being_jogged_when_park_is_asked_for_is_not_yanked() {
 fn a_seat_that_was_jogged_just_before_park_is_there_before_the_hall_says_that_it_is_parked() {
     for (by_mm, ms) in [(-20.0, 50), (-20.0, 300), (-60.0, 10), (-60.0, 700)] {
         let ether = ether(THREE, |_| {});
-        lead(THREE, &ether, false, |hall| {
+        lead(THREE, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(1_500);
             hall.stops();
@@ -239,7 +239,7 @@ fn a_seat_that_was_jogged_just_before_park_is_there_before_the_hall_says_that_it
 fn nor_does_it_go_on_to_say_so_of_one_that_was_jogged_up_while_it_was_parked() {
     for ms in [10, 50, 150, 300, 600] {
         let ether = ether(THREE, |_| {});
-        lead(THREE, &ether, false, |hall| {
+        lead(THREE, &ether, LedBefore::Ended, |hall| {
             hall.load(0);
             assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
             hall.pass(300);
@@ -260,7 +260,7 @@ fn nor_does_it_go_on_to_say_so_of_one_that_was_jogged_up_while_it_was_parked() {
 fn a_seat_that_was_jogged_just_before_go_is_not_yanked() {
     for passes in [100, 300, 500, 700] {
         let ether = ether(SIX, |_| {});
-        lead(SIX, &ether, false, |hall| {
+        lead(SIX, &ether, LedBefore::Ended, |hall| {
             hall.load(0);
             assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
             hall.pass(300);
@@ -281,7 +281,7 @@ fn a_seat_that_was_jogged_just_before_go_is_not_yanked() {
 #[test]
 fn a_seat_of_eight_axes_that_was_silent_in_mid_show_is_not_led_from_where_its_last_two_are_not() {
     let ether = ether(EIGHT, |_| {});
-    lead(EIGHT, &ether, false, |hall| {
+    lead(EIGHT, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
         hall.pass(1_000);
         hall.ether.turns(0, Weather::Cut, 600);
@@ -293,11 +293,11 @@ fn a_seat_of_eight_axes_that_was_silent_in_mid_show_is_not_led_from_where_its_la
 #[test]
 fn after_a_crash_a_seat_of_eight_axes_is_not_parked_from_where_its_last_two_are_not() {
     let ether = ether(EIGHT, |_| {});
-    lead(EIGHT, &ether, false, |hall| {
+    lead(EIGHT, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
         hall.pass(1_000);
     });
-    lead(EIGHT, &ether, true, |hall| {
+    lead(EIGHT, &ether, LedBefore::Crashed, |hall| {
         hall.load(0);
         hall.comes_to(|state| state != State::Boot, 5_000);
         hall.pass(1_000);
@@ -311,7 +311,7 @@ fn after_a_crash_a_seat_of_eight_axes_is_not_parked_from_where_its_last_two_are_
 fn wrong_place(place_mm: f64, set: impl Fn(&mut Settings)) {
     let ether = ether(THREE, set);
     ether.world().lines[0].seat.put(0, place_mm);
-    lead(THREE, &ether, false, |hall| {
+    lead(THREE, &ether, LedBefore::Ended, |hall| {
         hall.load(0);
         hall.comes_to(|state| state != State::Boot, 3_000);
         hall.pass(500);
@@ -353,7 +353,7 @@ fn nor_is_one_whose_words_the_wrong_way_round_read_as_parked() {
 fn rides_through(kind: Kind, weather: Weather, lengths: &[u64]) {
     for offset in [0, 310, 620, 930] {
         let ether = ether(kind, |_| {});
-        lead(kind, &ether, false, |hall| {
+        lead(kind, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(offset);
             for length in lengths {
@@ -385,7 +385,7 @@ fn nor_are_those_of_a_cable_that_was_out_at_a_thousand_frames_a_second() {
 fn nor_are_those_that_were_lost_while_replies_to_older_ones_still_came() {
     for offset in [0, 310, 620, 930] {
         let ether = ether(THREE, |_| {});
-        lead(THREE, &ether, false, |hall| {
+        lead(THREE, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(offset);
             hall.ether.turns(0, Weather::HeldBack, 120);
@@ -401,7 +401,7 @@ fn nor_are_those_that_were_lost_while_replies_to_older_ones_still_came() {
 fn a_seat_whose_frames_are_held_back_is_not_joined_from_what_it_reports_before_they_come() {
     for at in [0, 100, 200] {
         let ether = ether(THREE, |seat| seat.report_ms = 100);
-        lead(THREE, &ether, false, |hall| {
+        lead(THREE, &ether, LedBefore::Ended, |hall| {
             hall.load(0);
             assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
             hall.pass(300);
@@ -419,7 +419,7 @@ fn a_seat_whose_frames_are_held_back_is_not_joined_from_what_it_reports_before_t
 #[test]
 fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap() {
     let ether = ether(THREE, |_| {});
-    lead(THREE, &ether, false, |hall| {
+    lead(THREE, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
         hall.pass(600);
         hall.ether.turns(0, Weather::Lost, 180);
@@ -433,7 +433,7 @@ fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap
 fn a_seat_that_is_cut_off_on_its_way_to_park_is_there_before_the_hall_says_that_it_is_parked() {
     for (at, length) in [(0, 150), (300, 90), (300, 600), (900, 150)] {
         let ether = ether(THREE, |_| {});
-        lead(THREE, &ether, false, |hall| {
+        lead(THREE, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(600);
             hall.ask(Transition::Park);
@@ -451,7 +451,7 @@ fn a_seat_that_is_cut_off_on_its_way_to_park_is_there_before_the_hall_says_that_
 fn a_seat_whose_power_went_is_sent_nothing_when_it_comes_back_with_another_zero() {
     for park in [false, true] {
         let ether = ether(THREE, |_| {});
-        lead(THREE, &ether, false, |hall| {
+        lead(THREE, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(400);
             if park {
@@ -486,7 +486,7 @@ fn a_seat_that_hears_all_frames_and_is_not_heard_itself_comes_to_rest_within_its
     for offset in [0, 200, 400, 600, 800] {
         for ms in [60, 150, 400] {
             let ether = ether(THREE, |_| {});
-            let sharpest = lead(THREE, &ether, false, |hall| {
+            let sharpest = lead(THREE, &ether, LedBefore::Ended, |hall| {
                 hall.ride(0);
                 hall.pass(offset);
                 hall.ether.turns(0, Weather::Mute, ms);
@@ -504,7 +504,7 @@ fn a_seat_that_hears_all_frames_and_is_not_heard_itself_comes_to_rest_within_its
 fn a_show_whose_machine_was_asleep_for_seconds_does_not_go_on_by_itself() {
     for (kind, asleep_ms) in [(THREE, 3_000), (SIX, 9_000)] {
         let ether = ether(kind, |_| {});
-        lead(kind, &ether, false, |hall| {
+        lead(kind, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(500);
             hall.still(Thread::All, asleep_ms);
@@ -519,7 +519,7 @@ fn a_show_whose_machine_was_asleep_for_seconds_does_not_go_on_by_itself() {
 /// Moves that were hurried, and how long a frame waited in the queue at most, ms, of a show with that many pauses.
 fn paused(kind: Kind, hurry: bool, park: bool) -> (u32, f64) {
     let ether = ether(kind, |seat| seat.hurry = hurry);
-    lead(kind, &ether, false, |hall| {
+    lead(kind, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
         for _ in 0..2 {
             hall.pass(200);
@@ -570,7 +570,7 @@ fn nor_does_whoever_parks_out_of_a_pause() {
 fn a_seat_that_is_jogged_at_its_keys_in_a_show_is_sent_no_more_and_joins_again_from_where_it_was_left() {
     for (kind, mm) in [(THREE, 80.0), (FAST, 60.0), (SIX, -25.0)] {
         let ether = ether(kind, |_| {});
-        lead(kind, &ether, false, |hall| {
+        lead(kind, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(700);
             hall.ether.world().lines[0].seat.seize(Some((0, mm)), hall.ether.ns(), 600 * MS);
@@ -589,7 +589,7 @@ fn a_seat_that_is_jogged_at_its_keys_in_a_show_is_sent_no_more_and_joins_again_f
 fn a_seat_that_homes_by_itself_in_a_show_is_not_led_until_somebody_has_homed_it() {
     for kind in [THREE, EIGHT] {
         let ether = ether(kind, |_| {});
-        lead(kind, &ether, false, |hall| {
+        lead(kind, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(700);
             hall.ether.world().lines[0].seat.seize(None, hall.ether.ns(), 2_500 * MS);
@@ -606,7 +606,7 @@ fn a_seat_that_homes_by_itself_in_a_show_is_not_led_until_somebody_has_homed_it(
 fn a_seat_that_is_jogged_in_a_pause_gets_no_frame_and_joins_from_there() {
     for park in [false, true] {
         let ether = ether(SIX, |_| {});
-        lead(SIX, &ether, false, |hall| {
+        lead(SIX, &ether, LedBefore::Ended, |hall| {
             hall.ride(0);
             hall.pass(700);
             hall.ask(Transition::Pause);
@@ -630,7 +630,7 @@ fn a_seat_that_is_jogged_in_a_pause_gets_no_frame_and_joins_from_there() {
 fn a_seat_that_was_taken_out_is_parked_gets_no_frame_and_comes_back_from_where_it_was_jogged_to() {
     let two = TWO;
     let ether = ether(two, |_| {});
-    lead(two, &ether, false, |hall| {
+    lead(two, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
         hall.pass(500);
         let mix = hall.runtime.desk.mix(0);
@@ -648,4 +648,48 @@ fn a_seat_that_was_taken_out_is_parked_gets_no_frame_and_comes_back_from_where_i
         assert!(hall.ether.world().lines[0].frames > frames, "it is back");
     });
     assert_no_breach(&ether);
+}
+
+// A second show machine that takes over in mid-show.
+
+/// A ride of the first cue is cut off by the end of its machine, and taken up by another one, at whose RESUME the seats stand where `moved`
+/// has left them meanwhile.
+fn taken_up(kind: Kind, moved: impl FnOnce(&Ether)) {
+    let ether = ether(kind, |_| {});
+    lead(kind, &ether, LedBefore::Ended, |hall| {
+        hall.ride(0);
+        hall.pass(1_500);
+    });
+    // Its last frames arrive, and nobody sends.
+    ether.world().asked = false;
+    ether.pass_to(ether.ns() + 1_300 * MS);
+    moved(&ether);
+    lead(kind, &ether, LedBefore::OnCue, |hall| {
+        hall.load(0);
+        assert!(hall.comes_to(|state| state == State::Recovering, 1_500), "{:?}", hall.state);
+        hall.pass(2_000);
+        hall.ask(Transition::Resume);
+        assert!(
+            hall.comes_to(|state| state == State::Playing(PlayMode::Following), 5_000),
+            "{:?}",
+            hall.state
+        );
+        hall.pass(500);
+    });
+    assert_no_breach(&ether);
+}
+
+#[test]
+fn a_show_that_another_machine_led_is_joined_from_where_its_seats_were_left() {
+    [SIX, KINDS[0], KINDS[6], KINDS[7]].into_iter().for_each(|kind| taken_up(kind, |_| {}));
+}
+
+#[test]
+fn and_from_where_somebody_has_moved_them_meanwhile() {
+    for kind in [SIX, KINDS[0], KINDS[6]] {
+        taken_up(kind, |ether| {
+            assert!(ether.jog(0, 0, 40.0, ether.ns()));
+            ether.pass_to(ether.ns() + 3_000 * MS);
+        });
+    }
 }

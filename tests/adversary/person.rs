@@ -1,7 +1,7 @@
 //! A person, or a day, of whom nothing sensible can be expected.
 
 use kinocue::harness::engine::Mix;
-use kinocue::harness::state::{State, Transition};
+use kinocue::harness::state::{LedBefore, State, Transition};
 
 use super::bent::Bent;
 use super::dice::Dice;
@@ -15,7 +15,7 @@ pub(crate) enum Close {
     /// The history is over.
     Over,
     /// The program ends, or the configuration is read again, and the hall opens once more.
-    Again { crashed: bool },
+    Again(LedBefore),
 }
 
 /// Who leads a hall by chance: the seed says all that is done, up to so many deeds.
@@ -46,7 +46,7 @@ impl Person {
             let gap = self.dice.pick(&[5, 20, 60, 150, 300, 600]);
             hall.pass(self.dice.range(gap / 2, gap * 2));
             if hall.closed {
-                return Close::Again { crashed: false };
+                return Close::Again(LedBefore::Ended);
             }
             if self.deeds == 0 {
                 continue;
@@ -54,7 +54,8 @@ impl Person {
             self.deeds -= 1;
             if self.dice.one_in(60) {
                 hall.note(|| "the program crashes".to_owned());
-                return Close::Again { crashed: true };
+                let rides = matches!(hall.state, State::Playing(_) | State::Paused);
+                return Close::Again(if rides { LedBefore::OnCue } else { LedBefore::Crashed });
             }
             self.act(hall);
         }
@@ -79,7 +80,13 @@ impl Person {
     fn ask(&mut self, hall: &mut Hall<'_, '_>) {
         let leads = match hall.state {
             State::Boot => &[Transition::Park, Transition::Stop][..],
-            State::Recovering => &[Transition::Park, Transition::Park, Transition::Park, Transition::Home],
+            State::Recovering => &[
+                Transition::Park,
+                Transition::Park,
+                Transition::Resume,
+                Transition::Resume,
+                Transition::Home,
+            ],
             State::Parked => {
                 &[Transition::Arm, Transition::Arm, Transition::Arm, Transition::Park, Transition::HomeAndArm]
             }

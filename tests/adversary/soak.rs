@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use kinocue::harness::engine::Mix;
-use kinocue::harness::state::{State, Transition};
+use kinocue::harness::state::{LedBefore, State, Transition};
 
 use super::chance::setting;
 use super::counting::Calls;
@@ -120,7 +120,7 @@ fn a_day_of_shows_holds_no_more_memory_than_its_first_ten_minutes_and_accounts_f
     let minutes = setting("KINOCUE_SOAK_MINUTES").unwrap_or(60);
     let kind = KINDS[2];
     let ether = Ether::new(&seats(&kind), 18);
-    let ((day, counts), _) = open(&ether, kind, false, &BTreeMap::new(), |hall| {
+    let ((day, counts), _) = open(&ether, kind, LedBefore::Ended, &BTreeMap::new(), |hall| {
         let day = Operator { hall, dice: Dice::new(18), day: Day::default() }.run(minutes);
         hall.pass(2_000);
         (day, hall.runtime.live.table().iter().map(|row| row.counts).collect::<Vec<_>>())

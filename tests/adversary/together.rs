@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use kinocue::harness::engine::Mix;
 use kinocue::harness::recording::replayed;
-use kinocue::harness::state::{State, Transition};
+use kinocue::harness::state::{LedBefore, State, Transition};
 
 use super::bent::Bent;
 use super::chance::{Keeps, assert_at_most, live_through, setting};
@@ -23,7 +23,7 @@ fn quiet(kind: Kind) -> Ether {
 }
 
 fn lead<T>(kind: Kind, ether: &Ether, lead: impl FnOnce(&mut Hall<'_, '_>) -> T) -> T {
-    open(ether, kind, false, &BTreeMap::new(), lead).0
+    open(ether, kind, LedBefore::Ended, &BTreeMap::new(), lead).0
 }
 
 /// Ticks whose frames left as one datagram, and as one for each.

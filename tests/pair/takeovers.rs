@@ -49,7 +49,7 @@ fn second_leads(house: &House) -> MonoTime {
     let at = house.shows[1].leads("B", "recovering");
     let status = house.shows[1].wait(|status| {
         status["state"] == "recovering"
-            && status["next"] == "park, or home"
+            && status["next"] == "resume, or park"
             && status["show"]["cue"] == "night"
     });
     let notes = status["warnings"].to_string();
@@ -85,6 +85,24 @@ fn a_machine_that_is_killed_is_replaced_and_its_seats_rest_until_a_person_parks_
         took[took.len() / 2],
         took.last()
     ));
+}
+
+#[test]
+fn a_show_whose_machine_died_goes_on_at_the_other_one_where_its_film_is_by_then_once_a_person_resumes_it() {
+    for _ in 0..trials(1) {
+        let Some(mut house) = House::playing() else { return };
+        let place = |status: &serde_json::Value| status["show"]["position_s"].as_f64().unwrap();
+        let at_first = place(&house.shows[0].wait(|_| true));
+        let asked = Monotonic.now();
+        house.shows[0].kill();
+        second_leads(&house);
+        house.shows[1].done(&["resume"]);
+        let goes_on = house.shows[1].comes_to("playing");
+        let (film, passed) = (place(&goes_on) - at_first, Monotonic.now().since(asked).as_secs_f64());
+        // Its own clock goes on from where the machine was heard last; the status is told ten times a second.
+        assert!((film - passed).abs() < 0.5, "{film} s of film in {passed} s");
+        parks_and_ends(house);
+    }
 }
 
 /// What the second machine says of how it took over.

@@ -18,7 +18,7 @@ use kinocue::harness::rt::{
     Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, NewsIn, Places, PlanLoop,
     Planning, Sent, Task, TickLoop, Ticked, mailboxes,
 };
-use kinocue::harness::state::{Event, Finding, Latch, Readiness, State, Transition};
+use kinocue::harness::state::{Event, Finding, Latch, LedBefore, Readiness, State, Transition};
 use kinocue::harness::time::{Clock, MonoTime, ShowTime, TickGrid};
 use kinocue::wire::MotionRequest;
 use rtrb::{Consumer, Producer};
@@ -228,7 +228,7 @@ impl Hall<'_> {
         }
         match self.live.state() {
             State::Boot => {
-                let found = Finding { homed: true, at_park: true, crashed: false };
+                let found = Finding { homed: true, at_park: true, before: LedBefore::Ended };
                 self.command(Command::Event(Event::Identified(found)));
                 self.command(Command::Event(Event::Readiness(Readiness::Ready)));
                 (0..self.stage.seats).for_each(|lane| self.find(lane));

@@ -112,12 +112,28 @@ struct PairShared {
     log: Log,
 }
 
+/// What was taken over from the machine that led.
+#[derive(Debug, Clone)]
+pub(crate) struct TookOver {
+    /// What a person should know of it.
+    pub(crate) words: String,
+    /// The show that was under way there, where that is known well enough for it to go on here.
+    pub(crate) ride: Option<Ride>,
+}
+
+/// A show that was under way at the other machine, at the place that the settings have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Ride {
+    /// Since when its film runs on from there; `None` if it was paused.
+    pub(crate) runs_since: Option<MonoTime>,
+}
+
 /// This machine while it leads. Dropped, it goes on until the program ends.
 #[derive(Debug)]
 pub(crate) struct Pair {
     shared: Arc<PairShared>,
-    /// What a person should know of whoever led before; `None` if nobody was heard.
-    took_over: Option<String>,
+    /// `None` if nobody was heard.
+    took_over: Option<TookOver>,
     feeder: Option<WatchdogThread>,
 }
 
@@ -181,8 +197,8 @@ impl Pair {
         next.flat_map(of_each).collect()
     }
 
-    /// What a person should know of whoever led before; `None` if nobody was heard.
-    pub(crate) fn took_over(&self) -> Option<String> {
+    /// What was taken over; `None` if nobody was heard.
+    pub(crate) fn took_over(&self) -> Option<TookOver> {
         self.took_over.clone()
     }
 

@@ -2,8 +2,10 @@
 //! where it will look for it once it leads.
 
 use std::path::Path;
+use std::time::Duration;
 
-use super::{Heard, PairShared};
+use super::{Heard, PairShared, Ride};
+use crate::pair::Carried;
 use crate::settings::{self, Settings};
 use crate::sys::lock::lock;
 use crate::time::MonoTime;
@@ -43,14 +45,25 @@ impl PairSettings {
     }
 }
 
-/// Keeps what the machine that led has told last, with where its show is by now. Says to people what is there of it, and what may not be.
-pub(super) fn keep(shared: &PairShared, heard: &Heard, now: MonoTime, state: &Path) -> String {
+/// Whoever was heard last so long ago may have been stopped since, or its seats taken out: its show does not go on here. As long as it takes
+/// to lead, and to spare.
+const FRESH: Duration = Duration::from_secs(3);
+
+/// Keeps what the machine that led has told last, with where its show is by now. Says to people what is there of it, and what may not be;
+/// and gives the show that was under way there, where all of that came.
+pub(super) fn keep(
+    shared: &PairShared,
+    heard: &Heard,
+    now: MonoTime,
+    state: &Path,
+) -> (String, Option<Ride>) {
     let told = lock(&shared.settings);
     let other = &shared.other;
     let Some(text) = &told.text else {
-        return format!(
+        let words = format!(
             "{other} told nothing of what was set there, and all is as it was here: check levels, trim and seats"
         );
+        return (words, None);
     };
     let kept = Settings::parse(text).and_then(|mut settings| {
         if let Some(show) = settings.show.as_mut().filter(|_| heard.carried.is_on_cue) {
@@ -59,16 +72,30 @@ pub(super) fn keep(shared: &PairShared, heard: &Heard, now: MonoTime, state: &Pa
         }
         settings::keep(state, &settings).map_err(|error| error.to_string())
     });
-    let age_ms = now.since(heard.at).as_millis();
+    let age = now.since(heard.at);
+    let age_ms = age.as_millis();
     match kept {
-        Err(why) => format!(
-            "what was set at {other} is not taken over ({why}), and all is as it was here: check levels, trim and seats"
+        Err(why) => (
+            format!(
+                "what was set at {other} is not taken over ({why}), and all is as it was here: check levels, trim and seats"
+            ),
+            None,
         ),
-        Ok(()) if told.of != heard.settings_of() => format!(
-            "{other} had set something else that did not come here, {age_ms} ms before this machine led: check levels, trim and seats"
+        Ok(()) if told.of != heard.settings_of() => (
+            format!(
+                "{other} had set something else that did not come here, {age_ms} ms before this machine led: check levels, trim and seats"
+            ),
+            None,
         ),
-        Ok(()) => format!(
-            "levels, trim, seats that are out and the place in the film are as {other} told them last, {age_ms} ms before this machine led"
-        ),
+        Ok(()) => {
+            let Carried { is_on_cue, runs, .. } = heard.carried;
+            let ride = Ride { runs_since: runs.then_some(now) };
+            (
+                format!(
+                    "levels, trim, seats that are out and the place in the film are as {other} told them last, {age_ms} ms before this machine led"
+                ),
+                Some(ride).filter(|_| is_on_cue && age <= FRESH),
+            )
+        }
     }
 }

@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::{Pair, PairError, PairShared, beats, find_machine, key, lease, print_of, session, settings};
+use super::{
+    Pair, PairError, PairShared, TookOver, beats, find_machine, key, lease, print_of, session, settings,
+};
 use crate::config::{Config, Pair as PairConfig};
 use crate::log::{Log, Priority};
 use crate::net::Lead;
@@ -102,14 +104,21 @@ pub(crate) fn stand_by(
     Ok(StoodBy::Leads(Pair { shared, took_over, feeder }))
 }
 
-/// Keeps what the other machine has told, where it led; gives what a person should know of that.
-fn takes_over(shared: &PairShared, state: &Path) -> Option<String> {
+/// Keeps what the other machine has told, where it led.
+fn takes_over(shared: &PairShared, state: &Path) -> Option<TookOver> {
     let heard = lock(&shared.heard).clone()?;
-    let (other, kept) = (&shared.other, settings::keep(shared, &heard, Monotonic.now(), state));
+    let other = &shared.other;
+    let (kept, ride) = settings::keep(shared, &heard, Monotonic.now(), state);
     let was = if heard.carried.moves { "its seats were moving" } else { "its seats did not move" };
-    Some(format!(
-        "took over from {other}: {was}; {kept}; look at the seats, then park, or home, and start the show again"
-    ))
+    let then = if ride.is_some() {
+        "resume, and they join the show where its film is by then; or park"
+    } else {
+        "park, or home, and start the show again"
+    };
+    Some(TookOver {
+        words: format!("took over from {other}: {was}; {kept}; look at the seats, then {then}"),
+        ride,
+    })
 }
 
 /// Why this machine does not lead, and what to do.

@@ -34,6 +34,7 @@ use crate::rt::{
     NewsIn, Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line,
     mailboxes,
 };
+use crate::state::LedBefore;
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock, MonoTime, Rate, TickGrid};
@@ -74,8 +75,8 @@ pub enum Purpose {
     /// A hall that lives on between shows. It finds out by itself what its controllers are and where their seats stand, and what
     /// does not know its zero is out.
     Hall {
-        /// True if the mark of a crash was there.
-        crashed: bool,
+        /// How it ended before.
+        before: LedBefore,
     },
     /// One show. All axes are taken to be homed, and a script finds out where they are.
     Play {
@@ -229,9 +230,9 @@ impl Runtime {
         let watch =
             |health| Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, live_end);
         let (engine, watch, film) = match purpose {
-            Purpose::Hall { crashed } => {
+            Purpose::Hall { before } => {
                 let desk = Arc::clone(&desk);
-                let standby = Standby::new(&config.controllers, line_end, desk, orders_end, crashed);
+                let standby = Standby::new(&config.controllers, line_end, desk, orders_end, before);
                 (engine.unknown(), watch(health.of_a_hall()).of_a_hall(standby), None)
             }
             Purpose::Play { film, .. } => (engine.waiting(), watch(health), film),

@@ -10,7 +10,7 @@ use crate::control::{Desired, Problem, Surface};
 use crate::journal::PlaylistPlace;
 use crate::log::Line;
 use crate::rt::{Command as TickCommand, Order, Row};
-use crate::state::State;
+use crate::state::{State, Transition};
 
 /// What happens to the hall.
 #[derive(Debug)]
@@ -61,8 +61,10 @@ pub(super) enum Act {
     Name(String),
     /// Fails where somebody has to be buckled before the seats move.
     CheckBelts,
-    /// Lets the show go.
+    /// Lets the show go, or go on that another machine led.
     Go {
+        /// By a GO, or by RESUME.
+        by: Transition,
         /// For whom.
         who: String,
         /// By which surface.

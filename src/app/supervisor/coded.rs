@@ -152,7 +152,7 @@ mod tests {
         let over = each!(ParkCause { FilmEnded, FilmCutShort, CueLeft, HeldTooLong });
         let awaited = each!(HoldCause { Film(FilmState::Lost), Apart, Behind, Unstable, Asks });
         let mut all = each!(Cause {
-            Started, Crashed, AwayFromPark, FoundParked, Asked(Transition::Go), StoppedHoming, Homed, ArrivedAtPark, ArmLapsed,
+            Started, Crashed, TookOver, AwayFromPark, FoundParked, Asked(Transition::Go), StoppedHoming, Homed, ArrivedAtPark, ArmLapsed,
             NotReady(Readiness::NoCue), Rebooted(0), GapOver, Joined, Late, CueEnded, PausedTooLong, GroupOut(0), EmergencyStop(0),
             Trouble(Trouble::Deaf), Cleared, Slept, FilmOver(ParkCause::CueLeft), FilmAwaited(HoldCause::Asks), FilmLeads,
         });

@@ -17,7 +17,7 @@ use super::starts::FleetStarts;
 use crate::control::{Asked, Code, Command, LevelsChange, Problem, Who, overtaken};
 use crate::rt::Command as TickCommand;
 use crate::settings::{LONGEST_WHY, Out};
-use crate::state::{Next, State, Transition};
+use crate::state::{Cause, Next, State, Transition};
 use crate::time::{ShowTime, TRIM_MS};
 
 impl Features {
@@ -46,10 +46,10 @@ impl Features {
             Command::StartAt(order) => self.starts.ask(order, who, hall),
             Command::Commit { ticket } => self.starts.commit(ticket, who, hall),
             Command::Disarm => request(Transition::Disarm),
-            Command::Go => belts::check(hall).map(|()| vec![go(who)]),
+            Command::Go => belts::check(hall).map(|()| vec![go(Transition::Go, who)]),
             Command::GoFrom(film) => go_from(*film, who, hall),
             Command::Pause => request(Transition::Pause),
-            Command::Resume => request(Transition::Resume),
+            Command::Resume => resume(who, hall),
             Command::Park => request(Transition::Park),
             // Whoever pressed it meant what was latched then.
             Command::Clear if asked.is_before(hall.mirror.since) => {
@@ -127,8 +127,35 @@ fn home_and_arm(hall: &HallContext) -> Result<Vec<Act>, Problem> {
     request_when_free(Transition::HomeAndArm, hall)
 }
 
-fn go(who: &Who) -> Act {
-    Act::Go { who: who.to_string(), surface: who.surface }
+fn go(by: Transition, who: &Who) -> Act {
+    Act::Go { by, who: who.to_string(), surface: who.surface }
+}
+
+/// Goes on after a pause, or with a show that another machine led when it died: the seats join it where its film is by now.
+fn resume(who: &Who, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    let go = go(Transition::Resume, who);
+    match &hall.cued {
+        Some(cued) if hall.mirror.state == State::Recovering && hall.mirror.cause == Cause::TookOver => {
+            hall.is_free()?;
+            belts::check(hall)?;
+            if hall.is_led_elsewhere() {
+                return Ok(vec![go]);
+            }
+            let Some(film) = cued.left(hall.now) else {
+                let detail =
+                    "cannot resume: what the other machine played is not loaded, or its film is over";
+                return Err(Problem::new(Code::State, detail, "park, then arm and start a show"));
+            };
+            Ok(begin_at(film, go, hall))
+        }
+        _ => request(Transition::Resume),
+    }
+}
+
+/// Begins there, for that one show.
+fn begin_at(film: ShowTime, go: Act, hall: &HallContext) -> Vec<Act> {
+    let begin = [Act::Stage(ShowChange::Start(film))].into_iter().chain(player::seek(film, hall));
+    begin.chain([Act::Otherwise(vec![Act::Stage(ShowChange::Rewind)]), go]).collect()
 }
 
 /// Lets what is loaded go from there on, by a join onto the moving cue.
@@ -138,12 +165,15 @@ fn go_from(film: ShowTime, who: &Who, hall: &HallContext) -> Result<Vec<Act>, Pr
         let detail = format!("cannot go from {film} while {}", hall.mirror.state);
         return Err(Problem::new(Code::State, detail, "arm first; while the cue plays or is paused, seek"));
     }
-    let mut acts = seek(film, hall)?;
-    acts.extend([Act::Otherwise(vec![Act::Stage(ShowChange::Rewind)]), go(who)]);
-    Ok(acts)
+    within_cue(film, hall)?;
+    Ok(begin_at(film, go(Transition::Go, who), hall))
 }
 
-fn seek(film: ShowTime, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+/// True if the cue that is loaded has that time.
+///
+/// # Errors
+/// Why it has not.
+fn within_cue(film: ShowTime, hall: &HallContext) -> Result<(), Problem> {
     let Some(cued) = &hall.cued else {
         return Err(Problem::new(Code::State, "cannot seek: no cue is loaded", "load one"));
     };
@@ -152,6 +182,11 @@ fn seek(film: ShowTime, hall: &HallContext) -> Result<Vec<Act>, Problem> {
         let detail = format!("{film} is outside the cue, which is {length} long");
         return Err(Problem::new(Code::Value, detail, "give a time within it"));
     }
+    Ok(())
+}
+
+fn seek(film: ShowTime, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    within_cue(film, hall)?;
     // Where the film is shown from here it is wound, and the seats follow.
     let wound = player::seek(film, hall);
     Ok(match (hall.mirror.state, wound) {

@@ -15,6 +15,7 @@ use super::readiness::ReadinessCheck;
 use super::record::ShowRecords;
 use super::recorded::HallTeller;
 use super::seat_testing::SeatTesting;
+use super::show::LeftAt;
 use super::starts::FleetStarts;
 use crate::control::{Desired, Problem, Surface};
 use crate::rt::News;
@@ -130,9 +131,11 @@ impl Features {
         acts.push(match cued {
             Ok(mut cued) => {
                 let same = before.filter(|before| before.sha256 == cued.sha256);
-                let left_at = same.and_then(|before| before.film_ms).map(ShowTime::from_millis);
-                // Nobody knows what happened since a machine that led was heard last.
-                cued.left_at = left_at.filter(|film| *film < cued.timeline.duration());
+                let film = same.and_then(|before| before.film_ms).map(ShowTime::from_millis);
+                // One that is shown from here was shown by the machine that is gone.
+                let runs = self.lasting.ride.filter(|_| cued.movie.is_none());
+                let runs_since = runs.and_then(|ride| ride.runs_since);
+                cued.left_at = film.map(|film| LeftAt { film, runs_since });
                 Act::Stage(ShowChange::Cue(cued, None))
             }
             Err(problem) => Act::Fail(problem),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::hall_settings::HallSettings;
-use super::show::ProvedShow;
+use super::show::{LeftAt, ProvedShow};
 use super::state_mirror::StateMirror;
 use crate::app::buttons::PadTable;
 use crate::app::film::SharedTable;
@@ -290,11 +290,14 @@ impl HallContext {
         self.cued.as_mut().map(|cued| cued.staged(&self.config, &self.settings)).transpose()
     }
 
+    /// True if others show the film that leads what is loaded: it says by itself where a show goes on.
+    pub(super) fn is_led_elsewhere(&self) -> bool {
+        self.cued.as_ref().is_some_and(|cued| cued.film.is_some() && cued.movie.is_none())
+    }
+
     /// The hall goes from one state to another: where the film is when the seats leave the cue is where a show may go on.
     pub(super) fn note_place(&mut self, from: State, to: State) {
-        // A film that others show says by itself where a show goes on.
-        let is_led = self.cued.as_ref().is_some_and(|cued| cued.film.is_some() && cued.movie.is_none());
-        if rides(from) && !rides(to) && !is_led && !self.mirror.cause.completes() {
+        if rides(from) && !rides(to) && !self.is_led_elsewhere() && !self.mirror.cause.completes() {
             self.left_at = Some(self.live.show());
         }
     }
@@ -304,7 +307,7 @@ impl HallContext {
         let left_at = self.left_at.take();
         if let Some(cued) = &mut self.cued {
             let end = cued.timeline.duration();
-            cued.left_at = left_at.filter(|film| (WORTH_IT..end).contains(film));
+            cued.left_at = left_at.filter(|film| (WORTH_IT..end).contains(film)).map(LeftAt::waits);
         }
     }
 
@@ -352,7 +355,7 @@ mod tests {
             hall.live.on_show(film);
             hall.note_place(State::Paused, State::Stopping);
             hall.keep_place();
-            assert_eq!(hall.cued.unwrap().left_at, kept.then_some(film));
+            assert_eq!(hall.cued.unwrap().left_at, kept.then_some(LeftAt::waits(film)));
         }
     }
 }

@@ -7,11 +7,12 @@ use super::act::{Act, Feature, SupervisorEvent};
 use super::coded::{RemedyCode, WarningCode};
 use super::hall::{HallContext, SetAside};
 use super::job::{Again, Job, JobResult};
+use crate::app::pair::{Ride, TookOver};
 use crate::control::{Coded, Command, Desired, Severity, Warning, Who};
 use crate::journal::{PlaylistPlace, stamp};
 use crate::log::{Line, Priority};
 use crate::settings::{LoadedShow, Out, Settings, seats_out};
-use crate::state::State;
+use crate::state::{Cause, State};
 use crate::time::ShowTime;
 
 /// How exactly it is known after a crash where a show was.
@@ -30,17 +31,20 @@ pub(super) struct Lasting {
     unsaid: bool,
     /// What was loaded before was so at another machine, whose files may be others.
     pub(super) is_taken_over: bool,
+    /// The show that was under way there, until it is loaded here and looked at whether it may go on.
+    pub(super) ride: Option<Ride>,
 }
 
 impl Lasting {
     /// After the start of a program, for which that came back, in words; of this machine, or of the one that it took over from.
-    pub(super) fn since_start(came_back: Option<String>, is_taken_over: bool) -> Self {
-        Self { came_back, unsaid: true, is_taken_over, ..Self::default() }
+    pub(super) fn since_start(came_back: Option<String>, took_over: Option<&TookOver>) -> Self {
+        let (is_taken_over, ride) = (took_over.is_some(), took_over.and_then(|it| it.ride));
+        Self { came_back, unsaid: true, is_taken_over, ride, ..Self::default() }
     }
 
     /// The same for another hall, which loads anew what was loaded.
     pub(super) fn go_over(&mut self) -> Self {
-        Self { loading: None, ready: None, is_taken_over: false, ..std::mem::take(self) }
+        Self { loading: None, ready: None, is_taken_over: false, ride: None, ..std::mem::take(self) }
     }
 
     /// All that is to last, the playlist being there.
@@ -127,9 +131,19 @@ impl Feature for Lasting {
             SupervisorEvent::Entered(_) if hall.may("load").is_ok() => {
                 out.extend(self.ready.take().map(|again| Act::Take(JobResult::Again(again))));
             }
+            // Whoever resumes it is not to wait for preflight then.
+            SupervisorEvent::Round(_) if is_taken_up(hall) && hall.job.is_none() => {
+                out.extend(self.ride.take().map(|_| Act::Start(Job::Preflight)));
+            }
             _ => {}
         }
     }
+}
+
+/// True if the show that the other machine led is loaded, and may go on once all is known.
+fn is_taken_up(hall: &HallContext) -> bool {
+    let mirror = &hall.mirror;
+    mirror.state == State::Recovering && mirror.cause == Cause::TookOver && hall.cued.is_some()
 }
 
 /// What is loaded; while seats are tested, what was before.
@@ -137,10 +151,10 @@ fn loaded(hall: &HallContext, playlist: Option<PlaylistPlace>) -> Option<LoadedS
     let cued = hall.aside.as_ref().map_or(hall.cued.as_ref(), |SetAside(before)| before.as_ref())?;
     let at = millis(hall.live.show());
     let film_ms = match hall.mirror.state {
-        _ if hall.aside.is_some() => cued.left_at.map(millis),
+        _ if hall.aside.is_some() => cued.left(hall.now).map(millis),
         State::Playing(_) => Some(at / KEPT_EVERY_MS * KEPT_EVERY_MS).filter(|ms| *ms > 0),
         State::Paused => Some(at).filter(|ms| *ms > 0),
-        _ => hall.left_at.or(cued.left_at).map(millis), // the seats may be on their way to rest
+        _ => hall.left_at.or_else(|| cued.left(hall.now)).map(millis), // the seats may be on their way to rest
     };
     Some(LoadedShow { cue: cued.id.clone(), sha256: cued.sha256.clone(), playlist, film_ms })
 }
@@ -171,7 +185,7 @@ mod tests {
     #[test]
     fn what_came_back_is_said_at_the_first_arm_after_a_start_and_not_again() {
         let hall = hall(State::Armed, "one");
-        let mut lasting = Lasting::since_start(Some("motion 60 %".to_owned()), false);
+        let mut lasting = Lasting::since_start(Some("motion 60 %".to_owned()), None);
         let asks = [Command::Pause, Command::Arm { seats_empty: false }, Command::Arm { seats_empty: true }];
         let said = asks
             .map(|ask| told(&mut lasting, &SupervisorEvent::Done(&desired(Surface::Http, ask)), &hall).len());

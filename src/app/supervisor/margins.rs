@@ -39,7 +39,9 @@ mod tests {
     #[test]
     fn a_loaded_cue_says_what_it_leaves_of_each_limit_and_where() {
         let config = (*Rig::armed().supervisor.hall.config).clone();
-        let margins = proved("ride", &config).status(crate::time::ShowTime::ZERO).margins;
+        let margins = proved("ride", &config)
+            .status(crate::time::ShowTime::ZERO, crate::time::MonoTime::from_nanos(0))
+            .margins;
         assert_eq!(margins.iter().map(|one| one.of).collect::<Vec<_>>(), MarginOf::ALL);
         assert!(margins.iter().all(|one| (0.0..=1.0).contains(&one.part) && one.axis > 0), "{margins:?}");
     }

@@ -208,7 +208,7 @@ impl Supervisor {
             reloading: carryover.reloading,
         };
         carryover.untold.into_iter().for_each(|note| supervisor.note(note));
-        carryover.took_over.into_iter().for_each(|note| supervisor.note_for(note, true));
+        carryover.took_over.into_iter().for_each(|it| supervisor.note_for(it.words, true));
         supervisor.hall.set_desk();
         if carryover.latched {
             supervisor.hall.desk.stop();

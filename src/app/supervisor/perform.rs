@@ -62,7 +62,7 @@ impl Supervisor {
             Act::Name(name) => self.procedures.first().name = Some(name),
             Act::Fail(problem) => return Err(problem),
             Act::CheckBelts => return belts::check(&self.hall),
-            Act::Go { who, surface } => self.let_go(who, surface)?,
+            Act::Go { by, who, surface } => self.let_go(by, who, surface)?,
             Act::ArmedFor(group) => self.features.starts.armed(group, &self.hall),
             Act::DropStart => {
                 let acts = self.features.starts.drop_given();
@@ -123,13 +123,13 @@ impl Supervisor {
     }
 
     /// Lets the show go. By itself none begins in a hall that closes.
-    fn let_go(&mut self, who: String, surface: Surface) -> Result<(), Problem> {
+    fn let_go(&mut self, by: Transition, who: String, surface: Surface) -> Result<(), Problem> {
         if surface == Surface::Schedule {
             self.hall.is_free()?;
         }
         let (counted, place) = (self.hall.count(), self.features.onward.place(&self.hall));
         let begun = Box::new(ShowBegun { who, surface, counted, place });
-        let go = Act::Tick(TickCommand::Request(Transition::Go));
+        let go = Act::Tick(TickCommand::Request(by));
         self.procedures.first().go_on_with(vec![go, Act::Begin(begun)]);
         Ok(())
     }

@@ -286,7 +286,7 @@ fn starting(start: Start) -> Vec<Act> {
     if start == Start::GoOn {
         acts.push(Act::Tick(TickCommand::Request(Transition::Arm)));
     }
-    acts.push(Act::Go { who: "the playlist".to_owned(), surface: Surface::Schedule });
+    acts.push(Act::Go { by: Transition::Go, who: "the playlist".to_owned(), surface: Surface::Schedule });
     acts
 }
 

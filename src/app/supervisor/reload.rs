@@ -9,6 +9,7 @@ use super::hall::HallContext;
 use super::hall_settings::HallSettings;
 use super::lasting::Lasting;
 use super::notes::NoteBoard;
+use crate::app::pair::TookOver;
 use crate::config::{self, Api, Config};
 use crate::control::{Asked, Code, Problem};
 use crate::rt::Desk;
@@ -31,7 +32,7 @@ pub(crate) struct Carryover {
     /// What happened between the halls, and was not said yet.
     pub(super) untold: Vec<String>,
     /// The same of a machine that led before.
-    pub(super) took_over: Option<String>,
+    pub(super) took_over: Option<TookOver>,
     /// Who asked for another configuration, and what came of it.
     pub(super) reloading: Option<(Asked, Result<(), Problem>)>,
 }
@@ -39,9 +40,9 @@ pub(crate) struct Carryover {
 impl Carryover {
     /// Of a program that has just started, and found that; of one that took over from another machine, with what to tell of that.
     #[must_use]
-    pub(crate) fn of(kept: Kept, took_over: Option<String>) -> Self {
+    pub(crate) fn of(kept: Kept, took_over: Option<TookOver>) -> Self {
         let came_back = kept.settings.as_ref().and_then(Settings::words);
-        let lasting = Lasting::since_start(came_back, took_over.is_some());
+        let lasting = Lasting::since_start(came_back, took_over.as_ref());
         Self { settings: kept.settings, lasting, untold: kept.said, took_over, ..Self::default() }
     }
 

@@ -6,7 +6,7 @@ use super::job::Job;
 use super::seat_test::SeatTest;
 use super::show::ProvedShow;
 use crate::control::{Code, Problem, Surface};
-use crate::state::State;
+use crate::state::{State, Transition};
 
 /// The test of now, or the last one.
 #[derive(Debug, Default)]
@@ -46,7 +46,7 @@ impl SeatTesting {
         Ok(vec![
             Act::Otherwise(vec![Act::EndTest("did not begin"), Act::Stage(ShowChange::Again)]),
             Act::Stage(ShowChange::Test(cued, only)),
-            Act::Go { who: "a test of the seats".to_owned(), surface: Surface::Socket },
+            Act::Go { by: Transition::Go, who: "a test of the seats".to_owned(), surface: Surface::Socket },
         ])
     }
 

@@ -16,7 +16,7 @@ use crate::library::{CueId, IdError, Library};
 use crate::playlist::EntryFilm;
 use crate::proof::{self, Digest, LinkPlay, Terms};
 use crate::rt::{FilmStart, Loaded};
-use crate::time::{Rate, ShowTime};
+use crate::time::{MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
 
 /// A film that is shown from here.
@@ -26,6 +26,26 @@ pub(super) struct Movie {
     pub(super) name: String,
     /// Where it is, or why it cannot be shown.
     pub(super) file: Result<PathBuf, String>,
+}
+
+/// Where the film was when a show was left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct LeftAt {
+    pub(super) film: ShowTime,
+    /// Since when it runs on from there, as nobody has stopped it; `None` where it waits.
+    pub(super) runs_since: Option<MonoTime>,
+}
+
+impl LeftAt {
+    /// A film that waits there.
+    pub(super) const fn waits(film: ShowTime) -> Self {
+        Self { film, runs_since: None }
+    }
+
+    /// Where it is by now.
+    pub(super) fn at(self, now: MonoTime) -> ShowTime {
+        self.film + self.runs_since.map_or(Duration::ZERO, |since| now.since(since))
+    }
 }
 
 /// A cue that fits the hall and keeps its limits at full level.
@@ -38,8 +58,8 @@ pub(super) struct ProvedShow {
     headroom: Headroom,
     /// Show time at which it begins.
     pub(super) start: ShowTime,
-    /// Where the film was when its last show ended before the cue did; `None` if there is nothing to go on from.
-    pub(super) left_at: Option<ShowTime>,
+    /// Where its last show ended before the cue did; `None` if there is nothing to go on from.
+    pub(super) left_at: Option<LeftAt>,
     /// How long the first move onto it takes, seconds.
     pub(super) join_s: f64,
     /// How long before its film the first frame leaves: as long as the seat that is led furthest ahead needs.
@@ -118,8 +138,13 @@ impl ProvedShow {
         })
     }
 
+    /// From where it can go on; `None` if there is nothing to go on from, or its film has run past its end since.
+    pub(super) fn left(&self, now: MonoTime) -> Option<ShowTime> {
+        self.left_at.map(|left| left.at(now)).filter(|film| *film < self.timeline.duration())
+    }
+
     /// As surfaces show it, the film being at `position`.
-    pub(super) fn status(&self, position: ShowTime) -> ShowStatus {
+    pub(super) fn status(&self, position: ShowTime, now: MonoTime) -> ShowStatus {
         ShowStatus {
             cue: self.id.clone(),
             title: self.title.clone(),
@@ -127,7 +152,7 @@ impl ProvedShow {
             length_s: self.timeline.duration().as_secs_f64(),
             position_s: position.as_secs_f64(),
             join_s: self.join_s,
-            resume_s: self.left_at.map(ShowTime::as_secs_f64),
+            resume_s: self.left(now).map(ShowTime::as_secs_f64),
             axes: self.timeline.axes(),
             effects: self.timeline.switch_names(),
             margins: self.margins.clone(),

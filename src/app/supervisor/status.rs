@@ -85,7 +85,7 @@ impl StatusParts<'_> {
             lapses_s: mirror.lapses(now),
             moving,
             job: hall.job.or_else(|| hall.aside.is_some().then_some("test")).map(str::to_owned),
-            show: hall.cued.as_ref().map(|cued| cued.status(position(cued))),
+            show: hall.cued.as_ref().map(|cued| cued.status(position(cued), now)),
             playlist: features.onward.list.as_ref().map(|list| list.status(&Zoned::now())),
             film: hall.film.as_ref().map(|table| film::status(&table.read(), hall)),
             osc: hall.osc.as_ref().map(|counts| counts.by_word()),
@@ -154,7 +154,7 @@ impl StatusParts<'_> {
     /// What a person does next; where a show was left in its midst, also how it goes on from there.
     fn next(&self) -> (String, Coded) {
         let next = self.hall.mirror.next;
-        let left = self.hall.cued.as_ref().and_then(|cued| cued.left_at);
+        let left = self.hall.cued.as_ref().and_then(|cued| cued.left(self.hall.now));
         let from = |code: NextCode, words: &str, film: ShowTime| {
             (
                 format!("{next}; {words} {film}, where it was left"),

@@ -34,7 +34,7 @@ use crate::net::Ports;
 use crate::observe::ControllerState;
 use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Row, StartOff, Ticket, line};
 use crate::settings::SettingsFile;
-use crate::state::{Event, Finding, Machine, State};
+use crate::state::{Event, Finding, LedBefore, Machine, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::RealTime;
 use crate::time::{Clock as _, MonoTime, Rate, TickGrid};
@@ -235,7 +235,7 @@ impl Rig {
         for cue in ["one", "two", "three"] {
             fs::write(rig.folder.path().join("cues").join(format!("{cue}.csv")), RIDE).unwrap();
         }
-        rig.tell(Event::Identified(Finding { homed: true, at_park: true, crashed: false }));
+        rig.tell(Event::Identified(Finding { homed: true, at_park: true, before: LedBefore::Ended }));
         rig.ask(Command::Load { cue: "one".to_owned() }).unwrap();
         rig.supervisor.features.readiness.preflighted = Some(super::preflighted::Preflighted::passing(2));
         rig.supervisor.procedures.add(Vec::new());

@@ -7,9 +7,11 @@ use std::thread::JoinHandle;
 use super::homing::Homing;
 use super::job::{Job, JobResult};
 use super::preflighted::Preflighted;
+use super::show::LeftAt;
 use super::testing::{Rig, row};
 use super::*;
 use crate::app::film::{FilmTable, SharedTable};
+use crate::app::pair::{Ride, TookOver};
 use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
 use crate::health::HealthState;
@@ -17,7 +19,7 @@ use crate::motion::Pulses;
 use crate::observe::Heard;
 use crate::rt::{News, Row};
 use crate::settings::Kept;
-use crate::state::{Event, Next, PlayMode, Trouble};
+use crate::state::{Event, Finding, LedBefore, Next, PlayMode, Transition, Trouble};
 use crate::time::ShowTime;
 use crate::wire::PerAxis;
 
@@ -156,8 +158,67 @@ fn from_before_a_cue_is_read_until_it_is_loaded_each_status_says_that_it_is_bein
     loads_without_a_gap(&mut next, "two");
 }
 
+/// A hall that took over from a machine whose show was at 1.5 s of `two`, which runs on since then or is paused.
+fn taken_over(runs_since: Option<MonoTime>) -> Rig {
+    let mut before = Rig::parked();
+    before.ask(Command::Load { cue: "two".to_owned() }).unwrap();
+    let cue = before.folder.path().join("cues/two.csv");
+    let mut rig = Rig::starting_in(|folder| {
+        std::fs::create_dir(folder.join("cues")).unwrap();
+        std::fs::copy(&cue, folder.join("cues/two.csv")).unwrap();
+        let mut settings = before.supervisor.settings();
+        settings.show.as_mut().unwrap().film_ms = Some(1_500);
+        let took_over = TookOver { words: "took over".to_owned(), ride: Some(Ride { runs_since }) };
+        Carryover::of(Kept { settings: Some(settings), said: Vec::new() }, Some(took_over))
+    });
+    rig.settle();
+    rig.tell(Event::Identified(Finding { homed: true, at_park: false, before: LedBefore::OnCue }));
+    rig.supervisor.features.lasting.ride = None; // nobody answers a preflight here
+    rig.supervisor.features.readiness.preflighted = Some(Preflighted::passing(2));
+    rig.supervisor.procedures.add(Vec::new());
+    rig.settle();
+    rig
+}
+
+#[test]
+fn a_show_that_was_taken_over_goes_on_by_resume_where_its_film_is_by_then_and_not_past_its_end() {
+    let second = MonoTime::from_nanos(1_000_000_000);
+    let ago = |seconds: u64| {
+        MonoTime::from_nanos(Monotonic.now().as_nanos().saturating_sub(seconds * second.as_nanos()))
+    };
+    let start = |rig: &Rig| rig.supervisor.hall.cued.as_ref().unwrap().start;
+    let mut paused = taken_over(None);
+    assert_eq!(paused.supervisor.status().next, "resume, or park");
+    paused.ask(Command::Resume).unwrap();
+    assert_eq!(
+        (paused.state(), start(&paused)),
+        (State::Playing(PlayMode::Joining), ShowTime::from_millis(1_500))
+    );
+
+    let since = ago(1);
+    let mut runs = taken_over(Some(since));
+    runs.ask(Command::Resume).unwrap();
+    let most = ShowTime::from_millis(1_500) + Monotonic.now().since(since);
+    assert!(start(&runs) >= ShowTime::from_millis(2_500) && start(&runs) <= most, "{:?}", start(&runs));
+
+    let mut over = taken_over(Some(ago(60)));
+    assert_eq!(over.supervisor.status().show.unwrap().resume_s, None);
+    let refused = over.ask(Command::Resume).unwrap_err();
+    assert!(refused.detail.contains("its film is over"), "{refused}");
+    assert_eq!(over.state(), State::Recovering);
+
+    // Another cue is none that was under way.
+    let mut other = taken_over(None);
+    std::fs::copy(other.folder.path().join("cues/two.csv"), other.folder.path().join("cues/one.csv"))
+        .unwrap();
+    other.ask(Command::Load { cue: "one".to_owned() }).unwrap();
+    assert_eq!(other.ask(Command::Resume).unwrap_err().code, Code::State);
+    assert_eq!(other.state(), State::Recovering);
+}
+
 #[test]
 fn what_another_machine_played_is_taken_over_by_its_content_and_another_file_of_that_name_is_not_loaded() {
+    let led = Monotonic.now();
     for is_same in [true, false] {
         let mut before = Rig::parked();
         before.ask(Command::Load { cue: "two".to_owned() }).unwrap();
@@ -170,12 +231,17 @@ fn what_another_machine_played_is_taken_over_by_its_content_and_another_file_of_
             before.supervisor.keep_settings();
             let mut settings = before.supervisor.settings();
             settings.show.as_mut().unwrap().film_ms = Some(2_345);
-            Carryover::of(Kept { settings: Some(settings), said: Vec::new() }, Some("took over".to_owned()))
+            let ride = Some(Ride { runs_since: Some(led) });
+            let took_over = TookOver { words: "took over".to_owned(), ride };
+            Carryover::of(Kept { settings: Some(settings), said: Vec::new() }, Some(took_over))
         });
         rig.settle();
         let loaded = rig.supervisor.hall.cued.as_ref();
         assert_eq!(loaded.is_some(), is_same);
-        assert_eq!(loaded.and_then(|cued| cued.left_at), is_same.then(|| ShowTime::from_millis(2_345)));
+        assert_eq!(
+            loaded.and_then(|cued| cued.left_at),
+            is_same.then_some(LeftAt { film: ShowTime::from_millis(2_345), runs_since: Some(led) })
+        );
         let notes: Vec<_> = rig.supervisor.notes.iter().map(String::as_str).collect();
         assert_eq!(notes[0], "took over");
         let says =
@@ -280,7 +346,7 @@ fn a_plain_go_after_a_stop_begins_at_the_beginning() {
 
 #[test]
 fn where_a_show_was_left_lasts_over_a_restart_unless_the_cue_is_another_by_then() {
-    for (change, left_at) in [("", Some(ShowTime::from_millis(2_500))), ("5000,0.6\n", None)] {
+    for (change, left_at) in [("", Some(LeftAt::waits(ShowTime::from_millis(2_500)))), ("5000,0.6\n", None)] {
         let before = stopped_in_its_midst();
         let ride = std::fs::read_to_string(before.folder.path().join("cues/one.csv")).unwrap();
         let mut rig = Rig::starting_in(|folder| {
@@ -471,7 +537,8 @@ fn what_is_asked_waits_for_what_was_asked_before_it_and_neither_holds_up_the_sta
 #[test]
 fn an_entry_that_is_about_to_start_by_itself_does_not_in_a_hall_that_begins_to_close() {
     let mut rig = Rig::armed();
-    let go = || vec![Act::Go { who: "the playlist".to_owned(), surface: Surface::Schedule }];
+    let go =
+        || vec![Act::Go { by: Transition::Go, who: "the playlist".to_owned(), surface: Surface::Schedule }];
     rig.supervisor.hall.close();
     rig.does(go());
     assert_eq!(rig.state(), State::Armed);

@@ -12,7 +12,7 @@ use crate::health::{Continuity, Groups, HealthInput, HealthTable, Identity, Noti
 use crate::motion::Pulses;
 use crate::observe;
 use crate::state::rules::{HallRules, Step, Turn};
-use crate::state::{Demand, Event, Finding, Latch, Machine, Readiness, Transition, Trouble};
+use crate::state::{Demand, Event, Finding, Latch, LedBefore, Machine, Readiness, Transition, Trouble};
 use crate::time::MonoTime;
 use crate::tracker::{Books, Reply, Tracker};
 use crate::wire::{FrameNo, ReplyCode};
@@ -182,8 +182,8 @@ fn event(script: &mut Script<'_>) -> Option<Event> {
     Some(match script.below(22)? {
         plain @ ..11 => PLAIN[plain],
         11 | 12 => {
-            let [homed, at_park, crashed] = [script.flag()?, script.flag()?, script.flag()?];
-            Event::Identified(Finding { homed, at_park, crashed })
+            let before = script.one_of(&[LedBefore::Ended, LedBefore::Crashed, LedBefore::OnCue])?;
+            Event::Identified(Finding { homed: script.flag()?, at_park: script.flag()?, before })
         }
         13 => Event::Readiness(script.one_of(&READY)?),
         14 => Event::Astray(script.flag()?),

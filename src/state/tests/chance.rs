@@ -21,7 +21,8 @@ fn event() -> impl Strategy<Value = Event> {
     prop_oneof![
         8 => select(vec![PositionsRead, Homed, JoinBegun, Joined, Late, CueEnded, AtRest, Parked]),
         4 => select(vec![AllReleased, Event::Readiness(Readiness::Ready)]),
-        2 => any::<[bool; 3]>().prop_map(|[homed, at_park, crashed]| Identified(Finding { homed, at_park, crashed })),
+        2 => (any::<[bool; 2]>(), select(vec![LedBefore::Ended, LedBefore::Crashed, LedBefore::OnCue]))
+            .prop_map(|([homed, at_park], before)| Identified(Finding { homed, at_park, before })),
         1 => Just(Identified(PARKED)),
         1 => any::<bool>().prop_map(Event::Astray),
         1 => (0..3_usize).prop_map(Rebooted),

@@ -52,9 +52,10 @@ const fn is_tried(event: Event) {
 fn events() -> Vec<Event> {
     use Readiness::{NoCue, NotPreflighted, NotProved, Ready};
     let both = [false, true];
-    let findings = (0..8_u8).map(|bits| {
-        let [homed, at_park, crashed] = [0, 1, 2].map(|bit| bits >> bit & 1 == 1);
-        Event::Identified(Finding { homed, at_park, crashed })
+    let findings = (0..12_u8).map(|number| {
+        let before = [LedBefore::Ended, LedBefore::Crashed, LedBefore::OnCue][usize::from(number >> 2)];
+        let [homed, at_park] = [0, 1].map(|bit| number >> bit & 1 == 1);
+        Event::Identified(Finding { homed, at_park, before })
     });
     let holds = FilmState::ALL.map(HoldCause::Film).into_iter();
     let holds = holds.chain([HoldCause::Apart, HoldCause::Unstable, HoldCause::Asks]);
@@ -186,6 +187,12 @@ fn may_lead_up(hall: &Machine, request: Transition, to: State) -> bool {
     match (hall.state, request) {
         (State::Armed, Transition::Go) => to == State::Playing(PlayMode::Joining),
         (State::Paused, Transition::Resume) => to == State::Playing(PlayMode::Joining),
+        // Of one show alone, and only where all is known that a motion begins from.
+        (State::Recovering, Transition::Resume) => {
+            let Facts { identified, homed, measured, readiness, .. } = hall.facts;
+            let is_known = identified && homed && measured && readiness == Readiness::Ready;
+            to == State::Playing(PlayMode::Joining) && hall.cause == Cause::TookOver && is_known
+        }
         (State::Recovering | State::Parked, Transition::Park) => to == State::Parking,
         (State::Recovering | State::Parked, Transition::Home) => to == State::Homing,
         (State::Parked, Transition::Arm) => to == State::Armed && hall.facts.homed,

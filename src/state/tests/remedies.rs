@@ -79,7 +79,7 @@ fn whatever_goes_wrong_wherever_what_is_named_next_can_be_done_and_leads_to_a_sh
         Event::Policy(Demand::Park, 0),
         Event::Slept(Duration::from_secs(3)),
         Event::Slept(Duration::from_mins(6)),
-        Event::Identified(Finding { homed: false, at_park: false, crashed: true }),
+        Event::Identified(Finding { homed: false, at_park: false, before: LedBefore::Crashed }),
     ]);
     for event in events {
         for state in State::ALL {

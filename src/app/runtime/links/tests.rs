@@ -25,7 +25,7 @@ use crate::net::{Delivery, DrainGrid, Network, Origin};
 use crate::rt::{Command, Ticked};
 use crate::sim::serial::{Bus, LineFaults, SerialLine};
 use crate::sim::silvermax::{Action, SilverBus, Unit, UnitSetup};
-use crate::state::{Event, Finding, Readiness, State, Transition};
+use crate::state::{Event, Finding, LedBefore, Readiness, State, Transition};
 use crate::time::{Clock, MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
 use crate::wire::Timing;
@@ -256,7 +256,7 @@ impl<B: Bus> Hall<'_, '_, B> {
     fn go(&mut self, show: StagedShow) {
         self.run(1.0, |hall| hall.runtime.live.want(NOW.get()));
         assert!(self.reading().is_some_and(|reading| reading.rests), "{:?}", self.reading());
-        let found = Finding { homed: true, at_park: true, crashed: false };
+        let found = Finding { homed: true, at_park: true, before: LedBefore::Ended };
         self.ask([
             Command::Event(Event::Identified(found)),
             Command::Event(Event::Readiness(Readiness::Ready)),

@@ -24,6 +24,8 @@ const MAY = {
 };
 
 const may = (what, state) => MAY[what].includes(state);
+/** A show that the other show machine led goes on from `recovering`, once all is known. */
+const mayResume = (state, status) => may('resume', state) || (state === 'recovering' && status.next_coded?.code === 'resume');
 const post = (what) => change('POST', `show/${what}`);
 
 let lastGo = -Infinity;
@@ -85,7 +87,8 @@ function letGo(button, what, request) {
 /** Shows what may be pressed now. */
 export function showTransport(status, link) {
   const state = link === 'live' ? status.state : null;
-  for (const what of ['pause', 'resume', 'park', 'go']) setProperty(byId(what), 'disabled', !may(what, state));
+  for (const what of ['pause', 'park', 'go']) setProperty(byId(what), 'disabled', !may(what, state));
+  setProperty(byId('resume'), 'disabled', !mayResume(state, status));
   showArm(state, status);
   showGo(state);
   showGoFrom(state, status);

@@ -98,6 +98,7 @@ export default {
   "cause.slept": "der Rechner schlief, oder das Programm war angehalten, für mehr als 2 s",
   "cause.started": "das Programm ist gestartet",
   "cause.stopped-homing": "durch Bedienung gestoppt; Controller im Netz beenden ihre Referenzfahrt selbst, nur der festverdrahtete Not-Halt kann sie abbrechen",
+  "cause.took-over": "die andere Show-Maschine ist ausgefallen, während ihre Show lief",
   "clock.label": "Uhrzeit",
   "close": "Schließen",
   "controls.label": "Show",

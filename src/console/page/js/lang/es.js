@@ -98,6 +98,7 @@ export default {
   "cause.slept": "la máquina durmió, o el programa estuvo suspendido, más de 2 s",
   "cause.started": "el programa ha arrancado",
   "cause.stopped-homing": "detenido por el operador; los controladores de la red terminan solos su búsqueda de origen, que solo la parada de emergencia cableada puede interrumpir",
+  "cause.took-over": "la otra máquina de show ha caído con su show en marcha",
   "clock.label": "Hora",
   "close": "Cerrar",
   "controls.label": "Show",

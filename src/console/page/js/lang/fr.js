@@ -98,6 +98,7 @@ export default {
   "cause.slept": "la machine était en veille, ou le programme suspendu, pendant plus de 2 s",
   "cause.started": "le programme a démarré",
   "cause.stopped-homing": "arrêté par l’opérateur ; les contrôleurs du réseau terminent seuls leur prise d’origine, que seul l’arrêt d’urgence câblé peut interrompre",
+  "cause.took-over": "l’autre machine de show est tombée en plein show",
   "clock.label": "Heure",
   "close": "Fermer",
   "controls.label": "Show",

@@ -98,6 +98,7 @@ export default {
   "cause.slept": "マシンのスリープまたはプログラムの中断が 2 秒を超えました",
   "cause.started": "プログラムが起動しました",
   "cause.stopped-homing": "操作者が停止。原点復帰はネットワーク上のコントローラーが最後まで行い、止められるのはハードワイヤードの非常停止だけです",
+  "cause.took-over": "もう一台のショーマシンがショーの途中で停止しました",
   "clock.label": "現在時刻",
   "close": "閉じる",
   "controls.label": "ショー",

@@ -98,6 +98,7 @@ export default {
   "cause.slept": "计算机休眠或程序被挂起超过 2 s",
   "cause.started": "程序已启动",
   "cause.stopped-homing": "由操作员停止；网络上的控制器会自行完成回零，只有硬接线急停能中断",
+  "cause.took-over": "另一台放映主机在放映途中失效",
   "clock.label": "当前时间",
   "close": "关闭",
   "controls.label": "演出",
