@@ -29,20 +29,9 @@ pub(crate) struct PairMachine {
 }
 
 /// Reads the table of a hall that may have serial links, or be in a fleet.
-pub(super) fn pair(
-    entry: Entry<'_>,
-    has_links: bool,
-    has_fleet: bool,
-    faults: &mut Faults<'_>,
-) -> Option<Pair> {
+pub(super) fn pair(entry: Entry<'_>, has_links: bool, faults: &mut Faults<'_>) -> Option<Pair> {
     if has_links {
         entry.fault(faults, "serial lines end at one machine; a hall with [link] has no second one");
-    }
-    if has_fleet {
-        entry.fault(
-            faults,
-            "this version has no second machine in a hall of a fleet; leave out one of the two",
-        );
     }
     let at = entry.at;
     let mut section = Section::new("[pair]", at, entry.table(faults)?, faults);
@@ -144,7 +133,6 @@ mod tests {
             (format!("{key}{A}{}", B.replace("\"B\"", "\"B.1\"")), "is not a name here"),
             (format!("{key}takeover = \"join\"\n{A}{B}"), "leaves it to a person to go on"),
             (format!("{key}first = 1\n{A}{B}"), "unknown key in [pair]"),
-            (format!("{key}{A}{B}[fleet]\nname = \"berlin.h1\"\n"), "no second machine in a hall of a fleet"),
         ] {
             let faults = faults_of(&format!("[pair]\n{text}"));
             assert!(faults.iter().any(|fault| fault.contains(says)), "{text}: {faults:?}");

@@ -116,7 +116,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let buttons = buttons_at.map_or_else(Vec::new, |entry| buttons(entry, faults));
     let notify = notify_at.and_then(|entry| notify(entry, faults));
     let fleet = fleet_at.and_then(|entry| fleet(entry, faults));
-    let pair = pair_at.and_then(|entry| pair(entry, !links.is_empty(), fleet.is_some(), faults));
+    let pair = pair_at.and_then(|entry| pair(entry, !links.is_empty(), faults));
     let film = film_at.and_then(|entry| film(entry, faults));
     // The player tells where its film is, whoever else does.
     let of_player = film.is_some().then(FilmSync::default);

@@ -55,6 +55,18 @@ pub(crate) fn log_of(hall: &str) -> String {
     format!("kc.log.{hall}")
 }
 
+/// The same of one of its two show machines, each of which has a journal of its own.
+pub(crate) fn log_of_machine(hall: &str, machine: &str) -> String {
+    log_of(&format!("{hall}.{machine}"))
+}
+
+/// Whose log a subject is, `SITE.HALL`; `None` if it is none.
+pub(crate) fn hall_of_log(subject: &str) -> Option<&str> {
+    let hall = subject.strip_prefix("kc.log.")?;
+    let end = hall.match_indices('.').nth(1).map_or(hall.len(), |(end, _)| end);
+    Some(&hall[..end])
+}
+
 /// Where the lease of a hall with two show machines is kept.
 pub(crate) fn lease_of(hall: &str) -> String {
     format!("kc.lease.{hall}")
@@ -68,4 +80,16 @@ pub(crate) fn lease_stream(hall: &str) -> String {
 /// Where a part of a file is kept; `sha256` is that of the whole file, `n` counts from 0; both may be wildcards.
 pub(crate) fn chunk_of(sha256: &str, n: &str) -> String {
     format!("kc.cue.{sha256}.{n}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_logs_of_both_machines_of_a_hall_are_told_to_be_that_halls() {
+        let own = [log_of("berlin.h1"), log_of_machine("berlin.h1", "A"), log_of_machine("berlin.h1", "B")];
+        assert_eq!(own.each_ref().map(|subject| hall_of_log(subject)), [Some("berlin.h1"); 3]);
+        assert_eq!([hall_of_log("kc.status.berlin.h1"), hall_of_log("kc.log")], [None; 2]);
+    }
 }

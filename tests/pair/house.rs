@@ -76,9 +76,10 @@ impl House {
         make_fleet(&fleet);
         let mut engine = Engine { machine: engine, folder: fleet, process: None };
         engine.start();
+        let table = fs::read_to_string(engine.folder.join("h1/kinocue-fleet.toml")).unwrap();
         let shows = [(a, "a"), (b, "b")].map(|(machine, name)| {
             let folder = dir.path().join(name);
-            furnish(&folder);
+            furnish(&folder, &table);
             Show { machine, folder, serving: None, link: None, mover: None }
         });
         let mut house = Self { dir, shows, seats, sims: Vec::new(), engine, _alone: alone };
@@ -141,6 +142,26 @@ impl House {
         Guarded::start_command(&mut command)
     }
 
+    /// A command at the desk of the fleet.
+    pub(crate) fn desk(&self, args: &[&str]) -> Run {
+        let mut command = self.engine.machine.command(env!("CARGO_BIN_EXE_kinocue"));
+        command.arg("fleet").args(args).arg("--desk").arg(self.engine.folder.join("office/desk.toml"));
+        command.stdin(Stdio::null()).output().unwrap().into()
+    }
+
+    /// How the desk sees the hall once that is so.
+    #[track_caller]
+    pub(crate) fn seen(&self, wanted: impl Fn(&Value) -> bool) -> Value {
+        for _ in 0..100 {
+            let run = self.desk(&["status", "--json"]);
+            let all: Value = serde_json::from_str(&run.stdout).unwrap_or_else(|_| panic!("{run:?}"));
+            if let Some(hall) = all.as_array().and_then(|all| all.first()).filter(|hall| wanted(hall)) {
+                return hall.clone();
+            }
+        }
+        panic!("the desk does not see that: {:?}", self.desk(&["status"]));
+    }
+
     pub(crate) fn kill_engine(&mut self) {
         drop(self.engine.process.take());
     }
@@ -201,7 +222,7 @@ fn make_fleet(folder: &Path) {
         openssl req -newkey ed25519 -nodes -subj /CN=10.3.0.9 -keyout engine.key -out engine.csr\n\
         echo subjectAltName=IP:10.3.0.9 >ext\n\
         openssl x509 -req -days 9 -in engine.csr -CA fleet-ca.pem -CAkey ca.key -CAcreateserial -extfile ext -out engine.pem\n\
-        cp fleet-ca.pem h1/\n";
+        cp fleet-ca.pem h1/\ncp fleet-ca.pem office/\n";
     let made = Command::new("sh").args(["-ec", script]).current_dir(folder).output().unwrap();
     assert!(made.status.success(), "{made:?}");
     let conf = folder.join("nats-server.conf");
@@ -213,8 +234,8 @@ fn make_fleet(folder: &Path) {
     fs::write(conf, conf_text).unwrap();
 }
 
-/// What both machines have: the configuration, the key and the cue.
-fn furnish(folder: &Path) {
+/// What both machines have: the configuration, with the lines of its fleet, the key and the cue.
+fn furnish(folder: &Path, fleet: &str) {
     fs::create_dir_all(folder.join("state/cues")).unwrap();
     let named = |line: &&str| !["library", "dir", "[log]"].iter().any(|key| line.starts_with(key));
     let mut config: String = serving::hall(folder)
@@ -227,6 +248,7 @@ fn furnish(folder: &Path) {
         [pair]\nkey = \"pair.key\"\n\
         [[pair.machine]]\nname = \"A\"\naddresses = [\"10.1.0.1:8430\"]\n\
         [[pair.machine]]\nname = \"B\"\naddresses = [\"10.1.0.2:8430\"]\n";
+    config += fleet;
     fs::write(folder.join("hall.toml"), config).unwrap();
     let key = folder.join("pair.key");
     fs::write(&key, KEY).unwrap();

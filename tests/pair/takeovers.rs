@@ -235,6 +235,47 @@ fn a_machine_that_loses_both_the_other_one_and_the_engine_brakes_and_the_other_o
 }
 
 #[test]
+fn a_desk_sees_stops_and_reports_the_hall_whichever_machine_leads_it() {
+    let Some(mut house) = House::playing() else { return };
+    house.seen(|hall| hall["status"]["state"] == "playing");
+    let stops = |house: &House| {
+        let run = house.desk(&["stop"]);
+        assert_eq!(run.code, Some(0), "the machine that stands by says nothing: {run:?}");
+    };
+    stops(&house);
+    house.shows[0].comes_to("stopped");
+    for words in [&["clear"][..], &["park"]] {
+        house.shows[0].wait(|status| status["state"] == "stopped" || status["next"] == "park, or home");
+        house.shows[0].done(words);
+    }
+    house.shows[0].comes_to("parked");
+    for words in [&["arm"][..], &["go"]] {
+        house.shows[0].done(words);
+    }
+    house.shows[0].comes_to("playing");
+    house.shows[0].kill();
+    second_leads(&house);
+    house.seen(|hall| hall["status"]["state"] == "recovering");
+    house.shows[1].done(&["resume"]);
+    house.shows[1].comes_to("playing");
+    stops(&house);
+    house.shows[1].comes_to("stopped");
+    // Both tell their journals, each as a chain of its own, of which nothing is missing.
+    let shows = |house: &House| {
+        let run = house.desk(&["report", "--json"]);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        serde_json::from_str::<serde_json::Value>(&run.stdout).unwrap()["berlin.h1"].clone()
+    };
+    let is_all = |told: &serde_json::Value| told["totals"]["shows"] == 3 && told["totals"]["running"] == 0;
+    let told = (0..100).map(|_| shows(&house)).find(is_all).expect("they come");
+    let totals = [&told["totals"]["interrupted"], &told["totals"]["stopped"]];
+    assert_eq!(totals, [&serde_json::Value::from(1), &2.into()], "{told:#}");
+    house.shows[1].done(&["clear"]);
+    house.shows[1].wait(|status| status["next"] == "park, or home");
+    parks_and_ends(house);
+}
+
+#[test]
 fn with_either_of_them_away_the_show_goes_on_and_what_is_away_is_told() {
     let Some(mut house) = House::playing() else { return };
     let goes_on = |house: &House, says: &str| {

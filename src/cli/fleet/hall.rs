@@ -1,5 +1,6 @@
 //! A hall as its link reaches it, and the client by which it reaches the engine.
 
+use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -27,6 +28,22 @@ pub(super) struct Link {
 }
 
 impl Link {
+    /// The name of this machine while it leads a hall that has two; `None` else. The service says so in a file beside its socket.
+    pub(super) fn leads_as(&self) -> Option<String> {
+        let name = fs::read_to_string(self.socket.with_file_name("lead")).ok()?;
+        Some(name.trim().to_owned())
+    }
+
+    /// True if the hall has another show machine, whose link hears the same: only who leads answers for the hall.
+    pub(super) fn is_of_two(&self) -> bool {
+        self.socket.with_file_name("pair.sock").exists()
+    }
+
+    /// True while the other machine leads, as far as is known here.
+    pub(super) fn stands_by(&self) -> bool {
+        self.is_of_two() && self.leads_as().is_none()
+    }
+
     /// True if what is told now goes out now: what is told meanwhile would come late, when it is no longer so.
     pub(super) fn is_connected(&self) -> bool {
         self.client.connection_state() == State::Connected

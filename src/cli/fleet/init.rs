@@ -162,7 +162,7 @@ fn engine_conf(plan: &Plan<'_>, desk: &KeyPair, halls: &[(&String, KeyPair)]) ->
         let member = format!("{}.{hall}", plan.site);
         let mut rights = of_hall(plan.site, &member);
         if plan.pairs.contains(hall) {
-            rights.publish.extend(of_lease(&member));
+            rights.publish.extend(of_pair(&member));
         }
         user(&mut text, &member, &pair.public_key(), &rights, true);
     }
@@ -222,11 +222,14 @@ fn of_hall(site: &str, member: &str) -> Rights {
 
 /// What a hall of two show machines may beside that. It makes the stream of its lease, and the engine lets whoever makes a stream say of which
 /// subjects: such a key could have the engine keep what others are asked, so none has it without need.
-fn of_lease(member: &str) -> Vec<String> {
+fn of_pair(member: &str) -> Vec<String> {
     let stream = fleet::lease_stream(member);
     let asks =
         ["INFO", "CREATE", "MSG.GET"].into_iter().flat_map(|what| api(&format!("STREAM.{what}.{stream}")));
-    asks.chain([fleet::lease_of(member)]).collect()
+    // Each machine tells its own journal.
+    let log = fleet::log_of_machine(member, "*");
+    let last = api(&format!("DIRECT.GET.{LOG}.{log}"));
+    asks.chain([fleet::lease_of(member), log]).chain(last).collect()
 }
 
 fn user(text: &mut String, name: &str, public: &str, rights: &Rights, answers: bool) {

@@ -108,7 +108,7 @@ impl Link {
             let mut status: BriefStatus = match self.look_up("/api/v1/fleet/status").await {
                 Ok(status) => status,
                 Err(why) => {
-                    trouble.tell("the hall", &why);
+                    self.tell_trouble(&mut trouble, "the hall", &why);
                     continue;
                 }
             };
@@ -179,6 +179,7 @@ impl Link {
                 let reply = match timeout(STOPPED, stop(&link.socket.with_file_name("fleet-stop.sock"))).await
                 {
                     Ok(Ok(())) => (200, json!({ "stopping": true })),
+                    _ if link.is_of_two() => return,
                     Ok(Err(error)) => away(&anyhow!(error)),
                     Err(_) => away(&anyhow!("the hall did not answer within {} s", STOPPED.as_secs())),
                 };
@@ -206,8 +207,11 @@ impl Link {
             let link = Arc::clone(self);
             tokio::spawn(async move {
                 let _place = place;
-                let reply = link.carry(&message).await.unwrap_or_else(|why| away(&why));
-                link.answer(message, reply).await;
+                match link.carry(&message).await {
+                    Ok(reply) => link.answer(message, reply).await,
+                    Err(_) if link.is_of_two() => {}
+                    Err(why) => link.answer(message, away(&why)).await,
+                }
             });
         }
     }
@@ -242,7 +246,7 @@ impl Link {
                     sleep(AGAIN).await;
                 }
                 Err(why) => {
-                    trouble.tell("the log", &why);
+                    self.tell_trouble(&mut trouble, "the log", &why);
                     sleep(AGAIN).await;
                 }
             }
@@ -257,7 +261,7 @@ impl Link {
             let more = wishes.step().await;
             match &more {
                 Ok(_) => trouble.over("cues"),
-                Err(why) => trouble.tell("cues", why),
+                Err(why) => self.tell_trouble(&mut trouble, "cues", why),
             }
             if !more.unwrap_or(false) {
                 sleep(AGAIN).await;
@@ -285,8 +289,15 @@ impl Link {
             };
             match told {
                 Ok(()) => trouble.over("the time server"),
-                Err(why) => trouble.tell("the time server", &why),
+                Err(why) => self.tell_trouble(&mut trouble, "the time server", &why),
             }
+        }
+    }
+
+    /// Tells what goes wrong with a hall that is served here.
+    fn tell_trouble(&self, trouble: &mut Trouble, what: &str, why: &anyhow::Error) {
+        if !self.stands_by() {
+            trouble.tell(what, why);
         }
     }
 

@@ -49,7 +49,13 @@ impl<'l> LogTeller<'l> {
             return Ok(false);
         }
         let connects = self.link.connects();
-        if mem::replace(&mut self.connects, connects) != connects {
+        let hall = &self.link.hall;
+        let subject = self
+            .link
+            .leads_as()
+            .map_or_else(|| fleet::log_of(hall), |machine| fleet::log_of_machine(hall, &machine));
+        let is_other = mem::replace(&mut self.subject, subject) != self.subject;
+        if mem::replace(&mut self.connects, connects) != connects || is_other {
             self.forget();
         }
         let told = self.tell_next().await;

@@ -48,9 +48,10 @@ pub(super) struct Args {
 #[derive(Default)]
 struct ToldByHall {
     records: Vec<LogRecord>,
-    /// Lines of its journal that these are.
-    lines: BTreeSet<(String, u64)>,
-    last: Option<u64>,
+    /// Lines that these are: of which file, at which place, and what they say. The journals of two machines have files of the same names.
+    lines: BTreeSet<(String, u64, String)>,
+    /// The last record of each journal, by its subject.
+    last: BTreeMap<String, u64>,
     /// Records that are not there, in words.
     missing: Vec<String>,
 }
@@ -94,7 +95,7 @@ async fn read(client: &Client, day: Date) -> Result<BTreeMap<String, ToldByHall>
     let config = Config {
         deliver_policy: DeliverPolicy::ByStartTime { start_time },
         ack_policy: AckPolicy::None,
-        filter_subject: fleet::log_of("*.*"),
+        filter_subject: fleet::log_of(">"),
         ..Config::default()
     };
     let told = "the engine does not tell what it keeps of shows";
@@ -115,8 +116,8 @@ async fn read(client: &Client, day: Date) -> Result<BTreeMap<String, ToldByHall>
                 .context(told)
                 .or_exit(Exit::Unavailable)?
                 .pending;
-            if let Some(hall) = message.subject.strip_prefix("kc.log.") {
-                all.entry(hall.to_owned()).or_default().take(&message.payload);
+            if let Some(hall) = fleet::hall_of_log(&message.subject) {
+                all.entry(hall.to_owned()).or_default().take(&message.subject, &message.payload);
             }
         }
         if count == 0 {
@@ -129,19 +130,19 @@ async fn read(client: &Client, day: Date) -> Result<BTreeMap<String, ToldByHall>
 }
 
 impl ToldByHall {
-    fn take(&mut self, payload: &[u8]) {
+    fn take(&mut self, subject: &str, payload: &[u8]) {
         let Ok(record) = serde_json::from_slice::<LogRecord>(payload) else {
             self.missing
                 .push("a record is none of ours; the hall has told its journal again behind it".to_owned());
-            self.last = None;
+            self.last.remove(subject);
             return;
         };
         let n = record.n;
-        if let Some(last) = self.last.filter(|last| n != last + 1) {
+        if let Some(last) = self.last.insert(subject.to_owned(), n).filter(|last| n != last + 1) {
             self.missing.push(format!("record {n} follows record {last}: what is between is missing"));
         }
-        self.last = Some(n);
-        if self.lines.insert((record.part.file.clone(), record.part.line)) {
+        let line = (record.part.file.clone(), record.part.line, record.part.record.to_string());
+        if self.lines.insert(line) {
             self.records.push(record);
         }
     }
