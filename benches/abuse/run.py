@@ -32,7 +32,7 @@ class Hall:
 
     def __init__(self, program, folder, count, rate, port, disk):
         self.program, self.folder, self.port = program, folder, port
-        self.socket = folder / "control.sock"
+        self.socket, self.started = folder / "control.sock", []
         self.write(count, rate, disk)
         sim = ["sim", "--safe", "--count", count, "--axes", 3, "--listen", f"127.0.0.1:{port + 1}", "--host-port", port]
         self.sim = self.start(sim, "sim.log", preexec_fn=first_in_line)
@@ -47,7 +47,7 @@ class Hall:
         rows = (f"{100 * n},{curve(n, 0)},{curve(n, 1)},{curve(n, 2)}\n" for n in range(24_000))
         (disk / "cues" / "waves.csv").write_text("time_ms,a1,a2,a3\n" + "".join(rows))
         controllers = (
-            f'[[controller]]\nname = "c{n}"\nrow = "{chr(65 + n // 8)}"\nseat = "bench3"\n'
+            f'[[controller]]\nname = "c{n}"\nrow = "{row_name(n)}"\nseat = "bench3"\n'
             f'address = "127.0.0.1:{self.port + 1 + n}"\n'
             for n in range(count)
         )
@@ -62,13 +62,18 @@ class Hall:
     def start(self, arguments, log, **more):
         command = [self.program, *map(str, arguments)]
         with (self.folder / log).open("w") as output:
-            return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, **more)
+            self.started.append(subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, **more))
+            return self.started[-1]
 
     def until(self, what, true, seconds=30.0):
         end = time.monotonic() + seconds
         while not true():
             if time.monotonic() > end:
-                sys.exit(f"no {what} within {seconds:.0f} s: {(self.folder / 'serve.log').read_text()[-2000:]}")
+                logs = [self.folder / "serve.log", self.folder / "sim.log"]
+                said = "".join(log.read_text()[-2000:] for log in logs if log.exists())
+                for process in self.started:
+                    process.kill()
+                sys.exit(f"no {what} within {seconds:.0f} s: {said}")
             time.sleep(0.05)
 
     def ask(self, *words):
@@ -128,6 +133,11 @@ class Hall:
                 process.kill()
                 codes.append(process.wait())
         return codes[0]
+
+
+def row_name(n):
+    """Of the row of that controller, eight to a row: A to Z, then R26 and so on."""
+    return chr(65 + n // 8) if n < 208 else f"R{n // 8}"
 
 
 def first_in_line():

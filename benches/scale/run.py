@@ -78,8 +78,9 @@ def one(program, count, rate, seconds, port):
     with tempfile.TemporaryDirectory(prefix="kinocue-scale.") as name:
         folder = pathlib.Path(name)
         folder.chmod(0o755)
-        hall = Hall(program, folder, count, rate, port, folder)
+        hall = None
         try:
+            hall = Hall(program, folder, count, rate, port, folder)
             lines = (folder / "serve.log").read_text().splitlines()
             crowded = next((line for line in lines if "ticks may be missed" in line), "")
             hall.play()
@@ -87,7 +88,7 @@ def one(program, count, rate, seconds, port):
             told(count, rate, measured(hall, seconds), crowded.split(": ", 1)[-1].replace("|", "/"))
         except SystemExit as why:
             print(f"| {count} x {rate} | {str(why).splitlines()[0][:300]} |", flush=True)
-        finally:
+        if hall:
             with contextlib.suppress(SystemExit):
                 hall.ask("stop")
             hall.end()

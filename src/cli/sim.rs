@@ -86,7 +86,7 @@ pub(super) struct Args {
     listen: SocketAddrV4,
 
     /// Number of controllers, at consecutive ports.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000), conflicts_with = "tty")]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=4000), conflicts_with = "tty")]
     count: u16,
 
     /// Axes of each controller (PA02), 1 to 12.

@@ -10,6 +10,7 @@ mod error;
 mod lead;
 mod network;
 mod open;
+mod ready;
 mod recv;
 mod route;
 mod schedule;
@@ -25,6 +26,7 @@ use std::sync::atomic::AtomicU64;
 use socket2::Socket;
 
 use crate::time::MonoTime;
+use ready::Ready;
 
 pub(crate) use cost::SendCost;
 pub(crate) use error::NetError;
@@ -44,6 +46,8 @@ pub struct Ports {
     /// One for each network that is sent to as a whole.
     broadcasts: Vec<Lane>,
     stray: Socket,
+    /// Which of the lanes and the strangers' socket have something.
+    ready: Ready,
     /// Nothing that came before this can be read.
     quiet: MonoTime,
 }
@@ -106,6 +110,6 @@ impl Ports {
     pub fn split(self) -> (Sender, Receiver) {
         let lanes: Arc<[Lane]> = self.lanes.into();
         let sender = Sender::new(Arc::clone(&lanes), self.broadcasts.into());
-        (sender, Receiver::new(lanes, self.stray, self.quiet))
+        (sender, Receiver::new(lanes, self.stray, self.ready, self.quiet))
     }
 }

@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicU64;
 
 use socket2::{Domain, Protocol, Socket, Type};
 
+use super::ready::Ready;
 use super::way::way;
 use super::{Lane, NetError, Ports, Whole};
 use crate::sys::batch::{Batch, stamp_arrivals};
@@ -44,7 +45,8 @@ pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4], wholes: &[Whole])
     for socket in lanes.iter().map(|lane| &lane.socket).chain([&stray]) {
         quiet(&mut batch, socket);
     }
-    Ok(Ports { local, lanes, broadcasts, stray, quiet: quiet_from })
+    let ready = Ready::of(lanes.iter().map(|lane| &lane.socket).chain([&stray])).map_err(at_bind)?;
+    Ok(Ports { local, lanes, broadcasts, stray, ready, quiet: quiet_from })
 }
 
 fn check(peers: &[SocketAddrV4]) -> Result<(), NetError> {

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use socket2::Socket;
 
+use super::ready::Ready;
 use super::{Lane, Network};
 use crate::sys::batch::{Batch, SLOTS};
 use crate::sys::clock::{Monotonic, wall_now_ns};
@@ -42,6 +43,8 @@ enum Way {
 struct Sockets {
     lanes: Arc<[Lane]>,
     stray: Socket,
+    /// Which of them have something, the strangers' last.
+    ready: Ready,
     batch: Batch,
     /// Per socket, the strangers' last: an instant before it was last found empty. What is read next came after.
     emptied: Box<[MonoTime]>,
@@ -55,9 +58,9 @@ impl fmt::Debug for Sockets {
 
 impl Receiver {
     /// Sockets from which nothing that came before `quiet` can be read any more.
-    pub(super) fn new(lanes: Arc<[Lane]>, stray: Socket, quiet: MonoTime) -> Self {
+    pub(super) fn new(lanes: Arc<[Lane]>, stray: Socket, ready: Ready, quiet: MonoTime) -> Self {
         let emptied = vec![quiet; lanes.len() + 1].into_boxed_slice();
-        Self(Way::Kernel(Box::new(Sockets { lanes, stray, batch: Batch::new(), emptied })))
+        Self(Way::Kernel(Box::new(Sockets { lanes, stray, ready, batch: Batch::new(), emptied })))
     }
 
     pub(super) const fn over(network: Arc<dyn Network>) -> Self {
@@ -102,8 +105,13 @@ impl Sockets {
     fn drain(&mut self, on: &mut impl FnMut(Origin, &[u8], MonoTime)) -> MonoTime {
         let began = Monotonic.now();
         let mut now = began;
+        self.ready.look();
         for index in 0..=self.lanes.len() {
-            now = self.drain_one(index, now, on);
+            if self.ready.is(index) {
+                now = self.drain_one(index, now, on);
+            } else {
+                self.emptied[index] = began;
+            }
         }
         began
     }
