@@ -1,14 +1,13 @@
-//! Networks whose controllers may get one datagram together, as people are told of them.
+//! The network whose controllers may get one datagram together, as people are told of it.
 
 use crate::config::Controller;
 use crate::control::BroadcastStatus;
 use crate::rt::Live;
 
-/// All of them, in the order of the configuration; none where it has none.
+/// How it does; nothing where there is none.
 pub(super) fn status(controllers: &[Controller], live: &Live) -> Vec<BroadcastStatus> {
     let name = |lane: usize| controllers.get(lane).map_or_else(String::new, name);
-    let all = live.broadcasts().map_or(&[][..], |broadcasts| broadcasts.all());
-    let status = all.iter().map(|one| {
+    let status = live.broadcast().map(|one| {
         let [together, apart] = one.ticks();
         BroadcastStatus {
             name: one.name.clone(),
@@ -19,19 +18,18 @@ pub(super) fn status(controllers: &[Controller], live: &Live) -> Vec<BroadcastSt
             last_apart: one.last_apart(name),
         }
     });
-    status.collect()
+    status.into_iter().collect()
 }
 
-/// Those for which somebody has to do something: sentences that end with what.
+/// What somebody has to do for it: sentences that end with that.
 pub(super) fn troubles(controllers: &[Controller], live: &Live) -> Vec<String> {
     let name = |lane: usize| controllers.get(lane).map_or_else(String::new, name);
-    let all = live.broadcasts().map_or(&[][..], |broadcasts| broadcasts.all());
-    let trouble = all.iter().filter_map(|one| {
+    let trouble = live.broadcast().and_then(|one| {
         let permit = one.permit();
         let (words, remedy) = permit.words(name).zip(permit.remedy())?;
         Some(format!("[broadcast.{}]: {words}; {remedy}", one.name))
     });
-    trouble.collect()
+    trouble.into_iter().collect()
 }
 
 /// What a controller is called, and where it is.

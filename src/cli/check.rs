@@ -10,7 +10,7 @@ use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, metres, print};
 use crate::config::{self, Config, ConfigFault, ConfigFaults, line_load, parse_level};
 use crate::cue::{self, CueFaults, Fault, Place};
-use crate::drive::terms;
+use crate::drive::{EVERY_LED, terms};
 use crate::plain;
 use crate::proof::{Breach, Proof, Violation};
 use crate::time::parse_trim;
@@ -235,7 +235,7 @@ impl CheckReport {
     /// Notes how often the links of a hall play, and those that are to play more often than they can.
     fn links(&mut self, path: &Path, hall: &Config) {
         let (told, faults) = terms::in_words(hall);
-        let of_lines = line_load::in_words(hall);
+        let of_lines = line_load::in_words(hall, EVERY_LED);
         told.iter().chain(&metres::of_hall(hall)).chain(&of_lines).for_each(|text| self.note(path, text));
         for fault in faults {
             self.fault(Exit::CheckFailed, FaultReport::new(path, &Place::File, fault));

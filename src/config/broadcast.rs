@@ -88,20 +88,19 @@ impl Network4 {
 
 /// Reads the table. What is reached together has to be of one kind, and the code has to mean all of the network and nobody else. There is
 /// one at the most: whoever is on a wire may take what is broadcast to any network on it, and whose answers are whose nobody could tell.
-pub(super) fn broadcasts(
+pub(super) fn broadcast(
     entry: Entry<'_>,
     controllers: &[Controller],
     absent: &[Absent],
     frame_port: u16,
     faults: &mut Faults<'_>,
-) -> Vec<BroadcastNetwork> {
-    let Some(table) = entry.table(faults) else { return Vec::new() };
+) -> Option<BroadcastNetwork> {
     let all = || controllers.iter().chain(absent.iter().map(|one| &one.controller));
-    let mut read: Vec<BroadcastNetwork> = Vec::new();
-    for (name, value) in table {
+    let mut read: Option<BroadcastNetwork> = None;
+    for (name, value) in entry.table(faults)? {
         let entry = Entry::new(name.get_ref(), value);
         let Some((network, accept)) = one(entry, faults) else { continue };
-        if let Some(other) = read.first() {
+        if let Some(other) = &read {
             let why = format!(
                 "broadcast.{} is there already, and a hall broadcasts to one network: what goes to one may be taken by whoever is on \
                  the same wire; take one of them out",
@@ -116,13 +115,10 @@ pub(super) fn broadcasts(
         let accept = accept.unwrap_or_else(|| narrowest(&members));
         match port_of(&members, &others, network, accept, frame_port) {
             Err(why) => entry.fault(faults, &why),
-            Ok(port) => read.push(BroadcastNetwork {
-                name: entry.key.to_owned(),
-                network,
-                accept,
-                port,
-                members: members.iter().map(|(one, _)| one.name.clone()).collect(),
-            }),
+            Ok(port) => {
+                let members = members.iter().map(|(one, _)| one.name.clone()).collect();
+                read = Some(BroadcastNetwork { name: entry.key.to_owned(), network, accept, port, members });
+            }
         }
     }
     read
@@ -130,9 +126,16 @@ pub(super) fn broadcasts(
 
 /// The code that means all of these, and as few others as can be.
 fn narrowest(members: &[(&Controller, &Station)]) -> Code {
-    let mut codes = members.iter().map(|(_, at)| Code::station(at.address.ip().octets()).0 | 0xff);
+    let mut codes = members.iter().map(|(_, at)| own_code(at).0 | 0xff);
     let first = codes.next().unwrap_or(Code::ALL.0);
     if codes.all(|other| other == first) { Code(first) } else { Code::ALL }
+}
+
+/// The code that a controller knows for its own (PA12, PA13): that of its address, unless its frames have another.
+fn own_code(at: &Station) -> Code {
+    let own = |(code, address): (u8, u8)| if code == 0xff { address } else { code };
+    let ([_, _, xx, yy], [column, row]) = (at.address.ip().octets(), at.code().to_be_bytes());
+    Code(u16::from_be_bytes([(column, xx), (row, yy)].map(own)))
 }
 
 /// The network, and the code where the table has one.
@@ -173,8 +176,8 @@ fn port_of(
             "port {frame_port} is that of [show] bind as well, so that this machine would hear its own broadcasts; bind another"
         ));
     }
-    let is_meant = |ip: Ipv4Addr| accept.matches(Code::station(ip.octets()));
-    if let Some((one, at)) = others.iter().find(|(_, at)| is_meant(*at.address.ip())) {
+    let is_meant = |at: &Station| accept.matches(own_code(at));
+    if let Some((one, at)) = others.iter().find(|(_, at)| is_meant(at)) {
         return Err(format!(
             "accept {accept} means {} at {} as well, which is not in this network; give a code that means nobody but its controllers, or \
              take the table out",
@@ -187,7 +190,7 @@ fn port_of(
         if ip == network.first || ip == network.broadcast() {
             return Err(format!("{ip} of {name} is no single address of this network; correct the network"));
         }
-        if !is_meant(ip) {
+        if !is_meant(at) {
             return Err(format!(
                 "accept {accept} does not mean {name} at {ip}; every controller of the network has to take it"
             ));
@@ -234,13 +237,13 @@ mod tests {
 
     #[test]
     fn every_controller_of_a_network_gets_its_broadcasts_also_one_that_is_out() {
-        assert_eq!(hall("").unwrap().broadcasts, []);
+        assert_eq!(hall("").unwrap().broadcast, None);
         let hall = hall(
             "[[controller]]\nname = \"A3\"\nseat = \"s\"\naddress = \"192.168.15.3:7408\"\nenabled = false\n\
              [[controller]]\nname = \"B1\"\nseat = \"s\"\naddress = \"192.168.16.3:7408\"\n\
              [broadcast.row_a]\nalone = true\nnetwork = \"192.168.15.0/24\"\naccept = \"0fff\"",
         );
-        let [row] = &hall.unwrap().broadcasts[..] else { panic!("one") };
+        let row = hall.unwrap().broadcast.unwrap();
         assert_eq!(row.address(), "192.168.15.255:7408".parse().unwrap());
         assert_eq!((row.name.as_str(), row.accept, row.members.len()), ("row_a", Code(0x0fff), 3));
         assert_eq!(row.members, ["A1", "A2", "A3"]);
@@ -297,7 +300,7 @@ mod tests {
 
     #[test]
     fn the_code_is_as_narrow_as_the_network_lets_it_be_unless_another_is_given() {
-        let code = |more: &str| hall(more).unwrap().broadcasts[0].accept;
+        let code = |more: &str| hall(more).unwrap().broadcast.unwrap().accept;
         assert_eq!(code("[broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\""), Code(0x0fff));
         let wide = "[[controller]]\nname = \"B1\"\nseat = \"s\"\naddress = \"192.168.14.3:7408\"\n[broadcast.a]\nalone = true\n\
                     network = \"192.168.14.0/23\"";
@@ -319,6 +322,25 @@ mod tests {
                 assert!(told.contains(&wanted), "{told}");
             }
         }
+    }
+
+    #[test]
+    fn what_a_controller_takes_for_its_own_code_is_what_the_file_has_for_it() {
+        let with = |address: &str, code: &str, accept: &str| {
+            hall(&format!(
+                "[[controller]]\nname = \"B1\"\nseat = \"s\"\naddress = \"{address}:7408\"\naccept = \"{code}\"\n\
+                 [broadcast.a]\nalone = true\nnetwork = \"192.168.15.0/24\"\n{accept}"
+            ))
+        };
+        let narrow = "accept = \"0fff\"";
+        let elsewhere = with("192.168.16.3", "0f07", narrow).unwrap_err();
+        assert!(elsewhere.contains("accept 0fff means B1 at 192.168.16.3 as well"), "{elsewhere}");
+        for code in ["1007", "ff07", "ffff", "station"] {
+            assert!(with("192.168.16.3", code, narrow).is_ok(), "{code}");
+        }
+        let member = with("192.168.15.3", "0103", narrow).unwrap_err();
+        assert!(member.contains("accept 0fff does not mean B1 at 192.168.15.3"), "{member}");
+        assert_eq!(with("192.168.15.3", "0103", "").unwrap().broadcast.unwrap().accept, Code::ALL);
     }
 
     #[test]

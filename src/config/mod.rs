@@ -106,8 +106,8 @@ pub struct Config {
     pub(crate) absent: Vec<Absent>,
     /// The serial lines and buses that drives share, in the order of their names.
     pub(crate) links: Vec<Link>,
-    /// The networks whose controllers may get one datagram together, in the order of their names.
-    pub broadcasts: Vec<BroadcastNetwork>,
+    /// The network whose controllers may get one datagram together, where there is one.
+    pub broadcast: Option<BroadcastNetwork>,
     /// The port that takes OSC, where there is one.
     pub(crate) osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.

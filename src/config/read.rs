@@ -12,7 +12,7 @@ use crate::motion::MAX_AXES;
 
 use super::accept::acceptances;
 use super::api::api;
-use super::broadcast::broadcasts;
+use super::broadcast::broadcast;
 use super::buttons::buttons;
 use super::drive::{DriveEntry, seat_drives};
 use super::drive_controller::{
@@ -108,8 +108,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let (controllers, absent, links) = stated.controllers(&site, faults);
     let frame_port = show.as_ref().map_or(0, |show| show.bind.port());
-    let broadcasts = broadcast_at
-        .map_or_else(Vec::new, |entry| broadcasts(entry, &controllers, &absent, frame_port, faults));
+    let broadcast =
+        broadcast_at.and_then(|entry| broadcast(entry, &controllers, &absent, frame_port, faults));
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
@@ -133,7 +133,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         controllers,
         absent,
         links,
-        broadcasts,
+        broadcast,
         osc,
         text,
         buttons,

@@ -96,7 +96,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         controllers,
         absent: Vec::new(),
         links: Vec::new(),
-        broadcasts: Vec::new(),
+        broadcast: None,
         osc: None,
         text: None,
         buttons: Vec::new(),

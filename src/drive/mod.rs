@@ -20,7 +20,7 @@ pub use lane::Lane;
 pub(crate) use lane::Stamped;
 pub use lanes::Manner;
 pub(crate) use lanes::lanes;
-pub(crate) use rounds::Rounds;
+pub(crate) use rounds::{EVERY_LED, Rounds};
 pub(crate) use segments::{
     DriveCourse, DriveUnits, Knots, LOOP, Lag, Middle, Middles, Motor, Segment, SegmentFit, Shaker, TICK_NS,
     TargetMaker,

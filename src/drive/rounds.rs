@@ -9,7 +9,7 @@ use crate::time::MonoTime;
 const EVERY: Duration = Duration::from_millis(250);
 /// From one to the next of one controller while frames flow: each of at most three reads is made more often than eight times a
 /// second.
-const EVERY_LED: Duration = Duration::from_millis(40);
+pub(crate) const EVERY_LED: Duration = Duration::from_millis(40);
 
 /// Who is asked next, and when.
 #[derive(Debug)]

@@ -23,7 +23,7 @@ use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::motion::{AxisGeometry, MAX_AXES, Pose, Window};
 use crate::net::Delivery;
 use crate::rt::{
-    Alarm, Answer, Broadcasts, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places,
+    Alarm, Answer, Broadcast, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places,
     PlanLoop, Planning, Task, TickLoop, mailboxes,
 };
 use crate::state::Transition;
@@ -164,8 +164,8 @@ impl Virtual {
         if self.chases || self.armed {
             engine = engine.waiting();
         }
-        let broadcasts = self.together.then(|| Broadcasts::permitted(self.config())).flatten();
-        let live = Arc::new(Live::new(lanes.len()).with_broadcasts(broadcasts));
+        let broadcast = self.together.then(|| Broadcast::permitted(self.config())).flatten();
+        let live = Arc::new(Live::new(lanes.len()).with_broadcast(broadcast));
         (0..lanes.len()).for_each(|lane| read_at_rest(&live, lane, [0.0; MAX_AXES], ORIGIN));
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
         let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } = ends;
@@ -400,7 +400,7 @@ struct Link<'a> {
 }
 
 impl FrameSink for Link<'_> {
-    fn send_to_all(&mut self, _network: usize, datagram: &[u8]) -> Delivery {
+    fn send_to_all(&mut self, datagram: &[u8]) -> Delivery {
         let lanes = self.stands.borrow().len();
         for lane in 0..lanes {
             self.send(lane, datagram, self.now.get());

@@ -95,7 +95,7 @@ pub mod record {
 }
 pub mod rt {
     pub use crate::rt::{
-        Accounts, AckLoop, Alarm, Answer, Broadcasts, Command, Conductor, Desk, Ended, FilmLead, FrameSink,
+        Accounts, AckLoop, Alarm, Answer, Broadcast, Command, Conductor, Desk, Ended, FilmLead, FrameSink,
         Line, Live, Loaded, MailEnds, News, NewsIn, Order, Outlets, Places, PlanLoop, Planning, Sent,
         Spinning, Task, TickLoop, TickReport, Ticked, mailboxes,
     };

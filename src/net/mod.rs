@@ -43,8 +43,8 @@ pub use send::{Delivery, SendFault, Sender};
 pub struct Ports {
     local: SocketAddrV4,
     lanes: Vec<Lane>,
-    /// One for each network that is sent to as a whole.
-    broadcasts: Vec<Lane>,
+    /// That of the network that is sent to as a whole, where there is one.
+    whole: Option<Lane>,
     stray: Socket,
     /// Which of the lanes and the strangers' socket have something.
     ready: Ready,
@@ -81,11 +81,11 @@ impl Ports {
     /// [`NetError::Twice`] and [`NetError::NotUnicast`] for peers that cannot have a socket of their own;
     /// [`NetError::Refused`] where the system refuses, even if another program has the port.
     pub fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Self, NetError> {
-        Self::open_with(bind, peers, &[])
+        Self::open_with(bind, peers, None)
     }
 
-    /// The same, with a socket for each of these networks that sends to all of it at its broadcast address, and hears nothing: whoever
-    /// answers does so to the socket of its own address.
+    /// The same, with a socket that sends to all of a network at its broadcast address, and hears nothing: whoever answers does so to the
+    /// socket of its own address.
     ///
     /// # Errors
     /// As [`Ports::open`]; [`NetError::NoBroadcast`] and [`NetError::OffTheWire`] where a broadcast would not go to the controllers of the
@@ -94,9 +94,9 @@ impl Ports {
     pub(crate) fn open_with(
         bind: SocketAddrV4,
         peers: &[SocketAddrV4],
-        broadcasts: &[Whole],
+        whole: Option<&Whole>,
     ) -> Result<Self, NetError> {
-        open::open(bind, peers, broadcasts)
+        open::open(bind, peers, whole)
     }
 
     /// The local address, with the port that was taken.
@@ -109,7 +109,7 @@ impl Ports {
     #[must_use]
     pub fn split(self) -> (Sender, Receiver) {
         let lanes: Arc<[Lane]> = self.lanes.into();
-        let sender = Sender::new(Arc::clone(&lanes), self.broadcasts.into());
+        let sender = Sender::new(Arc::clone(&lanes), self.whole.map(Arc::new));
         (sender, Receiver::new(lanes, self.stray, self.ready, self.quiet))
     }
 }

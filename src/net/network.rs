@@ -14,8 +14,8 @@ pub trait Network: fmt::Debug + Send + Sync {
     /// Takes a datagram to a controller, or does not.
     fn send(&self, lane: usize, datagram: &[u8]) -> Delivery;
 
-    /// Takes a datagram to all of a network, counted from 0 in the order in which these were opened, or does not.
-    fn send_to_all(&self, _network: usize, _datagram: &[u8]) -> Delivery {
+    /// Takes a datagram to all of the network that is sent to as a whole, or does not.
+    fn send_to_all(&self, _datagram: &[u8]) -> Delivery {
         Delivery::Failed(SendFault::of(libc::EOPNOTSUPP))
     }
 

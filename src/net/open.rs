@@ -24,7 +24,11 @@ const QUIET_BATCHES: usize = 1_024;
 
 /// The socket for strangers binds first and alone, which fails if anyone has the port. Only then may the port be
 /// shared, and only until all of ours are bound: a permission left on any socket would let another program in.
-pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4], wholes: &[Whole]) -> Result<Ports, NetError> {
+pub(super) fn open(
+    bind: SocketAddrV4,
+    peers: &[SocketAddrV4],
+    network: Option<&Whole>,
+) -> Result<Ports, NetError> {
     check(peers)?;
     let at_bind = |cause| NetError::refused("bind UDP address", bind, cause);
     let stray = socket().map_err(at_bind)?;
@@ -34,10 +38,9 @@ pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4], wholes: &[Whole])
     stamp_arrivals(&stray).map_err(at_bind)?;
 
     let lanes = peers.iter().map(|&peer| lane(local, peer)).collect::<Result<Vec<_>, _>>()?;
-    let broadcasts =
-        wholes.iter().map(|one| whole(local, one, peers, &lanes)).collect::<Result<Vec<_>, _>>()?;
+    let whole = network.map(|network| whole(local, network, peers, &lanes)).transpose()?;
 
-    for socket in lanes.iter().chain(&broadcasts).map(|lane| &lane.socket).chain([&stray]) {
+    for socket in lanes.iter().chain(&whole).map(|lane| &lane.socket).chain([&stray]) {
         socket.set_reuse_address(false).map_err(at_bind)?;
     }
     let quiet_from = Monotonic.now();
@@ -46,7 +49,7 @@ pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4], wholes: &[Whole])
         quiet(&mut batch, socket);
     }
     let ready = Ready::of(lanes.iter().map(|lane| &lane.socket).chain([&stray])).map_err(at_bind)?;
-    Ok(Ports { local, lanes, broadcasts, stray, ready, quiet: quiet_from })
+    Ok(Ports { local, lanes, whole, stray, ready, quiet: quiet_from })
 }
 
 fn check(peers: &[SocketAddrV4]) -> Result<(), NetError> {

@@ -91,13 +91,13 @@ pub struct Sender {
 /// Where datagrams go.
 #[derive(Debug, Clone)]
 enum SendWay {
-    Kernel { lanes: Arc<[Lane]>, broadcasts: Arc<[Lane]> },
+    Kernel { lanes: Arc<[Lane]>, whole: Option<Arc<Lane>> },
     Network(Arc<dyn Network>),
 }
 
 impl Sender {
-    pub(super) const fn new(lanes: Arc<[Lane]>, broadcasts: Arc<[Lane]>) -> Self {
-        Self { way: SendWay::Kernel { lanes, broadcasts }, lead: None }
+    pub(super) const fn new(lanes: Arc<[Lane]>, whole: Option<Arc<Lane>>) -> Self {
+        Self { way: SendWay::Kernel { lanes, whole }, lead: None }
     }
 
     pub(super) const fn over(network: Arc<dyn Network>) -> Self {
@@ -140,17 +140,19 @@ impl Sender {
         self.send_by(lane, datagram)
     }
 
-    /// Sends one datagram to all of a network, counted from 0 in the order in which these were opened; as [`Sender::send`].
+    /// Sends one datagram to all of the network that is sent to as a whole; as [`Sender::send`].
     ///
     /// # Panics
-    /// If there is no such network.
-    pub(crate) fn send_to_all(&self, network: usize, datagram: &[u8]) -> Delivery {
+    /// If none was opened.
+    pub(crate) fn send_to_all(&self, datagram: &[u8]) -> Delivery {
         if self.is_over() {
             return Delivery::Failed(SendFault::NOT_LEADING);
         }
         match &self.way {
-            SendWay::Kernel { broadcasts, .. } => self.send_by(&broadcasts[network], datagram),
-            SendWay::Network(over) => over.send_to_all(network, datagram),
+            SendWay::Kernel { whole, .. } => {
+                self.send_by(whole.as_ref().expect("its network was opened"), datagram)
+            }
+            SendWay::Network(network) => network.send_to_all(datagram),
         }
     }
 

@@ -233,14 +233,14 @@ fn one_datagram_reaches_all_of_a_network_from_where_its_controllers_answer_to_an
     let port = any.local_addr().unwrap().port();
     let at = |ip: [u8; 4]| SocketAddrV4::new(ip.into(), port);
     let whole = |address, bits| Whole { address, bits, lanes: vec![0] };
-    let open = |peer, whole| Ports::open_with(LOOPBACK, &[peer], &[whole]);
+    let open = |peer, whole: Whole| Ports::open_with(LOOPBACK, &[peer], Some(&whole));
     let all = at([127, 255, 255, 255]);
     let (sender, receiver) = {
         let ports = open(at([127, 0, 0, 2]), whole(all, 8)).unwrap();
         assert!(bind_shared(ports.local()).is_err(), "nobody else can have the port");
         ports.split()
     };
-    assert_eq!(sender.send_to_all(0, b"all"), Delivery::Sent);
+    assert_eq!(sender.send_to_all(b"all"), Delivery::Sent);
     let mut buffer = [0; 10];
     let (len, from) = any.recv_from(&mut buffer).unwrap();
     assert_eq!((&buffer[..len], *v4(from).ip()), (&b"all"[..], *LOOPBACK.ip()));
@@ -258,5 +258,5 @@ fn one_datagram_reaches_all_of_a_network_from_where_its_controllers_answer_to_an
 
     let lead = std::sync::Arc::new(Lead::default());
     let led = sender.led_by(Some(lead));
-    assert_eq!(led.send_to_all(0, b"no"), Delivery::Failed(SendFault::NOT_LEADING));
+    assert_eq!(led.send_to_all(b"no"), Delivery::Failed(SendFault::NOT_LEADING));
 }

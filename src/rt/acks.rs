@@ -394,6 +394,11 @@ impl Ledger for Records<'_> {
         self.note_posted(&mut posted);
     }
 
+    fn on_early(&mut self, reply: &Reply) {
+        // Nobody waits for a record that hardly ever comes while whoever is not meant moves.
+        self.watch.iter().for_each(|watch| watch.mind_foreign(reply.controller, Fate::Stray));
+    }
+
     fn on_fate(&mut self, reply: &Reply, fate: Fate, sent_at: Option<MonoTime>) {
         copy(self.tap, &AckRecord::Fate(reply.controller, reply.frame, fate, latency_ns(sent_at, reply.at)));
         if let Fate::Answered(code) = fate {

@@ -1,4 +1,4 @@
-//! Networks whose controllers may get one datagram together: who is in them, whether that may be now, and how often it was. The ack
+//! The network whose controllers may get one datagram together: who is in it, whether that may be now, and how often it was. The ack
 //! thread permits it and takes it back, the tick thread asks before each datagram, and whoever looks reads; nobody waits. A permit is as
 //! old as the question that it rests on: it is none for what began after that, nor for longer than [`FRESH`], whoever has stopped asking.
 
@@ -14,21 +14,15 @@ use crate::wire::Code;
 /// How long who answered a question is taken for who is there.
 pub(crate) const FRESH: Duration = Duration::from_secs(10);
 
-/// All of them.
+/// The network.
 #[derive(Debug)]
-pub struct Broadcasts {
-    all: Box<[Broadcast]>,
-    /// Whether a lane is in one of them.
-    lanes: Box<[bool]>,
-}
-
-/// One of them.
-#[derive(Debug)]
-pub(crate) struct Broadcast {
+pub struct Broadcast {
     /// Its name.
     pub(crate) name: String,
     /// The lanes of its controllers, all of which take part at least in the configuration.
     pub(crate) lanes: Box<[usize]>,
+    /// Whether a lane is one of them.
+    members: Box<[bool]>,
     /// Who takes what goes to all, and answers where it asks.
     pub(crate) code: Code,
     permit: SharedWord,
@@ -71,7 +65,7 @@ pub(crate) enum Permit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Apart {
     /// The permit is missing, or older than what it would be for.
-    NoPermit,
+    NoPermit(Permit),
     /// No frame of this tick goes to that lane, or one of its own.
     Out(usize),
     /// That lane's frame is not the others'.
@@ -79,6 +73,8 @@ pub(crate) enum Apart {
 }
 
 const KIND: u32 = 48;
+/// Above the kind of a permit.
+const WHY: u32 = 56;
 
 impl Permit {
     fn word(self) -> u64 {
@@ -119,83 +115,55 @@ impl Permit {
     }
 }
 
-impl Broadcasts {
-    /// Those of a configuration, in its order; none where it has none. `silent` says that no frame asks for a reply.
+impl Broadcast {
+    /// That of a configuration; none where it has none. `silent` says that no frame asks for a reply.
     pub(crate) fn of(config: &Config, silent: bool) -> Option<Self> {
-        let mut lanes = vec![false; config.controllers.len()];
-        let one = |table: &crate::config::BroadcastNetwork| {
-            let place = |name: &String| config.controllers.iter().position(|one| one.name == *name);
-            let members: Box<[usize]> = table.members.iter().filter_map(place).collect();
-            let is_whole = members.len() == table.members.len();
-            let permit = SharedWord::default();
-            if !is_whole || silent {
-                permit.put(if is_whole { Permit::NoAcks } else { Permit::Absent }.word());
-            }
-            Broadcast {
-                name: table.name.clone(),
-                lanes: members,
-                code: table.accept,
-                permit,
-                asked: SharedWord::default(),
-                rested: SharedWord::default(),
-                together: AtomicU64::default(),
-                apart: AtomicU64::default(),
-                why: SharedWord::default(),
-            }
-        };
-        let all: Box<[Broadcast]> = config.broadcasts.iter().map(one).collect();
-        all.iter().flat_map(|one| &one.lanes).for_each(|lane| lanes[*lane] = true);
-        (!all.is_empty()).then(|| Self { all, lanes: lanes.into() })
+        let network = config.broadcast.as_ref()?;
+        let place = |name: &String| config.controllers.iter().position(|one| one.name == *name);
+        let lanes: Box<[usize]> = network.members.iter().filter_map(place).collect();
+        let permit = SharedWord::default();
+        if lanes.len() < network.members.len() {
+            permit.put(Permit::Absent.word());
+        } else if silent {
+            permit.put(Permit::NoAcks.word());
+        }
+        Some(Self {
+            name: network.name.clone(),
+            members: (0..config.controllers.len()).map(|lane| lanes.contains(&lane)).collect(),
+            lanes,
+            code: network.accept,
+            permit,
+            asked: SharedWord::default(),
+            rested: SharedWord::default(),
+            together: AtomicU64::default(),
+            apart: AtomicU64::default(),
+            why: SharedWord::default(),
+        })
     }
 
-    /// All of them, in the order of the configuration.
-    pub(crate) fn all(&self) -> &[Broadcast] {
-        &self.all
-    }
-
-    /// The hall is not on the cue in this tick: what begins after it is asked for anew. Tick thread alone.
-    pub(super) fn rest(&self, tick: MonoTime) {
-        self.all.iter().for_each(|one| one.rest(tick));
-    }
-
-    /// One network of all controllers of that configuration, by a code of its own, which may get one datagram whoever answers.
+    /// That of all controllers of that configuration, by a code of its own, which may get one datagram whoever answers.
     #[must_use]
     #[cfg(feature = "harness")]
     pub(crate) fn permitted(mut config: Config) -> Option<Self> {
         let names: Vec<_> = config.controllers.iter().map(|one| one.name.as_str()).collect();
-        config.broadcasts = vec![crate::config::BroadcastNetwork::of_loopback(&names)];
-        let all = Self::of(&config, false)?;
-        all.all[0].give(MonoTime::from_nanos(u64::MAX));
-        Some(all)
+        config.broadcast = Some(crate::config::BroadcastNetwork::of_loopback(&names));
+        let one = Self::of(&config, false)?;
+        one.give(MonoTime::from_nanos(u64::MAX));
+        Some(one)
     }
 
-    /// Whether that network may get one datagram now.
-    ///
-    /// # Panics
-    /// Where there is no such network.
+    /// Whether one datagram may go to all.
     #[must_use]
     #[cfg(feature = "harness")]
-    pub fn is_permitted(&self, network: usize) -> bool {
-        self.all[network].permit() == Permit::Given
+    pub fn is_permitted(&self) -> bool {
+        self.permit() == Permit::Given
     }
 
-    /// Ticks whose frames left as one datagram to that network, and as one for each controller.
-    ///
-    /// # Panics
-    /// Where there is no such network.
-    #[must_use]
-    #[cfg(feature = "harness")]
-    pub fn ticks(&self, network: usize) -> [u64; 2] {
-        self.all[network].ticks()
-    }
-
-    /// Whether a lane is in one of them.
+    /// Whether a lane is one of it.
     pub(crate) fn has(&self, lane: usize) -> bool {
-        self.lanes.get(lane).is_some_and(|has| *has)
+        self.members.get(lane).is_some_and(|has| *has)
     }
-}
 
-impl Broadcast {
     /// Whether one datagram may go to all now.
     pub(crate) fn permit(&self) -> Permit {
         Permit::of_word(self.permit.get())
@@ -242,25 +210,27 @@ impl Broadcast {
     /// Notes a tick whose frames left one by one.
     pub(crate) fn on_apart(&self, why: Apart) {
         self.apart.fetch_add(1, Ordering::Relaxed);
-        let (kind, lane) = match why {
-            Apart::NoPermit => (1, 0),
-            Apart::Out(lane) => (2, lane),
-            Apart::Differs(lane) => (3, lane),
+        let (kind, what) = match why {
+            Apart::NoPermit(permit) => (1, permit.word()),
+            Apart::Out(lane) => (2, lane as u64),
+            Apart::Differs(lane) => (3, lane as u64),
         };
-        self.why.put(kind << KIND | lane as u64);
+        self.why.put(kind << WHY | what);
     }
 
     /// Ticks whose frames left as one datagram, and as one for each.
-    pub(crate) fn ticks(&self) -> [u64; 2] {
+    #[must_use]
+    pub fn ticks(&self) -> [u64; 2] {
         [&self.together, &self.apart].map(|count| count.load(Ordering::Relaxed))
     }
 
     /// Why they were apart last; none where they never were.
     fn why_apart(&self) -> Option<Apart> {
         let word = self.why.get();
-        let lane = (word & ((1 << KIND) - 1)) as usize;
-        match word >> KIND {
-            1 => Some(Apart::NoPermit),
+        let what = word & ((1 << WHY) - 1);
+        let lane = what as usize;
+        match word >> WHY {
+            1 => Some(Apart::NoPermit(Permit::of_word(what))),
             2 => Some(Apart::Out(lane)),
             3 => Some(Apart::Differs(lane)),
             _ => None,
@@ -270,8 +240,8 @@ impl Broadcast {
     /// Why frames left one by one last, in words; none where they never did. `name` has the names of lanes.
     pub(crate) fn last_apart(&self, name: impl Fn(usize) -> String) -> Option<String> {
         Some(match self.why_apart()? {
-            Apart::NoPermit => {
-                self.permit().words(name).unwrap_or_else(|| "who answers had not been asked since".to_owned())
+            Apart::NoPermit(permit) => {
+                permit.words(name).unwrap_or_else(|| "who answers had not been asked since".to_owned())
             }
             Apart::Out(lane) => format!("{} got no frame, or one of its own", name(lane)),
             Apart::Differs(lane) => {
@@ -329,11 +299,11 @@ mod tests {
     use crate::config::from_to_args;
 
     /// Two controllers in a network that has as many as that.
-    fn two(members: &[&str], silent: bool) -> Broadcasts {
+    fn two(members: &[&str], silent: bool) -> Broadcast {
         let tos = ["127.0.0.1:7408".to_owned(), "127.0.0.2:7408".to_owned()];
         let mut config = from_to_args(&tos, &[], 3).unwrap();
-        config.broadcasts = vec![crate::config::BroadcastNetwork::of_loopback(members)];
-        Broadcasts::of(&config, silent).unwrap()
+        config.broadcast = Some(crate::config::BroadcastNetwork::of_loopback(members));
+        Broadcast::of(&config, silent).unwrap()
     }
 
     #[test]
@@ -352,10 +322,9 @@ mod tests {
         ] {
             assert_eq!(Permit::of_word(permit.word()), permit);
         }
-        let all = two(&["c1", "c2"], false);
-        let one = &all.all()[0];
+        let one = two(&["c1", "c2"], false);
         assert_eq!((one.ticks(), one.why_apart()), ([0, 0], None));
-        for why in [Apart::NoPermit, Apart::Out(0), Apart::Differs(1)] {
+        for why in [Apart::NoPermit(Permit::Stranger(stranger)), Apart::Out(0), Apart::Differs(1)] {
             one.on_apart(why);
             assert_eq!(one.why_apart(), Some(why));
         }
@@ -372,8 +341,7 @@ mod tests {
         for found in
             [Permit::Foreign(1), Permit::Twice(0), Permit::Stranger("10.0.0.9:7408".parse().unwrap())]
         {
-            let all = two(&["c1", "c2"], false);
-            let one = &all.all()[0];
+            let one = two(&["c1", "c2"], false);
             one.give(ms(1));
             assert!(one.permits(ms(2)));
             one.set(found);
@@ -384,13 +352,12 @@ mod tests {
 
     #[test]
     fn a_permit_is_none_for_what_began_after_its_question_nor_once_that_is_ten_seconds_ago() {
-        let all = two(&["c1", "c2"], false);
-        let one = &all.all()[0];
+        let one = two(&["c1", "c2"], false);
         assert!(!one.permits(ms(1)), "nobody was asked");
         one.give(ms(1_000));
         assert!(one.permits(ms(1_500)) && one.permits(ms(11_000)));
         assert!(!one.permits(ms(11_001)), "too long ago");
-        all.rest(ms(2_000));
+        one.rest(ms(2_000));
         assert!(!one.permits(ms(2_001)) && one.is_stale(), "it rested since");
         one.give(ms(2_500));
         assert!(one.permits(ms(3_000)) && !one.is_stale());
@@ -403,11 +370,10 @@ mod tests {
         for (members, silent, permit) in
             [(&["c1", "c2", "c3"][..], false, Permit::Absent), (&["c1", "c2"], true, Permit::NoAcks)]
         {
-            let all = two(members, silent);
-            let one = &all.all()[0];
+            let one = two(members, silent);
             one.give(ms(1));
             assert_eq!(one.permit(), permit);
         }
-        assert!(Broadcasts::of(&from_to_args(&["127.0.0.1:1".to_owned()], &[], 3).unwrap(), false).is_none());
+        assert!(Broadcast::of(&from_to_args(&["127.0.0.1:1".to_owned()], &[], 3).unwrap(), false).is_none());
     }
 }

@@ -101,8 +101,8 @@ impl FrameSink for Outlets {
         delivery
     }
 
-    fn send_to_all(&mut self, network: usize, datagram: &[u8]) -> Delivery {
-        self.sender.send_to_all(network, datagram)
+    fn send_to_all(&mut self, datagram: &[u8]) -> Delivery {
+        self.sender.send_to_all(datagram)
     }
 
     fn went_along(&mut self, lane: usize, datagram: &[u8], at: MonoTime, delivery: Delivery) {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::TickReport;
-use super::broadcast::Broadcasts;
+use super::broadcast::Broadcast;
 use super::table::Row;
 use crate::belief::{EvidenceTable, LaneEvidence};
 use crate::engine::Engine;
@@ -95,8 +95,8 @@ pub struct Live {
     /// By when it is to have told more.
     due_ns: AtomicU64,
     table: Mutex<Vec<Row>>,
-    /// Networks whose controllers may get one datagram together, where there are any.
-    broadcasts: Option<Arc<Broadcasts>>,
+    /// The network whose controllers may get one datagram together, where there is one.
+    broadcast: Option<Arc<Broadcast>>,
 }
 
 impl Live {
@@ -111,16 +111,16 @@ impl Live {
         }
     }
 
-    /// The same of one with such networks.
+    /// The same of one with such a network.
     #[must_use]
-    pub fn with_broadcasts(self, broadcasts: Option<Broadcasts>) -> Self {
-        Self { broadcasts: broadcasts.map(Arc::new), ..self }
+    pub fn with_broadcast(self, broadcast: Option<Broadcast>) -> Self {
+        Self { broadcast: broadcast.map(Arc::new), ..self }
     }
 
-    /// Networks whose controllers may get one datagram together, where there are any.
+    /// The network whose controllers may get one datagram together, where there is one.
     #[must_use]
-    pub const fn broadcasts(&self) -> Option<&Arc<Broadcasts>> {
-        self.broadcasts.as_ref()
+    pub const fn broadcast(&self) -> Option<&Arc<Broadcast>> {
+        self.broadcast.as_ref()
     }
 
     /// What the ack thread has seen of a lane; none where there is no such lane.

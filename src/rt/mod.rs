@@ -25,7 +25,7 @@ mod watch;
 mod withdrawn;
 
 pub use acks::{Accounts, AckLoop};
-pub use broadcast::Broadcasts;
+pub use broadcast::Broadcast;
 pub use conductor::Conductor;
 pub use desk::Desk;
 pub use film::FilmLead;
@@ -71,8 +71,8 @@ pub trait FrameSink {
     /// Hands one lane's datagram to the kernel, `at` being now; never blocks.
     fn send(&mut self, lane: usize, datagram: &[u8], at: MonoTime) -> Delivery;
 
-    /// Hands the kernel one datagram for all controllers of a network ([`Broadcasts`]); never blocks.
-    fn send_to_all(&mut self, _network: usize, _datagram: &[u8]) -> Delivery {
+    /// Hands the kernel one datagram for all controllers of the network that may get one together ([`Broadcast`]); never blocks.
+    fn send_to_all(&mut self, _datagram: &[u8]) -> Delivery {
         Delivery::Failed(SendFault::of(libc::EOPNOTSUPP))
     }
 
@@ -167,7 +167,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         self.places.look(&mut self.engine, &self.mail, now, moving);
         let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving, soon);
         let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
-        self.mind_broadcasts(now);
+        self.mind_broadcast(now);
         let late_ns = match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
             Step::Send if self.conductor.machine().may_send_motion() => {
@@ -293,11 +293,11 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     }
 
     /// One datagram is for many seats only while they all are on the cue: joins, holds, stops and ways to park rest on nobody's permit.
-    fn mind_broadcasts(&self, now: MonoTime) {
-        if let Some(broadcasts) = self.mail.live().broadcasts()
+    fn mind_broadcast(&self, now: MonoTime) {
+        if let Some(broadcast) = self.mail.live().broadcast()
             && self.conductor.machine().state() != State::Playing(PlayMode::Following)
         {
-            broadcasts.rest(now);
+            broadcast.rest(now);
         }
     }
 

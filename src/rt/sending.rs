@@ -1,7 +1,7 @@
-//! The frames of one tick on their way out: one datagram for each lane, or one for all lanes of a network whose frames are the same.
+//! The frames of one tick on their way out: one datagram for each lane, or one for all lanes of the network whose frames are the same.
 //! Tick thread; allocates nothing.
 
-use super::broadcast::{Apart, Broadcast, Broadcasts};
+use super::broadcast::{Apart, Broadcast};
 use super::mail::{Mail, Sent};
 use super::places::{self, Places};
 use super::{FrameSink, Outgoing};
@@ -38,12 +38,12 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
     /// Sends to every lane that gets a frame.
     #[inline]
     pub(super) fn send_all(&mut self, buf: &mut [u8; MAX_LEN]) {
-        let broadcasts = self.mail.live().broadcasts().cloned();
-        if let Some(broadcasts) = &broadcasts {
-            self.send_networks(broadcasts, buf);
+        let broadcast = self.mail.live().broadcast().cloned();
+        if let Some(one) = &broadcast {
+            self.send_network(one, buf);
         }
         for lane in 0..self.lanes.len() {
-            if broadcasts.as_ref().is_none_or(|all| !all.has(lane)) {
+            if broadcast.as_ref().is_none_or(|one| !one.has(lane)) {
                 self.send(lane, buf);
             }
         }
@@ -69,23 +69,18 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
         mail.clamps(index, motion.clamps().clamps);
     }
 
-    fn send_networks(&mut self, broadcasts: &Broadcasts, buf: &mut [u8; MAX_LEN]) {
-        for (network, one) in broadcasts.all().iter().enumerate() {
-            let at = self.clock.now();
-            match self.same(one, at, buf) {
-                Ok(same) => {
-                    self.send_to_all((network, one), same, at, &buf[..same.len]);
-                    one.on_together();
+    fn send_network(&mut self, one: &Broadcast, buf: &mut [u8; MAX_LEN]) {
+        let at = self.clock.now();
+        match self.same(one, at, buf) {
+            Ok(same) => self.send_to_all(one, same, at, &buf[..same.len]),
+            Err(why) => {
+                let mut sends = false;
+                for lane in &one.lanes {
+                    sends |= self.engine.lane(*lane).gets_a_frame();
+                    self.send(*lane, buf);
                 }
-                Err(why) => {
-                    let mut sends = false;
-                    for lane in &one.lanes {
-                        sends |= self.engine.lane(*lane).gets_a_frame();
-                        self.send(*lane, buf);
-                    }
-                    if sends {
-                        one.on_apart(why);
-                    }
+                if sends {
+                    one.on_apart(why);
                 }
             }
         }
@@ -105,7 +100,7 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
             return Err(Apart::Out(*out));
         }
         if !one.permits(self.tick) {
-            return Err(Apart::NoPermit);
+            return Err(Apart::NoPermit(one.permit()));
         }
         let mut number: Option<FrameNo> = None;
         for lane in &one.lanes {
@@ -114,6 +109,11 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
             }
             let next = lanes[*lane].next_frame();
             number = Some(number.filter(|newest| newest.since(next) >= 0).unwrap_or(next));
+        }
+        // Numbers go round: of some that lie all over the round none is later than all.
+        let is_taken = |lane: &&usize| number.is_some_and(|one| one.since(lanes[**lane].next_frame()) < 0);
+        if let Some(later) = one.lanes.iter().find(is_taken) {
+            return Err(Apart::Differs(*later));
         }
         let mut all: Option<Same> = None;
         let mut other = [0; MAX_LEN];
@@ -134,18 +134,12 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
             // Pulses are the same, and what they were rounded from may not be: it vibrates by no more than the greatest.
             same.stamped.shakes = same.stamped.shakes.max(stamped.shakes);
         }
-        all.ok_or(Apart::NoPermit)
+        all.ok_or(Apart::NoPermit(one.permit()))
     }
 
     /// Sends it, and notes for each lane what became of its frame.
-    fn send_to_all(
-        &mut self,
-        (network, one): (usize, &Broadcast),
-        same: Same,
-        at: MonoTime,
-        datagram: &[u8],
-    ) {
-        let Self { lanes, places, engine, mail, sink, first, .. } = self;
+    fn send_to_all(&mut self, one: &Broadcast, same: Same, at: MonoTime, datagram: &[u8]) {
+        let Self { lanes, places, engine, mail, sink, first, tick, .. } = self;
         let Stamped { frame, asked, shakes } = same.stamped;
         for lane in &one.lanes {
             let number = places::number(*lane);
@@ -155,7 +149,13 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
             mail.post(Sent::Posted { lane: number, frame, asked, at: at.whole_micros() });
         }
         first.get_or_insert(at);
-        let delivery = sink.send_to_all(network, datagram);
+        let delivery = sink.send_to_all(datagram);
+        if let Delivery::Failed(_) = delivery {
+            // The next goes to each by its own way, and all are asked anew.
+            one.rest(*tick);
+        } else {
+            one.on_together();
+        }
         for lane in &one.lanes {
             let (motion, beat) = (engine.lane(*lane), engine.beat_of(*lane));
             let (slots, level) = (lanes[*lane].window.slots().len(), motion.level());

@@ -2,7 +2,7 @@
 //! hear of that, and whose registers are read.
 
 mod asking;
-mod broadcasts;
+mod broadcast;
 mod hearing;
 mod notes;
 
@@ -28,7 +28,7 @@ use crate::state::{Event, State};
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
 use crate::wire::ReplyCode;
-use broadcasts::BroadcastLook;
+use broadcast::BroadcastLook;
 use notes::Notes;
 
 /// Changes that are kept for the report.
@@ -82,8 +82,8 @@ pub(crate) struct Watch {
     /// What a hall has beside a play.
     standby: Option<Standby>,
     turns: Turns,
-    /// How far the look at each network of broadcasts is.
-    looks: Vec<BroadcastLook>,
+    /// How far the look at the network of broadcasts is.
+    broadcast_look: BroadcastLook,
     /// What is told to `health`, where somebody records.
     records: Option<Notes>,
 }
@@ -124,7 +124,7 @@ impl Watch {
             health,
             sender,
             alarms,
-            looks: BroadcastLook::of(live.broadcasts()),
+            broadcast_look: BroadcastLook::of(live.broadcast()),
             live,
             silent,
             untold: false,
@@ -327,7 +327,7 @@ impl Watch {
             self.tell(self.notices[index]);
         }
         self.notices.clear();
-        self.mind_broadcasts(now);
+        self.mind_broadcast(now);
         self.tell_of_zeros();
         self.end_look_anew(now);
         self.send_alarms();

@@ -30,6 +30,9 @@ pub trait Ledger {
     /// Passes every record that has come to the tracker.
     fn bring_up_to_date(&mut self, tracker: &mut Tracker);
 
+    /// Hears, once, of a reply that is there before any record of its frame, and waits for that.
+    fn on_early(&mut self, _reply: &Reply) {}
+
     /// Hears what a reply turned out to be, and when its frame was sent, as far as that is known.
     fn on_fate(&mut self, _reply: &Reply, _fate: Fate, _sent_at: Option<MonoTime>) {}
 }
@@ -109,7 +112,9 @@ impl Books {
         self.waiting.retain_mut(|(reply, is_early)| {
             let early = !tracker.recorded(reply.controller, reply.frame);
             if early && now.since(reply.at) <= ACK_TIMEOUT {
-                *is_early = true;
+                if !std::mem::replace(is_early, true) {
+                    ledger.on_early(reply);
+                }
                 return true;
             }
             let fate = if *is_early {

@@ -29,8 +29,9 @@ pub(crate) struct Kind {
     /// The last axis of each seat is a turntable.
     pub(crate) turns: bool,
     ack_every: u32,
-    /// All seats may get one datagram together.
+    /// All seats may get one datagram together, but for so many, the last.
     together: bool,
+    pub(crate) outside: usize,
 }
 
 const PLAIN: Kind = Kind {
@@ -45,6 +46,7 @@ const PLAIN: Kind = Kind {
     turns: false,
     ack_every: 1,
     together: false,
+    outside: 0,
 };
 const MBOX: Kind = Kind { dialect: Dialect::Mbox, ..PLAIN };
 
@@ -137,6 +139,9 @@ pub(crate) const TOGETHER: [Kind; 4] = [
     Kind { axes: &[3, 3], hz: 50.0, policy: LossPolicy::Continue, together: true, ..MBOX },
 ];
 
+/// One of which a seat is in another network.
+pub(crate) const OUTSIDE: Kind = Kind { outside: 1, ..TOGETHER[0] };
+
 /// The same whose seats get their own.
 const ALONE: [Kind; 4] = [TOGETHER[0].alone(), TOGETHER[1].alone(), TOGETHER[2].alone(), TOGETHER[3].alone()];
 
@@ -183,14 +188,14 @@ impl Kind {
             controller.estop_inputs = u16::from(self.dialect == Dialect::Mbox);
         }
         if self.together {
-            config.broadcasts = self.network();
+            config.broadcast = self.network();
         }
         config.seats = config.controllers.iter().map(|controller| Arc::clone(&controller.seat)).collect();
         config
     }
 
     /// The network of all seats, as a configuration has it.
-    fn network(&self) -> Vec<BroadcastNetwork> {
+    fn network(&self) -> Option<BroadcastNetwork> {
         let (axes, mbox) = (self.axes[0], self.dialect == Dialect::Mbox);
         let mut text = format!(
             "[broadcast.all]\nalone = true\nnetwork = \"127.0.1.0/24\"\n[seat.s]\naxes = {axes}\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 10000\n\
@@ -198,14 +203,15 @@ impl Kind {
         );
         for seat in 1..=self.axes.len() {
             let dialect = if mbox { "mbox" } else { "smc" };
+            let third = if seat > self.axes.len() - self.outside { 2 } else { 1 };
             text += &format!(
-                "[[controller]]\nname = \"c{seat}\"\nseat = \"s\"\naddress = \"127.0.1.{seat}:7408\"\ndialect = \"{dialect}\"\n"
+                "[[controller]]\nname = \"c{seat}\"\nseat = \"s\"\naddress = \"127.0.{third}.{seat}:7408\"\ndialect = \"{dialect}\"\n"
             );
         }
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("hall.toml");
         std::fs::write(&path, text).expect("the folder is ours");
-        load(&path).expect("it is sound").broadcasts
+        load(&path).expect("it is sound").broadcast
     }
 
     fn most(&self) -> usize {
@@ -215,7 +221,7 @@ impl Kind {
     /// What there is for halls of this kind; made once.
     pub(crate) fn book(&self) -> &'static Book {
         const ALL: usize =
-            KINDS.len() + MBOXES.len() + 24 + OTHERS.len() + TURNTABLES.len() + 2 * TOGETHER.len();
+            KINDS.len() + MBOXES.len() + 24 + OTHERS.len() + TURNTABLES.len() + 2 * TOGETHER.len() + 1;
         static BOOKS: [OnceLock<Book>; ALL] = [const { OnceLock::new() }; ALL];
         let mut all = KINDS
             .iter()
@@ -224,6 +230,7 @@ impl Kind {
             .chain(&TURNTABLES)
             .chain(&TOGETHER)
             .chain(&ALONE)
+            .chain([&OUTSIDE])
             .chain(RELOADED.iter().flatten())
             .chain(FEWER.iter().flatten());
         let index = all.position(|kind| kind == self).expect("it is one of them");

@@ -113,6 +113,11 @@ pub(crate) struct World {
     pub(crate) stranger_answers: Option<SocketAddrV4>,
     /// A seat at whose address there is a second controller, which takes what goes to all.
     pub(crate) twice: Option<usize>,
+    /// How many seats, the last, are not in the network; and whether they take what goes to all of it nevertheless.
+    pub(crate) outside: usize,
+    pub(crate) outside_takes: bool,
+    /// The kernel takes nothing that is to go to all.
+    pub(crate) refuses_all: bool,
     /// Frames of motion, and questions, that went to all.
     pub(crate) to_all: [u64; 2],
 }
@@ -152,6 +157,9 @@ impl Ether {
             deaf_to_all: None,
             stranger_answers: None,
             twice: None,
+            outside: 0,
+            outside_takes: false,
+            refuses_all: false,
             to_all: [0; 2],
         };
         Self { now: Arc::new(AtomicU64::new(BEGIN)), world: Arc::new(Mutex::new(world)) }
@@ -373,13 +381,16 @@ impl Network for Ether {
         self.take_in(lane, datagram, self.ns())
     }
 
-    fn send_to_all(&self, _network: usize, datagram: &[u8]) -> Delivery {
+    fn send_to_all(&self, datagram: &[u8]) -> Delivery {
         let now = self.ns();
-        let deaf = self.world().deaf_to_all;
-        if self.world().lines.iter().any(|line| line.is(now, Weather::Refused).is_some()) {
+        let world = self.world();
+        if world.refuses_all || world.lines.iter().any(|line| line.is(now, Weather::Refused).is_some()) {
             return Delivery::Failed(SendFault::of(libc::ENOBUFS));
         }
-        for lane in (0..self.lanes()).filter(|lane| deaf != Some(*lane)) {
+        let lanes = world.lines.len() - if world.outside_takes { 0 } else { world.outside };
+        let deaf = world.deaf_to_all;
+        drop(world);
+        for lane in (0..lanes).filter(|lane| deaf != Some(*lane)) {
             self.take_in(lane, datagram, now);
         }
         let world = &mut *self.world();

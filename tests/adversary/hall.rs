@@ -52,7 +52,7 @@ pub(crate) struct Hall<'h, 'l> {
     pub(crate) kind: Kind,
     book: &'static Book,
     pub(crate) runtime: RuntimeHandle,
-    line: Line,
+    pub(crate) line: Line,
     loops: &'h mut Loops<'l, Ether>,
     drains: DrainGrid,
     tell_at: MonoTime,
@@ -92,6 +92,7 @@ pub(crate) fn open<T>(
 ) -> (T, Numbers) {
     let book = kind.book();
     ether.world().lines.iter_mut().for_each(|line| line.seat.settings.period_ms = kind.period_ms());
+    ether.world().outside = kind.outside;
     let halves = over(Arc::new(ether.clone()));
     let mut runtime =
         Runtime::over(Arc::clone(&book.config), Purpose::Hall { before }, numbers, &Arc::default(), halves)

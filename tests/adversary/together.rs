@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 
 use kinocue::harness::engine::Mix;
 use kinocue::harness::recording::replayed;
-use kinocue::harness::state::{LedBefore, State, Transition};
+use kinocue::harness::state::{LedBefore, PlayMode, State, Transition};
+use kinocue::wire::FrameNo;
 
 use super::bent::Bent;
 use super::chance::{Keeps, assert_at_most, live_through, setting};
-use super::cues::{Kind, TOGETHER};
+use super::cues::{Kind, OUTSIDE, TOGETHER};
 use super::ether::{Ether, Weather};
-use super::hall::{Hall, breaches, open, seats};
+use super::hall::{Hall, Thread, breaches, open, seats};
 
 /// Where the histories begin that are always the same.
 const FIXED: u64 = 23_000_000;
@@ -28,11 +29,11 @@ fn lead<T>(kind: Kind, ether: &Ether, lead: impl FnOnce(&mut Hall<'_, '_>) -> T)
 
 /// Ticks whose frames left as one datagram, and as one for each.
 fn ticks(hall: &Hall<'_, '_>) -> [u64; 2] {
-    hall.runtime.live.broadcasts().expect("it has a network").ticks(0)
+    hall.runtime.live.broadcast().expect("it has a network").ticks()
 }
 
 fn is_permitted(hall: &Hall<'_, '_>) -> bool {
-    hall.runtime.live.broadcasts().expect("it has a network").is_permitted(0)
+    hall.runtime.live.broadcast().expect("it has a network").is_permitted()
 }
 
 fn frames(hall: &Hall<'_, '_>) -> Vec<u64> {
@@ -71,6 +72,16 @@ fn rides_until_asked(hall: &mut Hall<'_, '_>) {
     assert!(hall.ether.world().to_all[1] > questions, "all are asked anew");
 }
 
+/// A show in which one datagram goes to all.
+#[track_caller]
+fn once_together<T>(kind: Kind, ether: &Ether, then: impl FnOnce(&mut Hall<'_, '_>) -> T) -> T {
+    lead(kind, ether, |hall| {
+        rides_until_asked(hall);
+        assert!(plays(hall, 600)[0] > 10);
+        then(hall)
+    })
+}
+
 /// Once nothing moves.
 #[track_caller]
 fn assert_accounts(hall: &mut Hall<'_, '_>) {
@@ -103,7 +114,7 @@ fn executed(kind: Kind) -> (Vec<Vec<Vec<u8>>>, [u64; 2]) {
         hall.pass(1_000);
         hall.ask(Transition::Park);
         assert!(hall.comes_to(|state| state == State::Parked, 10_000), "{:?}", hall.state);
-        let ticks = hall.runtime.live.broadcasts().map_or([0; 2], |all| all.ticks(0));
+        let ticks = hall.runtime.live.broadcast().map_or([0; 2], |one| one.ticks());
         assert_accounts(hall);
         ticks
     });
@@ -131,9 +142,7 @@ fn what_seats_are_led_through_by_one_datagram_is_to_the_bit_what_they_would_be_b
 fn a_seat_that_is_taken_out_is_reached_by_nothing_and_the_others_go_together_again_once_it_is_back() {
     for kind in TOGETHER {
         let ether = quiet(kind);
-        lead(kind, &ether, |hall| {
-            rides_until_asked(hall);
-            assert!(plays(hall, 600)[0] > 10);
+        once_together(kind, &ether, |hall| {
             switch(hall, 1, false);
             // It parks, and is told so.
             assert_eq!(plays(hall, 3_000)[0], 0);
@@ -156,9 +165,7 @@ fn a_seat_that_is_taken_out_is_reached_by_nothing_and_the_others_go_together_aga
 fn a_seat_that_is_lost_is_reached_by_nothing_until_it_is_back() {
     for kind in TOGETHER {
         let ether = quiet(kind);
-        lead(kind, &ether, |hall| {
-            rides_until_asked(hall);
-            assert!(plays(hall, 600)[0] > 10);
+        once_together(kind, &ether, |hall| {
             hall.ether.turns(0, Weather::Cut, 3_000);
             hall.pass(2_000);
             let before = frames(hall);
@@ -199,10 +206,7 @@ fn a_seat_with_a_level_of_its_own_gets_frames_of_its_own() {
 #[test]
 fn an_answer_to_a_frame_from_somebody_else_ends_it_for_good() {
     let kind = TOGETHER[0];
-    let ether = quiet(kind);
-    lead(kind, &ether, |hall| {
-        rides_until_asked(hall);
-        assert!(plays(hall, 600)[0] > 10);
+    once_together(kind, &quiet(kind), |hall| {
         let reply = hall.ether.world().last_reply.clone().expect("there was one");
         hall.ether.world().strangers.push_back(("127.0.1.99:7408".parse().expect("one"), reply));
         // As soon as it is read.
@@ -246,10 +250,7 @@ fn a_second_controller_with_the_address_of_one_is_found_at_rest_before_anything_
 #[test]
 fn a_second_controller_with_the_address_of_one_that_comes_in_mid_show_ends_it_with_its_first_ack() {
     let kind = TOGETHER[0];
-    let ether = quiet(kind);
-    lead(kind, &ether, |hall| {
-        rides_until_asked(hall);
-        assert!(plays(hall, 600)[0] > 10);
+    once_together(kind, &quiet(kind), |hall| {
         let before = hall.ether.world().to_all[0];
         hall.ether.world().twice = Some(1);
         let [_, each] = plays(hall, 2_000);
@@ -262,14 +263,163 @@ fn a_second_controller_with_the_address_of_one_that_comes_in_mid_show_ends_it_wi
 fn a_member_whose_acks_are_lost_ends_it_within_a_few_frames_and_until_all_are_asked_anew() {
     for kind in TOGETHER {
         let ether = quiet(kind);
-        lead(kind, &ether, |hall| {
-            rides_until_asked(hall);
-            assert!(plays(hall, 600)[0] > 10);
+        once_together(kind, &ether, |hall| {
             hall.ether.turns(1, Weather::Mute, 60_000);
             hall.pass(300);
             assert_eq!(plays(hall, 1_000)[0], 0);
         });
         assert_eq!(breaches(&ether).len(), 0);
+    }
+}
+
+#[test]
+fn a_stop_and_a_pause_go_to_each_from_the_first_frame_on() {
+    for (kind, request) in
+        TOGETHER.iter().flat_map(|kind| [(*kind, Transition::Stop), (*kind, Transition::Pause)])
+    {
+        let ether = quiet(kind);
+        once_together(kind, &ether, |hall| {
+            let before = frames(hall);
+            let motion = hall.ether.world().to_all[0];
+            hall.ask(request);
+            hall.pass(2_000);
+            assert_eq!(hall.ether.world().to_all[0], motion, "{request:?}");
+            assert!(frames(hall).iter().zip(before).all(|(after, before)| *after > before + 5));
+            assert_accounts(hall);
+        });
+        assert_eq!(breaches(&ether).len(), 0);
+    }
+}
+
+#[test]
+fn whenever_a_seat_is_taken_out_and_put_back_all_are_asked_before_one_datagram_goes_to_it_again() {
+    let kind = TOGETHER[0];
+    // Also in the midst of a look, and for two ticks alone.
+    for (at, out) in (0..16).flat_map(|step| [(90 * step, 45), (90 * step, 130)]) {
+        let ether = quiet(kind);
+        lead(kind, &ether, |hall| {
+            hall.ride(0);
+            hall.pass(at);
+            switch(hall, 1, false);
+            let motion = hall.ether.world().to_all[0];
+            hall.pass(out);
+            assert_eq!(hall.ether.world().to_all[0], motion, "at {at} ms");
+            switch(hall, 1, true);
+            let asked = hall.ether.world().to_all[1];
+            for _ in 0..300 {
+                hall.pass(10);
+                let [goes, asks] = hall.ether.world().to_all;
+                assert!(goes == motion || asks >= asked + 3, "at {at} ms for {out} ms");
+            }
+        });
+        assert_eq!(breaches(&ether).len(), 0, "at {at} ms for {out} ms");
+    }
+}
+
+#[test]
+fn where_the_kernel_takes_nothing_for_all_each_gets_its_own_from_the_next_tick_on() {
+    for kind in TOGETHER {
+        let ether = quiet(kind);
+        once_together(kind, &ether, |hall| {
+            hall.ether.world().refuses_all = true;
+            hall.pass(100);
+            let [one, each] = plays(hall, 1_000);
+            assert!(one == 0 && each > 40, "{one} as one, {each} as one for each");
+            assert_eq!(hall.state, State::Playing(PlayMode::Following));
+            hall.ether.world().refuses_all = false;
+            let goes_together = (0..20).any(|_| plays(hall, 100)[0] > 0);
+            assert!(goes_together, "once it takes them again");
+            assert_accounts(hall);
+        });
+        assert_eq!(breaches(&ether).len(), 0);
+    }
+}
+
+#[test]
+fn numbers_that_lie_all_over_the_round_have_none_that_is_later_than_all() {
+    let kind = TOGETHER[0];
+    let rounds =
+        [([u32::MAX - 90, 5, 1], true), ([1, 9_000, 1], true), ([1, 1_500_000_000, 3_000_000_000], false)];
+    for (firsts, goes_together) in rounds {
+        let ether = quiet(kind);
+        let number = |(seat, first)| (format!("127.0.1.{seat}:7408"), FrameNo(first));
+        let numbers = (1..).zip(firsts).map(number).collect();
+        open(&ether, kind, LedBefore::Ended, &numbers, |hall| {
+            hall.ride(0);
+            hall.pass(1_500);
+            let [one, each] = plays(hall, 1_000);
+            assert_eq!(one > 40 && each == 0, goes_together, "{one} as one, {each} as one for each");
+            assert_eq!(one == 0 && each > 40, !goes_together, "{one} as one, {each} as one for each");
+            assert_accounts(hall);
+        });
+        assert_eq!(breaches(&ether).len(), 0);
+    }
+}
+
+#[test]
+fn while_somebody_else_asks_a_permit_is_ten_seconds_old_at_most() {
+    let kind = TOGETHER[0];
+    lead(kind, &quiet(kind), |hall| {
+        hall.ride(3);
+        hall.pass(1_500);
+        assert!(plays(hall, 600)[0] > 10);
+        let questions = hall.ether.world().to_all[1];
+        hall.line.open(true);
+        assert!(plays(hall, 5_000)[0] > 200);
+        hall.pass(6_000);
+        assert_eq!(plays(hall, 1_000)[0], 0);
+        assert_eq!(hall.ether.world().to_all[1], questions, "nobody asks in between");
+        hall.line.open(false);
+        hall.pass(5_000);
+        assert!(plays(hall, 600)[0] > 10);
+    });
+}
+
+#[test]
+fn a_look_in_which_the_thread_that_asks_was_held_up_permits_nothing() {
+    let kind = TOGETHER[0];
+    lead(kind, &quiet(kind), |hall| {
+        while hall.ether.world().to_all[1] == 0 {
+            hall.pass(1);
+        }
+        hall.still(Thread::Acks, 400);
+        hall.pass(450);
+        assert_eq!(hall.ether.world().to_all[1], 1);
+        assert!(!is_permitted(hall), "nobody else may have heard it");
+        hall.pass(2_000);
+        assert!(is_permitted(hall));
+    });
+}
+
+#[test]
+fn a_seat_of_another_network_that_takes_what_goes_to_all_is_found_at_rest() {
+    let ether = quiet(OUTSIDE);
+    ether.world().outside_takes = true;
+    lead(OUTSIDE, &ether, |hall| {
+        hall.ride(0);
+        let [one, each] = plays(hall, 2_500);
+        assert!(one == 0 && each > 10, "{one} as one, {each} as one for each");
+        assert_eq!(hall.ether.world().to_all[0], 0);
+    });
+    assert_eq!(breaches(&ether).len(), 0);
+}
+
+#[test]
+fn a_seat_of_another_network_that_begins_to_take_it_in_mid_show_ends_it_with_its_first_ack() {
+    // One that is out is sent no frame of the numbers that it acks.
+    for is_out in [false, true] {
+        lead(OUTSIDE, &quiet(OUTSIDE), |hall| {
+            hall.pass(1_000);
+            switch(hall, 2, !is_out);
+            rides_until_asked(hall);
+            assert!(plays(hall, 600)[0] > 10);
+            let before = hall.ether.world().to_all[0];
+            hall.ether.world().outside_takes = true;
+            let [_, each] = plays(hall, 1_000);
+            let reached = hall.ether.world().to_all[0] - before;
+            assert!(reached <= 2 && each > 10, "{reached} frames reached it, {each} as one for each");
+            assert!(!is_permitted(hall));
+        });
     }
 }
 
@@ -295,14 +445,14 @@ fn all_are_asked_again_at_rest_and_while_the_show_runs() {
 #[test]
 fn such_a_history_that_was_recorded_is_judged_again_as_it_was() {
     let (mut differs, mut fates) = (Vec::new(), 0);
-    for seed in FIXED..FIXED + 12 {
+    for seed in FIXED..FIXED + 24 {
         for file in live_through(seed, Some(Bent::Together), u64::MAX, Keeps::Recordings).recordings {
             let again = replayed(&file);
             fates += again.fates;
             differs.extend(again.differences.first().map(|one| format!("seed {seed}: {one}")));
         }
     }
-    assert!(fates > 500 && differs.is_empty(), "{fates}: {differs:#?}");
+    assert!(fates > 400 && differs.is_empty(), "{fates}: {differs:#?}");
 }
 
 #[test]

@@ -21,8 +21,8 @@ pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> 
         bits: one.network.bits(),
         lanes: (0..peers.len()).filter(|lane| one.network.holds(*peers[*lane].ip())).collect(),
     };
-    let wholes: Vec<_> = config.broadcasts.iter().map(whole).collect();
-    Ok(Ports::open_with(config.show.bind, &peers, &wholes).map_err(RuntimeError::Net)?.split())
+    let whole = config.broadcast.as_ref().map(whole);
+    Ok(Ports::open_with(config.show.bind, &peers, whole.as_ref()).map_err(RuntimeError::Net)?.split())
 }
 
 /// What to do where frames to the controllers take too much of the time between ticks. Where that cannot be measured nothing is said.

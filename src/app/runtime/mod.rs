@@ -30,7 +30,7 @@ use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::record::{Judging, Taps};
 use crate::rt::{
-    AckLoop, Broadcasts, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds,
+    AckLoop, Broadcast, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds,
     NewsIn, Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line,
     mailboxes,
 };
@@ -215,8 +215,8 @@ impl Runtime {
         let manner = Manner { level: 0.0, silent: purpose.is_silent() };
         let (engine, lanes, planner, timeline) = boot::open(&config, numbers, manner)?.split();
         let desk = Arc::new(Desk::new(lanes.iter().map(|_| Mix::FULL)).ended_by(Arc::clone(signals)));
-        let broadcasts = Broadcasts::of(&config, purpose.is_silent());
-        let live = Arc::new(Live::new(lanes.len()).with_broadcasts(broadcasts));
+        let broadcast = Broadcast::of(&config, purpose.is_silent());
+        let live = Arc::new(Live::new(lanes.len()).with_broadcast(broadcast));
         let rate = Rate::from_hz(config.show.rate_hz);
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
         let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = ends;
