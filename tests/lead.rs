@@ -154,6 +154,11 @@ fn a_seek_in_a_pause_moves_nothing_until_resume() {
     assert_within(played.worst());
     let frames = played.lane(0).count();
     assert!(frames < 600 + 30 + 20 + 510 + 400, "{frames}: five seconds of film were left");
+    // From when it is resumed on the film runs from there, to the tick.
+    let (resumed, _) = played.happened[2];
+    let later = |frame: &&Frame| frame.at.since(resumed) >= Duration::from_millis(3_500);
+    let later = played.lane(0).find(later).expect("it goes on for five seconds");
+    assert_eq!(pulses(later), cue_at(&played, 18_500));
 }
 
 #[test]
@@ -259,6 +264,17 @@ fn a_trim_is_slewed_in_and_ends_where_it_should() {
 fn two_seats() -> Virtual {
     let to = ["127.0.0.1:7408", "127.0.0.1:7409"].map(str::to_owned);
     Virtual { to: to.to_vec(), ..ride() }
+}
+
+#[test]
+fn a_stop_brakes_each_of_several_seats() {
+    let show = Virtual { at_most: 2_000, ..two_seats() };
+    let played = show.with(460, Event::Stop).with(700, Event::Leave).play();
+    assert_eq!(played.ended.ending, Ending::Stopped);
+    let [first, second] = [0, 1].map(|lane| played.lane(lane).map(pulses).collect::<Vec<_>>());
+    assert!((465..500).contains(&first.len()), "{} frames", first.len());
+    assert_eq!(first, second, "they play the same");
+    assert_within(played.worst_of_lane(1, 0..second.len()));
 }
 
 fn bytes(played: &Played, lane: usize) -> Vec<Vec<u8>> {

@@ -362,6 +362,46 @@ mod tests {
         if order == 2 { shown.acceleration } else { shown.jerk }
     }
 
+    const HZ: f64 = 100.0;
+
+    /// The frame at rest at which an axis is calm again that was off its place for one frame, after so many in it.
+    fn calm_again_after(limits: &AxisLimits, off: f64, rested: usize) -> Option<usize> {
+        let at = |place: f64| {
+            let mut pose = [0.0; MAX_AXES];
+            pose[0] = place;
+            pose
+        };
+        let mut path = FastPath::new(std::iter::once(limits), Spacing::at_rate(HZ), at(0.5), 0.01);
+        (0..rested).for_each(|_| path.take(&at(0.5)));
+        path.take(&at(0.5 + off));
+        // The fourth difference is of poses that are all in one place.
+        (0..3).for_each(|_| path.take(&at(0.5)));
+        (0..1_000).find(|_| {
+            let is_calm = path.is_calm(0, 0.5);
+            path.take(&at(0.5));
+            is_calm
+        })
+    }
+
+    #[test]
+    fn what_was_above_the_level_counts_for_as_long_as_the_measure_looks_back_whenever_it_was() {
+        let Spacing { m, .. } = Spacing::at_rate(HZ);
+        let any = AxisLimits { velocity: 1e3, acceleration: 1e9, jerk: 1e9, step: 1e3 };
+        // One that jumps so is above twice the level of one of them, and far below that of the other.
+        let tight =
+            [(AxisLimits { acceleration: 1.0, ..any }, 2e-4), (AxisLimits { jerk: 1.0, ..any }, 2e-6)];
+        for (limits, off) in tight {
+            for rested in 0..2 * (3 * m + 1) {
+                let calm = calm_again_after(&limits, off, rested);
+                let looks_back = 3 * m - 2..2 * (3 * m + 1);
+                assert!(
+                    calm.is_some_and(|calm| looks_back.contains(&calm)),
+                    "{calm:?} after {rested}: {limits:?}"
+                );
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn a_difference_over_a_distance_is_a_mean_of_those_from_frame_to_frame_none_of_which_weighs_more_than_is_allowed_for(

@@ -4,10 +4,9 @@
 use std::path::Path;
 use std::time::Duration;
 
-use super::{Heard, PairShared, Ride};
+use super::{Heard, Ride};
 use crate::pair::Carried;
 use crate::settings::{self, Settings};
-use crate::sys::lock::lock;
 use crate::time::MonoTime;
 
 /// So many beats carry what has just been set: one may be lost.
@@ -52,13 +51,12 @@ const FRESH: Duration = Duration::from_secs(3);
 /// Keeps what the machine that led has told last, with where its show is by now. Says to people what is there of it, and what may not be;
 /// and gives the show that was under way there, where all of that came.
 pub(super) fn keep(
-    shared: &PairShared,
+    other: &str,
+    told: &PairSettings,
     heard: &Heard,
     now: MonoTime,
     state: &Path,
 ) -> (String, Option<Ride>) {
-    let told = lock(&shared.settings);
-    let other = &shared.other;
     let Some(text) = &told.text else {
         let words = format!(
             "{other} told nothing of what was set there, and all is as it was here: check levels, trim and seats"
@@ -96,6 +94,62 @@ pub(super) fn keep(
                 ),
                 Some(ride).filter(|_| is_on_cue && age <= FRESH),
             )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::{LoadedShow, SettingsFile};
+
+    const TOLD_AT: MonoTime = MonoTime::from_nanos(100_000_000_000);
+
+    /// What a machine leads that is at 10 s of a cue, and has told twice what is set there.
+    fn led(is_on_cue: bool, runs: bool) -> Heard {
+        let carried = Carried { film_ms: 10_000, is_on_cue, runs, revision: 2, ..Carried::default() };
+        Heard { session: 9, carried, at: TOLD_AT }
+    }
+
+    /// The place in the film that is kept so long after that was heard, where what is set was told in the revision `told`, and the show that
+    /// goes on.
+    fn kept(heard: &Heard, told: u32, later: Duration) -> (Option<i64>, Option<Ride>) {
+        let folder = tempfile::tempdir().unwrap();
+        let (cue, sha256) = ("two".to_owned(), "0".repeat(64));
+        let show = Some(LoadedShow { cue, sha256, playlist: None, film_ms: Some(4_000) });
+        let told = PairSettings::told(Settings { show, ..Settings::default() }.text(), (heard.session, told));
+        let (_, ride) = keep("kino-b", &told, heard, heard.at + later, folder.path());
+        let (_file, found) = SettingsFile::open(folder.path());
+        (found.settings.unwrap().show.unwrap().film_ms, ride)
+    }
+
+    #[test]
+    fn a_show_that_ran_goes_on_where_its_film_is_by_now_and_one_that_was_paused_where_it_stood() {
+        let later = Duration::from_millis(1_700);
+        let since = |runs_since| Some(Ride { runs_since });
+        assert_eq!(kept(&led(true, true), 2, later), (Some(11_700), since(Some(TOLD_AT + later))));
+        assert_eq!(kept(&led(true, false), 2, later), (Some(10_000), since(None)));
+        // Where none was under way, the place is the one at which people were left.
+        assert_eq!(kept(&led(false, false), 2, later), (Some(4_000), None));
+    }
+
+    #[test]
+    fn no_show_goes_on_of_a_machine_that_was_heard_more_than_three_seconds_ago_or_has_set_something_else_since()
+     {
+        let rides = |told, ms| kept(&led(true, true), told, Duration::from_millis(ms)).1.is_some();
+        assert!(rides(2, 3_000) && !rides(2, 3_001), "it may have been stopped since");
+        assert!(!rides(1, 1_000), "a seat may have been taken out since");
+    }
+
+    #[test]
+    fn nothing_goes_on_where_nothing_was_told_or_what_was_told_cannot_be_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let heard = led(true, true);
+        for told in
+            [PairSettings::default(), PairSettings::told("no settings".to_owned(), heard.settings_of())]
+        {
+            let (words, ride) = keep("kino-b", &told, &heard, TOLD_AT, folder.path());
+            assert!(ride.is_none() && words.ends_with("check levels, trim and seats"), "{words}");
         }
     }
 }

@@ -108,7 +108,7 @@ pub(crate) fn stand_by(
 fn takes_over(shared: &PairShared, state: &Path) -> Option<TookOver> {
     let heard = lock(&shared.heard).clone()?;
     let other = &shared.other;
-    let (kept, ride) = settings::keep(shared, &heard, Monotonic.now(), state);
+    let (kept, ride) = settings::keep(other, &lock(&shared.settings), &heard, Monotonic.now(), state);
     let was = if heard.carried.moves { "its seats were moving" } else { "its seats did not move" };
     let then = if ride.is_some() {
         "resume, and they join the show where its film is by then; or park"

@@ -12,6 +12,7 @@ use super::testing::{Rig, row};
 use super::*;
 use crate::app::film::{FilmTable, SharedTable};
 use crate::app::pair::{Ride, TookOver};
+use crate::config::Belts;
 use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
 use crate::health::HealthState;
@@ -214,6 +215,18 @@ fn a_show_that_was_taken_over_goes_on_by_resume_where_its_film_is_by_then_and_no
     other.ask(Command::Load { cue: "one".to_owned() }).unwrap();
     assert_eq!(other.ask(Command::Resume).unwrap_err().code, Code::State);
     assert_eq!(other.state(), State::Recovering);
+}
+
+#[test]
+fn a_show_that_was_taken_over_waits_for_its_belts_as_go_does() {
+    let mut rig = taken_over(None);
+    let mut config = (*rig.supervisor.hall.config).clone();
+    config.show.belts = Belts::All;
+    config.controllers.iter_mut().for_each(|one| one.belt_inputs = 1);
+    rig.supervisor.hall.config = Arc::new(config);
+    let refused = rig.ask(Command::Resume).unwrap_err();
+    assert!(refused.detail.contains("not buckled"), "{refused}");
+    assert_eq!(rig.state(), State::Recovering);
 }
 
 #[test]

@@ -248,3 +248,49 @@ impl LinkPeer {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::config::from_to_args;
+    use crate::cue::{Source as CueSource, read};
+    use crate::drive::{Manner, lanes};
+    use crate::timeline::Timeline;
+
+    fn ms(ms: u64) -> MonoTime {
+        MonoTime::from_nanos(ms * 1_000_000)
+    }
+
+    /// What is told of the first seat of a hall by an event.
+    fn told(peer: &mut LinkPeer, event: &StreamEvent) -> EvidenceList {
+        let mut out = EvidenceList::new();
+        peer.hear(event, ms(1_000), &mut out);
+        out
+    }
+
+    #[test]
+    fn a_seat_whose_drive_was_restarted_or_let_go_is_nowhere_and_not_home_until_all_its_drives_say_so_again()
+    {
+        let config = from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
+        let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &CueSource::Native).unwrap();
+        let lanes = lanes(&config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
+        let mut peer = LinkPeer::new(&config.controllers[0], &lanes[0]);
+        let homed = StreamEvent::Homed { lane: 0, homed: true };
+        let read = StreamEvent::Read { lane: 0, axis: 0, position: 0.0, held: None, at: ms(990) };
+        let is_placed = |out: &EvidenceList| out.iter().any(|one| matches!(one, Evidence::Position(_)));
+        let is_home = |out: &EvidenceList| out.contains(&Evidence::Homed(true));
+        for lost in [
+            StreamEvent::Restarted { lane: 0, axis: 0 },
+            StreamEvent::Killed { lane: 0, axis: 0, cause: 1 << 16 },
+        ] {
+            assert!(is_home(&told(&mut peer, &homed)));
+            assert!(is_placed(&told(&mut peer, &read)));
+            assert!(told(&mut peer, &lost).contains(&Evidence::LostZero));
+            // Counts of a drive that does not know its zero are no place.
+            assert!(!is_placed(&told(&mut peer, &read)), "after {lost:?}");
+        }
+        assert!(is_home(&told(&mut peer, &homed)) && is_placed(&told(&mut peer, &read)));
+    }
+}
