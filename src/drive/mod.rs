@@ -90,6 +90,8 @@ pub(crate) enum Evidence {
     Homed(bool),
     /// How many datagrams it has received, round after 65,535.
     Count(u16),
+    /// The same, as part of a look: what was sent and acked until now is what that count is held against, whenever the rest has come.
+    Counted,
     /// It speaks in a way that nobody here can read.
     Unreadable,
     /// It drives so many axes (PA02), which are not those that its frames lead.

@@ -38,6 +38,8 @@ pub(crate) enum HealthInput {
     OtherAxes(usize, u16),
     /// [`HealthTable::on_count`].
     Count(usize, u16),
+    /// [`HealthTable::on_counted`].
+    Counted(usize),
     /// [`HealthTable::on_moved`].
     Moved(usize),
     /// [`HealthTable::on_fell_out`].
@@ -76,6 +78,7 @@ impl HealthInput {
             | Self::Seen(of, ..)
             | Self::OtherAxes(of, _)
             | Self::Count(of, _)
+            | Self::Counted(of)
             | Self::Moved(of)
             | Self::FellOut(of, _)
             | Self::Outside(of, _)
@@ -105,6 +108,7 @@ impl HealthTable {
             HealthInput::Seen(controller, sighting, at) => self.on_sighting(controller, &sighting, at),
             HealthInput::OtherAxes(controller, drives) => self.on_other_axes(controller, drives),
             HealthInput::Count(controller, packets) => self.on_count(controller, packets),
+            HealthInput::Counted(controller) => self.on_counted(controller),
             HealthInput::Moved(controller) => self.on_moved(controller),
             HealthInput::FellOut(controller, why) => self.on_fell_out(controller, why),
             HealthInput::Outside(controller, outside) => self.on_outside(controller, outside),

@@ -62,6 +62,8 @@ pub(super) struct Member {
     /// When a frame was last sent, and what the controller counts meanwhile.
     framed: Option<MonoTime>,
     counter: PacketCounter,
+    /// What was sent and acked when it told its count last: frames go on while the rest of a look is on its way.
+    counted: Option<Traffic>,
     /// Another master that was found, until the hall is told.
     trouble: Option<Trouble>,
 }
@@ -86,6 +88,7 @@ impl Member {
             ambiguous: false,
             framed: None,
             counter: PacketCounter::default(),
+            counted: None,
             trouble: None,
         }
     }
@@ -161,19 +164,20 @@ impl Member {
             return;
         }
         self.on_answer(at);
+        let traffic = self.counted.take().unwrap_or(self.traffic);
         if let Some(packets) = sighting.packets() {
             // A look at a time, somebody else's frames are no more than may be under way: what they add up to tells.
-            self.counter.hear(packets, self.traffic.acked);
+            self.counter.hear(packets, traffic.acked);
         }
         self.faults.on_error(sighting.error);
         self.faults.on_alarm(DPFE, sighting.alarm);
         let is_well = sighting.error == 0 && sighting.alarm == 0;
         self.faults.refusing &= !is_well;
-        if let Some(why) = self.against(sighting, at) {
+        if let Some(why) = self.against(sighting, traffic, at) {
             self.must_home_again(why);
         } else {
-            let renewed = |before: Baseline| before.renewed(sighting, self.traffic, at);
-            let baseline = self.baseline().map_or_else(|| Baseline::of(sighting, self.traffic), renewed);
+            let renewed = |before: Baseline| before.renewed(sighting, traffic, at);
+            let baseline = self.baseline().map_or_else(|| Baseline::of(sighting, traffic), renewed);
             self.identity = KnownBy::Seen(baseline);
             self.replies.forget_gap();
             self.seen = is_well.then_some(at);
@@ -190,10 +194,10 @@ impl Member {
         self.must_be_home = true;
     }
 
-    fn against(&self, sighting: &Sighting, now: MonoTime) -> Option<Why> {
+    fn against(&self, sighting: &Sighting, traffic: Traffic, now: MonoTime) -> Option<Why> {
         let controller = self.controller;
         let verdict = match &self.identity {
-            KnownBy::Seen(baseline) => baseline.judge(sighting, self.traffic, self.replies.has_gap(), now),
+            KnownBy::Seen(baseline) => baseline.judge(sighting, traffic, self.replies.has_gap(), now),
             KnownBy::Trusted => Verdict::Same,
             KnownBy::Unproved => Verdict::Unproved,
         };
@@ -310,7 +314,12 @@ impl Member {
     }
 
     pub(super) const fn on_count(&mut self, packets: u16) {
+        self.on_counted();
         self.counter.hear(packets, self.traffic.acked);
+    }
+
+    pub(super) const fn on_counted(&mut self) {
+        self.counted = Some(self.traffic);
     }
 
     pub(super) fn tick(&mut self, now: MonoTime) {

@@ -215,6 +215,11 @@ impl HealthTable {
         self.members[controller].on_count(packets);
     }
 
+    /// The same as part of a look, whose sighting has the count.
+    pub(crate) fn on_counted(&mut self, controller: usize) {
+        self.members[controller].on_counted();
+    }
+
     /// A seat at rest was found elsewhere than frames left it: its group is out until it was looked at, and joins from there.
     pub(crate) fn on_moved(&mut self, controller: usize) {
         self.members[controller].unsure = Some(Why::Moved(controller));

@@ -81,6 +81,7 @@ impl Hall {
         if self.ack_after[controller].is_some() {
             self.packets[controller] = self.packets[controller].wrapping_add(1);
             let sighting = self.sighting(controller);
+            self.health.on_counted(controller);
             self.health.on_sighting(controller, &sighting, self.now);
         }
     }
@@ -186,6 +187,36 @@ impl Hall {
     /// Puts it back.
     fn back(&mut self) {
         self.ack_after[2] = Some(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_count_is_held_against_what_was_acked_when_it_came_however_late_the_rest_of_its_look() {
+    for frames in [60, 200, 1_000] {
+        let mut hall = Hall::asking(LossPolicy::Continue, 1, Duration::from_millis(1));
+        (0..500).for_each(|_| hall.tick_after(Duration::from_millis(1)));
+        hall.health.on_read_sent(2, 1);
+        hall.packets[2] += 1;
+        let sighting = hall.sighting(2);
+        hall.health.on_counted(2);
+        // A busy machine brings the rest so much later, and frames are acked meanwhile.
+        for _ in 0..frames {
+            hall.now = hall.now + Duration::from_millis(1);
+            hall.frame += 1;
+            hall.health.on_sent(2, FrameNo(hall.frame), true, hall.now);
+            hall.packets[2] = hall.packets[2].wrapping_add(1);
+            hall.health.on_ack(2, FrameNo(hall.frame), hall.now);
+        }
+        hall.health.on_sighting(2, &sighting, hall.now);
+        hall.look();
+        let group = hall.health.groups().group_of(2);
+        assert!(hall.health.standing(group).may_move(), "{frames}: {:?}", hall.health.why(group));
+        // Who has counted less than it acked has restarted all the same.
+        hall.read(2);
+        hall.packets[2] = 3;
+        hall.read(2);
+        hall.look();
+        assert!(!hall.health.standing(group).may_move(), "{frames}");
     }
 }
 

@@ -3,8 +3,9 @@
 use super::ack_words::{FALLS, of, place};
 use super::cursor::Cursor;
 use crate::health::HealthInput::{
-    self, Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, FellOut, Homed, Joined, Killed, LookAnew,
-    LostZero, Moved, OtherAxes, OtherSent, Outside, Part, Pushed, ReadSent, Refused, Seen, Wide, Zero,
+    self, Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, Counted, FellOut, Homed, Joined, Killed,
+    LookAnew, LostZero, Moved, OtherAxes, OtherSent, Outside, Part, Pushed, ReadSent, Refused, Seen, Wide,
+    Zero,
 };
 use crate::health::{self, Continuity, Identity, Sighting};
 use crate::motion::Pulses;
@@ -56,6 +57,7 @@ pub(super) fn write_input(out: &mut Vec<u8>, input: HealthInput) {
             let places = pushed.map_or([0; 2], |pushed| [pushed.at, pushed.held]);
             places.iter().for_each(|place| out.extend_from_slice(&place.to_le_bytes()));
         }
+        Counted(controller) => put(55, controller, &[]),
         BeatKept(controller, at) => put(54, controller, &at.as_nanos().to_le_bytes()),
     }
 }
@@ -92,6 +94,7 @@ pub(super) fn read_input(kind: u8, of: usize, from: &mut Cursor<'_>) -> Option<H
             Pushed(of, (axis != NONE).then_some(health::Pushed { axis: axis.into(), at, held }))
         }
         54 => BeatKept(of, from.time()?),
+        55 => Counted(of),
         _ => return None,
     })
 }

@@ -196,9 +196,9 @@ mod tests {
     #[test]
     fn what_health_was_told_reads_as_it_was() {
         use HealthInput::{
-            Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, FellOut, Homed, Joined, Killed, LookAnew,
-            LostZero, Moved, OtherAxes, OtherSent, Outside, Part, Pushed, ReadSent, Refused, Seen, Wide,
-            Zero,
+            Alive, Ambiguous, Answered, BeatKept, BeatSent, Count, Counted, FellOut, Homed, Joined, Killed,
+            LookAnew, LostZero, Moved, OtherAxes, OtherSent, Outside, Part, Pushed, ReadSent, Refused, Seen,
+            Wide, Zero,
         };
         let (mut tap, mut ring) = ack_tap(3, Rate::from_hz(100.0));
         let identity = Identity { version: 7, minor_version: 8, work_mode: 2, axes: 3 };
@@ -221,6 +221,7 @@ mod tests {
             Seen(1, sighting(Continuity::Mark), AT),
             OtherAxes(1, 6),
             Count(1, 40_000),
+            Counted(2),
             Moved(1),
             FellOut(1, Fall::Stale),
             Outside(1, Some((5, Pulses(-3)))),

@@ -192,6 +192,7 @@ impl MboxPeer {
             }
             (Zero, _) => out.extend(word.map(|state| Evidence::Homed(state == ZERO_KNOWN))),
             (Packets, Some(claim)) if claim.is_count => out.extend(word.map(Evidence::Count)),
+            (Packets, _) => out.extend(word.map(|_| Evidence::Counted)),
             _ => {}
         }
         self.probe.hear(read, reply);

@@ -306,6 +306,7 @@ impl WatchedSeats {
             10 => HealthInput::LostZero(of),
             11 => HealthInput::Wide(of),
             12 => HealthInput::OtherAxes(of, script.octet()?.into()),
+            13 if script.flag()? => HealthInput::Counted(of),
             13 => HealthInput::Count(of, script.word()?),
             14 => HealthInput::Moved(of),
             15 => HealthInput::FellOut(of, script.one_of(&FALLS)?),

@@ -65,6 +65,7 @@ impl Watch {
             }
             Evidence::Homed(_) => {}
             Evidence::Count(packets) => self.judge(HealthInput::Count(controller, packets)),
+            Evidence::Counted => self.judge(HealthInput::Counted(controller)),
             Evidence::Unreadable => self.judge(HealthInput::Wide(controller)),
             Evidence::OtherAxes(drives) => self.judge(HealthInput::OtherAxes(controller, drives)),
             Evidence::Seen(seen) => self.on_seen(controller, seen, at),
