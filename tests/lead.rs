@@ -230,6 +230,23 @@ fn a_level_fades_within_the_limits_and_arrives() {
 }
 
 #[test]
+fn no_level_goes_beyond_the_greatest_that_a_cue_keeps_the_limits_at() {
+    // Five seconds of rest, and then a swing that is a tenth faster than the seat may be.
+    let row = |ms: i32| {
+        let t = f64::from(ms - 5_000).max(0.0) / 1e3;
+        let swell = (t / 4.0).min(1.0).powi(2) * (3.0 - 2.0 * (t / 4.0).min(1.0));
+        format!("{ms},{:.6}\n", 0.5 + 0.4 * swell * (std::f64::consts::TAU * 0.7 * t).sin())
+    };
+    let cue = (0..=700).fold("time_ms,a1\n".to_owned(), |text, n| text + &row(20 * n));
+    let show = Virtual { level: 0.8, proved: 0.8, at_most: 3_000, ..Virtual::new(cue) };
+    let played = show.with(300, Event::Mix(0, Mix::FULL)).play();
+    assert_within(played.worst());
+    assert_eq!(played.clamps[0].clamps, 0);
+    let fastest = played.positions_mm(0, 0).windows(2).map(|p| (p[1] - p[0]).abs()).fold(0.0, f64::max);
+    assert!(fastest > 0.95 * 2.4, "{fastest} mm a frame: it gets what it can");
+}
+
+#[test]
 fn a_level_that_changes_all_the_time_keeps_the_limits_also_where_the_show_is_stopped_or_sought() {
     let mut show = Virtual::new(swell(3, 20, 70.0, 0.45));
     for (step, at) in (300..1_900).step_by(37).enumerate() {

@@ -82,6 +82,8 @@ pub struct Virtual {
     pub start: ShowTime,
     pub plays: u32,
     pub level: f64,
+    /// The level that its cue was proved at.
+    pub proved: f64,
     /// True if it chases a film, of which nobody has heard before the first [`Event::Film`].
     pub chases: bool,
     /// True if the hall is armed, and starts by what it is asked; else it goes at once.
@@ -108,6 +110,7 @@ impl Virtual {
             start: ShowTime::ZERO,
             plays: 1,
             level: 1.0,
+            proved: 1.0,
             chases: false,
             armed: false,
             together: false,
@@ -139,7 +142,7 @@ impl Virtual {
 
     fn stage(&self, show: Show) -> StagedShow {
         let timeline = Arc::new(self.timeline());
-        let mut lanes = lanes(&self.config(), &timeline, Manner { level: 1.0, silent: false });
+        let mut lanes = lanes(&self.config(), &timeline, Manner { level: self.proved, silent: false });
         for (lane, lead) in lanes.iter_mut().zip(&self.leads) {
             lane.window = lane.window.clone().led_ahead(*lead);
         }

@@ -173,8 +173,8 @@ fn taken_over(runs_since: Option<MonoTime>) -> Rig {
         Carryover::of(Kept { settings: Some(settings), said: Vec::new() }, Some(took_over))
     });
     rig.settle();
-    rig.tell(Event::Identified(Finding { homed: true, at_park: false, before: LedBefore::OnCue }));
     rig.supervisor.features.lasting.ride = None; // nobody answers a preflight here
+    rig.tell(Event::Identified(Finding { homed: true, at_park: false, before: LedBefore::OnCue }));
     rig.supervisor.features.readiness.preflighted = Some(Preflighted::passing(2));
     rig.supervisor.procedures.add(Vec::new());
     rig.settle();

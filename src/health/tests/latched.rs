@@ -89,6 +89,21 @@ fn a_drive_with_an_alarm_parks_whatever_the_configuration_says() {
 }
 
 #[test]
+fn a_drive_whose_alarm_goes_on_keeps_its_seat_out_through_a_clear() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.observed(3, What::ServoError { axis: 2, error: 16 });
+    hall.look();
+    hall.health.look_anew(2);
+    hall.run(30);
+    assert_eq!(hall.health.standing(2), HealthState::Error);
+    hall.observed(3, What::ServoError { axis: 2, error: 0 });
+    hall.health.look_anew(2);
+    hall.run(30);
+    assert_eq!(hall.health.standing(2), HealthState::Rejoining);
+}
+
+#[test]
 fn one_of_a_seat_that_is_lost_already_parks_as_well() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.silence(&[3]);

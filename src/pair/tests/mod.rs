@@ -181,6 +181,28 @@ fn a_key_is_not_taken_by_an_old_look_nor_one_that_was_written_just_now() {
     assert!(!takes(look(15, 1_250), 1_551), "looked at too long ago");
 }
 
+#[test]
+fn a_machine_that_hears_a_leader_or_has_given_it_its_word_leaves_a_key_alone_that_nobody_renews() {
+    let holder = Holder { session: 9, count: 3, print: 0 };
+    let look = |claim: &mut Claim, at| {
+        let ask = claim.ask(ms(at));
+        assert_eq!(ask.want, Want::Read, "at {at} ms");
+        claim.answer(ask.ticket, Answer::Key { holder, revision: 40 }, ms(at));
+    };
+    let mut claim = Claim::new(7, false, ms(0));
+    look(&mut claim, 100);
+    look(&mut claim, 1_400);
+    assert!(matches!(claim.clone().ask(ms(1_420)).want, Want::Swap { .. }), "nobody is heard");
+    claim.hear(&beat(9, 7, 1, true, 0), ms(1_410));
+    assert_eq!(claim.ask(ms(1_420)).want, Want::Read, "it hears that the other one leads");
+    assert_eq!(claim.beat(ms(1_430)).word, 1);
+    // The other one is away since 2,010 ms, and may lead by this word alone until 2,430 ms.
+    look(&mut claim, 2_300);
+    assert_eq!(claim.ask(ms(2_400)).want, Want::Read, "it has given its word");
+    look(&mut claim, 2_600);
+    assert!(matches!(claim.ask(ms(2_640)).want, Want::Swap { .. }), "its word is over");
+}
+
 /// A machine of that configuration that sees a key of another day, which nobody renews.
 fn alone_with(print: u64, key: u64) -> Claim {
     let mut claim = Claim::new(7, true, ms(0));

@@ -4,7 +4,7 @@ use std::path::Path;
 use rtrb::RingBuffer;
 
 use super::*;
-use crate::config::{LossPolicy, from_to_args};
+use crate::config::{Config, LossPolicy, from_to_args};
 use crate::cue::{Source, read};
 use crate::drive::{Incoming, Manner, lanes};
 use crate::health::Groups;
@@ -22,15 +22,20 @@ use crate::wire::{
 
 /// A watch over one controller with a belt, and room for two alarms.
 fn watch(dialect: Dialect) -> (Watch, rtrb::Consumer<Alarm>, Observer) {
-    let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &Source::Native).unwrap();
     let mut config = from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
     config.controllers[0].station_mut().dialect = dialect;
     config.controllers[0].belt_inputs = 1;
+    watch_over(&config, 2)
+}
+
+/// A watch over the controllers of a configuration, and room for so many alarms.
+fn watch_over(config: &Config, room: usize) -> (Watch, rtrb::Consumer<Alarm>, Observer) {
+    let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &Source::Native).unwrap();
     let stations = config.stations();
-    let lanes = lanes(&config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
-    let (sender, _) =
-        Ports::open("127.0.0.1:0".parse().unwrap(), &[stations[0].connection.address]).unwrap().split();
-    let (producer, alarms) = RingBuffer::new(2);
+    let addresses: Vec<_> = stations.iter().map(|one| one.connection.address).collect();
+    let lanes = lanes(config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
+    let (sender, _) = Ports::open("127.0.0.1:0".parse().unwrap(), &addresses).unwrap().split();
+    let (producer, alarms) = RingBuffer::new(room);
     let health =
         HealthTable::new(Groups::of(&config.controllers), LossPolicy::Continue, 1, Duration::from_millis(10));
     let watch = Watch::new(health, &config.controllers, &lanes, sender, producer, Arc::default());
@@ -69,6 +74,21 @@ fn no_alarm_is_dropped_where_the_tick_thread_has_no_room_and_all_come_in_their_o
         heard.extend(std::iter::from_fn(|| alarms.pop().ok()));
     }
     assert_eq!(heard, all);
+}
+
+#[test]
+fn an_emergency_stop_cuts_every_lane_of_its_seat_and_no_other() {
+    let tos = ["127.0.0.1:9", "127.0.0.2:9", "127.0.0.3:9"].map(str::to_owned);
+    let mut config = from_to_args(&tos, &[], 1).unwrap();
+    config.controllers[1].group = config.controllers[0].group.clone();
+    let (mut watch, mut alarms, mut observer) = watch_over(&config, 8);
+    let at = MonoTime::from_nanos(1_000_000);
+    observer.on_code(1, ReplyCode::EmergencyStop, at);
+    watch.look(&observer, at);
+    let heard: Vec<_> = std::iter::from_fn(|| alarms.pop().ok()).collect();
+    let is_of_lane = |alarm: &&Alarm| !matches!(alarm, Alarm::Event(_));
+    let of_lanes: Vec<_> = heard.iter().filter(is_of_lane).collect();
+    assert_eq!(of_lanes, [&Alarm::Cut(0), &Alarm::Cut(1)], "{heard:?}");
 }
 
 /// Acks are matched when all that came was read; a count of datagrams is held against them before that.
