@@ -61,7 +61,8 @@ class Soak(Hall):
             # A person would home a seat that lost its place: at so many losses one does now and then.
             _ = self.does("park") or self.does("home", "--seats-empty")
         elif state == "parked":
-            _ = self.does("preflight") and self.does("load", "waves") and self.does("arm")
+            ready = self.does("preflight") and self.does("load", "waves")
+            _ = ready and (self.does("arm") or self.does("home", "--seats-empty"))
         elif state == "armed":
             self.does("go")
 

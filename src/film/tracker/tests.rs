@@ -480,3 +480,21 @@ fn places_that_agree_on_nothing_are_followed_for_no_longer_than_silence_is() {
         assert!(run.has_been(FilmState::Unusable), "{name}: {:?}", run.states);
     }
 }
+
+#[test]
+fn a_told_speed_is_followed_up_to_the_band_and_no_further() {
+    let after = |speed| {
+        let mut tracker = SourceTracker::new(SourceKind::Mpv, BAND, mono(0.0));
+        for at in (0..200).map(|tick| f64::from(tick) * 0.02) {
+            tracker.hear(&Observation::new(mono(at), FilmWord::Position(ShowTime::from_secs_f64(at))));
+        }
+        tracker.hear(&Observation::new(mono(4.0), FilmWord::Speed(speed)));
+        tracker.state()
+    };
+    for part in [0.0, 0.9, -0.9] {
+        assert_ne!(after(1.0 + part * BAND), FilmState::Shuttle, "{part} of the band");
+    }
+    for part in [1.1, 1.9, -1.1, -1.9] {
+        assert_eq!(after(1.0 + part * BAND), FilmState::Shuttle, "{part} of the band");
+    }
+}

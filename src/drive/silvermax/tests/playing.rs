@@ -118,6 +118,21 @@ fn a_pose_that_passes_where_a_seat_stands_is_not_the_first_of_a_motion() {
     assert!(play.has("Elsewhere"), "{:?}", play.rare());
 }
 
+#[test]
+fn one_place_of_each_queue_stays_free_while_all_goes_well() {
+    let mut play = Play::with_ppm([0; 3]);
+    play.begin(ride);
+    play.play(1.0, 0);
+    let mut most = [0; 3];
+    for _ in 0..700 {
+        play.play(0.01, 0);
+        most = [0, 1, 2].map(|axis| play.unit(axis).queued().max(most[axis]));
+    }
+    assert_eq!(most, [3; 3], "of four");
+    let full = [0, 1, 2].map(|axis| (play.unit(axis).tally().full, play.figures()[axis].account.again));
+    assert_eq!(full, [(0, 0); 3]);
+}
+
 /// Three axes at 57,600 baud; `KINOCUE_SHOWS` is how many shows, 60 for an hour.
 #[test]
 fn no_queue_runs_dry_in_shows_whose_thread_is_held_up_as_a_real_time_thread_is() {
