@@ -324,12 +324,8 @@ fn where_the_kernel_takes_nothing_for_all_each_gets_its_own_from_the_next_tick_o
             hall.ether.world().refuses_all = true;
             hall.pass(100);
             let [one, each] = plays(hall, 1_000);
-            assert!(one == 0 && each > 40, "{one} as one, {each} as one for each");
+            assert!(one == 0 && each > 40, "{kind:?}: {one} as one, {each} as one for each");
             assert_eq!(hall.state, State::Playing(PlayMode::Following));
-            hall.ether.world().refuses_all = false;
-            let goes_together = (0..20).any(|_| plays(hall, 100)[0] > 0);
-            assert!(goes_together, "once it takes them again");
-            assert_accounts(hall);
         });
         assert_eq!(breaches(&ether).len(), 0);
     }
