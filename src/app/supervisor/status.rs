@@ -153,7 +153,11 @@ impl StatusParts<'_> {
 
     /// What a person does next; where a show was left in its midst, also how it goes on from there.
     fn next(&self) -> (String, Coded) {
-        let next = self.hall.mirror.next;
+        let next = match self.hall.mirror.next {
+            // What the state machine does not know of.
+            Next::Resume if self.hall.has_taken_over() && self.hall.goes_on().is_none() => Next::ParkOrHome,
+            next => next,
+        };
         let left = self.hall.cued.as_ref().and_then(|cued| cued.left(self.hall.now));
         let from = |code: NextCode, words: &str, film: ShowTime| {
             (
