@@ -155,6 +155,12 @@ impl Engine {
         &self.playhead
     }
 
+    /// Where the film is: whoever seeks has it there already, though the seats come there a moment later.
+    #[must_use]
+    pub(crate) fn film(&self) -> ShowTime {
+        self.planner.sought.map_or_else(|| self.playhead.film(), |cue| self.playhead.film_at(cue))
+    }
+
     /// How far it is.
     #[must_use]
     pub(crate) fn progress(&self) -> PlayProgress {

@@ -53,7 +53,12 @@ impl Playhead {
     /// Where the film is: what the playhead will be at once all lag and trim are slewed in, and the trim.
     #[must_use]
     pub(crate) fn film(&self) -> ShowTime {
-        ShowTime::from_nanos(self.due.as_nanos() + trim_ns(self.trim_ms))
+        self.film_at(self.due)
+    }
+
+    /// Where the film is while the motion is to be there in the cue.
+    pub(super) fn film_at(&self, cue: ShowTime) -> ShowTime {
+        ShowTime::from_nanos(cue.as_nanos() + trim_ns(self.trim_ms))
     }
 
     /// How long the frame of the next tick takes.

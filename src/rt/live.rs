@@ -72,11 +72,15 @@ pub struct Live {
     /// Seats that are brought to park, and below that how long the slowest takes, ms.
     parking: SharedWord,
     show_ns: AtomicI64,
+    /// The same, for whoever goes on from there.
+    sought_ns: AtomicI64,
     /// Twice how far ahead of the film the seats are, and 1; 0 while they follow none.
     film_error_ns: AtomicI64,
     /// The greatest amount of that since somebody asked, and 1; 0 if they followed none.
     film_error_most: AtomicU64,
     film_joins: AtomicU64,
+    /// What moves the seats is a test of them, and no show.
+    is_test: AtomicBool,
     ticks: AtomicU64,
     missed: AtomicU64,
     beats: AtomicU64,
@@ -206,6 +210,11 @@ impl Live {
         ShowTime::from_nanos(self.show_ns.load(Ordering::Relaxed))
     }
 
+    /// The same for whoever goes on from there: where somebody seeks, though the seats are on their way.
+    pub(crate) fn sought(&self) -> ShowTime {
+        ShowTime::from_nanos(self.sought_ns.load(Ordering::Relaxed))
+    }
+
     /// How far ahead of the film that they follow the seats are, seconds; none while they follow none.
     pub(crate) fn film_error_s(&self) -> Option<f64> {
         let twice = self.film_error_ns.load(Ordering::Relaxed);
@@ -310,6 +319,7 @@ impl Live {
         let moving = machine.may_send_motion();
         if moving {
             self.on_show(engine.playhead().film());
+            self.sought_ns.store(engine.film().as_nanos(), Ordering::Relaxed);
         }
         self.hall.set(machine.state(), moving && !engine.waits(), machine.clears());
     }
@@ -321,6 +331,16 @@ impl Live {
         if let Some(ns) = ns {
             self.film_error_most.fetch_max(ns.unsigned_abs().saturating_add(1), Ordering::Relaxed);
         }
+    }
+
+    /// Notes whether what is loaded is a test of the seats.
+    pub(crate) fn tests(&self, is_test: bool) {
+        self.is_test.store(is_test, Ordering::Relaxed);
+    }
+
+    /// True if it is.
+    pub(crate) fn is_test(&self) -> bool {
+        self.is_test.load(Ordering::Relaxed)
     }
 
     /// Notes where the film is.

@@ -73,6 +73,12 @@ pub(crate) struct LoadedShow {
     pub(crate) playlist: Option<PlaylistPlace>,
     /// Where the film was when its last show ended before the cue did, ms.
     pub(crate) film_ms: Option<i64>,
+    /// Where in a film that leads it the cue begins, ms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) begins_ms: Option<i64>,
+    /// The film that is shown with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) movie: Option<String>,
 }
 
 /// The whole text, as far as it says what it is.

@@ -25,7 +25,9 @@ fn set() -> Settings {
     set.out = [("B2".to_owned(), broken())].into();
     let playlist = Some(PlaylistPlace { id: "saturday".to_owned(), entry: 1 });
     let (cue, sha256) = ("night".to_owned(), "00ff".to_owned());
-    set.show = Some(LoadedShow { cue, sha256, playlist, film_ms: Some(12_340) });
+    let movie = Some("ride.mkv".to_owned());
+    set.show =
+        Some(LoadedShow { cue, sha256, playlist, film_ms: Some(12_340), begins_ms: Some(600_000), movie });
     set
 }
 

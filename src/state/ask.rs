@@ -208,7 +208,10 @@ impl Machine {
     fn cleared(&mut self, now: MonoTime) {
         self.facts.measured = false;
         self.clears = self.clears.wrapping_add(1);
-        self.enter(State::Recovering, Cause::Cleared, now);
+        // One controller is free again, and the show that another machine led may go on with it.
+        if self.cause != Cause::TookOver {
+            self.enter(State::Recovering, Cause::Cleared, now);
+        }
     }
 }
 

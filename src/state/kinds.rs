@@ -64,10 +64,12 @@ impl State {
         Self::Fault,
     ];
 
-    /// How long it lasts at the most; `None` if it does not end by itself.
+    /// How long it lasts at the most, where that is why; `None` if it does not end by itself.
     #[must_use]
-    pub(crate) const fn lasts(self) -> Option<Duration> {
+    pub(crate) fn lasts(self, cause: Cause) -> Option<Duration> {
         Some(match self {
+            // As a pause does: whoever sat there has got up.
+            Self::Recovering if cause == Cause::TookOver => super::PAUSED_FOR,
             Self::Armed => super::ARMED_FOR,
             Self::Paused => super::PAUSED_FOR,
             Self::Homing => super::HOMING_FOR,

@@ -169,12 +169,7 @@ impl Machine {
     /// When the state ends by itself; `None` if it does not. For a hall that is armed or paused, worth showing.
     #[must_use]
     pub(crate) fn lapses(&self) -> Option<MonoTime> {
-        let lasts = match (self.state, self.cause) {
-            // As a pause does: whoever sat there has got up.
-            (State::Recovering, Cause::TookOver) => PAUSED_FOR,
-            (state, _) => state.lasts()?,
-        };
-        Some(self.since + lasts)
+        Some(self.since + self.state.lasts(self.cause)?)
     }
 
     /// Ends a state whose time is over. To be told every tick; a clock that goes back ends nothing.

@@ -140,6 +140,15 @@ fn a_show_that_was_taken_over_is_resumed_by_a_person_within_five_minutes_and_onl
     }
     stopped.event(Event::PositionsRead, s(1));
     assert_eq!(resumed(stopped, 1), (Next::ParkOrHome, Err(Why::SeatsAnywhere)), "what was stopped stays so");
+    // The error of one controller is cleared without losing the show of all.
+    let mut held = taken_over(Readiness::Ready);
+    held.event(Event::Latched(Latch::Over), s(1));
+    assert_eq!(held.next(), Next::Clear);
+    held.request(Transition::Clear, s(1)).unwrap();
+    held.event(Event::Latched(Latch::Free), s(1));
+    assert_eq!(held.next(), Next::AwaitPositions);
+    held.event(Event::PositionsRead, s(1));
+    assert_eq!(resumed(held, 1), joins);
     assert_eq!(resumed(hall(State::Recovering), 1).1, Err(Why::SeatsAnywhere));
 }
 

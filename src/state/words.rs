@@ -225,7 +225,7 @@ impl Cause {
             Self::FilmLeads => ("film-leads", "the seats join the film"),
             Self::FilmAwaited(why) => why.row(),
             Self::FilmOver(why) => why.row(),
-            Self::PausedTooLong => ("paused-too-long", "the pause lasted more than five minutes"),
+            Self::PausedTooLong => ("paused-too-long", "nobody resumed for five minutes"),
             Self::GroupOut(_) => ("group-out", "a group of seats is out"),
             Self::EmergencyStop(_) => ("emergency-stop", "emergency stop"),
             Self::Trouble(trouble) => trouble.row(),

@@ -396,7 +396,7 @@ impl Hall<'_, '_> {
     pub(crate) fn seek(&mut self, ms: i64) {
         let film = ShowTime::from_millis(ms);
         self.note(|| format!("seeks {film}"));
-        if matches!(self.state, State::Armed | State::Parked) {
+        if matches!(self.state, State::Armed | State::Parked | State::Recovering) {
             self.start = film;
             self.stage();
         } else {

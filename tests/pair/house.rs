@@ -348,6 +348,13 @@ impl Show {
         command.output().unwrap().into()
     }
 
+    /// The same of one that takes its time; dropped, it is ended.
+    pub(crate) fn begin(&self, args: &[&str]) -> Guarded {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+        command.args(args).env("KINOCUE_SOCKET", self.path("control.sock"));
+        Guarded::start_command(&mut command)
+    }
+
     #[track_caller]
     pub(crate) fn done(&self, args: &[&str]) {
         let run = self.run(args);

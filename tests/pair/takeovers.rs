@@ -20,13 +20,13 @@ fn trials(usual: usize) -> usize {
     std::env::var("KINOCUE_TAKEOVERS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
-fn tell(text: &str) {
+pub(crate) fn tell(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Of the frames that came to a seat: none of the first machine came once one of the second had, and none leads faster than the seat may
 /// from where it was.
-fn judge(rows: &[Row], takes_over: bool) {
+pub(crate) fn judge(rows: &[Row], takes_over: bool) {
     let is_second = |row: &Row| row.frame >= ABOVE;
     let from = rows.iter().position(is_second);
     assert_eq!(from.is_some(), takes_over);
@@ -103,6 +103,50 @@ fn a_show_whose_machine_died_goes_on_at_the_other_one_where_its_film_is_by_then_
         assert!((film - passed).abs() < 0.5, "{film} s of film in {passed} s");
         parks_and_ends(house);
     }
+}
+
+#[test]
+fn a_seek_in_the_moment_before_is_gone_on_with_and_a_test_of_the_seats_is_not() {
+    let Some(mut house) = House::playing() else { return };
+    house.shows[0].done(&["seek", "1:00"]);
+    std::thread::sleep(Duration::from_millis(60)); // a beat has left
+    house.shows[0].kill();
+    second_leads(&house);
+    house.shows[1].done(&["resume"]);
+    let at = house.shows[1].comes_to("playing")["show"]["position_s"].as_f64().unwrap();
+    assert!((61.0..75.0).contains(&at), "{at}");
+    parks_and_ends(house);
+
+    let Some(mut house) = House::playing() else { return };
+    house.shows[0].done(&["park"]);
+    house.shows[0].comes_to("parked");
+    house.shows[0].done(&["arm"]);
+    let sweep = house.shows[0].begin(&["test", "sweep", "--seats-empty"]);
+    house.shows[0].wait(|status| status["moving"] == true && status["job"] == "test");
+    house.shows[0].kill();
+    drop(sweep);
+    house.shows[1].leads("B", "recovering");
+    let status = house.shows[1].wait(|status| status["show"]["cue"] == "night");
+    assert_eq!(status["next"], "park, or home", "{status}");
+    assert_eq!(house.shows[1].run(&["resume"]).code, Some(75));
+    house.shows[1].kill();
+    house.ends().iter().for_each(|rows| judge(rows, false));
+}
+
+#[test]
+fn what_a_machine_heard_before_it_stood_still_is_no_news_once_it_goes_on() {
+    let Some(mut house) = House::playing() else { return };
+    house.shows[1].serving().signal(Signal::STOP);
+    std::thread::sleep(Duration::from_secs(1));
+    house.shows[0].kill();
+    std::thread::sleep(Duration::from_secs(4));
+    house.shows[1].serving().signal(Signal::CONT);
+    house.shows[1].leads("B", "recovering");
+    let note = note(&house);
+    let ms = note.split(" ms before").next().and_then(|text| text.rsplit(' ').next()?.parse::<u64>().ok());
+    assert!(ms.is_some_and(|ms| (4_500..20_000).contains(&ms)), "{note}");
+    assert_eq!(house.shows[1].run(&["resume"]).code, Some(75), "A may have been stopped since");
+    parks_and_ends(house);
 }
 
 /// What the second machine says of how it took over.

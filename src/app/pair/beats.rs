@@ -4,9 +4,11 @@ use std::net::{SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use rustix::net::{RecvFlags, recv};
+
 use super::settings::PairSettings;
 use super::{Heard, PairError, PairShared, thread};
-use crate::pair::{BEAT, Carried, Message};
+use crate::pair::{AWAY, BEAT, Carried, Message};
 use crate::state::State;
 use crate::sys::clock::Monotonic;
 use crate::sys::lock::lock;
@@ -14,6 +16,8 @@ use crate::time::{Clock as _, ShowTime};
 
 /// The longest datagram there is.
 const DATAGRAM: usize = 1 << 16;
+/// No socket has room for more of them.
+const WAITING: u32 = 10_000;
 
 /// The sockets of this machine, each with the address of the other one in that network.
 pub(super) type Ways = Vec<(UdpSocket, SocketAddrV4)>;
@@ -57,10 +61,12 @@ fn carried(shared: &PairShared, number: u64) -> Carried {
         // No lane sends more than a frame a tick.
         let ticks = u32::try_from(live.beats()).unwrap_or(u32::MAX);
         carried.frame = first.saturating_add(ticks).saturating_add(1);
-        carried.film_ms = whole_ms(live.show());
+        carried.film_ms = whole_ms(live.sought());
         carried.moves = live.is_moving();
-        carried.runs = matches!(live.state(), State::Playing(_));
-        carried.is_on_cue = carried.runs || live.state() == State::Paused;
+        // A test of the seats goes on nowhere else.
+        let state = if live.is_test() { State::Parked } else { live.state() };
+        carried.runs = matches!(state, State::Playing(_));
+        carried.is_on_cue = carried.runs || state == State::Paused;
         let mut settings = lock(&shared.settings);
         carried.revision = settings.of.1;
         carried.settings = settings.carried(number);
@@ -75,12 +81,21 @@ fn whole_ms(at: ShowTime) -> i64 {
 
 fn hear(shared: &PairShared, socket: &UdpSocket) {
     let mut buf = vec![0; DATAGRAM];
+    let mut before = Monotonic.now();
     loop {
-        let Ok(len) = socket.recv(&mut buf) else {
+        let came = socket.recv(&mut buf);
+        let now = Monotonic.now();
+        let waited = now.since(std::mem::replace(&mut before, now));
+        let Ok(len) = came else {
             // Where the system is out of something it may be so for a while.
-            Monotonic.sleep_until(Monotonic.now() + BEAT);
+            Monotonic.sleep_until(now + BEAT);
             continue;
         };
+        if waited >= AWAY {
+            // Either nobody has sent, or this machine stood still: what waits then is from whenever, and tells of no now.
+            let _ = (0..WAITING).find(|_| recv(socket, &mut buf[..], RecvFlags::DONTWAIT).is_err());
+            continue;
+        }
         let Some(Message { beat, carried }) = Message::parse(&buf[..len], &shared.key) else { continue };
         if shared.act(|claim, now| claim.hear(&beat, now)) && beat.leads {
             note(shared, beat.from, carried);

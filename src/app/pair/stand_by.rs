@@ -110,15 +110,8 @@ fn takes_over(shared: &PairShared, state: &Path) -> Option<TookOver> {
     let other = &shared.other;
     let (kept, ride) = settings::keep(other, &lock(&shared.settings), &heard, Monotonic.now(), state);
     let was = if heard.carried.moves { "its seats were moving" } else { "its seats did not move" };
-    let then = if ride.is_some() {
-        "resume, and they join the show where its film is by then; or park"
-    } else {
-        "park, or home, and start the show again"
-    };
-    Some(TookOver {
-        words: format!("took over from {other}: {was}; {kept}; look at the seats, then {then}"),
-        ride,
-    })
+    // What a person does next is said by the status, for as long as it can be done.
+    Some(TookOver { words: format!("took over from {other}: {was}; {kept}; look at the seats"), ride })
 }
 
 /// Why this machine does not lead, and what to do.

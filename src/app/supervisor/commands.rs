@@ -5,7 +5,7 @@ use super::belts;
 use super::features::Features;
 use super::film;
 use super::gear;
-use super::hall::{HallContext, ShowChange};
+use super::hall::{GoesOn, HallContext, ShowChange};
 use super::hall_settings::HallSettings;
 use super::homing::refuse_winding;
 use super::job::Job;
@@ -17,7 +17,7 @@ use super::starts::FleetStarts;
 use crate::control::{Asked, Code, Command, LevelsChange, Problem, Who, overtaken};
 use crate::rt::Command as TickCommand;
 use crate::settings::{LONGEST_WHY, Out};
-use crate::state::{Cause, Next, State, Transition};
+use crate::state::{Next, State, Transition};
 use crate::time::{ShowTime, TRIM_MS};
 
 impl Features {
@@ -133,22 +133,19 @@ fn go(by: Transition, who: &Who) -> Act {
 
 /// Goes on after a pause, or with a show that another machine led when it died: the seats join it where its film is by now.
 fn resume(who: &Who, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    if !hall.has_taken_over() {
+        return request(Transition::Resume);
+    }
+    hall.is_free()?;
+    belts::check(hall)?;
     let go = go(Transition::Resume, who);
-    match &hall.cued {
-        Some(cued) if hall.mirror.state == State::Recovering && hall.mirror.cause == Cause::TookOver => {
-            hall.is_free()?;
-            belts::check(hall)?;
-            if hall.is_led_elsewhere() {
-                return Ok(vec![go]);
-            }
-            let Some(film) = cued.left(hall.now) else {
-                let detail =
-                    "cannot resume: what the other machine played is not loaded, or its film is over";
-                return Err(Problem::new(Code::State, detail, "park, then arm and start a show"));
-            };
-            Ok(begin_at(film, go, hall))
+    match hall.goes_on() {
+        Some(GoesOn::WithFilm) => Ok(vec![go]),
+        Some(GoesOn::At(film)) => Ok(begin_at(film, go, hall)),
+        None => {
+            let detail = "cannot resume: what the other machine played is not loaded as it was there, or its film is over";
+            Err(Problem::new(Code::State, detail, "park, then arm and start a show"))
         }
-        _ => request(Transition::Resume),
     }
 }
 

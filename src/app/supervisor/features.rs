@@ -130,7 +130,12 @@ impl Features {
         }
         acts.push(match cued {
             Ok(mut cued) => {
-                let same = before.filter(|before| before.sha256 == cued.sha256);
+                // Nor is a place in another film one in this one: the playlist of another machine may say so.
+                let is_taken_over = self.lasting.is_taken_over;
+                let same = before.filter(|before| {
+                    let led_by = (before.begins_ms, before.movie.clone());
+                    before.sha256 == cued.sha256 && (!is_taken_over || led_by == cued.led_by())
+                });
                 let film = same.and_then(|before| before.film_ms).map(ShowTime::from_millis);
                 // One that is shown from here was shown by the machine that is gone.
                 let runs = self.lasting.ride.filter(|_| cued.movie.is_none());

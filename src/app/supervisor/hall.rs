@@ -77,6 +77,15 @@ pub(super) struct HallContext {
     pub(super) grid: TickGrid,
 }
 
+/// Where a show goes on that another machine led.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum GoesOn {
+    /// There.
+    At(ShowTime),
+    /// Where the film is that others show.
+    WithFilm,
+}
+
 /// What was loaded before a test of the seats, if anything was.
 #[derive(Debug)]
 pub(super) struct SetAside(pub(super) Option<ProvedShow>);
@@ -260,6 +269,7 @@ impl HallContext {
                 return start.map_or(Undo::Nothing, |before| Undo::Change(ShowChange::Start(before)));
             }
             ShowChange::Test(cued, only) => {
+                self.live.tests(true);
                 self.aside = Some(SetAside(self.cued.replace(*cued)));
                 self.settings.only = only;
                 return Undo::Nothing;
@@ -279,6 +289,7 @@ impl HallContext {
         if let Some(SetAside(before)) = self.aside.take() {
             self.settings.only = None;
             self.cued = before;
+            self.live.tests(false);
         }
     }
 
@@ -290,14 +301,25 @@ impl HallContext {
         self.cued.as_mut().map(|cued| cued.staged(&self.config, &self.settings)).transpose()
     }
 
-    /// True if others show the film that leads what is loaded: it says by itself where a show goes on.
-    pub(super) fn is_led_elsewhere(&self) -> bool {
-        self.cued.as_ref().is_some_and(|cued| cued.film.is_some() && cued.movie.is_none())
+    /// True if a show is loaded where another machine died with one under way.
+    pub(super) fn has_taken_over(&self) -> bool {
+        let mirror = &self.mirror;
+        mirror.state == State::Recovering && mirror.cause == Cause::TookOver && self.cued.is_some()
+    }
+
+    /// Where the show goes on that was under way at the machine that died; `None` if what is loaded is another one, or its film is over.
+    pub(super) fn goes_on(&self) -> Option<GoesOn> {
+        let cued = self.cued.as_ref()?;
+        match cued.left_at {
+            Some(_) if cued.is_led_elsewhere() => Some(GoesOn::WithFilm),
+            _ => cued.left(self.now).map(GoesOn::At),
+        }
     }
 
     /// The hall goes from one state to another: where the film is when the seats leave the cue is where a show may go on.
     pub(super) fn note_place(&mut self, from: State, to: State) {
-        if rides(from) && !rides(to) && !self.is_led_elsewhere() && !self.mirror.cause.completes() {
+        let is_led = self.cued.as_ref().is_some_and(ProvedShow::is_led_elsewhere);
+        if rides(from) && !rides(to) && !is_led && !self.mirror.cause.completes() {
             self.left_at = Some(self.live.show());
         }
     }

@@ -7,12 +7,13 @@ use super::act::{Act, Feature, SupervisorEvent};
 use super::coded::{RemedyCode, WarningCode};
 use super::hall::{HallContext, SetAside};
 use super::job::{Again, Job, JobResult};
+use super::show::LeftAt;
 use crate::app::pair::{Ride, TookOver};
 use crate::control::{Coded, Command, Desired, Severity, Warning, Who};
 use crate::journal::{PlaylistPlace, stamp};
 use crate::log::{Line, Priority};
 use crate::settings::{LoadedShow, Out, Settings, seats_out};
-use crate::state::{Cause, State};
+use crate::state::State;
 use crate::time::ShowTime;
 
 /// How exactly it is known after a crash where a show was.
@@ -132,7 +133,7 @@ impl Feature for Lasting {
                 out.extend(self.ready.take().map(|again| Act::Take(JobResult::Again(again))));
             }
             // Whoever resumes it is not to wait for preflight then.
-            SupervisorEvent::Round(_) if is_taken_up(hall) && hall.job.is_none() => {
+            SupervisorEvent::Round(_) if hall.has_taken_over() && hall.job.is_none() => {
                 out.extend(self.ride.take().map(|_| Act::Start(Job::Preflight)));
             }
             _ => {}
@@ -140,23 +141,22 @@ impl Feature for Lasting {
     }
 }
 
-/// True if the show that the other machine led is loaded, and may go on once all is known.
-fn is_taken_up(hall: &HallContext) -> bool {
-    let mirror = &hall.mirror;
-    mirror.state == State::Recovering && mirror.cause == Cause::TookOver && hall.cued.is_some()
-}
-
 /// What is loaded; while seats are tested, what was before.
 fn loaded(hall: &HallContext, playlist: Option<PlaylistPlace>) -> Option<LoadedShow> {
     let cued = hall.aside.as_ref().map_or(hall.cued.as_ref(), |SetAside(before)| before.as_ref())?;
     let at = millis(hall.live.show());
+    let every = |ms: i64| Some(ms / KEPT_EVERY_MS * KEPT_EVERY_MS).filter(|ms| *ms > 0);
+    // Of a film that runs on no more is kept than of one that plays.
+    let left = cued.left(hall.now).map(millis);
+    let left = if cued.left_at.is_some_and(LeftAt::runs) { left.and_then(every) } else { left };
     let film_ms = match hall.mirror.state {
-        _ if hall.aside.is_some() => cued.left(hall.now).map(millis),
-        State::Playing(_) => Some(at / KEPT_EVERY_MS * KEPT_EVERY_MS).filter(|ms| *ms > 0),
+        _ if hall.aside.is_some() => left,
+        State::Playing(_) => every(at),
         State::Paused => Some(at).filter(|ms| *ms > 0),
-        _ => hall.left_at.or_else(|| cued.left(hall.now)).map(millis), // the seats may be on their way to rest
+        _ => hall.left_at.map(millis).or(left), // the seats may be on their way to rest
     };
-    Some(LoadedShow { cue: cued.id.clone(), sha256: cued.sha256.clone(), playlist, film_ms })
+    let (cue, sha256, (begins_ms, movie)) = (cued.id.clone(), cued.sha256.clone(), cued.led_by());
+    Some(LoadedShow { cue, sha256, playlist, film_ms, begins_ms, movie })
 }
 
 /// Says something that was set before the program started.

@@ -42,6 +42,11 @@ impl LeftAt {
         Self { film, runs_since: None }
     }
 
+    /// True if nobody has stopped it.
+    pub(super) const fn runs(self) -> bool {
+        self.runs_since.is_some()
+    }
+
     /// Where it is by now.
     pub(super) fn at(self, now: MonoTime) -> ShowTime {
         self.film + self.runs_since.map_or(Duration::ZERO, |since| now.since(since))
@@ -138,9 +143,21 @@ impl ProvedShow {
         })
     }
 
-    /// From where it can go on; `None` if there is nothing to go on from, or its film has run past its end since.
+    /// Where in a film that leads it the cue begins, ms, and which film is shown with it: an entry of a playlist says that.
+    pub(super) fn led_by(&self) -> (Option<i64>, Option<String>) {
+        let begins_ms = self.film.map(|film| film.begin.as_nanos() / 1_000_000);
+        (begins_ms, self.movie.as_ref().map(|movie| movie.name.clone()))
+    }
+
+    /// True if others show the film that leads it: it says by itself where a show goes on.
+    pub(super) fn is_led_elsewhere(&self) -> bool {
+        self.film.is_some() && self.movie.is_none()
+    }
+
+    /// From where it can go on; `None` if there is nothing to go on from, or its film has run past its end since, or says that by itself.
     pub(super) fn left(&self, now: MonoTime) -> Option<ShowTime> {
-        self.left_at.map(|left| left.at(now)).filter(|film| *film < self.timeline.duration())
+        let left = self.left_at.filter(|_| !self.is_led_elsewhere());
+        left.map(|left| left.at(now)).filter(|film| *film < self.timeline.duration())
     }
 
     /// As surfaces show it, the film being at `position`.

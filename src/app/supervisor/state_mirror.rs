@@ -40,7 +40,7 @@ impl StateMirror {
 
     /// Seconds until the state ends by itself; `None` if it does not.
     pub(super) fn lapses(&self, now: MonoTime) -> Option<f64> {
-        let end = self.since + self.state.lasts()?;
+        let end = self.since + self.state.lasts(self.cause)?;
         Some(end.since(now).as_secs_f64())
     }
 }

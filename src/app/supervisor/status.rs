@@ -4,9 +4,10 @@ use jiff::Zoned;
 
 use super::coded::{NextCode, StandingCode};
 use super::features::Features;
-use super::hall::HallContext;
+use super::hall::{GoesOn, HallContext};
 use super::readiness::CORRECT;
 use super::seat_places::SeatPlaces;
+use super::show::ProvedShow;
 use super::standing::standing_words;
 use super::{belts, film};
 use crate::app::buttons::PadTable;
@@ -67,7 +68,12 @@ impl StatusParts<'_> {
         let times = live.times();
         let moving = mirror.state.may_send_motion();
         let preflighted = &features.readiness.preflighted;
-        let position = |cued: &super::show::ProvedShow| if moving { live.show() } else { cued.start };
+        let position = |cued: &ProvedShow| match hall.goes_on() {
+            _ if moving => live.show(),
+            // What was taken over is where its film is by now.
+            Some(GoesOn::At(film)) if hall.has_taken_over() => film,
+            _ => cued.start,
+        };
         let (next, next_coded) = belts::next_action(hall, table).unwrap_or_else(|| self.next());
         Status {
             hall: hall.config.show.name.clone(),
@@ -153,7 +159,11 @@ impl StatusParts<'_> {
 
     /// What a person does next; where a show was left in its midst, also how it goes on from there.
     fn next(&self) -> (String, Coded) {
-        let next = self.hall.mirror.next;
+        let next = match self.hall.mirror.next {
+            // What the state machine does not know of.
+            Next::Resume if self.hall.has_taken_over() && self.hall.goes_on().is_none() => Next::ParkOrHome,
+            next => next,
+        };
         let left = self.hall.cued.as_ref().and_then(|cued| cued.left(self.hall.now));
         let from = |code: NextCode, words: &str, film: ShowTime| {
             (

@@ -15,11 +15,12 @@ use crate::app::pair::{Ride, TookOver};
 use crate::config::Belts;
 use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
+use crate::film::chase::ChaseRules;
 use crate::health::HealthState;
 use crate::motion::Pulses;
 use crate::observe::Heard;
-use crate::rt::{News, Row};
-use crate::settings::Kept;
+use crate::rt::{FilmStart, News, Row};
+use crate::settings::{Kept, LoadedShow};
 use crate::state::{Event, Finding, LedBefore, Next, PlayMode, Transition, Trouble};
 use crate::time::ShowTime;
 use crate::wire::PerAxis;
@@ -161,14 +162,23 @@ fn from_before_a_cue_is_read_until_it_is_loaded_each_status_says_that_it_is_bein
 
 /// A hall that took over from a machine whose show was at 1.5 s of `two`, which runs on since then or is paused.
 fn taken_over(runs_since: Option<MonoTime>) -> Rig {
+    taken_over_as(runs_since, |_| {})
+}
+
+/// The same of a show that was loaded so.
+fn taken_over_as(runs_since: Option<MonoTime>, was: impl FnOnce(&mut LoadedShow)) -> Rig {
     let mut before = Rig::parked();
-    before.ask(Command::Load { cue: "two".to_owned() }).unwrap();
     let cue = before.folder.path().join("cues/two.csv");
+    // Long enough for a machine that takes seconds for what follows.
+    std::fs::write(&cue, "time_ms,a1\n0,0.5\n1000,0.5\n2000,0.6\n60000,0.6\n").unwrap();
+    before.ask(Command::Load { cue: "two".to_owned() }).unwrap();
     let mut rig = Rig::starting_in(|folder| {
         std::fs::create_dir(folder.join("cues")).unwrap();
         std::fs::copy(&cue, folder.join("cues/two.csv")).unwrap();
         let mut settings = before.supervisor.settings();
-        settings.show.as_mut().unwrap().film_ms = Some(1_500);
+        let show = settings.show.as_mut().unwrap();
+        show.film_ms = Some(1_500);
+        was(show);
         let took_over = TookOver { words: "took over".to_owned(), ride: Some(Ride { runs_since }) };
         Carryover::of(Kept { settings: Some(settings), said: Vec::new() }, Some(took_over))
     });
@@ -183,10 +193,6 @@ fn taken_over(runs_since: Option<MonoTime>) -> Rig {
 
 #[test]
 fn a_show_that_was_taken_over_goes_on_by_resume_where_its_film_is_by_then_and_not_past_its_end() {
-    let second = MonoTime::from_nanos(1_000_000_000);
-    let ago = |seconds: u64| {
-        MonoTime::from_nanos(Monotonic.now().as_nanos().saturating_sub(seconds * second.as_nanos()))
-    };
     let start = |rig: &Rig| rig.supervisor.hall.cued.as_ref().unwrap().start;
     let mut paused = taken_over(None);
     assert_eq!(paused.supervisor.status().next, "resume, or park");
@@ -202,7 +208,7 @@ fn a_show_that_was_taken_over_goes_on_by_resume_where_its_film_is_by_then_and_no
     let most = ShowTime::from_millis(1_500) + Monotonic.now().since(since);
     assert!(start(&runs) >= ShowTime::from_millis(2_500) && start(&runs) <= most, "{:?}", start(&runs));
 
-    let mut over = taken_over(Some(ago(60)));
+    let mut over = taken_over(Some(ago(120)));
     assert_eq!(over.supervisor.status().show.unwrap().resume_s, None);
     let refused = over.ask(Command::Resume).unwrap_err();
     assert!(refused.detail.contains("its film is over"), "{refused}");
@@ -215,6 +221,132 @@ fn a_show_that_was_taken_over_goes_on_by_resume_where_its_film_is_by_then_and_no
     other.ask(Command::Load { cue: "one".to_owned() }).unwrap();
     assert_eq!(other.ask(Command::Resume).unwrap_err().code, Code::State);
     assert_eq!(other.state(), State::Recovering);
+}
+
+/// So many seconds ago.
+fn ago(seconds: u64) -> MonoTime {
+    MonoTime::from_nanos(Monotonic.now().as_nanos().saturating_sub(seconds * 1_000_000_000))
+}
+
+#[test]
+fn a_place_that_runs_on_with_its_film_is_no_new_setting_at_each_moment() {
+    let since = ago(10);
+    let mut rig = taken_over(Some(since));
+    let first = rig.supervisor.settings();
+    let kept = first.show.as_ref().unwrap().film_ms.unwrap();
+    for ms in [100, 700, 1_200] {
+        rig.supervisor.hall.now = since + Duration::from_millis(u64::try_from(kept - 1_500).unwrap() + ms);
+        assert_eq!(
+            rig.supervisor.settings(),
+            first,
+            "it is written down, and told the other machine, each time"
+        );
+    }
+    let waits = taken_over(None);
+    assert_eq!(waits.supervisor.settings().show.unwrap().film_ms, Some(1_500));
+}
+
+#[test]
+fn resume_is_named_as_the_next_action_only_where_it_is_taken() {
+    let next = |rig: &Rig| rig.supervisor.status().next;
+    let runs = taken_over(Some(ago(1)));
+    assert_eq!(next(&runs), "resume, or park");
+    let over = taken_over(Some(ago(120)));
+    assert_eq!(next(&over), "park, or home");
+    assert_ne!(over.supervisor.status().next_coded.code, "resume");
+    let mut other = taken_over(None);
+    std::fs::copy(other.folder.path().join("cues/two.csv"), other.folder.path().join("cues/one.csv"))
+        .unwrap();
+    other.ask(Command::Load { cue: "one".to_owned() }).unwrap();
+    assert_eq!(next(&other), "park, or home");
+}
+
+#[test]
+fn nor_is_a_cue_that_another_playlist_here_has_begin_elsewhere_in_the_film_or_be_shown_with_another_one() {
+    type Leads = fn(&mut LoadedShow);
+    let leads: [Leads; 2] =
+        [|show| show.begins_ms = Some(600_000), |show| show.movie = Some("two.mkv".to_owned())];
+    for led in leads {
+        let mut rig = taken_over_as(None, led);
+        assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().id, "two");
+        assert_eq!(rig.supervisor.status().next, "park, or home");
+        assert_eq!(rig.ask(Command::Resume).unwrap_err().code, Code::State);
+        assert_eq!(rig.state(), State::Recovering);
+    }
+}
+
+#[test]
+fn another_cue_is_not_gone_on_with_be_it_that_a_film_that_others_show_leads_it() {
+    let led = |rig: &mut Rig| {
+        let cued = rig.supervisor.hall.cued.as_mut().unwrap();
+        let rules = ChaseRules::until(cued.timeline.duration());
+        cued.film = Some(FilmStart { begin: ShowTime::ZERO, rules });
+    };
+    // Where its film is by then that says itself, be it past what was reckoned here.
+    let mut same = taken_over(Some(ago(120)));
+    led(&mut same);
+    assert_eq!(same.supervisor.status().next, "resume, or park");
+    same.ask(Command::Resume).unwrap();
+    assert_eq!(same.state(), State::Playing(PlayMode::Joining));
+    let mut other = taken_over(None);
+    std::fs::copy(other.folder.path().join("cues/two.csv"), other.folder.path().join("cues/one.csv"))
+        .unwrap();
+    other.ask(Command::Load { cue: "one".to_owned() }).unwrap();
+    led(&mut other);
+    assert_eq!(other.ask(Command::Resume).unwrap_err().code, Code::State);
+    assert_eq!(other.state(), State::Recovering);
+}
+
+#[test]
+fn a_show_that_was_taken_over_is_gone_on_with_once_and_by_people_alone() {
+    let mut rig = taken_over(None);
+    for surface in [Surface::Osc, Surface::Text, Surface::Fleet] {
+        assert_eq!(rig.ask_as(surface, Command::Resume).unwrap_err().code, Code::Role, "{surface}");
+    }
+    assert_eq!(rig.state(), State::Recovering);
+    rig.supervisor.hall.job = Some("preflight");
+    assert_eq!(rig.ask(Command::Resume).unwrap_err().code, Code::Busy);
+    rig.supervisor.hall.job = None;
+    for _ in 0..2 {
+        rig.ask(Command::Resume).unwrap();
+        assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
+    }
+    assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().start, ShowTime::from_millis(1_500));
+    assert!(rig.supervisor.features.records.is_under_way());
+    assert!(!rig.supervisor.notes.iter().any(|note| note.contains("took over")));
+    rig.ask(Command::Stop).unwrap();
+    rig.tell(Event::AtRest);
+    rig.ask(Command::Clear).unwrap();
+    rig.tell(Event::PositionsRead);
+    assert_eq!(rig.ask(Command::Resume).unwrap_err().code, Code::State);
+    // Nor where the configuration was read anew in between.
+    let mut rig = taken_over(None);
+    let mut next = Rig::starting(rig.supervisor.remember());
+    next.settle();
+    next.tell(Event::Identified(Finding { homed: true, at_park: false, before: LedBefore::Ended }));
+    assert_eq!(next.ask(Command::Resume).unwrap_err().code, Code::State);
+}
+
+#[test]
+fn how_long_a_show_that_was_taken_over_can_be_gone_on_with_is_told() {
+    let rig = taken_over(None);
+    let lapses = rig.supervisor.status().lapses_s.unwrap();
+    assert!((290.0..=300.0).contains(&lapses), "{lapses}");
+}
+
+#[test]
+fn a_seat_that_fails_preflight_is_named_and_without_it_the_show_goes_on() {
+    let mut rig = taken_over(None);
+    rig.supervisor.features.readiness.preflighted = Some(Preflighted::failing_at(1, 2));
+    rig.does(Vec::new());
+    let refused = rig.ask(Command::Resume).unwrap_err();
+    assert!(refused.detail.contains("preflight"), "{refused}");
+    assert_eq!(rig.state(), State::Recovering);
+    assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().start, ShowTime::ZERO);
+    rig.ask(out("B1")).unwrap();
+    assert_eq!(rig.supervisor.status().next, "resume, or park");
+    rig.ask(Command::Resume).unwrap();
+    assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
 }
 
 #[test]

@@ -91,7 +91,7 @@ export default {
   "cause.not-proved": "der Cue ist für diese Sitze nicht nachgewiesen",
   "cause.other-master": "ein anderer Master sendet Frames an einen Controller",
   "cause.parking-time": "das Parken dauerte zu lange",
-  "cause.paused-too-long": "die Pause dauerte mehr als fünf Minuten",
+  "cause.paused-too-long": "fünf Minuten lang hat niemand fortgesetzt",
   "cause.planner": "eine Bewegung ließ sich nicht planen",
   "cause.ready": "der Cue ist bereit",
   "cause.rebooted": "ein Controller ist neu gestartet; seine Position ist unbekannt",

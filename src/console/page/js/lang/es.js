@@ -91,7 +91,7 @@ export default {
   "cause.not-proved": "el cue no está verificado para estas butacas",
   "cause.other-master": "otro maestro envía tramas a un controlador",
   "cause.parking-time": "la vuelta a reposo duró demasiado",
-  "cause.paused-too-long": "la pausa duró más de cinco minutos",
+  "cause.paused-too-long": "nadie reanudó durante cinco minutos",
   "cause.planner": "no se pudo planificar un movimiento",
   "cause.ready": "el cue está listo",
   "cause.rebooted": "un controlador se ha reiniciado; su posición es desconocida",

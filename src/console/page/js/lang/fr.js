@@ -91,7 +91,7 @@ export default {
   "cause.not-proved": "le cue n’est pas vérifié pour ces sièges",
   "cause.other-master": "un autre maître envoie des trames à un contrôleur",
   "cause.parking-time": "le retour au repos a duré trop longtemps",
-  "cause.paused-too-long": "la pause a duré plus de cinq minutes",
+  "cause.paused-too-long": "personne n’a repris pendant cinq minutes",
   "cause.planner": "un mouvement n’a pas pu être planifié",
   "cause.ready": "le cue est prêt",
   "cause.rebooted": "un contrôleur a redémarré ; sa position est inconnue",

@@ -91,7 +91,7 @@ export default {
   "cause.not-proved": "キューはこの座席で検証されていません",
   "cause.other-master": "他のマスターがコントローラーにフレームを送っています",
   "cause.parking-time": "パークに時間がかかりすぎました",
-  "cause.paused-too-long": "一時停止が 5 分を超えました",
+  "cause.paused-too-long": "5 分間、誰も再開しませんでした",
   "cause.planner": "動作を計画できませんでした",
   "cause.ready": "キューは準備完了です",
   "cause.rebooted": "コントローラーが再起動しました。位置は不明です",

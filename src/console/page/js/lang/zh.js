@@ -91,7 +91,7 @@ export default {
   "cause.not-proved": "该 Cue 未针对这些座椅验证",
   "cause.other-master": "另一台主机正向控制器发送帧",
   "cause.parking-time": "归位时间过长",
-  "cause.paused-too-long": "暂停超过五分钟",
+  "cause.paused-too-long": "五分钟内无人恢复",
   "cause.planner": "无法规划一次移动",
   "cause.ready": "Cue 已就绪",
   "cause.rebooted": "控制器已重启；其位置未知",
