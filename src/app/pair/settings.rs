@@ -116,7 +116,14 @@ mod tests {
     fn kept(heard: &Heard, told: u32, later: Duration) -> (Option<i64>, Option<Ride>) {
         let folder = tempfile::tempdir().unwrap();
         let (cue, sha256) = ("two".to_owned(), "0".repeat(64));
-        let show = Some(LoadedShow { cue, sha256, playlist: None, film_ms: Some(4_000) });
+        let show = Some(LoadedShow {
+            cue,
+            sha256,
+            playlist: None,
+            film_ms: Some(4_000),
+            begins_ms: None,
+            movie: None,
+        });
         let told = PairSettings::told(Settings { show, ..Settings::default() }.text(), (heard.session, told));
         let (_, ride) = keep("kino-b", &told, heard, heard.at + later, folder.path());
         let (_file, found) = SettingsFile::open(folder.path());
