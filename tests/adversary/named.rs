@@ -718,9 +718,9 @@ fn whatever_happens_about_the_resume_of_a_show_that_another_machine_led_no_seat_
     use About::*;
     let all = [Nothing, Jog, Reboot, Press, Release, Out, Lost, Mute, Stop, Park, Pause, Home, Twice, Seize];
     let (mut joined, mut tried) = (0, 0);
-    for kind in [THREE, SIX, TWO, FAST] {
+    for kind in [THREE, SIX] {
         for about in all {
-            for before_ms in [0_i64, 10, 30, 70, 150, 400, -10, -40, -100, -300, -900] {
+            for before_ms in [0_i64, 30, 150, -10, -100, -400] {
                 for film_ms in [0, 700] {
                     tried += 1;
                     let ether = ether(kind, |_| {});
