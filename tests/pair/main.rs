@@ -17,6 +17,5 @@ mod serving;
 #[path = "../common/statuses.rs"]
 mod statuses;
 
-mod attacks;
 mod house;
 mod takeovers;

@@ -20,13 +20,13 @@ fn trials(usual: usize) -> usize {
     std::env::var("KINOCUE_TAKEOVERS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
-pub(crate) fn tell(text: &str) {
+fn tell(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Of the frames that came to a seat: none of the first machine came once one of the second had, and none leads faster than the seat may
 /// from where it was.
-pub(crate) fn judge(rows: &[Row], takes_over: bool) {
+fn judge(rows: &[Row], takes_over: bool) {
     let is_second = |row: &Row| row.frame >= ABOVE;
     let from = rows.iter().position(is_second);
     assert_eq!(from.is_some(), takes_over);

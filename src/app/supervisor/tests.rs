@@ -170,7 +170,7 @@ fn taken_over_as(runs_since: Option<MonoTime>, was: impl FnOnce(&mut LoadedShow)
     let mut before = Rig::parked();
     let cue = before.folder.path().join("cues/two.csv");
     // Long enough for a machine that takes seconds for what follows.
-    std::fs::write(&cue, "time_ms,a1\n0,0.5\n1000,0.5\n2000,0.6\n60000,0.6\n").unwrap();
+    std::fs::write(&cue, "time_ms,a1\n0,0.5\n1000,0.5\n2000,0.5\n60000,0.5\n").unwrap();
     before.ask(Command::Load { cue: "two".to_owned() }).unwrap();
     let mut rig = Rig::starting_in(|folder| {
         std::fs::create_dir(folder.join("cues")).unwrap();
