@@ -320,12 +320,19 @@ fn whenever_a_seat_is_taken_out_and_put_back_all_are_asked_before_one_datagram_g
 fn where_the_kernel_takes_nothing_for_all_each_gets_its_own_from_the_next_tick_on() {
     for kind in TOGETHER {
         let ether = quiet(kind);
-        once_together(kind, &ether, |hall| {
+        lead(kind, &ether, |hall| {
+            hall.ride(3);
+            hall.pass(1_500);
+            assert!(plays(hall, 600)[0] > 10, "{kind:?}");
             hall.ether.world().refuses_all = true;
             hall.pass(100);
             let [one, each] = plays(hall, 1_000);
             assert!(one == 0 && each > 40, "{kind:?}: {one} as one, {each} as one for each");
             assert_eq!(hall.state, State::Playing(PlayMode::Following));
+            // The look that is under way then has lost a question; the next one is a second later.
+            hall.ether.world().refuses_all = false;
+            assert!((0..40).any(|_| plays(hall, 100)[0] > 0), "{kind:?}: once it takes them again");
+            assert_accounts(hall);
         });
         assert_eq!(breaches(&ether).len(), 0);
     }
