@@ -46,7 +46,7 @@ Exit codes: 0 playing, 69 no daemon, 75 not armed or too late, 77 not allowed")]
     /// Holds the seats where they are; the film waits.
     #[command(after_help = "Example:\n  kinocue pause")]
     Pause(ServerArgs),
-    /// Resumes a paused show, or one that the other show machine led when it died.
+    /// Resumes a paused show, or one that was taken over.
     #[command(after_help = "Example:\n  kinocue resume")]
     Resume(ServerArgs),
     /// Jumps to another position in the cue.
