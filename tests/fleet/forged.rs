@@ -115,6 +115,10 @@ fn no_wish_counts_that_was_altered_is_another_s_is_old_or_names_a_path_and_nothi
         run.code == Some(1) && run.stderr.contains("what was wished before is no wish; --only"),
         "{run:?}"
     );
+    // One hall whose wish cannot be added to keeps it from no other.
+    let run = engine.desk(&["push", file.to_str().unwrap(), "--to", "all", "--no-wait"]);
+    assert!(run.code == Some(1) && run.stderr.contains("berlin.h1: what was wished before"), "{run:?}");
+    engine.has("berlin.h2", |hall| hall["wished_rev"].is_u64());
     let run = engine.desk(&["push", file.to_str().unwrap(), "--to", "berlin.h1", "--only"]);
     assert_eq!(run.code, Some(0), "{run:?}");
 }

@@ -57,17 +57,28 @@ impl WishArgs {
         files: &[WishedFile],
         change: impl Fn(&mut Wish),
     ) -> Result<Exit, Failure> {
-        let mut wished = BTreeMap::new();
+        let (mut wished, mut failed) = (BTreeMap::new(), None::<Failure>);
         for hall in halls {
-            let seq = wish(kept, settings, &hall, self.only, &change).await?;
-            wished.insert(hall, seq);
+            match wish(kept, settings, &hall, self.only, &change).await {
+                Ok(seq) => drop(wished.insert(hall, seq)),
+                // The others get it all the same, and what comes of it there is told.
+                Err(failure) => {
+                    if let Some(before) = failed.replace(failure) {
+                        print::tell(&before.to_string());
+                    }
+                }
+            }
         }
-        if self.no_wait {
+        let came = if wished.is_empty() {
+            Exit::Done
+        } else if self.no_wait {
             print::tell("the halls take it when they are parked; kinocue fleet have says who has what");
-            return Ok(Exit::Done);
-        }
-        let until = Instant::now() + Duration::from_secs(self.within);
-        follow(kept, &wished, files, until).await
+            Exit::Done
+        } else {
+            let until = Instant::now() + Duration::from_secs(self.within);
+            follow(kept, &wished, files, until).await?
+        };
+        failed.map_or(Ok(came), Err)
     }
 }
 
