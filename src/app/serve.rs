@@ -212,13 +212,7 @@ fn serve_halls(
     let (mut numbers, took_over) = before(pair.as_ref(), &config);
     let mut film = HallFilm::default();
     let opening = Opening { config: &places.config, leave: &signals.leave, pair: pair.as_ref() };
-    let ended = match &took_over {
-        Some(TookOver { ride: Some(_), .. }) => LedBefore::OnCue,
-        Some(_) => LedBefore::Crashed,
-        None if crashed => LedBefore::Crashed,
-        None => LedBefore::Ended,
-    };
-    let mut runtime = opening.first(&config, ended, &numbers, &mut film)?;
+    let mut runtime = opening.first(&config, led_before(crashed, took_over.as_ref()), &numbers, &mut film)?;
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let record_places = places.of_recordings(&config);
@@ -283,6 +277,16 @@ fn open_library(config: &Config, path: &Path) -> Result<Library, ServeError> {
 fn end_recording(recorder: HallRecorder, log: &Log) {
     if let Err(waits) = recorder.end() {
         log.say(Line::new(Priority::Warning, "record-show", waits.to_string()));
+    }
+}
+
+/// How the program ended that led the hall before.
+const fn led_before(crashed: bool, took_over: Option<&TookOver>) -> LedBefore {
+    match took_over {
+        Some(TookOver { ride: Some(_), .. }) => LedBefore::OnCue,
+        Some(_) => LedBefore::Crashed,
+        None if crashed => LedBefore::Crashed,
+        None => LedBefore::Ended,
     }
 }
 

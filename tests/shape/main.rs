@@ -94,7 +94,8 @@ const ROWS: &[Row] = &[
     // 1,080 more: one datagram for many seats, with who answers it, and which way it goes.
     // 480 more: what a second machine takes over and what it says of that, wishes that are bounded and put nothing over people's files,
     // what a hall is about. 190 more for recordings that viewers read as they are meant, and frames that are read once.
-    ("lines of code", counts::lines_of_code, Less, 104_612.0, 39_800.0),
+    // 310 more: a show that is taken over goes on, halls of a fleet with two machines, and which sockets have something; broadcasts take 40 less.
+    ("lines of code", counts::lines_of_code, Less, 104_925.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
@@ -107,7 +108,8 @@ const ROWS: &[Row] = &[
     // Ten more: the lead of one of two machines, and doors of the fuzzer.
     // 17 more: ticks that went as one datagram, in status and report, and their networks, which tests make.
     // One more for what a hall is about, in the status.
-    ("public items and fields", counts::public_items, Less, 1_283.0, 400.0),
+    // One more: how the program ended before, which tests tell a hall.
+    ("public items and fields", counts::public_items, Less, 1_284.0, 400.0),
     // A table: a row for each reason why a seat stands as it does.
     // The parts that a service opens, one after the other.
     ("lines of the longest function", counts::longest_function, Less, 65.0, 48.0),
