@@ -652,17 +652,22 @@ fn a_seat_that_was_taken_out_is_parked_gets_no_frame_and_comes_back_from_where_i
 
 // A second show machine that takes over in mid-show.
 
-/// A ride of the first cue is cut off by the end of its machine, and taken up by another one, at whose RESUME the seats stand where `moved`
-/// has left them meanwhile.
-fn taken_up(kind: Kind, moved: impl FnOnce(&Ether)) {
+/// Seats whose ride of the first cue was cut off by the end of its machine, so many milliseconds in.
+fn left_in_mid_ride(kind: Kind, ms: u64) -> Ether {
     let ether = ether(kind, |_| {});
     lead(kind, &ether, LedBefore::Ended, |hall| {
         hall.ride(0);
-        hall.pass(1_500);
+        hall.pass(ms);
     });
     // Its last frames arrive, and nobody sends.
     ether.world().asked = false;
     ether.pass_to(ether.ns() + 1_300 * MS);
+    ether
+}
+
+/// Such a ride is taken up by another machine, at whose RESUME the seats stand where `moved` has left them meanwhile.
+fn taken_up(kind: Kind, moved: impl FnOnce(&Ether)) {
+    let ether = left_in_mid_ride(kind, 1_500);
     moved(&ether);
     lead(kind, &ether, LedBefore::OnCue, |hall| {
         hall.load(0);
@@ -713,81 +718,98 @@ enum About {
     Seize,
 }
 
+impl About {
+    const ALL: [Self; 14] = [
+        Self::Nothing,
+        Self::Jog,
+        Self::Reboot,
+        Self::Press,
+        Self::Release,
+        Self::Out,
+        Self::Lost,
+        Self::Mute,
+        Self::Stop,
+        Self::Park,
+        Self::Pause,
+        Self::Home,
+        Self::Twice,
+        Self::Seize,
+    ];
+
+    fn happens(self, hall: &mut Hall<'_, '_>) {
+        let now = hall.ether.ns();
+        match self {
+            Self::Nothing => {}
+            Self::Jog => drop(hall.ether.jog(0, 0, 40.0, now)),
+            Self::Seize => hall.ether.world().lines[0].seat.seize(Some((0, 40.0)), now, 600 * MS),
+            Self::Reboot => hall.ether.world().lines[0].seat.reboot(now, 400 * MS),
+            Self::Press => hall.ether.world().lines[0].seat.press(true, now),
+            Self::Release => {
+                hall.ether.world().lines[0].seat.press(true, now);
+                hall.pass(60);
+                let now = hall.ether.ns();
+                hall.ether.world().lines[0].seat.press(false, now);
+            }
+            Self::Out => {
+                let mix = hall.runtime.desk.mix(0);
+                hall.set(0, Mix { on: false, ..mix });
+            }
+            Self::Lost => hall.ether.turns(0, Weather::Lost, 300),
+            Self::Mute => hall.ether.turns(0, Weather::Mute, 300),
+            Self::Stop => hall.ask(Transition::Stop),
+            Self::Park => hall.ask(Transition::Park),
+            Self::Pause => hall.ask(Transition::Pause),
+            Self::Home => hall.ask(Transition::Home),
+            Self::Twice => {
+                hall.ask(Transition::Resume);
+                hall.ask(Transition::Resume);
+            }
+        }
+    }
+}
+
+/// A show that another machine led is resumed, and that happens so many milliseconds before, or after where that is less than 0; says whether
+/// seats joined.
+fn is_joined_about(kind: Kind, about: About, before_ms: i64) -> bool {
+    let ether = left_in_mid_ride(kind, 1_600);
+    let is_joined = lead(kind, &ether, LedBefore::OnCue, |hall| {
+        hall.load(0);
+        hall.seek(700);
+        hall.comes_to(|state| state == State::Recovering, 1_500);
+        hall.pass(700);
+        if before_ms >= 0 {
+            about.happens(hall);
+            hall.pass(before_ms.unsigned_abs());
+            hall.ask(Transition::Resume);
+        } else {
+            hall.ask(Transition::Resume);
+            hall.pass(before_ms.unsigned_abs());
+            about.happens(hall);
+        }
+        let mut is_joined = false;
+        for _ in 0..150 {
+            hall.pass(20);
+            is_joined |= matches!(hall.state, State::Playing(_));
+        }
+        is_joined
+    });
+    let found = breaches(&ether);
+    assert!(
+        found.is_empty(),
+        "{kind:?} {about:?} {before_ms}: {:?}",
+        found.iter().take(4).map(ToString::to_string).collect::<Vec<_>>()
+    );
+    is_joined
+}
+
 #[test]
 fn whatever_happens_about_the_resume_of_a_show_that_another_machine_led_no_seat_leaps() {
-    use About::*;
-    let all = [Nothing, Jog, Reboot, Press, Release, Out, Lost, Mute, Stop, Park, Pause, Home, Twice, Seize];
     let (mut joined, mut tried) = (0, 0);
     for kind in [THREE, SIX] {
-        for about in all {
-            for before_ms in [0_i64, 70, -40, -300] {
-                let film_ms = 700;
+        for about in About::ALL {
+            for before_ms in [0, 70, -40, -300] {
                 tried += 1;
-                let ether = ether(kind, |_| {});
-                lead(kind, &ether, LedBefore::Ended, |hall| {
-                    hall.ride(0);
-                    hall.pass(1_600);
-                });
-                ether.world().asked = false;
-                ether.pass_to(ether.ns() + 1_300 * MS);
-                let is_joined = lead(kind, &ether, LedBefore::OnCue, |hall| {
-                    hall.load(0);
-                    hall.seek(film_ms);
-                    hall.comes_to(|state| state == State::Recovering, 1_500);
-                    hall.pass(700);
-                    let happen = |hall: &mut Hall<'_, '_>| {
-                        let now = hall.ether.ns();
-                        match about {
-                            Nothing => {}
-                            Jog => drop(hall.ether.jog(0, 0, 40.0, now)),
-                            Seize => hall.ether.world().lines[0].seat.seize(Some((0, 40.0)), now, 600 * MS),
-                            Reboot => hall.ether.world().lines[0].seat.reboot(now, 400 * MS),
-                            Press => hall.ether.world().lines[0].seat.press(true, now),
-                            Release => {
-                                hall.ether.world().lines[0].seat.press(true, now);
-                                hall.pass(60);
-                                let now = hall.ether.ns();
-                                hall.ether.world().lines[0].seat.press(false, now);
-                            }
-                            Out => {
-                                let mix = hall.runtime.desk.mix(0);
-                                hall.set(0, Mix { on: false, ..mix });
-                            }
-                            Lost => hall.ether.turns(0, Weather::Lost, 300),
-                            Mute => hall.ether.turns(0, Weather::Mute, 300),
-                            Stop => hall.ask(Transition::Stop),
-                            Park => hall.ask(Transition::Park),
-                            Pause => hall.ask(Transition::Pause),
-                            Home => hall.ask(Transition::Home),
-                            Twice => {
-                                hall.ask(Transition::Resume);
-                                hall.ask(Transition::Resume);
-                            }
-                        }
-                    };
-                    if before_ms >= 0 {
-                        happen(hall);
-                        hall.pass(before_ms as u64);
-                        hall.ask(Transition::Resume);
-                    } else {
-                        hall.ask(Transition::Resume);
-                        hall.pass(before_ms.unsigned_abs());
-                        happen(hall);
-                    }
-                    let mut is_joined = false;
-                    for _ in 0..150 {
-                        hall.pass(20);
-                        is_joined |= matches!(hall.state, State::Playing(_));
-                    }
-                    is_joined
-                });
-                joined += usize::from(is_joined);
-                let found = breaches(&ether);
-                assert!(
-                    found.is_empty(),
-                    "{kind:?} {about:?} {before_ms} {film_ms}: {:?}",
-                    found.iter().take(4).map(ToString::to_string).collect::<Vec<_>>()
-                );
+                joined += usize::from(is_joined_about(kind, about, before_ms));
             }
         }
     }

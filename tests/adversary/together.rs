@@ -82,6 +82,18 @@ fn once_together<T>(kind: Kind, ether: &Ether, then: impl FnOnce(&mut Hall<'_, '
     })
 }
 
+/// A show from whose beginning on each seat gets its own.
+#[track_caller]
+fn nothing_goes_to_all(kind: Kind, ether: &Ether) {
+    lead(kind, ether, |hall| {
+        hall.ride(0);
+        let [one, each] = plays(hall, 2_500);
+        assert!(one == 0 && each > 10, "{one} as one, {each} as one for each");
+        assert_eq!(hall.ether.world().to_all[0], 0);
+    });
+    assert_eq!(breaches(ether).len(), 0);
+}
+
 /// Once nothing moves.
 #[track_caller]
 fn assert_accounts(hall: &mut Hall<'_, '_>) {
@@ -238,13 +250,7 @@ fn a_second_controller_with_the_address_of_one_is_found_at_rest_before_anything_
     let kind = TOGETHER[0];
     let ether = quiet(kind);
     ether.world().twice = Some(1);
-    lead(kind, &ether, |hall| {
-        hall.ride(0);
-        let [one, each] = plays(hall, 2_500);
-        assert!(one == 0 && each > 10, "{one} as one, {each} as one for each");
-        assert_eq!(hall.ether.world().to_all[0], 0);
-    });
-    assert_eq!(breaches(&ether).len(), 0);
+    nothing_goes_to_all(kind, &ether);
 }
 
 #[test]
@@ -398,13 +404,7 @@ fn a_look_in_which_the_thread_that_asks_was_held_up_permits_nothing() {
 fn a_seat_of_another_network_that_takes_what_goes_to_all_is_found_at_rest() {
     let ether = quiet(OUTSIDE);
     ether.world().outside_takes = true;
-    lead(OUTSIDE, &ether, |hall| {
-        hall.ride(0);
-        let [one, each] = plays(hall, 2_500);
-        assert!(one == 0 && each > 10, "{one} as one, {each} as one for each");
-        assert_eq!(hall.ether.world().to_all[0], 0);
-    });
-    assert_eq!(breaches(&ether).len(), 0);
+    nothing_goes_to_all(OUTSIDE, &ether);
 }
 
 #[test]

@@ -149,10 +149,14 @@ fn resume(who: &Who, hall: &HallContext) -> Result<Vec<Act>, Problem> {
     }
 }
 
+/// Has what is loaded begin there, and the film that is shown from here wound to it.
+fn start_at(film: ShowTime, hall: &HallContext) -> impl Iterator<Item = Act> {
+    [Act::Stage(ShowChange::Start(film))].into_iter().chain(player::seek(film, hall))
+}
+
 /// Begins there, for that one show.
 fn begin_at(film: ShowTime, go: Act, hall: &HallContext) -> Vec<Act> {
-    let begin = [Act::Stage(ShowChange::Start(film))].into_iter().chain(player::seek(film, hall));
-    begin.chain([Act::Otherwise(vec![Act::Stage(ShowChange::Rewind)]), go]).collect()
+    start_at(film, hall).chain([Act::Otherwise(vec![Act::Stage(ShowChange::Rewind)]), go]).collect()
 }
 
 /// Lets what is loaded go from there on, by a join onto the moving cue.
@@ -184,13 +188,12 @@ fn within_cue(film: ShowTime, hall: &HallContext) -> Result<(), Problem> {
 
 fn seek(film: ShowTime, hall: &HallContext) -> Result<Vec<Act>, Problem> {
     within_cue(film, hall)?;
+    if hall.mirror.state == State::Armed {
+        return Ok(start_at(film, hall).collect());
+    }
     // Where the film is shown from here it is wound, and the seats follow.
-    let wound = player::seek(film, hall);
-    Ok(match (hall.mirror.state, wound) {
-        (State::Armed, wound) => [Act::Stage(ShowChange::Start(film))].into_iter().chain(wound).collect(),
-        (State::Playing(_) | State::Paused, Some(wound)) => vec![wound],
-        _ => vec![Act::Tick(TickCommand::Seek(film))],
-    })
+    let wound = player::seek(film, hall).filter(|_| hall.is_on_cue());
+    Ok(vec![wound.unwrap_or(Act::Tick(TickCommand::Seek(film)))])
 }
 
 /// Sets something, and makes the show anew where its first frames hang on that.

@@ -307,9 +307,10 @@ impl HallContext {
         mirror.state == State::Recovering && mirror.cause == Cause::TookOver && self.cued.is_some()
     }
 
-    /// Where the show goes on that was under way at the machine that died; `None` if what is loaded is another one, or its film is over.
+    /// Where the show goes on that was under way at the machine that died; `None` if none was, what is loaded is another one, or its film is
+    /// over.
     pub(super) fn goes_on(&self) -> Option<GoesOn> {
-        let cued = self.cued.as_ref()?;
+        let cued = self.cued.as_ref().filter(|_| self.has_taken_over())?;
         match cued.left_at {
             Some(_) if cued.is_led_elsewhere() => Some(GoesOn::WithFilm),
             _ => cued.left(self.now).map(GoesOn::At),

@@ -71,7 +71,7 @@ impl StatusParts<'_> {
         let position = |cued: &ProvedShow| match hall.goes_on() {
             _ if moving => live.show(),
             // What was taken over is where its film is by now.
-            Some(GoesOn::At(film)) if hall.has_taken_over() => film,
+            Some(GoesOn::At(film)) => film,
             _ => cued.start,
         };
         let (next, next_coded) = belts::next_action(hall, table).unwrap_or_else(|| self.next());

@@ -191,6 +191,13 @@ fn taken_over_as(runs_since: Option<MonoTime>, was: impl FnOnce(&mut LoadedShow)
     rig
 }
 
+/// Loads a cue that is another one by its name alone.
+fn load_another(rig: &mut Rig) {
+    let cue = |name| rig.folder.path().join("cues").join(name);
+    std::fs::copy(cue("two.csv"), cue("one.csv")).unwrap();
+    rig.ask(Command::Load { cue: "one".to_owned() }).unwrap();
+}
+
 #[test]
 fn a_show_that_was_taken_over_goes_on_by_resume_where_its_film_is_by_then_and_not_past_its_end() {
     let start = |rig: &Rig| rig.supervisor.hall.cued.as_ref().unwrap().start;
@@ -216,9 +223,7 @@ fn a_show_that_was_taken_over_goes_on_by_resume_where_its_film_is_by_then_and_no
 
     // Another cue is none that was under way.
     let mut other = taken_over(None);
-    std::fs::copy(other.folder.path().join("cues/two.csv"), other.folder.path().join("cues/one.csv"))
-        .unwrap();
-    other.ask(Command::Load { cue: "one".to_owned() }).unwrap();
+    load_another(&mut other);
     assert_eq!(other.ask(Command::Resume).unwrap_err().code, Code::State);
     assert_eq!(other.state(), State::Recovering);
 }
@@ -255,9 +260,7 @@ fn resume_is_named_as_the_next_action_only_where_it_is_taken() {
     assert_eq!(next(&over), "park, or home");
     assert_ne!(over.supervisor.status().next_coded.code, "resume");
     let mut other = taken_over(None);
-    std::fs::copy(other.folder.path().join("cues/two.csv"), other.folder.path().join("cues/one.csv"))
-        .unwrap();
-    other.ask(Command::Load { cue: "one".to_owned() }).unwrap();
+    load_another(&mut other);
     assert_eq!(next(&other), "park, or home");
 }
 
@@ -289,9 +292,7 @@ fn another_cue_is_not_gone_on_with_be_it_that_a_film_that_others_show_leads_it()
     same.ask(Command::Resume).unwrap();
     assert_eq!(same.state(), State::Playing(PlayMode::Joining));
     let mut other = taken_over(None);
-    std::fs::copy(other.folder.path().join("cues/two.csv"), other.folder.path().join("cues/one.csv"))
-        .unwrap();
-    other.ask(Command::Load { cue: "one".to_owned() }).unwrap();
+    load_another(&mut other);
     led(&mut other);
     assert_eq!(other.ask(Command::Resume).unwrap_err().code, Code::State);
     assert_eq!(other.state(), State::Recovering);
