@@ -132,7 +132,7 @@ impl Belief {
             own: window.own(),
             within: 0,
             known: Known::Nothing,
-            spans: Spans::over(GAP + window.acked_after()),
+            spans: Spans::over(GAP + window.acked_after(), period),
             history: History::at([0.0; MAX_AXES]),
             acked: None,
             shaking: Shaking::default(),
@@ -269,11 +269,10 @@ impl Belief {
         Found::Astray
     }
 
-    /// That the ack thread is slow is no gap at first: what an ack may still be read for is not missing. Of a span the oldest
-    /// frame counts, so that a frame is missed after 40 to 50 ms, where acks come at once.
+    /// That the ack thread is slow is no gap at first: what an ack may still be read for is not missing.
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
         let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
-        let later = self.acked_after + self.spans.slack();
+        let later = self.acked_after;
         let is_missed = |since| told.since(since) > GAP + later || now.since(since) > GAP_UNTOLD + later;
         let unheard = || self.spans.waiting_since(self.acked).is_some_and(is_missed);
         refused || (self.asks && unheard())

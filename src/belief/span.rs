@@ -6,8 +6,8 @@ use crate::motion::{MAX_AXES, Pose};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
-/// The ticks whose frames are kept together at the least. What is acked within a span is told apart from the rest of it only once the
-/// next span is: shorter ones would tell more precisely, and cost more.
+/// The ticks whose frames are kept together at the least. Where those led that were acked within a span is told apart from the rest of it only
+/// once the next span is: shorter ones would tell more precisely, and cost more.
 pub(super) const SPAN: Duration = Duration::from_millis(10);
 /// Once they are used up the last one takes all that follows.
 const SPANS: usize = 8;
@@ -61,6 +61,8 @@ pub(super) struct Spans {
     spans: [Span; SPANS],
     /// How long each is.
     length: Duration,
+    /// Frames are so far apart, at the least.
+    period: Duration,
     /// How many hold frames; the first also holds the place that they began at.
     count: usize,
     last: Pose,
@@ -70,22 +72,17 @@ pub(super) struct Spans {
 impl Spans {
     /// No frame yet; spans that are long enough for frames that are open for so long.
     #[expect(clippy::cast_possible_truncation, reason = "a handful")]
-    pub(super) fn over(open: Duration) -> Self {
+    pub(super) fn over(open: Duration, period: Duration) -> Self {
         let (at, last) = (MonoTime::from_nanos(0), [0.0; MAX_AXES]);
         let empty = Span { first: FrameNo::FIRST, at, asked: None, reach: Reach::at(last) };
         // The one that is being filled may have just begun.
         let length = SPAN.max(open / (SPANS as u32 - 1));
-        Self { spans: [empty; SPANS], length, count: 0, last, newest: FrameNo::FIRST }
+        Self { spans: [empty; SPANS], length, period, count: 0, last, newest: FrameNo::FIRST }
     }
 
     /// No frame since the axes were there.
     pub(super) const fn restart_at(&mut self, pose: Pose) {
         (self.count, self.last) = (0, pose);
-    }
-
-    /// How much older than a frame its span may be, beyond the least.
-    pub(super) fn slack(&self) -> Duration {
-        self.length.saturating_sub(SPAN)
     }
 
     /// Where the newest frame leads.
@@ -138,11 +135,14 @@ impl Spans {
         self.count = 0;
     }
 
-    /// Since when an ack is waited for.
+    /// Since when an ack is waited for, or a little earlier.
     pub(super) fn waiting_since(&self, acked: Option<FrameNo>) -> Option<MonoTime> {
         let open = |last: FrameNo| acked.is_none_or(|acked| last.since(acked) > 0);
-        let asked = self.spans[..self.count].iter().filter_map(|span| span.asked);
-        asked.filter(|(_, last)| open(*last)).map(|(since, _)| since).next()
+        self.spans[..self.count].iter().find_map(|span| {
+            let (since, _) = span.asked.filter(|(_, last)| open(*last))?;
+            let taken = acked.map_or(0, |acked| acked.since(span.first) + 1);
+            Some(since.max(span.at + self.period * u32::try_from(taken).unwrap_or(0)))
+        })
     }
 
     /// Between which places a slot may be.

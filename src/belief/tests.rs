@@ -146,6 +146,22 @@ fn fifty_milliseconds_without_an_ack_are_a_gap_and_what_is_sent_then_is_slow_fro
 }
 
 #[test]
+fn a_frame_is_missed_after_fifty_milliseconds_however_many_of_its_neighbours_were_acked() {
+    let mut bench = Bench::found(0.0);
+    bench.belief = Belief { period: Duration::from_millis(1), ..bench.belief };
+    bench.belief.spans = Spans::over(GAP, Duration::from_millis(1));
+    bench.read(0.0, 0, true);
+    let gap = (0_u32..400).find(|when| {
+        // Frame n leaves at n - 1 ms and is acked 49 ms later, until frame 203, which is not.
+        bench.ack(when.saturating_sub(48).min(202));
+        let found = bench.look((*when).into());
+        bench.send(0.0, 1, (*when).into());
+        found == Found::Gap
+    });
+    assert_eq!(gap, Some(202 + 51));
+}
+
+#[test]
 fn acks_that_come_again_tell_where_frames_are_taken_and_a_reading_ends_the_gap() {
     let (mut bench, _) = unheard(200);
     bench.ack(21);

@@ -34,8 +34,8 @@ use rtrb::Producer;
 use super::counting::Calls;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(1);
-/// Frames whose replies may be under way; where they are of one controller alone, they are too few to be missing for a gap.
-const UNDER_WAY: u64 = 64;
+/// Frames whose replies may be under way: 16 ms where they are of one controller alone, which with 80 ms that are overslept is no gap.
+const UNDER_WAY: u64 = 16;
 pub(crate) const CONTROLLERS: usize = 2;
 
 /// Something that happens before a tick.
