@@ -2,7 +2,6 @@
 //! a letter counts for whose key has signed it. That is checked here, where the keys are configured, and not by who carries it: it is
 //! what others reach over the network, and may be taken over without a seat more in danger.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -24,13 +23,10 @@ use super::status::check_pulse;
 use crate::config;
 use crate::control::{ClockReading, Code, Command, HallFacts, LevelsChange, Problem, StartOrder};
 use crate::fleet::{BriefStatus, Letter, Order};
-use crate::journal::{self, JournalPart, stamp};
+use crate::journal::{self, JournalPart, TOLD_AT_ONCE, Told, stamp};
 use crate::library::CueId;
 use crate::sys::clock::{Monotonic, wall_at, wall_now_ns};
 use crate::time::Clock as _;
-
-/// Records of the journal in a reply.
-const RECORDS: usize = 100;
 
 /// The longest ticket of a start.
 const LONGEST_TICKET: usize = 64;
@@ -240,24 +236,16 @@ pub(super) async fn clock(
     Ok(JsonReply(Value::Object(Default::default())))
 }
 
-/// How much of the journal was told.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct JournalTold {
-    /// Lines of each file, by its name.
-    told: BTreeMap<String, u64>,
-}
-
 /// What the journal says of shows beyond that.
 pub(super) async fn journal(
     State(shared): State<Arc<Shared>>,
-    Json(JournalTold { told }): Json<JournalTold>,
+    Json(told): Json<Told>,
 ) -> Result<JsonReply<Vec<JournalPart>>, Problem> {
     let turn = turn(&shared.reports, "a report").await?;
     let dir = shared.journal.clone();
     let parts = shared.blocking(move || {
         let _turn = turn;
-        journal::tail(&dir, &told, RECORDS).map_err(|error| {
+        journal::tail(&dir, &told, TOLD_AT_ONCE).map_err(|error| {
             Problem::new(Code::File, error.to_string(), "check the folder of the journal and its disk")
         })
     });

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::journal::{JournalPart, TOLD_FILES};
+use crate::journal::{JournalPart, TOLD_FILES, Told};
 
 /// A record of `kc_log`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,5 +27,10 @@ impl LogRecord {
             told.pop_first();
         }
         Self { n: before.map_or(0, |before| before.n) + 1, told, part }
+    }
+
+    /// How much of the journal was told by then.
+    pub(crate) fn told(&self) -> Told {
+        Told { lines: self.told.clone(), last: Some((&self.part).into()) }
     }
 }

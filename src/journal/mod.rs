@@ -32,7 +32,7 @@ pub(crate) use record::{PlaylistPlace, stamp};
 pub(crate) use report::{
     JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report, report_of,
 };
-pub(crate) use tail::{JournalPart, TOLD_FILES, tail};
+pub(crate) use tail::{JournalPart, LONGEST_TOLD, TOLD_AT_ONCE, TOLD_FILES, Told, tail};
 #[cfg(feature = "harness")]
 pub(crate) use tried::try_file;
 

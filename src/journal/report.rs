@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use jiff::ToSpan as _;
 use jiff::civil::Date;
+use jiff::{Timestamp, ToSpan as _};
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -139,14 +139,28 @@ pub(crate) fn report(
     Ok(days.report(runs))
 }
 
-/// The same of lines that a journal told elsewhere, in their order; what is none is noted.
-pub(crate) fn report_of(lines: impl IntoIterator<Item = Value>, from: Date, to: Date) -> JournalReport {
+/// The same of what the journals of a hall told elsewhere, each in its order: where it has two show machines, the start of one ends what the
+/// other one played. What is no line is noted.
+pub(crate) fn report_of(
+    journals: impl IntoIterator<Item = Vec<Value>>,
+    from: Date,
+    to: Date,
+) -> JournalReport {
     let mut days = Days::new(from, to, ReportBounds::ALL);
-    for line in lines {
-        match serde_json::from_value(line) {
-            Ok(line) => days.take(line),
-            Err(error) => days.notes.push(format!("a record is of another version, skipped: {error}")),
+    let mut read = |line| match serde_json::from_value(line) {
+        Ok(line) => Some(line),
+        Err(error) => {
+            days.notes.push(format!("a record is of another version, skipped: {error}"));
+            None
         }
+    };
+    let mut journals: Vec<VecDeque<Line>> =
+        journals.into_iter().map(|lines| lines.into_iter().filter_map(&mut read).collect()).collect();
+    let next_at = |lines: &VecDeque<Line>| lines.front()?.at().parse::<Timestamp>().ok();
+    while let Some(journal) =
+        journals.iter_mut().filter(|lines| !lines.is_empty()).min_by_key(|lines| next_at(lines))
+    {
+        journal.pop_front().into_iter().for_each(|line| days.take(line));
     }
     days.report(true)
 }
@@ -250,7 +264,7 @@ impl Open {
             None => ShowResult::Interrupted,
         };
         let took_s = record.outcome.as_ref().and_then(|outcome| {
-            let (start, end): (jiff::Timestamp, jiff::Timestamp) =
+            let (start, end): (Timestamp, Timestamp) =
                 (record.start.parse().ok()?, outcome.end.parse().ok()?);
             Some(end.duration_since(start).as_secs_f64())
         });

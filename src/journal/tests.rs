@@ -118,6 +118,24 @@ fn a_show_is_reported_as_it_was_recorded() {
 }
 
 #[test]
+fn of_two_machines_the_start_of_one_ends_what_the_other_one_played_in_whatever_order_they_told_it() {
+    let began = |start: &str| Line::Begin(Box::new(record(start)));
+    let start = |at: &str| Line::Start { at: at.to_owned(), version: "1".to_owned() };
+    let later = "2026-11-21T19:30:00.000+01:00";
+    // The first one died in its show, and could tell it only once it was back.
+    let first = [start("2026-11-21T08:00:00.000Z"), began(START)];
+    let second = [start("2026-11-21T18:02:00.000Z"), began(later)];
+    let told = |journal: &[Line]| journal.iter().map(|line| serde_json::to_value(line).unwrap()).collect();
+    for journals in [[&first, &second], [&second, &first]] {
+        let date = day("2026-11-21");
+        let report = report_of(journals.map(|journal| told(journal)), date, date);
+        let shows: Vec<_> =
+            report.shows.iter().map(|show| (show.record.start.as_str(), show.result)).collect();
+        assert_eq!(shows, [(START, ShowResult::Interrupted), (later, ShowResult::Running)]);
+    }
+}
+
+#[test]
 fn a_show_that_goes_on_is_running_and_one_without_an_end_was_interrupted() {
     let dir = tempfile::tempdir().unwrap();
     let result = |dir: &Path| {

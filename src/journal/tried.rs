@@ -23,11 +23,19 @@ pub(crate) fn try_file(octets: &[u8]) {
     assert!(report.shows.len() <= 3 && report.actions.len() <= 3 && report.notes.len() <= MOST_NOTES + 3);
     serde_json::to_vec(&report).expect("a report is text and numbers");
     let mut at_once = Vec::new();
-    tail::told_in(octets, NAME, 0, usize::MAX, &mut at_once).expect(IN_MEMORY);
+    tail::told_in(octets, NAME, (0, None), usize::MAX, &mut at_once).expect(IN_MEMORY);
     let mut in_parts: Vec<JournalPart> = Vec::new();
     loop {
-        let (before, told) = (in_parts.len(), in_parts.last().map_or(0, |part| part.line));
-        tail::told_in(octets, NAME, told, before + 100, &mut in_parts).expect(IN_MEMORY);
+        // As an engine gives it back.
+        let last =
+            in_parts.last().map(|part| serde_json::to_vec(part).expect("a record is text and numbers"));
+        let last = last.map(|text| serde_json::from_slice::<JournalPart>(&text).expect("it was one"));
+        let before = in_parts.len();
+        let (line, last) =
+            (last.as_ref().map_or(0, |last| last.line), last.as_ref().map(tail::LastTold::from));
+        assert!(
+            tail::told_in(octets, NAME, (line, last.as_ref()), before + 100, &mut in_parts).expect(IN_MEMORY)
+        );
         if in_parts.len() == before {
             break;
         }

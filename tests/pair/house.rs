@@ -16,7 +16,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::net::Machine;
-use crate::process::{Guarded, Row, Run};
+use crate::process::{Guarded, PATIENCE, Row, Run};
 use crate::programs::is_installed;
 use crate::serving::{self, Serving};
 use crate::statuses;
@@ -152,14 +152,34 @@ impl House {
     /// How the desk sees the hall once that is so.
     #[track_caller]
     pub(crate) fn seen(&self, wanted: impl Fn(&Value) -> bool) -> Value {
-        for _ in 0..100 {
-            let run = self.desk(&["status", "--json"]);
-            let all: Value = serde_json::from_str(&run.stdout).unwrap_or_else(|_| panic!("{run:?}"));
-            if let Some(hall) = all.as_array().and_then(|all| all.first()).filter(|hall| wanted(hall)) {
-                return hall.clone();
+        self.at_desk(&["status", "--json"], |all| {
+            all.as_array()?.first().filter(|hall| wanted(hall)).cloned()
+        })
+    }
+
+    /// How many shows the day's report at the desk counts once that is so.
+    #[track_caller]
+    pub(crate) fn played(&self, wanted: impl Fn(&Value) -> bool) -> Value {
+        self.at_desk(&["report", "--json"], |halls| {
+            Some(&halls["berlin.h1"]["totals"]).filter(|totals| wanted(totals)).cloned()
+        })
+    }
+
+    /// Asks the desk until it says that.
+    #[track_caller]
+    fn at_desk(&self, args: &[&str], wanted: impl Fn(&Value) -> Option<Value>) -> Value {
+        let until = Monotonic.now() + PATIENCE;
+        let mut last = None;
+        while Monotonic.now() < until {
+            let run = self.desk(args);
+            // Where the engine is slow there is none.
+            let told: Option<Value> = serde_json::from_str(&run.stdout).ok();
+            if let Some(told) = told.as_ref().and_then(&wanted) {
+                return told;
             }
+            last = Some(run);
         }
-        panic!("the desk does not see that: {:?}", self.desk(&["status"]));
+        panic!("the desk does not come to say that: {last:#?}");
     }
 
     pub(crate) fn kill_engine(&mut self) {

@@ -1,10 +1,12 @@
 //! This machine as one of the two show machines of its hall. It stands by until it leads (`stand_by`); from then on it serves the hall, for
 //! as long as it leads. What leads to that is decided by `pair::Claim`; here is what carries its messages: heartbeats between the machines
-//! (`beats`), the lease by the link to the engine (`lease`), and what people have set (`settings`). All on ordinary threads, none of which
-//! the show waits for.
+//! (`beats`), the lease by the link to the engine (`lease`), and what people have set (`settings`). The link reads this machine's journal
+//! (`journal`). All on ordinary threads, none of which the show waits for.
 
 mod beats;
+mod journal;
 mod lease;
+mod links;
 mod settings;
 mod stand_by;
 

@@ -8,7 +8,8 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::{
-    Pair, PairError, PairShared, TookOver, beats, find_machine, key, lease, print_of, session, settings,
+    Pair, PairError, PairShared, TookOver, beats, find_machine, journal, key, lease, print_of, session,
+    settings,
 };
 use crate::config::{Config, Pair as PairConfig};
 use crate::log::{Log, Priority};
@@ -25,8 +26,9 @@ const LOOK: Duration = Duration::from_millis(20);
 const ADDRESS: Duration = Duration::from_secs(3);
 /// By this file in the folder of the state a person says that the other machine is off.
 const ALONE: &str = "alone";
-/// The name of the socket of the lease, beside that of the fleet.
-const SOCKET: &str = "pair.sock";
+/// The names of the sockets of the lease and of the journal, beside that of the fleet.
+const LEASE: &str = "pair.sock";
+const JOURNAL: &str = "pair-journal.sock";
 
 /// Where the service has its files.
 #[derive(Debug, Clone, Copy)]
@@ -62,6 +64,8 @@ pub(crate) fn stand_by(
     log: &Log,
 ) -> Result<StoodBy, PairError> {
     let (shared, name) = start(pair, places, log)?;
+    let _ = fs::create_dir_all(&config.log.dir); // what cannot be kept there is told once this machine leads
+    journal::start(name.clone(), config.log.dir.clone(), &places.fleet.with_file_name(JOURNAL))?;
     let interval = sd::watchdog();
     let beats = Arc::clone(&shared);
     let pulse = move || {
@@ -158,7 +162,7 @@ fn start(
         lead_file,
         log: log.clone(),
     });
-    lease::start(&shared, &places.fleet.with_file_name(SOCKET))?;
+    lease::start(&shared, &places.fleet.with_file_name(LEASE))?;
     beats::start(&shared)?;
     Ok((shared, own.name.clone()))
 }

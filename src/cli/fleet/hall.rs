@@ -1,6 +1,5 @@
 //! A hall as its link reaches it, and the client by which it reaches the engine.
 
-use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -17,7 +16,7 @@ use serde_json::Value;
 use crate::cli::client::http::{self, HttpReply};
 
 /// How long the hall may take to answer what is looked up.
-const LOOKED_UP: Duration = Duration::from_secs(2);
+pub(super) const LOOKED_UP: Duration = Duration::from_secs(2);
 
 /// What a link has.
 pub(super) struct Link {
@@ -28,20 +27,14 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// The name of this machine while it leads a hall that has two; `None` else. The service says so in a file beside its socket.
-    pub(super) fn leads_as(&self) -> Option<String> {
-        let name = fs::read_to_string(self.socket.with_file_name("lead")).ok()?;
-        Some(name.trim().to_owned())
-    }
-
     /// True if the hall has another show machine, whose link hears the same: only who leads answers for the hall.
     pub(super) fn is_of_two(&self) -> bool {
         self.socket.with_file_name("pair.sock").exists()
     }
 
-    /// True while the other machine leads, as far as is known here.
+    /// True while the other machine leads, as far as is known here. The service of the one that leads has a file that says so.
     pub(super) fn stands_by(&self) -> bool {
-        self.is_of_two() && self.leads_as().is_none()
+        self.is_of_two() && !self.socket.with_file_name("lead").exists()
     }
 
     /// True if what is told now goes out now: what is told meanwhile would come late, when it is no longer so.

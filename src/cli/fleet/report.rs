@@ -47,7 +47,8 @@ pub(super) struct Args {
 /// What a hall told.
 #[derive(Default)]
 struct ToldByHall {
-    records: Vec<LogRecord>,
+    /// By the subject of the journal: each machine of a hall has one.
+    records: BTreeMap<String, Vec<LogRecord>>,
     /// Lines that these are: of which file, at which place, and what they say. The journals of two machines have files of the same names.
     lines: BTreeSet<(String, u64, String)>,
     /// The last record of each journal, by its subject.
@@ -69,7 +70,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let is_whole = told.values().all(|hall| hall.missing.is_empty());
     if args.records {
-        let records: BTreeMap<_, _> = told.iter().map(|(hall, told)| (hall, &told.records)).collect();
+        let of_hall = |told: &ToldByHall| told.records.values().flatten().cloned().collect::<Vec<_>>();
+        let records: BTreeMap<_, _> = told.iter().map(|(hall, told)| (hall, of_hall(told))).collect();
         print::json(&records)?;
         return Ok(if is_whole { Exit::Done } else { Exit::CheckFailed });
     }
@@ -143,13 +145,13 @@ impl ToldByHall {
         }
         let line = (record.part.file.clone(), record.part.line, record.part.record.to_string());
         if self.lines.insert(line) {
-            self.records.push(record);
+            self.records.entry(subject.to_owned()).or_default().push(record);
         }
     }
 
     fn report(self, day: Date) -> JournalReport {
-        let lines = self.records.into_iter().map(|record| record.part.record);
-        let mut report = report_of(lines, day, day);
+        let lines = |records: Vec<LogRecord>| records.into_iter().map(|record| record.part.record).collect();
+        let mut report = report_of(self.records.into_values().map(lines), day, day);
         report.notes.extend(self.missing);
         report
     }
