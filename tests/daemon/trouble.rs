@@ -94,7 +94,12 @@ fn a_plug_pulled_in_mid_show_is_named_the_others_play_on_and_put_back_it_joins_a
     let lost = hall.wait(|status| health(status, 1) == "lost");
     assert!(lost["state"] == "playing" && plays_on(&lost, 0), "{lost}");
     let told = warning(&lost, "A2").expect("it is told");
-    assert!(told["text"].as_str().unwrap().contains("missing for over 50 ms"), "{told}");
+    // After 50 ms its frames are cut off, and after 250 ms it is lost; on a busy machine the first status is of the second.
+    let text = told["text"].as_str().unwrap();
+    assert!(
+        ["missing for over 50 ms", "no ack and no report"].iter().any(|why| text.contains(why)),
+        "{told}"
+    );
     assert!(told["remedy"].as_str().unwrap().contains("power and its cable"), "{told}");
     hall.serving().heard(|line| (line.contains("controller-lost") && line.contains("A2")).then_some(()));
     let acked = |status: &Value| status["controllers"][0]["acked"].as_u64();
