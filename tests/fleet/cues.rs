@@ -166,3 +166,17 @@ fn a_hall_that_does_not_allow_it_and_one_that_is_away_are_told_apart() {
     engine.has("berlin.h2", |hall| *state(hall, "storm") == "ready");
     assert_eq!(engine.desk(&["have", "berlin.h2"]).code, Some(0));
 }
+
+#[test]
+fn a_desk_is_told_that_the_link_has_no_place_for_a_cue() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", CUES);
+    hall.write("link", "a file, where the folder of its cues would be");
+    let _link = engine.link("h1", &hall);
+    engine.hears_all();
+    let run = push(&engine, "storm", &swell(3), &["--to", "all", "--no-wait"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    engine.has("berlin.h1", |hall| {
+        hall["cues"].to_string().contains("waiting: its link has no place for cues in")
+    });
+}

@@ -66,3 +66,23 @@ fn a_hall_does_what_it_allows_and_refuses_the_rest_with_what_to_do() {
     let run = engine.desk(&["stop", "berlin.h1"]);
     assert_eq!(run.code, Some(0), "a stop needs no key of the hall's: {run:?}");
 }
+
+#[test]
+fn a_link_whose_service_is_down_answers_for_no_hall_that_another_machine_serves() {
+    let Some(engine) = Engine::start_with("h1", &["--pairs", "h1"]) else { return };
+    let hall = engine.hall("h1", ALL);
+    let nothing = tempfile::tempdir().unwrap();
+    let down = engine.link_in("h1", nothing.path());
+    down.heard("the hall: ");
+    let _link = engine.link("h1", &hall);
+    engine.hears_all();
+    for tries in 0..20 {
+        let run = engine.desk(&["level", &format!("{}%", 50 + tries), "all"]);
+        assert_eq!(run.code, Some(0), "{tries}: {run:?}");
+    }
+    let run = engine.desk(&["load", "night", "all"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let run = engine.desk(&["stop"]);
+    assert_eq!((run.code, run.stdout.as_str()), (Some(0), "berlin.h1: stopping\n"), "{run:?}");
+    hall.comes_to("stopped");
+}

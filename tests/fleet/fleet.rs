@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::net::{TcpListener, TcpStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
@@ -181,8 +181,13 @@ impl Engine {
 
     /// The link of a hall.
     pub(crate) fn link(&self, name: &str, hall: &Hall) -> Link {
+        self.link_in(name, hall.folder())
+    }
+
+    /// The same where its sockets and its cues are in a folder.
+    pub(crate) fn link_in(&self, name: &str, folder: &Path) -> Link {
         let settings = self.path(&format!("fleet/{name}/fleet.toml"));
-        let path = |name: &str| hall.path(name).to_str().unwrap().to_owned();
+        let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
         let (settings, socket, state) = (settings.to_str().unwrap(), path("fleet.sock"), path("link"));
         let mut process =
             Guarded::start(&["fleet", "link", "--config", settings, "--socket", &socket, "--state", &state]);
@@ -299,6 +304,11 @@ impl Link {
                 return line;
             }
         }
+    }
+
+    /// True if it has said that since it was listened to last.
+    pub(crate) fn has_said(&self, text: &str) -> bool {
+        self.said.try_iter().any(|line| line.contains(text))
     }
 
     pub(crate) fn signal(&self, signal: Signal) {

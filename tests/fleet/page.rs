@@ -142,6 +142,29 @@ fn a_page_is_served_before_its_engine_is_there_and_hears_halls_once_it_is() {
 }
 
 #[test]
+fn a_stop_that_is_pressed_while_the_engine_is_away_is_said_to_be_none_and_stops_no_hall_once_that_is_back() {
+    let Some(mut engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", "[]");
+    let link = engine.link("h1", &hall);
+    let page = engine.page(OPEN);
+    page.wait(|page| are_heard(page, 1));
+    engine.kill();
+    page.wait(|page| page["engine"] == false);
+    let all = json!({ "halls": ["all"] }).to_string();
+    let stop = || Request::new("POST", "/api/v1/fleet/stop").json(all.clone()).send(page.to()).value();
+    let answers = stop();
+    assert_eq!((&answers[0]["done"], &answers[0]["answered"]), (&false.into(), &false.into()), "{answers}");
+    assert_eq!(answers[0]["text"], "not asked: the engine is away");
+    engine.restart();
+    page.wait(|page| page["engine"] == true && are_heard(page, 1));
+    // Of two stops the engine passes on the first one first.
+    assert_eq!(stop()[0]["done"], true);
+    hall.comes_to("stopped");
+    link.heard("office asks for a stop");
+    assert!(!link.has_said("office asks for a stop"), "the other one was asked later");
+}
+
+#[test]
 fn a_desk_without_a_place_for_its_page_says_what_to_add() {
     let Some(engine) = Engine::start("h1") else { return };
     let run = engine.desk(&["desk"]);

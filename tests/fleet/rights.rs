@@ -1,15 +1,24 @@
 //! What the key of a hall, or of a desk, may at the engine, and what not.
 
 use std::fs;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
 use async_nats::{Client, ConnectOptions, Event};
+use base64::Engine as _;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::Clock as _;
+use nkeys::KeyPair;
+use serde_json::{Value, json};
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use tokio::time::{sleep, timeout};
 
 use crate::fleet::Engine;
+use crate::http::Request;
 use crate::process::PATIENCE;
 
 /// A member that says whatever it is told to.
@@ -61,6 +70,57 @@ impl Member {
             is_let = false;
         }
     }
+}
+
+/// A member that sends octets of its own.
+struct RawMember(TcpStream);
+
+impl RawMember {
+    fn connect(engine: &Engine, key: &str) -> Self {
+        let seed = fs::read_to_string(engine.path(&format!("fleet/{key}"))).unwrap();
+        let pair = KeyPair::from_seed(seed.trim()).unwrap();
+        let mut stream = TcpStream::connect(engine.address()).unwrap();
+        let mut info = String::new();
+        BufReader::new(&stream).read_line(&mut info).unwrap();
+        let info: Value = serde_json::from_str(info.strip_prefix("INFO ").unwrap()).unwrap();
+        let sig = URL_SAFE_NO_PAD.encode(pair.sign(info["nonce"].as_str().unwrap().as_bytes()).unwrap());
+        let connect = json!({ "verbose": false, "headers": true, "nkey": pair.public_key(), "sig": sig });
+        write!(stream, "CONNECT {connect}\r\n").unwrap();
+        Self(stream)
+    }
+
+    /// Publishes with headers that are none.
+    fn garble(&mut self, subject: &str) {
+        let headers = "NATS/1.0\r\nno header\r\n\r\n";
+        let length = headers.len();
+        let _ = write!(self.0, "HPUB {subject} {length} {length}\r\n{headers}\r\n"); // it may be let in no more
+    }
+}
+
+#[test]
+fn a_stolen_key_of_a_hall_that_sends_what_nobody_can_read_takes_no_stop_of_another_hall_from_the_page() {
+    let Some(engine) = Engine::start("h1,h2") else { return };
+    let two = engine.hall("h2", "[]");
+    let _link = engine.link("h2", &two);
+    let page = engine.page("open_role = \"view\"");
+    page.wait(|page| page["halls"].as_array().unwrap().iter().any(|hall| hall["silent"] == false));
+    let mut thief = RawMember::connect(&engine, "h1/fleet.nk");
+    let ends = AtomicBool::new(false);
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            while !ends.load(Ordering::Relaxed) {
+                (0..20).for_each(|_| thief.garble("kc.status.berlin.h1"));
+                Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(2));
+            }
+        });
+        page.wait(|page| page["engine"] == false);
+        let stop = json!({ "halls": ["berlin.h2"] }).to_string();
+        let stop = || Request::new("POST", "/api/v1/fleet/stop").json(stop.clone()).send(page.to()).value();
+        let answers: Vec<_> = (0..5).map(|_| stop()).collect();
+        ends.store(true, Ordering::Relaxed);
+        assert!(answers.iter().all(|stop| stop[0]["done"] == true), "{answers:?}");
+    });
+    two.comes_to("stopped");
 }
 
 /// Whoever makes a stream says of which subjects, and to whom the engine answers.

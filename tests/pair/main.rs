@@ -17,5 +17,6 @@ mod serving;
 #[path = "../common/statuses.rs"]
 mod statuses;
 
+mod asked;
 mod house;
 mod takeovers;

@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use anyhow::anyhow;
+use async_nats::connection::State as EngineState;
 use async_nats::{Client, StatusCode};
 use futures_util::StreamExt as _;
 use futures_util::future::join_all;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use tokio::time::timeout;
+use tokio::time::{Instant, sleep, timeout_at};
 
 use super::desk::said;
 use super::settings::DeskSettings;
@@ -24,6 +25,10 @@ use crate::sys::clock::wall_now_ns;
 const PATIENCE: Duration = Duration::from_secs(3);
 /// The same where it reads and proves a cue.
 const LONG: Duration = Duration::from_secs(70);
+/// How often it is looked whether the engine is there.
+const LOOK: Duration = Duration::from_millis(20);
+/// The status by which a link says that the hall behind it did not answer.
+const AWAY: u16 = 503;
 
 /// Brings the seats of halls to rest at once.
 ///
@@ -258,26 +263,42 @@ pub(super) async fn request(
             None => return Err(Answer::Refused("the key of this desk cannot sign".to_owned())),
         },
     };
-    match timeout(asked.patience, answer_of(client, hall, subject, letter)).await {
+    let until = Instant::now() + asked.patience;
+    // What is asked while the engine is away goes out once it is back: long after whoever asked was told that nobody has answered.
+    if timeout_at(until, reached(client)).await.is_err() {
+        return Err(Answer::Silent("not asked: the engine is away".to_owned()));
+    }
+    let mut away = None;
+    match timeout_at(until, answer_of(client, hall, subject, letter, &mut away)).await {
         Ok(Ok(Some(answer))) => Answer::of(answer),
         Ok(Ok(None)) => {
             Err(Answer::Silent("nobody hears it there: its link or its network is down".to_owned()))
         }
         Ok(Err(error)) => Err(Answer::Silent(format!("not asked: {error:#}"))),
-        Err(_) => Err(Answer::Silent(format!(
-            "no answer within {} s; it may still take effect",
-            asked.patience.as_secs()
-        ))),
+        Err(_) => away.map_or_else(|| Err(no_answer_within(asked.patience)), Answer::of),
     }
 }
 
+/// Waits until the engine is there.
+async fn reached(client: &Client) {
+    while client.connection_state() != EngineState::Connected {
+        sleep(LOOK).await;
+    }
+}
+
+fn no_answer_within(patience: Duration) -> Answer {
+    Answer::Silent(format!("no answer within {} s; it may still take effect", patience.as_secs()))
+}
+
 /// What the hall's own link answers; `None` where nobody hears. Others may answer as well, such as an engine that was told to keep what is
-/// asked: that says nothing of the hall.
+/// asked: that says nothing of the hall. The links of both show machines of a hall hear the same: that a service is down, kept in `away`,
+/// is the answer only where no other one comes.
 async fn answer_of(
     client: &Client,
     hall: &str,
     subject: String,
     letter: String,
+    away: &mut Option<LinkReply>,
 ) -> anyhow::Result<Option<LinkReply>> {
     let inbox = client.new_inbox();
     let mut answers = client.subscribe(inbox.clone()).await?;
@@ -287,8 +308,10 @@ async fn answer_of(
             return Ok(None);
         }
         let answer = serde_json::from_slice::<LinkReply>(&message.payload).ok();
-        if let Some(answer) = answer.filter(|answer| answer.hall == hall) {
-            return Ok(Some(answer));
+        match answer.filter(|answer| answer.hall == hall) {
+            Some(answer) if answer.status == AWAY => *away = Some(answer),
+            Some(answer) => return Ok(Some(answer)),
+            None => {}
         }
     }
     anyhow::bail!("the engine is away")
@@ -330,7 +353,7 @@ impl Answer {
         }
         let text = serde_json::from_value::<ServiceProblem>(answer.reply).unwrap_or_default().line();
         // The link is there, and the hall behind it did not answer.
-        Err(if answer.status == 503 { Self::Silent(text) } else { Self::Refused(text) })
+        Err(if answer.status == AWAY { Self::Silent(text) } else { Self::Refused(text) })
     }
 
     pub(super) fn line(&self) -> String {

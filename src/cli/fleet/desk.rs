@@ -5,9 +5,10 @@ use std::io::{IsTerminal as _, stdout};
 use std::pin::pin;
 use std::time::Duration;
 
+use anyhow::{Context as _, anyhow};
+use async_nats::jetstream::context::Context;
 use async_nats::{Client, Message, Subscriber};
-use futures_util::StreamExt as _;
-use futures_util::future::join_all;
+use futures_util::{StreamExt as _, stream};
 use serde::Serialize;
 use tokio::time::{Instant, sleep_until, timeout_at};
 
@@ -24,6 +25,8 @@ use crate::time::{Clock as _, MonoTime};
 const LISTEN: Duration = Duration::from_millis(1_200);
 /// After so long without a status a hall is silent.
 const SILENT: Duration = Duration::from_millis(1_500);
+/// How long the engine may take to say what it has kept.
+const LOOKED_UP: Duration = Duration::from_secs(8);
 /// How often a watched table is drawn.
 const DRAW: Duration = Duration::from_millis(500);
 /// The longest text in a cell or a line, bytes: a hall may say whatever it likes, and the others are to be seen beside it.
@@ -57,6 +60,13 @@ pub(super) struct WatchArgs {
     json: bool,
 }
 
+/// What the engine has kept of halls.
+pub(super) struct KeptHalls {
+    of: BTreeMap<String, Kept>,
+    /// Why it did not say so of all of them.
+    lack: Option<anyhow::Error>,
+}
+
 /// What is known of a hall.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct HallSeen {
@@ -88,7 +98,7 @@ pub(super) fn status(args: &StatusArgs) -> Result<Exit, Failure> {
         let mut heard = client.subscribe(fleet::status_of("*.*")).await.or_exit(Exit::Unavailable)?;
         let until = Instant::now() + LISTEN;
         // What the engine keeps is for those who are silent; without it the others are shown as well.
-        let kept = halls.look_up_kept(&client, &mut heard).await;
+        let lack = halls.look_up_kept(&client, &mut heard).await;
         halls.listen(&mut heard, until).await;
         let table = halls.table(Monotonic.now());
         if args.json {
@@ -96,8 +106,12 @@ pub(super) fn status(args: &StatusArgs) -> Result<Exit, Failure> {
         } else {
             print::out(&drawn(&table))?;
         }
-        kept?;
-        Ok(if table.iter().any(|hall| hall.silent) { Exit::TryAgain } else { Exit::Done })
+        let is_silent = table.iter().any(|hall| hall.silent);
+        match lack?.filter(|_| is_silent) {
+            Some(why) => Err(why).or_exit(Exit::Unavailable),
+            None if is_silent => Ok(Exit::TryAgain),
+            None => Ok(Exit::Done),
+        }
     })
 }
 
@@ -168,23 +182,27 @@ impl Halls {
         }
     }
 
-    /// Takes in what the engine has kept.
-    pub(super) fn take(&mut self, kept: BTreeMap<String, Kept>) {
-        self.kept = kept;
+    /// Takes in what the engine has kept; says why it is not all of it.
+    pub(super) fn take(&mut self, KeptHalls { of, lack }: KeptHalls) -> Option<anyhow::Error> {
+        self.kept.extend(of);
+        lack
     }
 
-    /// Asks the engine for the last status of each hall of the desk. Halls are heard meanwhile: an engine may take its time, and what
-    /// waited would look new.
-    async fn look_up_kept(&mut self, client: &Client, heard: &mut Subscriber) -> Result<(), Failure> {
+    /// Asks the engine for the last status of each hall of the desk; says why it did not tell all of them. Halls are heard meanwhile: an
+    /// engine may take its time, and what waited would look new.
+    async fn look_up_kept(
+        &mut self,
+        client: &Client,
+        heard: &mut Subscriber,
+    ) -> Result<Option<anyhow::Error>, Failure> {
         let names = self.names.clone();
         let mut kept = pin!(kept_of(client, &names));
-        self.kept = loop {
+        loop {
             tokio::select! {
-                kept = &mut kept => break kept?,
+                kept = &mut kept => return Ok(self.take(kept?)),
                 () = self.listen(heard, Instant::now() + DRAW) => {}
             }
-        };
-        Ok(())
+        }
     }
 
     /// What is known of one.
@@ -210,17 +228,38 @@ impl Halls {
     }
 }
 
-/// What the engine has kept of halls.
-pub(super) async fn kept_of(client: &Client, names: &[String]) -> Result<BTreeMap<String, Kept>, Failure> {
-    let kept = engine::kept(client);
-    engine::prepare(&kept).await?;
-    let of_one = async |name: &String| {
-        let entry = engine::last_value(&kept, fleet::SEEN, name).await.ok()??;
-        let status = serde_json::from_slice(&entry.payload).ok()?;
-        let seen = (status, engine::age_of(&entry), Monotonic.now());
-        (!engine::is_answered(&entry)).then(|| (name.clone(), seen))
+/// Asks the engine for what it has kept of halls, so many at a time: all of thousands at once would be late.
+pub(super) async fn kept_of(client: &Client, names: &[String]) -> Result<KeptHalls, Failure> {
+    let kept = &engine::kept(client);
+    engine::prepare(kept).await?;
+    let ask = |name: String| async move {
+        let seen = kept_of_one(kept, &name).await.with_context(|| name.clone());
+        (name, seen)
     };
-    Ok(join_all(names.iter().map(of_one)).await.into_iter().flatten().collect())
+    let mut told = pin!(stream::iter(names.to_vec()).map(ask).buffer_unordered(engine::AT_ONCE));
+    let until = Instant::now() + LOOKED_UP;
+    let mut all = KeptHalls { of: BTreeMap::new(), lack: None };
+    loop {
+        match timeout_at(until, told.next()).await {
+            Ok(Some((name, Ok(Some(seen))))) => drop(all.of.insert(name, seen)),
+            Ok(Some((_, Ok(None)))) => {}
+            Ok(Some((_, Err(why)))) => all.lack = Some(why),
+            Ok(None) => return Ok(all),
+            Err(_) => {
+                let why = anyhow!("the engine did not say within {} s what it has", LOOKED_UP.as_secs());
+                return Ok(KeptHalls { lack: Some(why), ..all });
+            }
+        }
+    }
+}
+
+async fn kept_of_one(kept: &Context, name: &str) -> anyhow::Result<Option<Kept>> {
+    let entry = engine::last_value(kept, fleet::SEEN, name).await?;
+    let entry = entry.filter(|entry| !engine::is_answered(entry));
+    Ok(entry.and_then(|entry| {
+        let status = serde_json::from_slice(&entry.payload).ok()?;
+        Some((status, engine::age_of(&entry), Monotonic.now()))
+    }))
 }
 
 impl HallSeen {

@@ -19,6 +19,8 @@ use crate::sys::clock::wall_now_ns;
 const ENTRY: Duration = Duration::from_secs(3);
 /// How long an answer of the engine may take.
 const ANSWER: Duration = Duration::from_secs(3);
+/// What a desk asks it for at a time.
+pub(super) const AT_ONCE: usize = 64;
 /// How often the engine is asked whether it lives; after two of these without an answer it is looked for anew.
 const PING: Duration = Duration::from_secs(5);
 /// The longest wait between two tries to reach it.

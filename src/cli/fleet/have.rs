@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use async_nats::jetstream::context::Context;
-use futures_util::future::try_join_all;
+use futures_util::{StreamExt as _, stream};
 use serde::Serialize;
 
 use super::act::{HallsOrAllArgs, chosen};
@@ -99,7 +99,7 @@ pub(super) fn run(Args { of }: &Args) -> Result<Exit, Failure> {
         let client = engine::connect_desk(&settings.access, &settings.name).await?;
         let kept = engine::kept(&client);
         engine::prepare(&kept).await?;
-        try_join_all(halls.iter().map(|hall| HallHas::look_up(&kept, hall))).await.or_exit(Exit::Unavailable)
+        look_up_all(&kept, halls).await
     })?;
     let stand: Vec<_> = halls.iter().flat_map(HallHas::all).collect();
     if of.json {
@@ -109,6 +109,25 @@ pub(super) fn run(Args { of }: &Args) -> Result<Exit, Failure> {
         print::out(&drawn(&halls, &stand))?;
     }
     Ok(exit_of_halls(&halls, &stand))
+}
+
+/// What the engine has of halls. One of which it does not say keeps no other from being shown.
+async fn look_up_all(kept: &Context, halls: Vec<String>) -> Result<Vec<HallHas>, Failure> {
+    let ask = |hall: String| async move { (HallHas::look_up(kept, &hall).await, hall) };
+    let told: Vec<_> = stream::iter(halls).map(ask).buffered(engine::AT_ONCE).collect().await;
+    let is_silent = !told.is_empty() && told.iter().all(|(has, _)| has.is_err());
+    let mut all = Vec::new();
+    for (has, hall) in told {
+        match has {
+            Err(why) if is_silent => return Err(why).or_exit(Exit::Unavailable),
+            Err(why) => {
+                print::tell(&said(&format!("{hall}: {why:#}")));
+                all.push(HallHas::unknown(&hall));
+            }
+            Ok(has) => all.push(has),
+        }
+    }
+    Ok(all)
 }
 
 /// The same of all that halls have, also of a hall that has all of a wish from before the one that it does not take.

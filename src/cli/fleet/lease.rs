@@ -10,7 +10,8 @@ use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::stream::{Config, DiscardPolicy, LastRawMessageErrorKind, StorageType};
 use tokio::io::{AsyncBufReadExt as _, AsyncWriteExt as _, BufReader};
 use tokio::net::UnixStream;
-use tokio::time::{sleep, timeout};
+use tokio::sync::watch;
+use tokio::time::{Instant, sleep, timeout};
 
 use super::engine;
 use super::hall::Link;
@@ -22,23 +23,32 @@ const AGAIN: Duration = Duration::from_millis(200);
 /// How long the engine may take: what it says later is worth nothing.
 const ANSWER: Duration = Duration::from_millis(800);
 
+/// When the machine that leads was last seen to renew its lease: then its own link reached the engine.
+pub(super) type Renewed = watch::Receiver<Option<Instant>>;
+
 /// Carries what a service asks of its lease, for ever. A hall of one machine has no such socket.
-pub(super) async fn carry(link: &Link) {
+pub(super) async fn carry(link: &Link, renewed: &watch::Sender<Option<Instant>>) {
     let socket = link.socket.with_file_name("pair.sock");
     loop {
-        let _ = serve(link, &socket).await; // the service is gone, or has no second machine: it is looked for again
+        let _ = serve(link, &socket, renewed).await; // the service is gone, or has no second machine: it is looked for again
         sleep(AGAIN).await;
     }
 }
 
-async fn serve(link: &Link, socket: &Path) -> anyhow::Result<()> {
+async fn serve(link: &Link, socket: &Path, renewed: &watch::Sender<Option<Instant>>) -> anyhow::Result<()> {
     let mut stream = UnixStream::connect(socket).await?;
     let (read, mut write) = stream.split();
     let mut lines = BufReader::new(read).lines();
     let kept = engine::kept_within(&link.client, ANSWER);
+    let mut seen = None;
     while let Some(line) = lines.next_line().await? {
         let Ask { ticket, want } = serde_json::from_str(&line)?;
         let answer = if link.is_connected() { put(link, &kept, want).await } else { None };
+        if let Some(Answer::Key { revision, .. }) = answer
+            && seen.replace(revision).is_some_and(|before| before != revision)
+        {
+            renewed.send_replace(Some(Instant::now()));
+        }
         let mut reply = serde_json::to_string(&Answered { ticket, answer })?;
         reply.push('\n');
         write.write_all(reply.as_bytes()).await?;

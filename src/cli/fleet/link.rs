@@ -1,7 +1,7 @@
 //! `kinocue fleet link`: carries what a hall says of itself to the engine, and what it is asked to the hall. It decides nothing: letters
 //! are checked by the hall. While it is away, or the engine, the hall plays on as ever.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,8 +9,6 @@ use anyhow::{Context as _, anyhow};
 use async_nats::Message;
 use futures_util::{StreamExt as _, stream};
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
-use tokio::net::UnixStream;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
@@ -26,7 +24,7 @@ use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
 /// What is heard by several subjects.
-type Messages = stream::SelectAll<async_nats::Subscriber>;
+pub(super) type Messages = stream::SelectAll<async_nats::Subscriber>;
 
 /// How often the hall is looked at, and so the most that is told of it.
 const LOOK: Duration = Duration::from_millis(100);
@@ -38,8 +36,6 @@ const KEEP: Duration = Duration::from_secs(60);
 const AGAIN: Duration = Duration::from_secs(2);
 /// How long the hall may take to answer what is asked.
 const ASKED: Duration = Duration::from_secs(65);
-/// How long a stop may take.
-const STOPPED: Duration = Duration::from_secs(2);
 /// What is asked at a time.
 const AT_ONCE: usize = 32;
 /// The longest letter.
@@ -73,6 +69,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         let clock = settings.time_server.as_deref().map(|server| (server, clock::watch_server(server)));
         print::tell(&format!("carries {} by {}", link.hall, link.socket.display()));
         let (tell, told) = watch::channel(None);
+        let (renew, renewed) = watch::channel(None);
         let work = async {
             // First, so that a hall that is heard of can also be stopped.
             let stops = link.subscribe_to_stops().await;
@@ -81,10 +78,10 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
                 link.tell(&tell),
                 link.keep(told.clone()),
                 link.keep_wishes(parts, told),
-                link.hear_stops(stops),
+                link.hear_stops(stops, renewed),
                 link.hear_orders(orders),
                 link.tell_log(),
-                lease::carry(&link),
+                lease::carry(&link, &renew),
                 link.tell_clock(clock)
             );
         };
@@ -116,27 +113,32 @@ impl Link {
             let now = Monotonic.now();
             let is_due = told_at.is_none_or(|at| now.since(at) >= TELL);
             let differs = last.borrow().as_ref().is_none_or(|before| status.differs(before));
-            if !self.is_connected() || !(is_due || differs) {
+            if !(is_due || differs) {
                 continue;
             }
-            seq += 1;
-            (status.seq, told_at) = (seq, Some(now));
-            let text = serde_json::to_vec(&status).expect("a status is text and numbers");
-            // Where it does not go out, the next one does.
-            let _ = self.client.publish(fleet::status_of(&self.hall), text.into()).await;
+            // Whoever fetches cues stops as soon as the hall is armed, also while the engine is away.
+            if self.is_connected() {
+                seq += 1;
+                (status.seq, told_at) = (seq, Some(now));
+                let text = serde_json::to_vec(&status).expect("a status is text and numbers");
+                // Where it does not go out, the next one does.
+                let _ = self.client.publish(fleet::status_of(&self.hall), text.into()).await;
+            } else {
+                status.seq = seq;
+            }
             last.send_replace(Some(status));
         }
     }
 
-    /// Has the engine keep the last status: at each change of state, and each minute.
+    /// Has the engine keep the last status: at each change of state, and each minute. None twice: one of a hall that does not answer any more
+    /// would look new, and take the place of what its other machine tells.
     async fn keep(&self, mut told: watch::Receiver<Option<BriefStatus>>) {
         let kept = engine::kept(&self.client);
         let subject = engine::value_to(fleet::SEEN, &self.hall);
         let mut trouble = Trouble::default();
+        let mut seq = 0;
         loop {
-            let Ok(status) = told.wait_for(Option::is_some).await.map(|status| status.clone()) else {
-                return;
-            };
+            let Some(status) = told_after(&mut told, seq).await else { return };
             if !self.is_connected() {
                 sleep(AGAIN).await;
                 continue;
@@ -151,40 +153,11 @@ impl Link {
                     continue;
                 }
             }
-            let state = status.map(|status| status.state);
-            let differs = told.wait_for(|now| now.as_ref().map(|now| &now.state) != state.as_ref());
+            seq = status.seq;
+            let differs = told.wait_for(|now| now.as_ref().is_some_and(|now| now.state != status.state));
             if matches!(timeout(KEEP, differs).await, Ok(Err(_))) {
                 return;
             }
-        }
-    }
-
-    async fn subscribe_to_stops(&self) -> Messages {
-        let site = self.hall.split_once('.').map_or("", |(site, _)| site);
-        let all = fleet::stop_to(&format!("{site}.{}", fleet::ALL), "*");
-        self.subscribed([fleet::stop_to(&self.hall, "*"), all]).await
-    }
-
-    /// Passes stops on, by a socket of their own that waits for nothing.
-    async fn hear_stops(self: &Arc<Self>, mut stops: Messages) {
-        while let Some(message) = stops.next().await {
-            if is_of_engine(&message) {
-                print::tell("no stop: a member had the engine answer here");
-                continue;
-            }
-            let link = Arc::clone(self);
-            tokio::spawn(async move {
-                let who = message.subject.rsplit('.').next().unwrap_or_default();
-                print::tell(&format!("{who} asks for a stop"));
-                let reply = match timeout(STOPPED, stop(&link.socket.with_file_name("fleet-stop.sock"))).await
-                {
-                    Ok(Ok(())) => (200, json!({ "stopping": true })),
-                    _ if link.is_of_two() => return,
-                    Ok(Err(error)) => away(&anyhow!(error)),
-                    Err(_) => away(&anyhow!("the hall did not answer within {} s", STOPPED.as_secs())),
-                };
-                link.answer(message, reply).await;
-            });
         }
     }
 
@@ -228,7 +201,7 @@ impl Link {
         Ok((reply.status, serde_json::from_str(&reply.text).unwrap_or(Value::Null)))
     }
 
-    async fn answer(&self, message: Message, (status, reply): (u16, Value)) {
+    pub(super) async fn answer(&self, message: Message, (status, reply): (u16, Value)) {
         let Some(to) = message.reply else { return };
         let text = json!({ "hall": self.hall, "status": status, "reply": reply }).to_string();
         let _ = self.client.publish(to, text.into()).await; // whoever asked is told nothing, and says so
@@ -301,7 +274,7 @@ impl Link {
         }
     }
 
-    async fn subscribed<const N: usize>(&self, subjects: [String; N]) -> Messages {
+    pub(super) async fn subscribed<const N: usize>(&self, subjects: [String; N]) -> Messages {
         let mut all = stream::SelectAll::new();
         for subject in subjects {
             // It fails where the client was closed, which nobody does.
@@ -313,26 +286,15 @@ impl Link {
     }
 }
 
-/// True of what the engine itself says. It answers to whatever subject it is asked to answer to, so also for a member that may not publish
-/// there. All else is somebody's stop, whatever is in it.
-fn is_of_engine(message: &Message) -> bool {
-    let is_kept = message.headers.as_ref().is_some_and(|headers| headers.get("Nats-Stream").is_some());
-    let says = [&b"{\"stream\":"[..], b"{\"error\":", b"{\"type\":\"io.nats."];
-    message.status.is_some() || is_kept || says.iter().any(|start| message.payload.starts_with(start))
+/// The newest status that was told after the one of that number, as soon as there is one; `None` where no more is told.
+async fn told_after(told: &mut watch::Receiver<Option<BriefStatus>>, seq: u64) -> Option<BriefStatus> {
+    told.wait_for(|now| now.as_ref().is_some_and(|now| now.seq > seq)).await.ok()?.clone()
 }
 
 /// That the hall cannot be asked.
-fn away(why: &anyhow::Error) -> (u16, Value) {
+pub(super) fn away(why: &anyhow::Error) -> (u16, Value) {
     let remedy = "look at the hall: its service may be down";
     (503, json!({ "code": "timeout", "detail": format!("{why:#}"), "remedy": remedy }))
-}
-
-async fn stop(socket: &Path) -> std::io::Result<()> {
-    let mut stream = UnixStream::connect(socket).await?;
-    stream.write_all(b"stop\n").await?;
-    let mut reply = [0; 9];
-    stream.read_exact(&mut reply).await?;
-    if &reply == b"stopping\n" { Ok(()) } else { Err(std::io::ErrorKind::InvalidData.into()) }
 }
 
 /// What goes wrong, told once until it is over.
@@ -352,5 +314,28 @@ impl Trouble {
         if self.0.take().is_some() {
             print::tell(&format!("{what}: well again"));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_of_a_hall_that_tells_no_more_is_kept_once() {
+        let status = |seq| Some(BriefStatus { seq, ..BriefStatus::default() });
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        runtime.block_on(async {
+            let (tell, mut told) = watch::channel(None);
+            let mut after = async |seq| timeout(LOOK, told_after(&mut told, seq)).await.ok();
+            assert_eq!(after(0).await, None, "nothing was told yet");
+            tell.send_replace(status(1));
+            assert_eq!(after(0).await, Some(status(1)));
+            assert_eq!(after(1).await, None, "a minute later it would look new");
+            tell.send_replace(status(2));
+            assert_eq!(after(1).await, Some(status(2)));
+            drop(tell);
+            assert_eq!(after(2).await, Some(None));
+        });
     }
 }

@@ -26,6 +26,7 @@ mod push;
 mod report;
 mod settings;
 mod start;
+mod stops;
 mod wishes;
 mod wishing;
 

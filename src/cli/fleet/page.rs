@@ -57,7 +57,10 @@ pub(super) struct Args {
 /// What all requests share.
 struct Desk {
     settings: DeskSettings,
+    /// By it halls are heard, and what the engine has kept of them.
     client: Client,
+    /// By it stops are asked. What a hall tells may end the connection that hears it: headers that are none do (async-nats).
+    asks: Client,
     /// What was heard of them.
     heard: Mutex<Halls>,
     /// How many halls were asked for a stop from here, by what came of it.
@@ -104,8 +107,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     engine::block_on(async {
         let mut ends = signal(SignalKind::terminate()).context("signals cannot be handled").or_system()?;
         let client = engine::connect_link(&settings.access, &settings.name).await?;
+        let asks = engine::connect_link(&settings.access, &settings.name).await?;
         let heard = Mutex::new(Halls::of(&settings));
-        let desk = Arc::new(Desk { settings, client, heard, stops: Mutex::default() });
+        let desk = Arc::new(Desk { settings, client, asks, heard, stops: Mutex::default() });
         let (closing, closed) = watch::channel(false);
         let addresses = api::serve_behind_doors(&api, routes(Arc::clone(&desk)), closed, log);
         for address in addresses.map_err(anyhow::Error::from).or_exit(Exit::Unavailable)? {
@@ -146,7 +150,7 @@ impl Desk {
     async fn look_up(&self) {
         loop {
             if let Ok(kept) = kept_of(&self.client, &self.settings.halls).await {
-                lock(&self.heard).take(kept);
+                let _ = lock(&self.heard).take(kept); // what is not known is asked for again
             }
             sleep(LOOK_UP).await;
         }
@@ -189,7 +193,7 @@ async fn stop(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
         Err(failure) => return wrong(failure.to_string()),
     };
     let ask = async |hall: String| {
-        let answer = act::ask_one(&desk.settings, &desk.client, &hall, &act::STOP).await;
+        let answer = act::ask_one(&desk.settings, &desk.asks, &hall, &act::STOP).await;
         *lock(&desk.stops).entry(answer.result()).or_default() += 1;
         answer.json(&hall)
     };

@@ -140,7 +140,9 @@ impl ToldByHall {
             return;
         };
         let n = record.n;
-        if let Some(last) = self.last.insert(subject.to_owned(), n).filter(|last| n != last + 1) {
+        if let Some(last) =
+            self.last.insert(subject.to_owned(), n).filter(|last| last.checked_add(1) != Some(n))
+        {
             self.missing.push(format!("record {n} follows record {last}: what is between is missing"));
         }
         let line = (record.part.file.clone(), record.part.line, record.part.record.to_string());
@@ -154,5 +156,26 @@ impl ToldByHall {
         let mut report = report_of(self.records.into_values().map(lines), day, day);
         report.notes.extend(self.missing);
         report
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn whatever_number_a_record_has_is_no_reason_to_end_and_what_is_between_two_is_missing() {
+        let mut told = ToldByHall::default();
+        for (line, n) in [(1, 6), (2, 7), (3, u64::MAX), (4, 1)] {
+            let record =
+                json!({ "n": n, "told": {}, "file": "x", "line": line, "record": { "kind": "start" } });
+            told.take("kc.log.berlin.h1", record.to_string().as_bytes());
+        }
+        assert_eq!(told.records.len(), 4);
+        let missing = told.missing.join("\n");
+        assert!(missing.contains("record 18446744073709551615 follows record 7"), "{missing}");
+        assert!(missing.contains("record 1 follows record 18446744073709551615"), "{missing}");
     }
 }

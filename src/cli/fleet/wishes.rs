@@ -5,7 +5,7 @@
 //! right that could be turned against others.
 
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::mem;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -182,7 +182,13 @@ impl<'l> WishKeeper<'l> {
             Fetched::Later => return Ok(false),
             Fetched::Again => return Ok(true),
         };
-        let body = FileBody::open(part.path()).context("a cue that was fetched cannot be read")?;
+        let body = match FileBody::open(part.path()) {
+            Ok(body) => body,
+            Err(error) => {
+                self.no_place(cue, &error);
+                return Ok(true);
+            }
+        };
         let link = self.link;
         let path = format!("/api/v1/fleet/cues/{id}");
         let given = link.give(&path, body, PROVED);
@@ -210,8 +216,10 @@ impl<'l> WishKeeper<'l> {
     async fn fetch(&mut self, report: &HaveReport, id: &str, cue: &WishedCue) -> anyhow::Result<Fetched> {
         let (folder, of_part) = (self.folder.clone(), cue.clone());
         let opened = spawn_blocking(move || CuePart::open(&folder, &of_part)).await?;
-        let mut part =
-            opened.with_context(|| format!("no place for cues in {}; set --state", self.folder.display()))?;
+        let mut part = match opened {
+            Ok(part) => part,
+            Err(error) => return Ok(self.no_place(cue, &error)),
+        };
         let mut told_at = None;
         while !part.next(BATCH).is_empty() {
             if !self.is_parked() {
@@ -227,7 +235,8 @@ impl<'l> WishKeeper<'l> {
             let added = spawn_blocking(move || part.add(&pieces).map(|()| part)).await?;
             part = match added {
                 Err(error) if error.kind() == ErrorKind::InvalidData => return Ok(self.damaged(cue)),
-                added => added.context("a cue cannot be written as it is fetched")?,
+                Err(error) => return Ok(self.no_place(cue, &error)),
+                Ok(part) => part,
             };
             match end {
                 Ok(()) => {}
@@ -240,12 +249,15 @@ impl<'l> WishKeeper<'l> {
             }
         }
         self.tell(report, Some((id, 100))).await?;
-        let (right, part) = spawn_blocking(move || part.is_right().map(|right| (right, part))).await??;
-        if right {
-            return Ok(Fetched::Whole(part));
+        let read = spawn_blocking(move || part.is_right().map(|right| (right, part))).await?;
+        match read {
+            Ok((true, part)) => Ok(Fetched::Whole(part)),
+            Ok((false, part)) => {
+                remove(part);
+                Ok(self.damaged(cue))
+            }
+            Err(error) => Ok(self.no_place(cue, &error)),
         }
-        remove(part);
-        Ok(self.damaged(cue))
     }
 
     /// Messages of a cue in their order, as far as they come; why the next one did not.
@@ -277,6 +289,15 @@ impl<'l> WishKeeper<'l> {
         while self.link.is_connected() && self.link.connects() == connects {
             sleep(LOOK).await;
         }
+    }
+
+    /// The folder of what is fetched takes a cue no further, which the desk is told as well.
+    fn no_place(&mut self, cue: &WishedCue, error: &io::Error) -> Fetched {
+        let folder = self.folder.display();
+        let why =
+            format!("its link has no place for cues in {folder}: {error}; make room there, or set --state");
+        self.put_off(cue, HadState::Waiting, why, LATER);
+        Fetched::Again
     }
 
     fn damaged(&mut self, cue: &WishedCue) -> Fetched {
