@@ -154,11 +154,19 @@ impl StopDesk {
                 }
                 Ok(_) => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return,
+                // Also where nobody calls: whoever was let in last is not to go for nobody.
+                Err(error) if want_of_files(&error).is_some() && !self.is_called() => return,
                 Err(error) if want_of_files(&error).is_some() && self.makes_room() => {}
                 // Out of descriptors or memory: a moment later there may be some.
                 Err(_) => self.pause_until = Some(now + PAUSE),
             }
         }
+    }
+
+    /// Whether somebody waits to be let in.
+    fn is_called(&self) -> bool {
+        let mut listener = [PollFd::new(&self.listener, PollFlags::IN)];
+        poll(&mut listener, Some(&Timespec::default())).is_ok() && !listener[0].revents().is_empty()
     }
 
     /// Gives up a descriptor for whoever calls: the spare one, or that of the oldest caller.

@@ -26,7 +26,7 @@ impl LogRecord {
         while told.len() > TOLD_FILES {
             told.pop_first();
         }
-        Self { n: before.map_or(0, |before| before.n) + 1, told, part }
+        Self { n: before.map_or(0, |before| before.n).saturating_add(1), told, part }
     }
 
     /// How much of the journal was told by then.

@@ -47,6 +47,7 @@ fn an_emergency_stop_pressed_at_rest_is_shown_and_nothing_is_armed_until_it_was_
 fn an_emergency_stop_in_mid_show_is_cleared_once_it_was_released_though_no_frame_is_sent() {
     let hall = Hall::open();
     hall.play("night");
+    hall.lives_on(100); // far from park
     hall.happens("pa91=0");
     hall.happens("2@estop=1");
     assert_eq!(hall.comes_to("stopped")["cause"], "A2: emergency stop");

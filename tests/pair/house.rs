@@ -319,11 +319,16 @@ impl Show {
             command.args(["-c", &script]);
             self.mover = Some(Guarded::start_command(&mut command));
         }
-        self.serving =
-            Some(Serving::start_by(&self.folder, |args| Guarded::start_by(&self.machine.enter(), args)));
+        // As the units have it: what the link reaches lies apart.
+        let sockets = self.path("fleet");
+        fs::create_dir_all(&sockets).unwrap();
+        let socket = sockets.join("fleet.sock");
+        let socket = socket.to_str().unwrap();
+        self.serving = Some(Serving::start_by(&self.folder, |args| {
+            Guarded::start_by(&self.machine.enter(), &[args, &["--fleet-socket", socket]].concat())
+        }));
         if self.link.is_none() {
-            let socket = self.path("fleet.sock");
-            let args = ["fleet", "link", "--config", settings, "--socket", socket.to_str().unwrap()];
+            let args = ["fleet", "link", "--config", settings, "--socket", socket];
             let mut link = Guarded::start_by(&self.machine.enter(), &args);
             let lines = link.stderr();
             thread::spawn(move || lines.lines().map_while(Result::ok).for_each(drop));

@@ -54,6 +54,7 @@ fn with_no_descriptor_left_the_show_goes_on_a_stop_is_heard_and_what_to_do_is_sa
     assert!(count(&later, 0, "acked") > count(&first, 0, "acked"), "{later}");
 
     let mut stop = connect(&hall.path("stop.sock"));
+    told.next().expect("a status"); // it is let in long before it says anything
     stop.write_all(b"stop\n").expect("it listens");
     let mut answer = String::new();
     stop.read_to_string(&mut answer).expect("text");
@@ -69,6 +70,7 @@ fn with_no_descriptor_left_the_show_goes_on_a_stop_is_heard_and_what_to_do_is_sa
     hall.serving().heard(|line| line.contains("(os error 24)").then_some(()));
     limit(pid, 1_024);
     drop(held);
+    hall.lives_on(50); // the reload is over
     hall.done(&["clear"]);
     hall.wait(|status| status["next"] == "park, or home");
     hall.comes_down();

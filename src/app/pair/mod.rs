@@ -42,7 +42,8 @@ use settings::PairSettings;
 const LOST: i32 = 75;
 /// The frame numbers of whoever takes over are so far above those that were heard last.
 const ABOVE: u32 = 100_000;
-/// That this machine leads, for whoever moves the address of the hall; beside the control socket.
+/// That this machine leads: beside the control socket for whoever moves the address of the hall, beside the fleet socket for the link, which
+/// sees no other folder.
 const LEAD_FILE: &str = "lead";
 /// The longest file of a key.
 const LONGEST_KEY: u64 = 1_024;
@@ -110,7 +111,7 @@ struct PairShared {
     heard: Mutex<Option<Heard>>,
     settings: Mutex<PairSettings>,
     beats: AtomicU64,
-    lead_file: PathBuf,
+    lead_files: [PathBuf; 2],
     log: Log,
 }
 
@@ -159,7 +160,7 @@ impl PairShared {
 
     /// The lead is lost: nothing leaves any more, whatever this program does. So it ends, and stands by when it is started again.
     fn end(&self) {
-        let _ = fs::remove_file(&self.lead_file); // whoever moves the address looks at the service as well
+        self.lead_files.iter().for_each(|file| drop(fs::remove_file(file))); // whoever moves the address looks at the service as well
         let text = format!(
             "this machine leads the hall no more: neither {} nor the engine was heard for a second, or it stood still for that long",
             self.other

@@ -103,8 +103,9 @@ pub(crate) fn stand_by(
     shared.say(Priority::Notice, format!("{name} leads the hall"));
     let _ = fs::create_dir_all(places.state); // what cannot be kept there is told
     let took_over = takes_over(&shared, places.state);
-    fs::write(&shared.lead_file, format!("{name}\n")).map_err(PairError::System)?;
-    await_address(config.show.bind, &shared.lead_file)?;
+    let write = |file: &PathBuf| fs::write(file, format!("{name}\n"));
+    shared.lead_files.iter().try_for_each(write).map_err(PairError::System)?;
+    await_address(config.show.bind, &shared.lead_files[0])?;
     Ok(StoodBy::Leads(Pair { shared, took_over, feeder }))
 }
 
@@ -144,8 +145,8 @@ fn start(
     let key = key(&key_file)?;
     let (number, sockets) = find_machine(pair)?;
     let (own, other) = (&pair.machines[number], &pair.machines[1 - number]);
-    let lead_file = places.control.with_file_name(super::LEAD_FILE);
-    let _ = fs::remove_file(&lead_file); // of a program that was killed while it led
+    let lead_files = [places.control, places.fleet].map(|socket| socket.with_file_name(super::LEAD_FILE));
+    lead_files.iter().for_each(|file| drop(fs::remove_file(file))); // of a program that was killed while it led
     let session = session().map_err(PairError::System)?;
     let mut claim = Claim::new(session, number == 0, Monotonic.now());
     claim.set_print(print_of(places.config).map_err(PairError::System)?);
@@ -159,7 +160,7 @@ fn start(
         heard: None.into(),
         settings: Mutex::default(),
         beats: 0.into(),
-        lead_file,
+        lead_files,
         log: log.clone(),
     });
     lease::start(&shared, &places.fleet.with_file_name(LEASE))?;
