@@ -4,13 +4,12 @@
 use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::process::ChildStderr;
-use std::sync::{MutexGuard, PoisonError};
 
 use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::hall::ALONE;
+use crate::hall::Turn;
 use crate::net::Machine;
 use crate::process::{Guarded, Run};
 
@@ -23,7 +22,7 @@ struct Town {
     dir: TempDir,
     show: Machine,
     hosts: Vec<Machine>,
-    _alone: MutexGuard<'static, ()>,
+    _turn: Turn,
 }
 
 struct Sim(Guarded, BufReader<ChildStderr>);
@@ -42,7 +41,7 @@ impl Sim {
 impl Town {
     /// None where the machine refuses namespaces.
     fn open() -> Option<Self> {
-        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let turn = Turn::beside();
         let show = Machine::first()?;
         show.run("ip link add hub type bridge\nip address add 10.77.0.1/24 dev hub\nip link set hub up");
         let host = |last: &u8| {
@@ -56,7 +55,7 @@ impl Town {
             host
         };
         let hosts = SEATS.iter().chain([&STRANGER]).map(host).collect();
-        Some(Self { dir: tempfile::tempdir().expect("a folder"), show, hosts, _alone: alone })
+        Some(Self { dir: tempfile::tempdir().expect("a folder"), show, hosts, _turn: turn })
     }
 
     /// The virtual controller of an address, which hears broadcasts as it listens at any address of its machine.

@@ -6,7 +6,7 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStderr, Command, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use rustix::process::Signal;
 use serde_json::Value;
@@ -17,8 +17,25 @@ use crate::process::{Guarded, PATIENCE, Row, Run};
 use crate::serving::{self, Serving};
 use crate::statuses;
 
-/// One hall at a time: beside others its frames would be late by themselves.
-pub(crate) static ALONE: Mutex<()> = Mutex::new(());
+/// A hall whose processor is taken away is alone: others would be late by that.
+static BESIDE: RwLock<()> = RwLock::new(());
+
+/// The turn of a hall.
+#[expect(dead_code, reason = "they are held")]
+pub(crate) enum Turn {
+    Beside(RwLockReadGuard<'static, ()>),
+    Alone(RwLockWriteGuard<'static, ()>),
+}
+
+impl Turn {
+    pub(crate) fn beside() -> Self {
+        Self::Beside(BESIDE.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn alone() -> Self {
+        Self::Alone(BESIDE.write().unwrap_or_else(PoisonError::into_inner))
+    }
+}
 
 /// Where the service is, and its controllers.
 pub(crate) const SHOW: [u8; 4] = [10, 77, 0, 1];
@@ -44,7 +61,7 @@ pub(crate) struct Hall {
     axes: usize,
     sims: [Option<Sim>; 2],
     serving: Option<Serving>,
-    _alone: MutexGuard<'static, ()>,
+    _turn: Turn,
 }
 
 /// A `kinocue sim` at work.
@@ -70,7 +87,7 @@ impl Hall {
 
     /// The same with seats of so many axes, three of which move; the service started by a program with those arguments.
     pub(crate) fn open_with(axes: usize, by: &[&str]) -> Option<Self> {
-        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let turn = if by.is_empty() { Turn::beside() } else { Turn::alone() };
         let show = Machine::first()?;
         let far = show.beside();
         let pid = far.pid();
@@ -81,7 +98,7 @@ impl Hall {
             "ip address add 10.77.0.2/24 dev far\nip address add 10.77.0.3/24 dev far\nip link set far up",
         );
         let dir = tempfile::tempdir().expect("a folder");
-        let mut hall = Self { dir, show, far, axes, sims: [None, None], serving: None, _alone: alone };
+        let mut hall = Self { dir, show, far, axes, sims: [None, None], serving: None, _turn: turn };
         (0..2).for_each(|seat| hall.switch_on(seat));
         hall.configure();
         let enter = [hall.show.enter(), by.iter().map(|&word| word.to_owned()).collect()].concat();
