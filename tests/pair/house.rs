@@ -6,6 +6,7 @@ use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStderr, Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 
@@ -21,8 +22,9 @@ use crate::programs::is_installed;
 use crate::serving::{self, Serving};
 use crate::statuses;
 
-/// One house at a time: beside others its machines would stand still by themselves.
-static ALONE: Mutex<()> = Mutex::new(());
+/// Two houses at a time: beside more their machines would stand still by themselves.
+static TURNS: [Mutex<()>; 2] = [const { Mutex::new(()) }; 2];
+static OPENED: AtomicUsize = AtomicUsize::new(0);
 
 /// The address by which controllers know the hall.
 const HALL: [u8; 4] = [10, 77, 0, 1];
@@ -36,7 +38,7 @@ pub(crate) struct House {
     seats: Machine,
     sims: Vec<Sim>,
     engine: Engine,
-    _alone: MutexGuard<'static, ()>,
+    _turn: MutexGuard<'static, ()>,
 }
 
 /// A show machine.
@@ -64,7 +66,8 @@ struct Sim {
 impl House {
     /// With nothing running but controllers and engine; none where the machine refuses namespaces or has no engine.
     pub(crate) fn open() -> Option<Self> {
-        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let turn = &TURNS[OPENED.fetch_add(1, Ordering::Relaxed) % TURNS.len()];
+        let turn = turn.lock().unwrap_or_else(PoisonError::into_inner);
         if !["nats-server", "openssl"].into_iter().all(is_installed) {
             return None;
         }
@@ -82,7 +85,7 @@ impl House {
             furnish(&folder, &table);
             Show { machine, folder, serving: None, link: None, mover: None }
         });
-        let mut house = Self { dir, shows, seats, sims: Vec::new(), engine, _alone: alone };
+        let mut house = Self { dir, shows, seats, sims: Vec::new(), engine, _turn: turn };
         house.sims = (0..2).map(|seat| house.simulate(seat)).collect();
         Some(house)
     }
