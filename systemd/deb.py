@@ -66,6 +66,7 @@ def sums(root):
 def main():
     package = tomllib.loads(pathlib.Path("Cargo.toml").read_text())["package"]
     deb = package["metadata"]["deb"]
+    os.umask(0o022)  # folders take it from whoever builds
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         root.chmod(0o755)

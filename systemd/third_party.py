@@ -1,7 +1,8 @@
-"""Writes the licences of all libraries that the program has in it, with their texts, as these ask for.
+"""Writes the licences of all libraries that the program has in it, with their texts, as these ask for; and, for machines, a list of
+all its parts (`sbom.py`).
 
-python3 systemd/third_party.py FILE, from the root of the project; needs cargo and the sources of the libraries, which a build
-has fetched. A library without a licence, or under one that is not known here, ends it with 1: look at it, then add it.
+python3 systemd/third_party.py LICENCES [LIST], from the root of the project; needs cargo and the sources of the libraries, which
+a build has fetched. A library without a licence, or under one that is not known here, ends it with 1: look at it, then add it.
 """
 
 import json
@@ -11,34 +12,35 @@ import re
 import subprocess
 import sys
 
+import sbom
+
 # A library may be under any one of several; of these each one asks for no more than to be named.
 FINE = {"MIT", "Apache-2.0", "BSD-3-Clause", "BSD-2-Clause", "Zlib", "0BSD", "Unlicense", "Unicode-3.0", "BSL-1.0", "ISC"}
+TARGET = f"{platform.machine()}-unknown-linux-gnu"
+# What a library brings along, but is not built into a program: tools and examples of the C library LZ4 are under the GPL.
+ASIDE = {"benches", "build", "contrib", "doc", "examples", "fuzz", "ossfuzz", "programs", "tests"}
 
 
-def linked():
-    """The packages that the program is linked from, ours left out, by name."""
-    target = f"{platform.machine()}-unknown-linux-gnu"
-    command = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", target]
-    data = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
-    packages = {package["id"]: package for package in data["packages"]}
-    nodes = {node["id"]: node for node in data["resolve"]["nodes"]}
-    root = data["resolve"]["root"]
-    found, waiting = set(), [root]
-    while waiting:
-        node = waiting.pop()
-        if node in found:
-            continue
-        found.add(node)
-        for dependency in nodes[node]["deps"]:
-            if any(kind["kind"] is None for kind in dependency["dep_kinds"]):
-                waiting.append(dependency["pkg"])
-    # The metadata count what tests ask of a library; the tree does not.
-    command = ["cargo", "tree", "--locked", "--edges", "normal", "--target", target, "--prefix", "none", "--format", "{p}"]
-    tree = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
-    built = {tuple(line.split()[:2]) for line in tree if line}
-    linked = (packages[one] for one in found - {root})
-    linked = (package for package in linked if (package["name"], "v" + package["version"]) in built)
-    return sorted(linked, key=lambda package: (package["name"], package["version"]))
+def cargo(*command):
+    return subprocess.run(["cargo", *command, "--locked"], check=True, capture_output=True, text=True).stdout
+
+
+def resolved():
+    """What cargo knows of the packages of every target of ours."""
+    return json.loads(cargo("metadata", "--format-version", "1", "--filter-platform", TARGET))
+
+
+def tree(edges):
+    """Name and version of whatever the program needs by such edges. The metadata count what tests ask of a library; this does not."""
+    lines = cargo("tree", "--edges", edges, "--target", TARGET, "--prefix", "none", "--format", "{p}").splitlines()
+    return {tuple(line.split()[:2]) for line in lines if line}
+
+
+def of(data, names):
+    """The packages of such names and versions, ours left out."""
+    others = (one for one in data["packages"] if one["id"] != data["resolve"]["root"])
+    found = (one for one in others if (one["name"], "v" + one["version"]) in names)
+    return sorted(found, key=lambda one: (one["name"], one["version"]))
 
 
 def is_fine(licence):
@@ -49,18 +51,17 @@ def is_fine(licence):
 
 
 def texts(package):
+    """The texts of its licences, and of those of what it carries in folders of its own."""
     folder = pathlib.Path(package["manifest_path"]).parent
-    files = (file for file in sorted(folder.iterdir()) if re.match(r"(?i)(licen[cs]e|copying|notice)", file.name))
-    return [file.read_text(errors="replace").strip() for file in files if file.is_file()]
+    named = (file for file in folder.rglob("*") if re.match(r"(?i)(licen[cs]e|copying|notice)", file.name))
+    kept = (file for file in named if file.is_file() and ASIDE.isdisjoint(file.relative_to(folder).parts))
+    inner_last = sorted(kept, key=lambda file: (len(file.parts), file))
+    return [file.read_text(errors="replace").strip() for file in inner_last]
 
 
-def main():
-    packages = linked()
-    wrong = [f"{one['name']}: {one['license']}" for one in packages if not is_fine(one["license"])]
-    if wrong:
-        sys.exit("third_party.py: not known to be fine: " + ", ".join(wrong))
+def write_licences(path, packages):
     known = {}
-    with open(sys.argv[1], "w", encoding="utf-8") as out:
+    with open(path, "w", encoding="utf-8") as out:
         out.write("kinocue has these libraries in it. A text that stands here already is not repeated.\n")
         for package in packages:
             name = f"{package['name']} {package['version']}"
@@ -68,6 +69,18 @@ def main():
             for text in texts(package):
                 first = known.setdefault(" ".join(text.split()), name)
                 out.write(f"\n{text}\n" if first == name else f"\nThe same text as of {first}.\n")
+
+
+def main():
+    data = resolved()
+    packages = of(data, tree("normal"))
+    wrong = [f"{one['name']}: {one['license']}" for one in packages if not is_fine(one["license"])]
+    if wrong:
+        sys.exit("third_party.py: not known to be fine: " + ", ".join(wrong))
+    write_licences(sys.argv[1], packages)
+    if len(sys.argv) > 2:
+        inside = {one["id"] for one in of(data, tree("normal,no-proc-macro"))}
+        sbom.write(sys.argv[2], data, inside, of(data, tree("normal,build")))
 
 
 main()

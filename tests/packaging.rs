@@ -4,8 +4,10 @@
 #[path = "common/programs.rs"]
 mod programs;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::net::SocketAddr;
+use std::os::unix::fs::{PermissionsExt as _, symlink};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -248,10 +250,104 @@ fn every_expression_of_the_dashboard_is_one_that_prometheus_takes() {
 fn every_library_in_the_program_may_be_passed_on_with_its_licence() {
     let folder = tempfile::tempdir().unwrap();
     let list = folder.path().join("third-party.txt");
-    if let Some(output) = tool("python3", &["systemd/third_party.py", list.to_str().unwrap()]) {
+    if let Some(output) = tool("python3", &["-B", "systemd/third_party.py", list.to_str().unwrap()]) {
         assert!(output.status.success(), "{}", said(&output));
-        assert!(fs::read_to_string(list).unwrap().contains("\nrustix "));
+        let list = fs::read_to_string(list).unwrap();
+        assert!(list.contains("\nrustix "));
+        assert!(list.contains("Copyright (c) 2011-2020, Yann Collet"), "and what a library compiles in");
     }
+}
+
+/// Name, version and licence of all that cargo finds by such edges below the program, itself left out.
+fn needed(edges: &str) -> BTreeSet<[String; 3]> {
+    let asked = ["tree", "--locked", "--prefix", "none", "--format", "{p}|{l}", "--edges", edges];
+    let output = tool("cargo", &asked).expect("cargo runs the tests");
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let parts = lines.lines().filter(|line| !line.starts_with("kinocue ")).map(|line| {
+        let (package, licence) = line.trim_end_matches(" (*)").split_once('|').unwrap();
+        let (name, version) = package.split_once(" v").unwrap();
+        let version = version.split(' ').next().unwrap();
+        [name.to_owned(), version.to_owned(), licence.replace(" / ", "/").replace('/', " OR ")]
+    });
+    parts.collect()
+}
+
+#[test]
+fn the_list_for_machines_names_each_part_with_its_version_and_licence_and_whether_it_is_in_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = folder.path().join("kinocue.cdx.json");
+    let texts = folder.path().join("third-party.txt");
+    let asked = ["-B", "systemd/third_party.py", texts.to_str().unwrap(), list.to_str().unwrap()];
+    let Some(output) = tool("python3", &asked) else { return };
+    assert!(output.status.success(), "{}", said(&output));
+    let list: serde_json::Value = serde_json::from_str(&fs::read_to_string(list).unwrap()).unwrap();
+    assert_eq!((&list["bomFormat"], &list["specVersion"]), (&"CycloneDX".into(), &"1.5".into()));
+    let components = list["components"].as_array().unwrap();
+    let listed = |scope: &str| -> BTreeSet<[String; 3]> {
+        let parts = components.iter().filter(|part| part["scope"] == scope);
+        let fields = |part: &serde_json::Value| {
+            [&part["name"], &part["version"], &part["licenses"][0]["expression"]]
+                .map(|field| field.as_str().unwrap().to_owned())
+        };
+        parts.map(fields).collect()
+    };
+    let (inside, all) = (needed("normal,no-proc-macro"), needed("normal,build"));
+    assert!(inside.len() > 200 && all.len() > inside.len(), "{} of {}", inside.len(), all.len());
+    let more: BTreeSet<_> = listed("required").difference(&inside).cloned().collect();
+    let names: Vec<&str> = more.iter().map(|[name, ..]| name.as_str()).collect();
+    assert_eq!(names, ["lz4", "std", "uplot"], "what comes from elsewhere");
+    assert_eq!(inside.difference(&listed("required")).next(), None);
+    assert_eq!(listed("excluded"), all.difference(&inside).cloned().collect());
+    let lock = toml("Cargo.lock");
+    let packages = lock["package"].as_array().unwrap();
+    for part in components.iter().filter(|part| part["purl"].as_str().unwrap().starts_with("pkg:cargo/")) {
+        let of = |key: &str| part[key].as_str().unwrap();
+        let is_it = |one: &&toml::Value| {
+            one["name"].as_str() == Some(of("name")) && one["version"].as_str() == Some(of("version"))
+        };
+        let locked = packages.iter().find(is_it).unwrap();
+        assert_eq!(part["hashes"][0]["content"].as_str(), locked["checksum"].as_str(), "{}", of("name"));
+    }
+}
+
+/// The sources of the program in a folder of their own, with what stands for a built program there.
+fn sources_elsewhere() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in fs::read_dir(root()).unwrap() {
+        let entry = entry.unwrap();
+        if !["target", ".git"].iter().any(|name| entry.file_name() == *name) {
+            symlink(entry.path(), folder.path().join(entry.file_name())).unwrap();
+        }
+    }
+    let built = folder.path().join("target/dist");
+    fs::create_dir_all(&built).unwrap();
+    let program = |name: &str, text: String| {
+        let path = built.join(name);
+        fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    };
+    program("kinocue", format!("exec '{}' \"$@\"", env!("CARGO_BIN_EXE_kinocue")));
+    program("cargo-deb", "exit 1".to_owned()); // which would strip the program: it is none
+    folder
+}
+
+#[test]
+fn the_package_of_the_same_sources_is_the_same_to_the_bit_whoever_packs_it_wherever_and_whenever() {
+    if !is_installed("dpkg-deb") || !is_installed("python3") {
+        return;
+    }
+    let pack = |umask: &str, zone: &str| {
+        let folder = sources_elsewhere();
+        let path = format!("{}/target/dist:{}", folder.path().display(), std::env::var("PATH").unwrap());
+        let mut command = Command::new("bash");
+        command.args(["-c", "umask $0 && exec systemd/build-deb.sh --no-build", umask]);
+        command.current_dir(folder.path()).env("PATH", path).env("TZ", zone);
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{}", said(&output));
+        let mut packages = fs::read_dir(folder.path().join("target/debian")).unwrap();
+        fs::read(packages.next().unwrap().unwrap().path()).unwrap()
+    };
+    assert!(pack("022", "UTC") == pack("077", "Pacific/Kiritimati"));
 }
 
 #[test]

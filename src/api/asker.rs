@@ -13,7 +13,7 @@ use hyper::body::Bytes;
 use super::access::one;
 use super::problem::{bad_value, panicked};
 use super::shared::Shared;
-use crate::control::{self, Code, Command, FRESH, Problem, Role, Status, Surface, Who};
+use crate::control::{self, Code, Command, FRESH, Problem, Status, Surface, Who};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock as _, MonoTime};
 
@@ -53,7 +53,6 @@ impl FromRequestParts<Arc<Shared>> for Asker {
 impl Asker {
     /// Asks, and replies with the state that it led to.
     pub(super) async fn ask(self, ask: Command) -> Result<StatusReply, Problem> {
-        self.allow(&ask)?;
         let asked_at = self.asked_at(&ask, Monotonic.now())?;
         let status = if ask == Command::Stop {
             self.stop().await
@@ -61,30 +60,6 @@ impl Asker {
             self.shared.handle.post_asked(self.who, ask, asked_at)?.answer().await?
         };
         Ok(StatusReply(self.shared.write(&status)))
-    }
-
-    /// True if they are an engineer, who may change the library.
-    pub(super) fn engineer(&self) -> Result<(), Problem> {
-        self.least(Role::Engineer, "changing the library")
-    }
-
-    /// True if they are an engineer; `what` needs one.
-    pub(super) fn least_engineer(&self, what: &str) -> Result<(), Problem> {
-        self.least(Role::Engineer, what)
-    }
-
-    /// Over TCP arming needs an engineer: whoever arms sees the seats.
-    fn allow(&self, ask: &Command) -> Result<(), Problem> {
-        let local = self.who.surface == Surface::Socket;
-        let arms = matches!(ask, Command::Arm { .. } | Command::ArmFor(_));
-        if arms && !local { self.least(Role::Engineer, "arming over TCP") } else { Ok(()) }
-    }
-
-    fn least(&self, least: Role, what: &str) -> Result<(), Problem> {
-        if self.who.role >= least {
-            return Ok(());
-        }
-        Err(Problem::role(what, least, &self.who))
     }
 
     /// When it was asked, by our own clock; now, where nobody said and it does not matter.

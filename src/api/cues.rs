@@ -17,7 +17,6 @@ use tokio::time::timeout;
 use utoipa::IntoParams;
 
 use super::access::one as one_header;
-use super::asker::Asker;
 use super::input::{Id, check_length};
 use super::problem::bad_value;
 use super::shared::{Shared, StillAsked, turn};
@@ -96,12 +95,10 @@ pub(super) async fn curve(
     responses((status = 200, body = CueInfo))
 )]
 pub(super) async fn upload(
-    asker: Asker,
     State(shared): State<Arc<Shared>>,
     Id(id): Id,
     request: Request,
 ) -> Result<JsonReply<CueInfo>, Problem> {
-    asker.engineer()?;
     no_form(&request)?;
     receive(&shared, id, request, |upload, awaited| upload.finish(Some(awaited))).await
 }

@@ -1,4 +1,4 @@
-//! Admission of every request: is it meant for us, who sends it, with which role, did it come before. Refusals leave it as
+//! Admission of every request: is it meant for us, who sends it, is their role enough for it, did it come before. Refusals leave it as
 //! problems, and every reply with the headers that keep pages of others out.
 
 use std::panic::AssertUnwindSafe;
@@ -23,6 +23,7 @@ use super::once::{KeptReply, KeyHolder, KeyedRequest};
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
 use super::rest::BodyRest;
+use super::roles;
 use super::shared::{Shared, StillAsked};
 use super::show::STOP;
 use super::tries::Tries;
@@ -69,6 +70,9 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
     let Some(who) = who else {
         return render(caught(next.run(request)).await, None);
     };
+    if let Err(problem) = roles::check(&request, &who) {
+        return render(problem.into_response(), Some(&shared.handle.status()));
+    }
     let name = who.to_string();
     let asker = KeyHolder { name, is_known: introduce(&mut request, who) };
     let key = one(request.headers(), &IDEMPOTENCY_KEY).map(|key| key.map(str::to_owned));

@@ -49,6 +49,7 @@ mod problem;
 mod recordings;
 mod reports;
 mod rest;
+mod roles;
 mod routes;
 mod serve;
 mod service;

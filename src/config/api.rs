@@ -42,7 +42,7 @@ pub enum Role {
     View,
     /// Run a show that is armed: load, go, pause, seek, park, levels, trim, seats, preflight.
     Operate,
-    /// Home, clear, test seats, reload and change the library; over TCP arm as well.
+    /// Home, clear, test seats, arm, reload and change the library.
     Engineer,
 }
 

@@ -162,9 +162,8 @@ impl Command {
             Self::Load { .. } => ("load", Operate, LASTS, None, Some(Fleet::Load)),
             Self::Playlist { .. } => ("playlist", Operate, LASTS, None, None),
             Self::Select { .. } => ("select", Operate, LASTS, None, None),
-            Self::Arm { seats_empty: false } => ("arm", Operate, STALE, None, None),
-            Self::Arm { seats_empty: true } => ("arm", Engineer, STALE, None, None),
-            Self::ArmFor(_) => ("arm", Operate, STALE, None, None),
+            // Whoever arms sees the seats, or knows who does.
+            Self::Arm { .. } | Self::ArmFor(_) => ("arm", Engineer, STALE, None, None),
             Self::StartAt(_) => ("start", Operate, STALE, None, Some(Fleet::Start)),
             Self::Commit { .. } => ("commit", Operate, STALE, None, Some(Fleet::Start)),
             Self::Disarm => ("disarm", Operate, LASTS, None, Some(Fleet::Disarm)),

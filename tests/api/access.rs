@@ -4,6 +4,7 @@ use kinocue::harness::control::{Command, Role, Surface};
 
 use crate::client::{Reply, Request, problem};
 use crate::hall::{Hall, TOKENS};
+use crate::routes::described;
 
 fn as_role(hall: &Hall, role: Role, method: &str, path: &str) -> Reply {
     let (token, _) = TOKENS[role as usize];
@@ -53,6 +54,102 @@ fn each_role_may_do_what_is_its_own_and_no_more() {
             .filter(|one| matches!(one.ask, Command::Arm { .. }))
             .all(|one| one.who.name == "engineer's")
     );
+}
+
+/// What nobody needs a token for.
+const OPEN: [&str; 3] = ["get /api/v1/openapi.json", "get /healthz", "get /readyz"];
+
+/// What whoever may look may not; all else that changes something, but a stop, stands below.
+const OF_OPERATORS: [&str; 18] = [
+    "post /api/v1/controllers/{name}/disable",
+    "post /api/v1/controllers/{name}/enable",
+    "post /api/v1/playlist/select",
+    "post /api/v1/preflight",
+    "post /api/v1/presets/{name}",
+    "post /api/v1/record/dump",
+    "post /api/v1/record/mark",
+    "post /api/v1/show/disarm",
+    "post /api/v1/show/go",
+    "post /api/v1/show/load",
+    "post /api/v1/show/park",
+    "post /api/v1/show/pause",
+    "post /api/v1/show/resume",
+    "post /api/v1/show/seek",
+    "put /api/v1/levels",
+    "put /api/v1/playlist",
+    "put /api/v1/sync/source",
+    "put /api/v1/trim",
+];
+
+const OF_ENGINEERS: [&str; 8] = [
+    "delete /api/v1/recordings/{name}",
+    "get /api/v1/recordings/{name}",
+    "post /api/v1/reload",
+    "post /api/v1/show/arm",
+    "post /api/v1/show/clear",
+    "post /api/v1/show/home",
+    "post /api/v1/test",
+    "put /api/v1/cues/{id}",
+];
+
+const STOP: &str = "post /api/v1/show/stop";
+
+/// A request for each operation of the description, in all the ways in which one can come that is to be refused without a look into it: with
+/// a body that is none, one that is too long, a key, and nothing. With them the role that it needs; none where nobody has to say who they are.
+fn operations(hall: &Hall) -> Vec<(String, Option<Role>, Vec<Request>)> {
+    let of = |(method, path): (String, String)| {
+        let name = format!("{method} {path}");
+        let least = match name.as_str() {
+            open if OPEN.contains(&open) => None,
+            one if OF_OPERATORS.contains(&one) => Some(Role::Operate),
+            one if OF_ENGINEERS.contains(&one) => Some(Role::Engineer),
+            _ => Some(Role::View),
+        };
+        assert!(method == "get" || name == STOP || least > Some(Role::View), "{name} stands in no table");
+        let path = path.replace("{name}", "a").replace("{id}", "a").replace("{day}", "2026-01-31");
+        let plain = Request::new(&method.to_uppercase(), &path);
+        let mut ways = vec![plain.clone()];
+        if method != "get" {
+            let long = plain.clone().json("7".repeat(100_000));
+            ways.extend([plain.clone().json("{"), long, plain.json("{").header("Idempotency-Key", "k")]);
+        }
+        (name, least, ways)
+    };
+    described(hall).into_iter().map(of).collect()
+}
+
+#[test]
+fn who_may_not_is_refused_by_every_route_before_a_look_at_the_body_and_who_may_is_not() {
+    let hall = Hall::open();
+    let operations = operations(&hall);
+    let named: Vec<&str> = operations.iter().map(|(name, ..)| name.as_str()).collect();
+    let tables = [&OPEN[..], &OF_OPERATORS, &OF_ENGINEERS].concat();
+    assert!(tables.iter().all(|name| named.contains(name)), "the tables name what is there");
+    for (name, least, ways) in &operations {
+        for request in ways {
+            let refusal = || request.send(&hall.port());
+            match least {
+                None => assert_ne!(refusal().status, 401, "{name}"),
+                Some(_) => assert_eq!(refusal().problem(), problem(401, "token"), "{name}"),
+            }
+            for (token, role) in TOKENS {
+                if Some(role) < *least {
+                    let refusal = request.clone().token(token).send(&hall.port());
+                    assert_eq!(refusal.problem(), problem(403, "role"), "{name} by {role}: {request:?}");
+                } else if name != "get /api/v1/events" {
+                    let status = request.clone().token(token).send(&hall.port()).status;
+                    assert!(status != 401 && status != 403, "{name} by {role}: {status}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_head_of_what_may_not_be_read_is_not_told_either() {
+    let hall = Hall::open();
+    assert_eq!(as_role(&hall, Role::Operate, "HEAD", "/api/v1/recordings/a").status, 403);
+    assert_eq!(as_role(&hall, Role::Engineer, "HEAD", "/api/v1/recordings/a").status, 404);
 }
 
 #[test]

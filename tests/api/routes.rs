@@ -59,7 +59,7 @@ const CHANGES: [(&str, &str); 24] = [
 ];
 
 /// Every operation of the description.
-fn described(hall: &Hall) -> Vec<(String, String)> {
+pub fn described(hall: &Hall) -> Vec<(String, String)> {
     let document = hall.socket().get("/api/v1/openapi.json").value();
     let paths = document["paths"].as_object().unwrap();
     let of_path = |(path, item): (&String, &Value)| {

@@ -106,10 +106,7 @@ async fn ride(handle: &Handle, screen: &Screen, show: DemoShow) -> Result<(), Pr
         return Ok(());
     }
     for ask in [show.load, Command::Preflight, ARM, Command::Go] {
-        handle
-            .ask(demo(Role::Operate), ask)
-            .await
-            .inspect_err(|_| tell_findings(&handle.status(), screen))?;
+        handle.ask(demo(), ask).await.inspect_err(|_| tell_findings(&handle.status(), screen))?;
     }
     let resting = [State::Parked, State::Stopped, State::Fault, State::Recovering];
     let _ = reach(handle, |status| resting.iter().any(|state| status.state == *state)).await; // gone, it is at rest as well
@@ -134,12 +131,12 @@ async fn home(handle: &Handle, screen: &Screen) -> Result<Option<()>, Problem> {
         "drives do not know their position until they are homed. With real seats a person first makes sure that nobody sits on them, \
          then homes them; here the demo does both",
     );
-    handle.ask(demo(Role::Engineer), Command::Home).await?;
+    handle.ask(demo(), Command::Home).await?;
     within(HOMING, handle, State::Parked).await
 }
 
-fn demo(role: Role) -> Who {
-    Who { role, surface: Surface::Program, name: "demo".to_owned() }
+fn demo() -> Who {
+    Who { role: Role::Engineer, surface: Surface::Program, name: "demo".to_owned() }
 }
 
 /// Waits until the hall is in a state; nothing where it is gone meanwhile.
