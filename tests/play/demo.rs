@@ -166,7 +166,7 @@ fn the_demo_of_a_film_says_what_to_install_where_there_is_no_player() {
 fn ctrl_c_parks_the_seats_of_the_demo_and_ends_it_with_the_report() {
     let folder = Folder::new();
     let mut demo = demo(&folder);
-    demo.wait_for("playing: the seats that take part are on the cue");
+    Console::told(&demo.wait_for("playing: the seats that take part are on the cue")).status_once_it_plays();
     demo.signal(Signal::INT);
     demo.wait_for("parked: the seats that take part have parked");
     let report = demo.finish().report_of(0);

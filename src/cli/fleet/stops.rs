@@ -34,7 +34,7 @@ const AGAIN: Duration = Duration::from_millis(100);
 const WAITING: usize = 64;
 
 /// A stop, and when it was asked.
-type Asked = (Instant, Message);
+type WaitingStop = (Instant, Message);
 
 impl Link {
     pub(super) async fn subscribe_to_stops(&self) -> Messages {
@@ -67,7 +67,7 @@ impl Link {
     }
 
     /// Has a machine stop that is about to lead, as soon as it serves the hall.
-    async fn stop_later(self: Arc<Self>, mut waiting: mpsc::Receiver<Asked>, renewed: Renewed) {
+    async fn stop_later(self: Arc<Self>, mut waiting: mpsc::Receiver<WaitingStop>, renewed: Renewed) {
         while let Some(first) = waiting.recv().await {
             let mut all = vec![first];
             while !all.is_empty() {
