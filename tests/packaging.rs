@@ -262,11 +262,11 @@ fn every_library_in_the_program_may_be_passed_on_with_its_licence() {
 fn needed(edges: &str) -> BTreeSet<[String; 3]> {
     let asked = ["tree", "--locked", "--prefix", "none", "--format", "{p}|{l}", "--edges", edges];
     let output = tool("cargo", &asked).expect("cargo runs the tests");
-    let lines = String::from_utf8(output.stdout).unwrap();
+    let lines = String::from_utf8(output.stdout).expect("cargo prints text");
     let parts = lines.lines().filter(|line| !line.starts_with("kinocue ")).map(|line| {
-        let (package, licence) = line.trim_end_matches(" (*)").split_once('|').unwrap();
-        let (name, version) = package.split_once(" v").unwrap();
-        let version = version.split(' ').next().unwrap();
+        let (package, licence) = line.trim_end_matches(" (*)").split_once('|').expect("as the format says");
+        let (name, version) = package.split_once(" v").expect("a version");
+        let version = version.split(' ').next().expect("a version");
         [name.to_owned(), version.to_owned(), licence.replace(" / ", "/").replace('/', " OR ")]
     });
     parts.collect()
@@ -312,19 +312,19 @@ fn the_list_for_machines_names_each_part_with_its_version_and_licence_and_whethe
 
 /// The sources of the program in a folder of their own, with what stands for a built program there.
 fn sources_elsewhere() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    for entry in fs::read_dir(root()).unwrap() {
-        let entry = entry.unwrap();
+    let folder = tempfile::tempdir().expect("a folder");
+    for entry in fs::read_dir(root()).expect("it is ours") {
+        let entry = entry.expect("it is ours");
         if !["target", ".git"].iter().any(|name| entry.file_name() == *name) {
-            symlink(entry.path(), folder.path().join(entry.file_name())).unwrap();
+            symlink(entry.path(), folder.path().join(entry.file_name())).expect("the folder is ours");
         }
     }
     let built = folder.path().join("target/dist");
-    fs::create_dir_all(&built).unwrap();
+    fs::create_dir_all(&built).expect("the folder is ours");
     let program = |name: &str, text: String| {
         let path = built.join(name);
-        fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        fs::write(&path, format!("#!/bin/sh\n{text}\n")).expect("the folder is ours");
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("the file is ours");
     };
     program("kinocue", format!("exec '{}' \"$@\"", env!("CARGO_BIN_EXE_kinocue")));
     program("cargo-deb", "exit 1".to_owned()); // which would strip the program: it is none

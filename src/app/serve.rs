@@ -18,7 +18,7 @@ use signal_hook::flag;
 
 use super::film::HallFilm;
 use super::notify::AlarmTeller;
-use super::pair::{Pair, TookOver};
+use super::pair::{Pair, TookOver, is_alone};
 use super::recorder::{HallRecorder, RecordLink, RecordPlaces};
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
@@ -219,6 +219,9 @@ fn serve_halls(
     let recordings = record_places.recordings.clone();
     let surfaces =
         Surfaces::open(&config, &places.sockets, &handle, library.clone(), recordings, pages, &log)?;
+    if pair.is_none() {
+        is_alone(&places.sockets.fleet);
+    }
     let alarms = AlarmTeller::start(&config, &log).map_err(ServeError::System)?;
     let mut ports = SupervisorPorts {
         inbox,

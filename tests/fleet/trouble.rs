@@ -53,7 +53,11 @@ fn a_desk_is_told_that_the_hall_behind_a_link_is_away_and_hears_it_again_once_it
         assert_eq!(run.code, Some(75), "{run:?}");
         assert!(run.stdout.contains("look at the hall"), "{run:?}");
     }
+    // What a service left that was one of two machines: its link would wait for the other one.
+    let left = ["pair.sock", "pair-journal.sock"].map(|name| hall.path(name));
+    left.iter().for_each(|file| std::fs::write(file, "").unwrap());
     hall.serve();
     link.heard("the hall: well again");
     engine.hears_all();
+    assert!(!left.iter().any(|file| file.exists()));
 }

@@ -109,6 +109,13 @@ pub(crate) fn stand_by(
     Ok(StoodBy::Leads(Pair { shared, took_over, feeder }))
 }
 
+/// Removes what tells the link that this is one of two machines, where it was and is not any more: the sockets of a program that has ended.
+pub(crate) fn is_alone(fleet: &Path) {
+    for name in [LEASE, JOURNAL] {
+        let _ = fs::remove_file(fleet.with_file_name(name)); // mostly there is none
+    }
+}
+
 /// Keeps what the other machine has told, where it led.
 fn takes_over(shared: &PairShared, state: &Path) -> Option<TookOver> {
     let heard = lock(&shared.heard).clone()?;
