@@ -173,7 +173,7 @@ mod tests {
                 json!({ "n": n, "told": {}, "file": "x", "line": line, "record": { "kind": "start" } });
             told.take("kc.log.berlin.h1", record.to_string().as_bytes());
         }
-        assert_eq!(told.records.len(), 4);
+        assert_eq!(told.records["kc.log.berlin.h1"].len(), 4);
         let missing = told.missing.join("\n");
         assert!(missing.contains("record 18446744073709551615 follows record 7"), "{missing}");
         assert!(missing.contains("record 1 follows record 18446744073709551615"), "{missing}");
