@@ -317,6 +317,8 @@ fn a_desk_sees_stops_and_reports_the_hall_whichever_machine_leads_it() {
     house.start(0);
     let totals = house.played(|totals| totals["shows"] == 3 && totals["running"] == 0);
     assert_eq!((&totals["interrupted"], &totals["stopped"]), (&1.into(), &2.into()), "{totals:#}");
+    let run = house.desk(&["report"]);
+    assert_eq!(run.code, Some(0), "a record is missing: {run:?}");
     house.shows[1].done(&["clear"]);
     house.shows[1].wait(|status| status["next"] == "park, or home");
     parks_and_ends(house);
