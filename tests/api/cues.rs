@@ -73,7 +73,7 @@ fn an_upload_that_is_too_long_or_cut_short_leaves_nothing() {
 #[test]
 fn what_was_asked_by_someone_who_has_gone_away_is_not_worked_at_any_longer() {
     // Opened by both, the pipe says that the check has begun; it ends with the check, which else would write to it.
-    let hall = Hall::with_checks_by("exec 3>\"${0%/*}/work\"; sleep 10 3>&-; echo done >&3");
+    let mut hall = Hall::with_checks_by("exec 3>\"${0%/*}/work\"; sleep 10 3>&-; echo done >&3");
     let pipe = hall.dir.path().join("work");
     rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).unwrap();
     let asks = [upload("calm", CUE), Request::new("GET", "/api/v1/cues/there/curve?points=10")];
@@ -85,6 +85,7 @@ fn what_was_asked_by_someone_who_has_gone_away_is_not_worked_at_any_longer() {
         drop(connection);
         assert_eq!(at_work.read(&mut [0]).unwrap(), 0, "it was not ended");
     }
+    hall.close(); // a check has ended before its upload is taken away
     assert_eq!(files(&hall), ["there.csv"]);
 }
 
