@@ -238,8 +238,9 @@ fn a_hall_whose_key_was_stolen_has_no_other_told_of_and_no_cue_written_over() {
         let forged = r#"{"version":"forged","rev":1,"cues":{}}"#;
         assert!(thief.may_publish_text("kc.log.berlin.h1", forged).await);
         for to in ["$KV.kc_have.berlin.h2", &format!("kc.cue.{}.0", sha256(swell(3).as_bytes()))] {
-            let asks = "$JS.hub.API.DIRECT.GET.kc_log.kc.log.berlin.h1";
-            thief.client.publish_with_reply(asks, to.to_owned(), "".into()).await.unwrap();
+            let last = r#"{"last_by_subj":"kc.log.berlin.h1"}"#;
+            let asks = "$JS.hub.API.STREAM.MSG.GET.kc_log";
+            thief.client.publish_with_reply(asks, to.to_owned(), last.into()).await.unwrap();
         }
         thief.client.flush().await.unwrap();
     });

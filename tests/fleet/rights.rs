@@ -89,6 +89,11 @@ impl RawMember {
         Self(stream)
     }
 
+    /// Asks the engine, which is to answer there.
+    fn ask(&mut self, subject: &str, to: &str, text: &str) {
+        let _ = write!(self.0, "PUB {subject} {to} {}\r\n{text}\r\n", text.len());
+    }
+
     /// Publishes with headers that are none.
     fn garble(&mut self, subject: &str) {
         let headers = "NATS/1.0\r\nno header\r\n\r\n";
@@ -120,6 +125,32 @@ fn a_stolen_key_of_a_hall_that_sends_what_nobody_can_read_takes_no_stop_of_anoth
         ends.store(true, Ordering::Relaxed);
         assert!(answers.iter().all(|stop| stop[0]["done"] == true), "{answers:?}");
     });
+    two.comes_to("stopped");
+}
+
+#[test]
+fn what_nobody_can_read_the_engine_keeps_for_a_stolen_key_and_sends_to_no_other_hall() {
+    let Some(engine) = Engine::start("h1,h2") else { return };
+    let two = engine.hall("h2", "[]");
+    let _link = engine.link("h2", &two);
+    engine.hears_one();
+    let mut thief = RawMember::connect(&engine, "h1/fleet.nk");
+    let ends = AtomicBool::new(false);
+    let stops: Vec<_> = thread::scope(|scope| {
+        scope.spawn(|| {
+            thief.garble("kc.log.berlin.h1");
+            let last = json!({ "last_by_subj": "kc.log.berlin.h1" }).to_string();
+            while !ends.load(Ordering::Relaxed) {
+                thief.ask("$JS.hub.API.DIRECT.GET.kc_log.kc.log.berlin.h1", "kc.stop.berlin.h2.office", "");
+                thief.ask("$JS.hub.API.STREAM.MSG.GET.kc_log", "kc.stop.berlin.h2.office", &last);
+                Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(2));
+            }
+        });
+        let stops = (0..5).map(|_| engine.desk(&["stop", "berlin.h2"])).collect();
+        ends.store(true, Ordering::Relaxed);
+        stops
+    });
+    assert!(stops.iter().all(|stop| stop.code == Some(0)), "{stops:?}");
     two.comes_to("stopped");
 }
 
@@ -162,6 +193,7 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
                 "kc.log.berlin.h1",
                 "$JS.hub.API.$KV.kc_seen.berlin.h1",
                 "$JS.hub.API.$KV.kc_have.berlin.h1",
+                "$JS.hub.API.STREAM.MSG.GET.kc_log",
                 "$JS.hub.API.DIRECT.GET.KV_kc_want.$KV.kc_want.berlin.h1",
                 "$JS.hub.API.DIRECT.GET.kc_cues.kc.cue.5f.0",
             ] {
@@ -184,7 +216,9 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
                 "$JS.hub.API.STREAM.DELETE.kc_log",
                 "$JS.hub.API.STREAM.PURGE.kc_log",
                 "$JS.hub.API.STREAM.INFO.kc_log",
-                "$JS.hub.API.DIRECT.GET.kc_log.kc.log.berlin.h2",
+                "$JS.hub.API.DIRECT.GET.kc_log.kc.log.berlin.h1",
+                "$JS.hub.API.STREAM.MSG.GET.KV_kc_want",
+                "$JS.hub.API.STREAM.MSG.GET.KV_kc_have",
                 "$JS.hub.API.CONSUMER.CREATE.kc_log",
                 "$JS.hub.API.CONSUMER.CREATE.kc_cues",
                 "$JS.hub.API.CONSUMER.CREATE.KV_kc_want",
@@ -259,7 +293,7 @@ fn a_key_of_a_hall_has_the_engine_neither_stop_another_nor_speak_for_it() {
     // The engine answers each of these, to wherever it is asked to answer.
     let answered = [
         "kc.log.berlin.h1",
-        "$JS.hub.API.DIRECT.GET.kc_log.kc.log.berlin.h1",
+        "$JS.hub.API.STREAM.MSG.GET.kc_log",
         "$JS.hub.API.$KV.kc_seen.berlin.h1",
     ];
     let status = r#"{"format":2,"state":"parked","cause":"all is well"}"#;

@@ -7,7 +7,9 @@ use std::time::Duration;
 use anyhow::Context as _;
 use async_nats::jetstream::context::{Context, ContextBuilder};
 use async_nats::jetstream::message::StreamMessage;
-use async_nats::jetstream::stream::{Config, DirectGetErrorKind, DiscardPolicy, StorageType};
+use async_nats::jetstream::stream::{
+    Config, DirectGetErrorKind, DiscardPolicy, LastRawMessageErrorKind, StorageType, Stream,
+};
 use async_nats::{Client, ConnectOptions, header};
 
 use super::settings::Access;
@@ -184,10 +186,28 @@ pub(super) async fn last_of(
     }
 }
 
-/// True of a message that the engine itself has written, as it answers to whatever subject it is asked to answer to: for a member that may
-/// not write there.
+/// The same of what whoever asks has written there; wrapped by the engine, so that it is nothing where the engine is asked to answer to another.
+pub(super) async fn own_last_of<I>(
+    stream: &Stream<I>,
+    subject: &str,
+) -> anyhow::Result<Option<StreamMessage>> {
+    match stream.get_last_raw_message_by_subject(subject).await {
+        Ok(message) => Ok(Some(message)),
+        Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(None),
+        Err(error) => Err(error).context("the engine does not say what it has"),
+    }
+}
+
+/// True of what the engine itself says. It answers to whatever subject it is asked to answer to, so also for a member that may not publish
+/// there.
+pub(super) fn is_said_by_engine(payload: &[u8]) -> bool {
+    let says = [&b"{\"stream\":"[..], b"{\"error\":", b"{\"type\":\"io.nats."];
+    says.iter().any(|start| payload.starts_with(start))
+}
+
+/// The same of a message that a stream has.
 pub(super) fn is_answered(message: &StreamMessage) -> bool {
-    message.headers.get_all(header::NATS_SUBJECT).count() > 1
+    message.headers.get_all(header::NATS_SUBJECT).count() > 1 || is_said_by_engine(&message.payload)
 }
 
 /// How long ago the engine took a message, by its clock and ours.

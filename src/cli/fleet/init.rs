@@ -207,10 +207,10 @@ fn of_desk(desk: &str) -> Rights {
 }
 
 /// A hall tells of itself alone, hears what it alone is asked, answers whoever asked, and looks up what it alone shall have and the files
-/// of that. No consumers: those send whatever they read to wherever their maker says.
+/// of that. Neither consumers nor DIRECT.GET of what it wrote itself: they send that on as it is, to wherever they are asked to.
 fn of_hall(site: &str, member: &str) -> Rights {
     let mut publish = vec![fleet::status_of(member), fleet::log_of(member)];
-    publish.extend(api(&format!("DIRECT.GET.{LOG}.{}", fleet::log_of(member))));
+    publish.extend(api(&format!("STREAM.MSG.GET.{LOG}")));
     publish.extend(api(&format!("DIRECT.GET.KV_{WANT}.$KV.{WANT}.{member}")));
     publish.extend(api(&format!("DIRECT.GET.{CUES}.{}", fleet::chunk_of("*", "*"))));
     publish.extend([SEEN, HAVE].iter().flat_map(|bucket| api(&format!("$KV.{bucket}.{member}"))));
@@ -227,9 +227,7 @@ fn of_pair(member: &str) -> Vec<String> {
     let asks =
         ["INFO", "CREATE", "MSG.GET"].into_iter().flat_map(|what| api(&format!("STREAM.{what}.{stream}")));
     // Each machine tells its own journal.
-    let log = fleet::log_of_machine(member, "*");
-    let last = api(&format!("DIRECT.GET.{LOG}.{log}"));
-    asks.chain([fleet::lease_of(member), log]).chain(last).collect()
+    asks.chain([fleet::lease_of(member), fleet::log_of_machine(member, "*")]).collect()
 }
 
 fn user(text: &mut String, name: &str, public: &str, rights: &Rights, answers: bool) {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use async_nats::jetstream::context::{Context, PublishErrorKind};
 use async_nats::jetstream::message::PublishMessage;
-use async_nats::jetstream::stream::{Config, DiscardPolicy, LastRawMessageErrorKind, StorageType};
+use async_nats::jetstream::stream::{Config, DiscardPolicy, StorageType};
 use tokio::io::{AsyncBufReadExt as _, AsyncWriteExt as _, BufReader};
 use tokio::net::UnixStream;
 use tokio::sync::watch;
@@ -70,14 +70,11 @@ async fn put(link: &Link, kept: &Context, want: Want) -> Option<Answer> {
 async fn read(link: &Link, kept: &Context) -> anyhow::Result<Answer> {
     // Made where it is missing: with nothing in it, which is no key.
     let stream = kept.get_or_create_stream(bucket(&link.hall)).await?;
-    match stream.get_last_raw_message_by_subject(&fleet::lease_of(&link.hall)).await {
-        Ok(message) => {
-            let holder: Holder = serde_json::from_slice(&message.payload).context("it is no lease")?;
-            Ok(Answer::Key { holder, revision: message.sequence })
-        }
-        Err(error) if error.kind() == LastRawMessageErrorKind::NoMessageFound => Ok(Answer::NoKey),
-        Err(error) => Err(error.into()),
-    }
+    let Some(message) = engine::own_last_of(&stream, &fleet::lease_of(&link.hall)).await? else {
+        return Ok(Answer::NoKey);
+    };
+    let holder: Holder = serde_json::from_slice(&message.payload).context("it is no lease")?;
+    Ok(Answer::Key { holder, revision: message.sequence })
 }
 
 async fn write(link: &Link, kept: &Context, revision: u64, holder: &Holder) -> anyhow::Result<Answer> {

@@ -123,7 +123,8 @@ impl<'l> LogTeller<'l> {
     /// What the engine has last of this hall. Behind what is no record of ours the journal is told from its first line: nobody can take that
     /// away again, and reports have each line once.
     async fn ask(&self) -> anyhow::Result<(u64, Option<LogRecord>)> {
-        let Some(message) = engine::last_of(&self.kept, fleet::LOG, &self.subject).await? else {
+        let stream = self.kept.get_stream_no_info(fleet::LOG).await?;
+        let Some(message) = engine::own_last_of(&stream, &self.subject).await? else {
             return Ok((0, None));
         };
         let record = serde_json::from_slice(&message.payload).ok();

@@ -16,6 +16,7 @@ use tokio::net::UnixStream;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep, timeout};
 
+use super::engine;
 use super::hall::Link;
 use super::lease::Renewed;
 use super::link::{Messages, away};
@@ -104,12 +105,10 @@ fn stopping() -> (u16, Value) {
     (200, json!({ "stopping": true }))
 }
 
-/// True of what the engine itself says. It answers to whatever subject it is asked to answer to, so also for a member that may not publish
-/// there. All else is somebody's stop, whatever is in it.
+/// True of what the engine itself says. All else is somebody's stop, whatever is in it.
 fn is_of_engine(message: &Message) -> bool {
     let is_kept = message.headers.as_ref().is_some_and(|headers| headers.get("Nats-Stream").is_some());
-    let says = [&b"{\"stream\":"[..], b"{\"error\":", b"{\"type\":\"io.nats."];
-    message.status.is_some() || is_kept || says.iter().any(|start| message.payload.starts_with(start))
+    message.status.is_some() || is_kept || engine::is_said_by_engine(&message.payload)
 }
 
 async fn ask(socket: &Path) -> std::io::Result<()> {
