@@ -245,9 +245,7 @@ pub(super) async fn journal(
     let dir = shared.journal.clone();
     let parts = shared.blocking(move || {
         let _turn = turn;
-        journal::tail(&dir, &told, TOLD_AT_ONCE).map_err(|error| {
-            Problem::new(Code::File, error.to_string(), "check the folder of the journal and its disk")
-        })
+        Ok(journal::tail(&dir, &told, TOLD_AT_ONCE)?)
     });
     parts.await.map(JsonReply)
 }

@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 
 use super::recordings::{OUTCOMES, names};
 use super::shared::{Shared, turn};
-use crate::control::{Code, Problem};
+use crate::control::Problem;
 use crate::journal::{self, ReportBounds, ReportShown, ShowRecord, ShowResult};
 use crate::record::{Closing, Margin, closing_of};
 
@@ -97,10 +97,7 @@ fn history(journal: &Path, recordings: &Path) -> Result<Vec<PastShow>, Problem> 
     let mut shows = Vec::new();
     for days in DAYS {
         let first = today.checked_sub(days.days()).unwrap_or(today);
-        let told = journal::report(journal, first, today, bounds).map_err(|error| {
-            Problem::new(Code::File, error.to_string(), "check the folder of the journal and its disk")
-        })?;
-        shows = told.shows;
+        shows = journal::report(journal, first, today, bounds)?.shows;
         if shows.len() >= SHOWS {
             break;
         }

@@ -19,7 +19,7 @@ use super::input::Name;
 use super::pieces::Pieces;
 use super::problem::bad_value;
 use super::shared::{Shared, turn};
-use crate::control::{Code, Problem};
+use crate::control::Problem;
 use crate::journal::{self, JournalReport, ReportBounds};
 
 /// The newest of a day, and no more.
@@ -40,11 +40,7 @@ pub(super) async fn one(State(shared): State<Arc<Shared>>, Name(day): Name) -> R
     let day = date(&day)?;
     let turn = turn(&shared.reports, "a report").await?;
     let dir = shared.journal.clone();
-    let report = shared.blocking(move || {
-        journal::report(&dir, day, day, MOST).map_err(|error| {
-            Problem::new(Code::File, error.to_string(), "check the folder of the journal and its disk")
-        })
-    });
+    let report = shared.blocking(move || Ok(journal::report(&dir, day, day, MOST)?));
     let report = report.await?;
     let (to, mut written) = mpsc::channel(WAITING);
     let (pieces, body) = mpsc::channel(WAITING);

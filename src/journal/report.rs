@@ -13,6 +13,7 @@ use utoipa::ToSchema;
 use super::record::{Action, Line, ShowRecord, day_of};
 use super::{files, read};
 use crate::control::model::{Ending, FrameCounts, words};
+use crate::control::{Code, Problem};
 use crate::sys::folder::Folder;
 
 /// How long after its day the end of a show is looked for, days.
@@ -42,6 +43,12 @@ pub(crate) struct JournalError {
     pub(crate) path: PathBuf,
     /// What the system said.
     pub(crate) source: io::Error,
+}
+
+impl From<JournalError> for Problem {
+    fn from(error: JournalError) -> Self {
+        Self::new(Code::File, error.to_string(), "check the folder of the journal and its disk")
+    }
 }
 
 /// What was played, and what was asked, on some days.

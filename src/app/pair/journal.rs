@@ -10,6 +10,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::{PairError, links};
+use crate::control::Problem;
 use crate::journal::{TOLD_AT_ONCE, tail};
 
 /// How long a link may say nothing: it asks each second.
@@ -30,10 +31,7 @@ fn tell(machine: &str, dir: &Path, stream: &UnixStream) -> io::Result<()> {
         lines.by_ref().take(LINE).read_line(&mut line)?;
         let told = serde_json::from_str(&line)?;
         let parts = tail(dir, &told, TOLD_AT_ONCE);
-        write(
-            stream,
-            &parts.map_err(|error| format!("{error}; check the folder of the journal and its disk")),
-        )?;
+        write(stream, &parts.map_err(|error| Problem::from(error).to_string()))?;
     }
 }
 
