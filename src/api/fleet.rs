@@ -2,6 +2,7 @@
 //! a letter counts for whose key has signed it. That is checked here, where the keys are configured, and not by who carries it: it is
 //! what others reach over the network, and may be taken over without a seat more in danger.
 
+use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -21,7 +22,9 @@ use super::shared::{Shared, turn};
 use super::show::Load;
 use super::status::check_pulse;
 use crate::config;
-use crate::control::{ClockReading, Code, Command, HallFacts, LevelsChange, Problem, StartOrder};
+use crate::control::{
+    ClockReading, Code, Command, HallFacts, LevelsChange, PreflightStatus, Problem, StartOrder,
+};
 use crate::fleet::{BriefStatus, Letter, Order};
 use crate::journal::{self, JournalPart, TOLD_AT_ONCE, Told, stamp};
 use crate::library::CueId;
@@ -95,6 +98,7 @@ fn command(order: &Order) -> Result<Command, Problem> {
             Command::Levels(change)
         }
         "trim" => args::<Trim>(order)?.command()?,
+        "preflight" => none().map(|()| Command::Preflight)?,
         "start" => start(order)?,
         "commit" => {
             let Commit { ticket } = args(order)?;
@@ -209,8 +213,25 @@ pub(super) async fn order(
         }
         FleetAsk::Of(ask) => ask,
     };
+    let is_preflight = ask == Command::Preflight;
     let status = shared.handle.post_asked(who, ask, asked_at)?.answer().await?;
-    Ok(JsonReply(HallFacts::from(&*status)).into_response())
+    match &status.preflight {
+        Some(found) if is_preflight && !found.passed => Err(unfit(found)),
+        _ => Ok(JsonReply(HallFacts::from(&*status)).into_response()),
+    }
+}
+
+/// What came of a preflight that failed, for whoever does not see the findings: the gravest of them.
+fn unfit(found: &PreflightStatus) -> Problem {
+    let PreflightStatus { answered, findings, .. } = found;
+    let mut detail = format!("the hall does not pass preflight, {answered} controllers answered");
+    let mut remedy = "ask somebody in the hall to look at its preflight";
+    if let Some(gravest) = findings.first() {
+        let who = gravest.controller.as_deref().unwrap_or("the hall");
+        let _ = write!(detail, ": {who}: {} ({} findings)", gravest.text, findings.len()); // a String takes it
+        remedy = &gravest.remedy;
+    }
+    Problem::new(Code::Check, detail, remedy)
 }
 
 /// How far the wall clock of this machine was found ahead of a time server's.
@@ -253,6 +274,7 @@ pub(super) async fn journal(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::Warning;
 
     #[test]
     fn words_are_read_with_what_belongs_to_them_and_no_others_at_all() {
@@ -264,6 +286,7 @@ mod tests {
         };
         assert_eq!(ask("load", "{\"cue\":\"storm\"}"), Ok(Command::Load { cue: "storm".to_owned() }));
         assert_eq!(ask("trim", "{\"offset_s\":0.08}"), Ok(Command::Trim(80)));
+        assert_eq!(ask("preflight", "{}"), Ok(Command::Preflight));
         let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
         assert_eq!(ask("levels", "{\"motion\":0.5}"), Ok(Command::Levels(half)));
         assert_eq!(ask("park", "null"), Ok(Command::Park));
@@ -303,5 +326,21 @@ mod tests {
         ] {
             assert_eq!(ask(word, "{}"), Err(Code::Role), "{word}");
         }
+    }
+
+    #[test]
+    fn a_preflight_that_fails_is_told_by_the_gravest_of_its_findings() {
+        let one = |who: &str, text: &str| Warning {
+            controller: Some(who.to_owned()),
+            text: text.to_owned(),
+            remedy: format!("look at {who}"),
+            ..Warning::default()
+        };
+        let findings = vec![one("A2", "it does not answer"), one("A1", "it is warm")];
+        let found = PreflightStatus { passed: false, age_s: 0.0, answered: 1, findings };
+        let told = unfit(&found).to_string();
+        let detail =
+            "the hall does not pass preflight, 1 controllers answered: A2: it does not answer (2 findings)";
+        assert_eq!(told, format!("{detail}; look at A2"));
     }
 }

@@ -56,6 +56,8 @@ pub(crate) enum FleetWord {
     Levels,
     /// To move the motion against the film.
     Trim,
+    /// To ask the controllers how they are, while nothing is armed.
+    Preflight,
     /// To put cues into the library, while parked; loads none of them.
     Cues,
     /// To put playlists beside the library, while parked; loads none of them.
@@ -68,13 +70,14 @@ pub(crate) enum FleetWord {
 
 impl FleetWord {
     /// Those of `allow`, by the words of the configuration.
-    pub(crate) const ALL: [(&'static str, Self); 9] = [
+    pub(crate) const ALL: [(&'static str, Self); 10] = [
         ("pause", Self::Pause),
         ("park", Self::Park),
         ("disarm", Self::Disarm),
         ("load", Self::Load),
         ("levels", Self::Levels),
         ("trim", Self::Trim),
+        ("preflight", Self::Preflight),
         ("cues", Self::Cues),
         ("playlists", Self::Playlists),
         ("pull", Self::Pull),
@@ -95,6 +98,7 @@ plain::displayed!(FleetWord {
     Self::Load => "load",
     Self::Levels => "levels",
     Self::Trim => "trim",
+    Self::Preflight => "preflight",
     Self::Cues => "cues",
     Self::Playlists => "playlists",
     Self::Pull => "pull",

@@ -184,7 +184,7 @@ impl Command {
             Self::Preset(_) => ("preset", Operate, LASTS, None, None),
             Self::Enable(_) => ("enable", Operate, STALE, Some(GearWord::Seats), None),
             Self::Disable { .. } => ("disable", Operate, LASTS, Some(GearWord::Seats), None),
-            Self::Preflight => ("preflight", Operate, LASTS, None, None),
+            Self::Preflight => ("preflight", Operate, LASTS, None, Some(Fleet::Preflight)),
             Self::Test { .. } => ("test", Engineer, STALE, None, None),
             Self::Reload => ("reload", Engineer, LASTS, None, None),
             Self::Mark { .. } => ("mark", Operate, LASTS, None, None),

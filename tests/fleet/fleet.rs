@@ -21,7 +21,7 @@ use crate::programs::is_installed;
 
 /// All words that a hall may allow.
 pub(crate) const ALL: &str =
-    r#"["pause", "park", "disarm", "load", "levels", "trim", "cues", "playlists", "pull"]"#;
+    r#"["pause", "park", "disarm", "load", "levels", "trim", "preflight", "cues", "playlists", "pull"]"#;
 
 /// An engine that runs, with the keys of all who know it.
 pub(crate) struct Engine {

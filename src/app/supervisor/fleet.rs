@@ -33,8 +33,8 @@ pub(super) fn may_ask(desired: &Desired, hall: &HallContext) -> Result<(), Probl
     }
     let state = hall.mirror.state;
     match ask {
-        // Whoever armed it saw what was loaded.
-        Command::Load { .. } if state != State::Parked => {
+        // Whoever armed it saw what was loaded, and what preflight found.
+        Command::Load { .. } | Command::Preflight if state != State::Parked => {
             refused(format!("the hall is {state}, not parked"), "try again when it is parked")
         }
         // Whoever armed it saw the seats; for what it was armed is known to `starts`.
@@ -131,7 +131,7 @@ mod tests {
             | State::Stopping
             | State::Stopped
             | State::Fault => &["disarm", "levels", "pause", "stop", "trim"],
-            State::Parked => &["disarm", "levels", "load", "pause", "stop", "trim"],
+            State::Parked => &["disarm", "levels", "load", "pause", "preflight", "stop", "trim"],
             State::Playing(_) | State::Paused | State::Parking => {
                 &["disarm", "levels", "park", "pause", "stop", "trim"]
             }

@@ -1,4 +1,4 @@
-//! `kinocue fleet stop`, `pause`, `park`, `disarm`, `level` and `load`: asked of all chosen halls at once, a line for each.
+//! `kinocue fleet stop`, `pause`, `park`, `disarm`, `level`, `trim`, `load` and `preflight`: asked of all chosen halls at once, a line for each.
 
 use std::time::Duration;
 
@@ -20,10 +20,11 @@ use crate::config::parse_level;
 use crate::control::HallFacts;
 use crate::fleet::{self, Letter, Order};
 use crate::sys::clock::wall_now_ns;
+use crate::time::parse_trim;
 
 /// How long a hall may take to answer.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// The same where it reads and proves a cue.
+/// The same where it reads and proves a cue, or asks its controllers.
 const LONG: Duration = Duration::from_secs(70);
 /// How often it is looked whether the engine is there.
 const LOOK: Duration = Duration::from_millis(20);
@@ -101,6 +102,25 @@ pub(super) struct LevelArgs {
     of: HallArgs,
 }
 
+/// Has the motion in halls that allow it (trim) be later than the film, or earlier.
+#[derive(Debug, clap::Args)]
+pub(super) struct TrimArgs {
+    /// -500ms to 500ms: positive makes the motion later than the film, negative earlier.
+    #[arg(value_parser = parse_trim, allow_hyphen_values = true)]
+    trim: i32,
+    #[command(flatten)]
+    of: HallArgs,
+}
+
+/// Has halls that allow it (preflight) check their controllers; nothing moves.
+///
+/// A hall whose preflight fails counts as one that refuses; what was found is on its console.
+#[derive(Debug, clap::Args)]
+pub(super) struct PreflightArgs {
+    #[command(flatten)]
+    of: HallArgs,
+}
+
 /// Loads a cue of their own libraries in halls that allow it (load) and are parked.
 #[derive(Debug, clap::Args)]
 pub(super) struct LoadArgs {
@@ -158,6 +178,15 @@ pub(super) fn disarm(args: &DisarmArgs) -> Result<Exit, Failure> {
 
 pub(super) fn level(args: &LevelArgs) -> Result<Exit, Failure> {
     ask(&args.of, Asked { word: "levels", args: json!({ "motion": args.level }), patience: PATIENCE })
+}
+
+pub(super) fn trim(args: &TrimArgs) -> Result<Exit, Failure> {
+    let offset_s = f64::from(args.trim) / 1e3;
+    ask(&args.of, Asked { word: "trim", args: json!({ "offset_s": offset_s }), patience: PATIENCE })
+}
+
+pub(super) fn preflight(args: &PreflightArgs) -> Result<Exit, Failure> {
+    ask(&args.of, Asked { word: "preflight", args: json!({}), patience: LONG })
 }
 
 pub(super) fn load(args: &LoadArgs) -> Result<Exit, Failure> {

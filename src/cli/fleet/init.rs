@@ -134,7 +134,7 @@ fn hall_table(plan: &Plan<'_>, hall: &str, desk: &KeyPair) -> String {
     let (site, name, public) = (plan.site, plan.desk, desk.public_key());
     format!(
         "# Add this to kinocue.toml, and restart the service. A stop is always taken; name in allow what else the desk may ask:\n\
-         # pause, park, disarm, load, levels, trim, cues and playlists, which come into its folders, and pull, which fetches its cues. With start = true it may also start\n\
+         # pause, park, disarm, load, levels, trim, preflight, cues and playlists, which come into its folders, and pull, which fetches its cues. With start = true it may also start\n\
          # what somebody here has armed with --fleet.\n\
          [fleet]\nname = \"{site}.{hall}\"\nallow = {}\n\n[[fleet.key]]\nname = \"{name}\"\nrole = \"operate\"\npublic = \"{public}\"\n",
         plan.allow

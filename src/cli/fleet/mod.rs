@@ -41,6 +41,8 @@ Examples:
   kinocue fleet stop
   kinocue fleet stop berlin.h2
   kinocue fleet level 60% 'berlin.*'
+  kinocue fleet trim +40ms berlin.h1
+  kinocue fleet preflight all                            whether their seats could play now
   kinocue fleet start --group trio --at +10s
   kinocue fleet report --day yesterday
   kinocue fleet push cues/storm.mcap --to 'berlin.*'     tomorrow's cue into all halls, and where not, and why
@@ -75,7 +77,9 @@ enum FleetCommand {
     Park(act::ParkArgs),
     Disarm(act::DisarmArgs),
     Level(act::LevelArgs),
+    Trim(act::TrimArgs),
     Load(act::LoadArgs),
+    Preflight(act::PreflightArgs),
     Start(start::Args),
     Report(report::Args),
     Push(push::Args),
@@ -106,7 +110,9 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         FleetCommand::Park(args) => act::park(args),
         FleetCommand::Disarm(args) => act::disarm(args),
         FleetCommand::Level(args) => act::level(args),
+        FleetCommand::Trim(args) => act::trim(args),
         FleetCommand::Load(args) => act::load(args),
+        FleetCommand::Preflight(args) => act::preflight(args),
         FleetCommand::Start(args) => start::run(args),
         FleetCommand::Report(args) => report::run(args),
         FleetCommand::Push(args) => push::run(args),
