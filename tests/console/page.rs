@@ -168,6 +168,30 @@ fn whoever_left_the_question_for_a_token_finds_the_way_back_to_it() {
 }
 
 #[test]
+fn a_refusal_that_comes_late_asks_nobody_who_has_given_a_token_meanwhile() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    browser.open(hall.url());
+    browser.wait("!document.getElementById('token').hidden");
+    browser.eval(
+        "const real = window.real = fetch;
+         window.late = [];
+         window.fetch = async (...asked) => {
+           const reply = await real(...asked);
+           if (reply.status === 401) await new Promise((come) => late.push(come));
+           return reply;
+         };",
+    );
+    browser.wait("late.length > 0");
+    browser.press("#token-text");
+    browser.type_text(crate::hall::TOKEN);
+    browser.press("#token [type=submit]");
+    browser.eval("window.fetch = window.real; late.forEach((come) => come())");
+    browser.reads("state", "parked");
+    assert_eq!(browser.eval("return document.getElementById('token').hidden"), json!(true));
+}
+
+#[test]
 fn the_map_is_one_tab_stop_and_the_arrow_keys_lead_from_seat_to_seat() {
     let Some(browser) = Browser::start() else { return };
     let hall = Hall::open();

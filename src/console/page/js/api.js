@@ -86,7 +86,7 @@ function send(method, path, body, repeatOf, patience) {
 }
 
 async function request(method, path, body, more, patience) {
-  const before = performance.now();
+  const [before, shown] = [performance.now(), token()];
   let response;
   let text;
   try {
@@ -106,7 +106,7 @@ async function request(method, path, body, more, patience) {
   }
   const reply = parsed(text);
   if (response.ok) return reply;
-  if (response.status === 401) askForToken({ pressed: method !== 'GET' });
+  if (response.status === 401) askForToken({ pressed: method !== 'GET', shown });
   if (reply.code === 'role') askForAnother();
   throw new Problem({
     status: response.status,

@@ -4,7 +4,7 @@
 import { headers } from './api.js';
 import { hear } from './clock.js';
 import { setLost, setStatus } from './state.js';
-import { askForToken, onToken } from './token.js';
+import { askForToken, onToken, token } from './token.js';
 import { words } from './language.js';
 
 const SILENCE_MS = 1500;
@@ -55,7 +55,7 @@ function watchSilence() {
 }
 
 async function read() {
-  attempt = { begun: performance.now(), abort: new AbortController() };
+  attempt = { begun: performance.now(), abort: new AbortController(), shown: token() };
   const response = await fetch('/api/v1/events', {
     headers: headers({ Accept: 'text/event-stream' }),
     cache: 'no-store',
@@ -81,7 +81,7 @@ async function read() {
 
 async function refusalOf(response) {
   if (response.status === 401) {
-    askForToken({ pressed: false });
+    askForToken({ pressed: false, shown: attempt.shown });
     return words('lost.token');
   }
   const problem = await response.json().catch(() => ({}));

@@ -15,9 +15,12 @@ export const token = () => sessionStorage.getItem(KEY);
 /** Calls back when a token was given. */
 export const onToken = (listener) => given.push(listener);
 
-/** The server does not know who asks. Whoever left the dialog is asked again only when they press something. */
-export function askForToken({ pressed }) {
-  if (left && !pressed) return;
+/**
+ * The server does not know who showed that token. Whoever has given another one since is not asked, and whoever left the dialog only when
+ * they press something.
+ */
+export function askForToken({ pressed, shown = token() }) {
+  if (shown !== token() || (left && !pressed)) return;
   open(token() ? 'token.unknown' : 'token.required');
 }
 
