@@ -40,8 +40,10 @@ fn a_cue_comes_back_from_a_hall_as_it_is_and_over_no_file_that_is_there() {
     let run = pull("ride", &[]);
     assert!(run.code == Some(64) && run.stderr.contains("exists; --force replaces it"), "{run:?}");
     assert_eq!(fs::read_to_string(&out).unwrap(), long());
-    let other = "0".repeat(64);
-    let run = pull("ride", &["--force", "--sha256", &other]);
+    let other = ["--force", "--sha256", &"0".repeat(64)];
+    // The cues that were there are checked one after the other once the service has begun.
+    engine.wait(|_| !pull("ride", &other).stderr.contains("not checked yet"));
+    let run = pull("ride", &other);
     assert!(run.code == Some(1) && run.stderr.contains("it has another cue of that id"), "{run:?}");
     assert_eq!(fs::read_to_string(&out).unwrap(), long());
     let run = pull("ride", &["--force"]);
