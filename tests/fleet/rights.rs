@@ -291,11 +291,8 @@ fn a_key_of_a_hall_has_the_engine_neither_stop_another_nor_speak_for_it() {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let thief = runtime.block_on(Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1")).client;
     // The engine answers each of these, to wherever it is asked to answer.
-    let answered = [
-        "kc.log.berlin.h1",
-        "$JS.hub.API.STREAM.MSG.GET.kc_log",
-        "$JS.hub.API.$KV.kc_seen.berlin.h1",
-    ];
+    let answered =
+        ["kc.log.berlin.h1", "$JS.hub.API.STREAM.MSG.GET.kc_log", "$JS.hub.API.$KV.kc_seen.berlin.h1"];
     let status = r#"{"format":2,"state":"parked","cause":"all is well"}"#;
     let speak = move |to: &'static str| {
         let thief = thief.clone();
