@@ -428,9 +428,7 @@ impl Supervisor {
         let latched = self.hall.mirror.state.is_latched();
         if latched {
             let (state, cause) = (self.hall.mirror.state, self.hall.cause());
-            let then =
-                if self.reload.is_some() { "the configuration was reloaded" } else { "the service ended" };
-            self.note(format!("the hall was in {state} before {then}: {cause}"));
+            self.note(format!("the hall was in {state} before {}: {cause}", self.why_it_closes()));
         }
         Carryover {
             settings: Some(self.settings()),
@@ -443,11 +441,21 @@ impl Supervisor {
         }
     }
 
+    const fn why_it_closes(&self) -> &'static str {
+        if self.reload.is_some() { "the configuration was reloaded" } else { "the service ended" }
+    }
+
+    /// Answers whoever waits for what this hall does not do any more.
+    fn refuse_asked(&mut self) {
+        for asked in std::mem::take(&mut self.procedures).into_asked() {
+            let problem = state_mirror::closed(self.why_it_closes());
+            self.answer(asked, Err(problem));
+        }
+    }
+
     /// The hall has closed.
     fn end(mut self, closed: Box<RuntimeEnd>) -> SupervisorEnd {
-        for asked in std::mem::take(&mut self.procedures).into_asked() {
-            self.answer(asked, Err(state_mirror::no_answer()));
-        }
+        self.refuse_asked();
         self.features.records.end(&self.hall);
         self.features.records.close(&self.hall);
         self.keep_settings();

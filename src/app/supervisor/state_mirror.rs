@@ -72,3 +72,12 @@ pub(super) fn no_answer() -> Problem {
         "check the status before you repeat the command: it may still take effect",
     )
 }
+
+/// The tick thread has ended.
+pub(super) fn closed(why: &str) -> Problem {
+    Problem::new(
+        Code::Timeout,
+        format!("{why} before the tick thread had answered"),
+        "check the status, and repeat the command if it took no effect",
+    )
+}

@@ -658,6 +658,19 @@ fn a_homing_that_is_stopped_tells_no_further_seat_to_home() {
 }
 
 #[test]
+fn who_waits_for_an_answer_while_the_hall_closes_is_told_why_none_comes() {
+    let mut rig = Rig::parked();
+    let waits = rig.while_it_waits(|rig| {
+        let waits = rig.post(Command::Disarm);
+        rig.hear();
+        rig.supervisor.refuse_asked();
+        waits
+    });
+    let detail = waits.join().unwrap().unwrap_err().detail;
+    assert_eq!(detail, "the service ended before the tick thread had answered");
+}
+
+#[test]
 fn what_is_asked_waits_for_what_was_asked_before_it_and_neither_holds_up_the_status() {
     let mut rig = Rig::parked();
     let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
