@@ -104,7 +104,7 @@ pub(super) struct LevelArgs {
 
 /// Has the motion in halls that allow it (trim) be later than the film, or earlier.
 #[derive(Debug, clap::Args)]
-pub(super) struct TrimArgs {
+pub(super) struct HallTrimArgs {
     /// -500ms to 500ms: positive makes the motion later than the film, negative earlier.
     #[arg(value_parser = parse_trim, allow_hyphen_values = true)]
     trim: i32,
@@ -180,7 +180,7 @@ pub(super) fn level(args: &LevelArgs) -> Result<Exit, Failure> {
     ask(&args.of, Asked { word: "levels", args: json!({ "motion": args.level }), patience: PATIENCE })
 }
 
-pub(super) fn trim(args: &TrimArgs) -> Result<Exit, Failure> {
+pub(super) fn trim(args: &HallTrimArgs) -> Result<Exit, Failure> {
     let offset_s = f64::from(args.trim) / 1e3;
     ask(&args.of, Asked { word: "trim", args: json!({ "offset_s": offset_s }), patience: PATIENCE })
 }

@@ -77,7 +77,7 @@ enum FleetCommand {
     Park(act::ParkArgs),
     Disarm(act::DisarmArgs),
     Level(act::LevelArgs),
-    Trim(act::TrimArgs),
+    Trim(act::HallTrimArgs),
     Load(act::LoadArgs),
     Preflight(act::PreflightArgs),
     Start(start::Args),
