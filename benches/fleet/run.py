@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
 """How old a desk's picture of its halls is, what that costs the engine, and how soon all of them hear a stop.
 
-    benches/fleet/run.py [--halls N] [--real N] [--seconds S] [--program PATH]
+    benches/fleet/run.py [--halls N] [--real N [--play]] [--seconds S] [--program PATH]
 
 Light halls speak for themselves alone, each with its own key and connection: a status of the length of a real one twice a second, and an
-answer to each stop. `--real` adds whole halls with two simulated seats each, with their links. Engine, desk and halls are on this machine,
-on loopback, and share its processors. Needs nats-server, and nats-py with nkeys (pip install nats-py nkeys).
+answer to each stop. `--real` adds whole halls with two simulated seats each, with their links; `--play` has each of them play, and kills the
+engine in mid-show, before all are stopped. Engine, desk and halls are on this machine, on loopback, and share its processors. Needs nats-server, and nats-py with nkeys (pip install nats-py nkeys).
 """
 
 import argparse
 import asyncio
 import json
+import math
 import os
 import random
 import shutil
@@ -28,6 +29,8 @@ import nats
 ROOT = Path(__file__).resolve().parents[2]
 # Below the ports that the system gives out by itself: among so many halls it would give one out twice.
 PORTS = 21_000
+# The seats of a show have joined after so long, at the most.
+JOINED_S = 10
 # As one of our halls tells of itself in a show.
 STATUS = {
     "format": 1, "at": "2026-11-21T19:05:12.400+01:00", "seq": 0, "hall": "", "version": "0.1.0", "state": "playing",
@@ -98,7 +101,8 @@ async def measure(args, folder):
         return running[-1]
 
     try:
-        engine = start(shutil.which("nats-server") or "/usr/sbin/nats-server", "-c", str(conf), stderr=subprocess.DEVNULL)
+        serve = lambda: start(shutil.which("nats-server") or "/usr/sbin/nats-server", "-c", str(conf), stderr=subprocess.DEVNULL)
+        engine = serve()
         settings = folder / "fleet/office/desk.toml"
         settings.write_text(settings.read_text() + '[api]\nlisten = ["127.0.0.1:0"]\nopen_role = "view"\n')
         while socket.socket().connect_ex(("127.0.0.1", int(engine_at.split(":")[1]))):
@@ -112,11 +116,8 @@ async def measure(args, folder):
         halls = [asyncio.create_task(of(name)) for name in names[: args.halls]]
         loop = asyncio.get_running_loop()
         page = lambda: loop.run_in_executor(None, ask, address, "halls")
-        began = time.monotonic()
-        while silent := [hall["name"] for hall in (await page())["halls"] if hall["silent"]]:
-            if time.monotonic() - began > 120:
-                sys.exit(f"not heard after 120 s: {', '.join(silent)}")
-            await asyncio.sleep(0.5)
+        await hear_all(page)
+        shows = [Show(args.program, folder / name) for name in names[args.halls :] if args.play]
         ages, replies_ms, before, began = [], [], (processor_s(engine.pid), processor_s(desk.pid)), time.monotonic()
         while time.monotonic() - began < args.seconds:
             asked = time.monotonic()
@@ -130,6 +131,13 @@ async def measure(args, folder):
         print(f"a look at the page   p50 {statistics.median(replies_ms):.1f}  p99 {quantile(replies_ms, 0.99):.1f} ms")
         print(f"engine               {share[0]:.1f} % of a core, {resident_mib(engine.pid):.0f} MiB")
         print(f"desk                 {share[1]:.1f} % of a core, {resident_mib(desk.pid):.0f} MiB")
+        if shows:
+            engine.kill()
+            await asyncio.sleep(10)
+            engine = serve()
+            await hear_all(page)
+            lost, other = sum(show.lost() for show in shows), [show.own.name for show in shows if not show.plays_on()]
+            print(f"{len(shows)} shows           {sum(show.sent() for show in shows)} frames, {lost} lost; not on in their show: {', '.join(other) or 'none'}")
         asked = time.monotonic()
         answers = await loop.run_in_executor(None, ask, address, "stop", {"halls": ["all"]})
         all_ms = (time.monotonic() - asked) * 1000
@@ -146,14 +154,56 @@ async def measure(args, folder):
             one.wait(30)
 
 
+async def hear_all(page):
+    """Waits until the desk hears all halls."""
+    began = time.monotonic()
+    while silent := [hall["name"] for hall in (await page())["halls"] if hall["silent"]]:
+        if time.monotonic() - began > 120:
+            sys.exit(f"not heard after 120 s: {', '.join(silent)}")
+        await asyncio.sleep(0.5)
+
+
+class Show:
+    """A hall that plays; what became of that, asked of the hall itself."""
+
+    def __init__(self, program, own):
+        self.program, self.own = program, own
+        for words in (["preflight"], ["load", "waves"], ["arm"], ["go"]):
+            self.ask(*words)
+        self.went = time.monotonic()
+
+    def ask(self, *words):
+        command = [self.program, *words, "--socket", str(self.own / "control.sock")]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+    def status(self):
+        return json.loads(self.ask("status", "--json"))
+
+    def counted(self, what):
+        return sum(one[what] for one in self.status()["controllers"])
+
+    def sent(self):
+        return self.counted("sent")
+
+    def lost(self):
+        return self.counted("lost") + self.counted("refused") + self.counted("send_failed")
+
+    def plays_on(self):
+        """It has been playing since its seats had joined."""
+        status = self.status()
+        return status["state"] == "playing" and status["since_s"] > time.monotonic() - self.went - JOINED_S
+
+
 def start_hall(program, folder, name, port, start):
     """A whole hall that sends from that port to two simulated seats at those after it, and its link."""
     own = folder / name
-    own.mkdir()
+    (own / "cues").mkdir(parents=True)
+    waves = (f"{n},{0.5 + 0.2 * math.sin(1.3 * n) * min(1, n / 10):.4f}\n" for n in range(600))
+    (own / "cues/waves.csv").write_text("# interpolation: spline\ntime_s,a1\n" + "".join(waves))
     ports = [port + 1, port + 2]
     seats = "".join(f'[[controller]]\nname = "A{n}"\nseat = "s"\naddress = "127.0.0.1:{port}"\n' for n, port in enumerate(ports))
     (own / "hall.toml").write_text(
-        f'[show]\nname = "{name}"\nbind = "127.0.0.1:{port}"\n[seat.s]\naxes = 3\nstroke_mm = 150.0\nlead_mm = 5.0\npulses_per_rev = 10000\n'
+        f'[show]\nname = "{name}"\nbind = "127.0.0.1:{port}"\nlibrary = "{own}/cues"\n[seat.s]\naxes = 3\nstroke_mm = 150.0\nlead_mm = 5.0\npulses_per_rev = 10000\n'
         "max_velocity_mm_s = 240.0\nmax_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\n"
         f"{seats}{(folder / f'fleet/{name}/kinocue-fleet.toml').read_text()}"
     )
@@ -167,6 +217,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--halls", type=int, default=1000, help="light halls")
     parser.add_argument("--real", type=int, default=0, help="whole halls")
+    parser.add_argument("--play", action="store_true", help="a show in each whole hall")
     parser.add_argument("--seconds", type=float, default=60)
     parser.add_argument("--program", default=str(ROOT / "target/release/kinocue"))
     args = parser.parse_args()
