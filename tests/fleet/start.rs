@@ -24,6 +24,8 @@ const HALLS: [&str; 3] = ["h1", "h2", "h3"];
 /// The speed of the ride between its ends, strokes a second, and when that begins and ends.
 const SPEED: f64 = 0.2;
 const EVEN_S: (f64, f64) = (0.8, 1.8);
+/// The halls tick so far apart, ms.
+const TICK_MS: f64 = 10.0;
 /// What is in a stroke of the bench seat.
 const PULSES: f64 = 300_000.0;
 
@@ -70,6 +72,11 @@ fn zero_of(hall: &Hall) -> f64 {
     let zeros: Vec<f64> = frames.iter().filter_map(film_zero_ns).collect();
     assert!(zeros.len() > 50, "{} of {} frames", zeros.len(), frames.len());
     zeros.into_iter().fold(f64::INFINITY, f64::min)
+}
+
+/// Ticks that a hall has slept through.
+fn missed_of(hall: &Hall) -> u32 {
+    u32::try_from(hall.status()["missed_ticks"].as_u64().unwrap()).unwrap()
 }
 
 /// A time server on loopback, whose clock is so much ahead of ours; its address.
@@ -146,6 +153,7 @@ fn three_halls_start_at_one_instant_and_no_seat_can_tell_which_was_first() {
     for round in 0..rounds {
         halls.iter().for_each(arm);
         halls.iter().for_each(|hall| drop(hall.relay(0).seen()));
+        let before = halls.each_ref().map(missed_of);
         let run = engine.desk(&["start", "--group", "trio", "--at", "+4s", "--json"]);
         assert_eq!(run.code, Some(0), "{run:?}");
         let told = run.report();
@@ -159,12 +167,15 @@ fn three_halls_start_at_one_instant_and_no_seat_can_tell_which_was_first() {
         let (skew_ms, within_ms) = ((most - least) / 1e6, told["within_ms"].as_f64().unwrap());
         skews.push(skew_ms);
         offs.extend(zeros.map(|zero| (zero - instant_ns) / 1e6));
-        println!("round {round}: skew {skew_ms:.3} ms, told within {within_ms:.3} ms");
+        // Ticks that a hall sleeps through in its show put its film behind, and are taken back slowly.
+        let missed = halls.iter().zip(before).map(|(hall, before)| missed_of(hall) - before).max().unwrap();
+        println!("round {round}: skew {skew_ms:.3} ms, told within {within_ms:.3} ms, {missed} ticks missed");
         for hall in told["halls"].as_array().unwrap() {
             assert_eq!(hall["done"], true, "{hall}");
             assert!(hall["bound_ms"].as_f64().unwrap() <= 2.0, "{hall}");
         }
-        assert!(skew_ms <= 2.0 + within_ms, "skew of film zero {skew_ms:.3} ms, bounds {within_ms:.3} ms");
+        let most_ms = 2.0 + within_ms + TICK_MS * f64::from(missed);
+        assert!(skew_ms <= most_ms, "skew of film zero {skew_ms:.3} ms, at most {most_ms:.3} ms");
         for hall in &halls {
             let status = hall.status();
             assert_eq!(status["fleet"]["start"]["phase"], "started");
