@@ -175,8 +175,9 @@ impl StopDesk {
 
     /// Has the oldest caller go, once what they said meanwhile was read; whether there was one.
     fn parts_with_oldest(&mut self) -> bool {
-        let oldest = self.peers.pop_front();
-        oldest.map(|mut caller| caller.listen(&self.handle, self.who)).is_some()
+        let Some(mut oldest) = self.peers.pop_front() else { return false };
+        oldest.listen(&self.handle, self.who);
+        true
     }
 }
 
