@@ -54,19 +54,7 @@ pub(crate) fn fleet_stop_socket(path: &Path, handle: Handle) -> Result<StopSocke
 }
 
 fn serve_stop(path: &Path, handle: Handle, who: fn(&str) -> Who) -> Result<StopSocket, ApiError> {
-    let (listener, file) = socket::unix(path)?;
-    let (wake, sleeper) = UnixStream::pair().map_err(ApiError::System)?;
-    let spare = sleeper.try_clone().ok();
-    let desk = StopDesk {
-        listener,
-        _file: file,
-        sleeper,
-        spare,
-        handle,
-        who,
-        peers: VecDeque::new(),
-        pause_until: None,
-    };
+    let (desk, wake) = StopDesk::new(path, handle, who)?;
     let thread = Builder::new().name("stop".to_owned()).spawn(move || desk.run());
     Ok(StopSocket { wake: Some(wake), thread: Some(thread.map_err(ApiError::System)?) })
 }
@@ -102,6 +90,15 @@ struct Caller {
 }
 
 impl StopDesk {
+    /// One that ends once what is given beside it is dropped.
+    fn new(path: &Path, handle: Handle, who: fn(&str) -> Who) -> Result<(Self, UnixStream), ApiError> {
+        let (listener, file) = socket::unix(path)?;
+        let (wake, sleeper) = UnixStream::pair().map_err(ApiError::System)?;
+        let (spare, peers) = (sleeper.try_clone().ok(), VecDeque::new());
+        let desk = Self { listener, _file: file, sleeper, spare, handle, who, peers, pause_until: None };
+        Ok((desk, wake))
+    }
+
     fn run(mut self) {
         loop {
             let woken = self.wait();
@@ -136,10 +133,10 @@ impl StopDesk {
         Some(!ready[0].revents().is_empty())
     }
 
-    /// Reads what the connections said, without waiting for any.
+    /// Reads what the connections said, without waiting for any; before one goes that said nothing for long: this thread may have stood still.
     fn hear(&mut self, now: MonoTime) {
         let (handle, who) = (&self.handle, self.who);
-        self.peers.retain_mut(|caller| caller.until > now && caller.listen(handle, who));
+        self.peers.retain_mut(|caller| caller.listen(handle, who) && caller.until > now);
     }
 
     fn accept(&mut self, now: MonoTime) {
@@ -149,7 +146,9 @@ impl StopDesk {
                     let mut caller = Caller { stream, line: Vec::new(), until: now + SILENCE };
                     if caller.listen(&self.handle, self.who) {
                         self.peers.push_back(caller);
-                        self.peers.drain(..self.peers.len().saturating_sub(PEERS));
+                        if self.peers.len() > PEERS {
+                            self.parts_with_oldest();
+                        }
                     }
                 }
                 Ok(_) => {}
@@ -171,7 +170,14 @@ impl StopDesk {
 
     /// Gives up a descriptor for whoever calls: the spare one, or that of the oldest caller.
     fn makes_room(&mut self) -> bool {
-        self.spare.take().is_some() || self.peers.pop_front().is_some()
+        self.spare.take().is_some() || self.parts_with_oldest()
+    }
+
+    /// Has the oldest caller go, once what they said meanwhile was read; whether there was one.
+    fn parts_with_oldest(&mut self) -> bool {
+        let Some(mut oldest) = self.peers.pop_front() else { return false };
+        oldest.listen(&self.handle, self.who);
+        true
     }
 }
 
@@ -298,6 +304,31 @@ mod tests {
         BufReader::new(&stream).read_line(&mut reply).unwrap();
         assert_eq!(reply, "stopping\n");
         assert!(hall.desk.take_stop());
+    }
+
+    #[test]
+    fn a_stop_that_came_while_nobody_looked_is_heard_before_its_caller_goes() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("stop.sock");
+        let desk = Arc::new(Desk::new(std::iter::empty()));
+        let (handle, _inbox, _) = handle(Arc::clone(&desk), Status::starting("Hall 1"));
+        let (mut stops, _wake) = StopDesk::new(&path, handle, peer::local).unwrap();
+        let now = Monotonic.now();
+        let call = |stops: &mut StopDesk| {
+            let stream = UnixStream::connect(&path).unwrap();
+            stops.accept(now);
+            stream
+        };
+        let mut early = call(&mut stops);
+        early.write_all(b"stop\n").unwrap();
+        stops.hear(now + SILENCE);
+        assert!(desk.take_stop(), "the thread stood still for as long as a caller may say nothing");
+
+        let mut oldest = call(&mut stops);
+        oldest.write_all(b"stop\n").unwrap();
+        let _others: Vec<_> = (0..PEERS).map(|_| call(&mut stops)).collect();
+        assert!(desk.take_stop(), "and it has to make room for others");
+        assert_eq!(stops.peers.len(), PEERS);
     }
 
     #[test]

@@ -67,6 +67,7 @@ pub(super) struct Spans {
     count: usize,
     last: Pose,
     newest: FrameNo,
+    newest_at: MonoTime,
 }
 
 impl Spans {
@@ -77,7 +78,7 @@ impl Spans {
         let empty = Span { first: FrameNo::FIRST, at, asked: None, reach: Reach::at(last) };
         // The one that is being filled may have just begun.
         let length = SPAN.max(open / (SPANS as u32 - 1));
-        Self { spans: [empty; SPANS], length, period, count: 0, last, newest: FrameNo::FIRST }
+        Self { spans: [empty; SPANS], length, period, count: 0, last, newest: FrameNo::FIRST, newest_at: at }
     }
 
     /// No frame since the axes were there.
@@ -112,7 +113,7 @@ impl Spans {
         if asked {
             span.asked = Some((span.asked.map_or(at, |(since, _)| since), frame));
         }
-        (self.last, self.newest) = (*pose, frame);
+        (self.last, self.newest, self.newest_at) = (*pose, frame, at);
     }
 
     /// A frame was acked: those before its span say nothing any more.
@@ -135,13 +136,17 @@ impl Spans {
         self.count = 0;
     }
 
-    /// Since when an ack is waited for, or a little earlier.
+    /// Since when an ack is waited for: about when the frame behind `acked` left, and no later than its span was over. Numbers may be left out, and
+    /// would tell of a time to come.
     pub(super) fn waiting_since(&self, acked: Option<FrameNo>) -> Option<MonoTime> {
         let open = |last: FrameNo| acked.is_none_or(|acked| last.since(acked) > 0);
-        self.spans[..self.count].iter().find_map(|span| {
+        let spans = &self.spans[..self.count];
+        let over = spans.iter().skip(1).map(|next| next.at).chain([self.newest_at]);
+        spans.iter().zip(over).find_map(|(span, over)| {
             let (since, _) = span.asked.filter(|(_, last)| open(*last))?;
-            let taken = acked.map_or(0, |acked| acked.since(span.first) + 1);
-            Some(since.max(span.at + self.period * u32::try_from(taken).unwrap_or(0)))
+            let taken = acked.map_or(0, |acked| acked.since(span.first).saturating_add(1));
+            let left = span.at + self.period * u32::try_from(taken).unwrap_or(0);
+            Some(since.max(left.min(over)))
         })
     }
 

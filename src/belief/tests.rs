@@ -162,6 +162,24 @@ fn a_frame_is_missed_after_fifty_milliseconds_however_many_of_its_neighbours_wer
 }
 
 #[test]
+fn a_frame_is_missed_within_a_span_though_numbers_before_it_were_left_out() {
+    let mut bench = Bench::found(0.0);
+    bench.belief = Belief { period: Duration::from_millis(1), ..bench.belief };
+    bench.belief.spans = Spans::over(GAP, Duration::from_millis(1));
+    bench.read(0.0, 0, true);
+    // The lane goes on with the number of others at 203 ms. Acks come after 5 ms, and for what leaves from 206 ms on none.
+    let number = |when: u32| when + if when < 203 { 1 } else { 1_001 };
+    let gap = (0_u32..400).find(|when| {
+        bench.ack(number(when.saturating_sub(5).min(205)));
+        let found = bench.look((*when).into());
+        bench.next = number(*when);
+        bench.send(0.0, 1, (*when).into());
+        found == Found::Gap
+    });
+    assert!(gap.is_some_and(|gap| (206 + 51..=206 + 61).contains(&gap)), "{gap:?}");
+}
+
+#[test]
 fn acks_that_come_again_tell_where_frames_are_taken_and_a_reading_ends_the_gap() {
     let (mut bench, _) = unheard(200);
     bench.ack(21);

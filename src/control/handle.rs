@@ -100,9 +100,13 @@ struct Led {
 }
 
 impl StatusSource {
-    /// From now on a stop goes to that desk: the hall was opened anew.
+    /// From now on a stop goes to that desk: the hall was opened anew. So does one that was asked while the hall before closed: nobody takes it
+    /// there any more, and whoever asked was told that it is done.
     pub(crate) fn lead(&self, desk: Arc<Desk>) {
-        self.1.write().unwrap_or_else(PoisonError::into_inner).desk = desk;
+        let mut led = self.1.write().unwrap_or_else(PoisonError::into_inner);
+        if std::mem::replace(&mut led.desk, desk).take_stop() {
+            led.desk.stop();
+        }
     }
 
     /// From now on that thread is woken by each ask. What was asked before is there to be taken.
@@ -312,6 +316,20 @@ mod tests {
         handle.note_stop(who(Role::View));
         let last = std::iter::from_fn(|| inbox.next(NOW)).last().unwrap();
         assert_eq!(last.desired.ask, Command::Stop);
+    }
+
+    #[test]
+    fn a_stop_that_the_hall_before_did_not_take_any_more_is_one_of_the_hall_that_was_opened_anew() {
+        let [before, next] = [(); 2].map(|()| Arc::new(Desk::new(std::iter::empty())));
+        let (handle, _inbox, source) = handle(Arc::clone(&before), Status::starting("Hall 1"));
+        source.lead(Arc::clone(&before));
+        assert!(!before.take_stop(), "nobody asked for one");
+        handle.stop();
+        source.lead(Arc::clone(&next));
+        assert!(next.take_stop());
+        source.lead(before);
+        handle.stop();
+        assert!(!next.take_stop());
     }
 
     #[test]

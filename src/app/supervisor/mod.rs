@@ -423,8 +423,9 @@ impl Supervisor {
         asked.answer(result.map(|()| status));
     }
 
-    /// What goes over to the next hall.
+    /// What goes over to the next hall, with what the tick thread said as it left.
     fn remember(&mut self) -> Carryover {
+        self.take_news();
         let latched = self.hall.mirror.state.is_latched();
         if latched {
             let (state, cause) = (self.hall.mirror.state, self.hall.cause());

@@ -50,6 +50,17 @@ fn a_hall_that_was_latched_is_so_with_another_configuration_too() {
 }
 
 #[test]
+fn so_is_one_that_the_tick_thread_stopped_as_it_left() {
+    let mut before = Rig::parked();
+    before.handle.stop();
+    while before.state() != State::Stopped {
+        std::thread::yield_now();
+    }
+    let mut rig = Rig::starting(before.supervisor.remember());
+    rig.wait_until(|supervisor| supervisor.hall.mirror.state == State::Stopped);
+}
+
+#[test]
 fn a_seat_that_is_out_is_out_from_the_first_tick_of_the_next_hall_on() {
     let mut before = Rig::parked();
     before.ask(out("B1")).unwrap();

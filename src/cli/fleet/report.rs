@@ -151,7 +151,10 @@ impl ToldByHall {
         }
     }
 
-    fn report(self, day: Date) -> JournalReport {
+    fn report(mut self, day: Date) -> JournalReport {
+        // As the hall itself reads them: what was told again, of days before, is not behind what was told first.
+        let file_of = |record: &LogRecord| record.part.file.clone();
+        self.records.values_mut().for_each(|records| records.sort_by_cached_key(file_of));
         let lines = |records: Vec<LogRecord>| records.into_iter().map(|record| record.part.record).collect();
         let mut report = report_of(self.records.into_values().map(lines), day, day);
         report.notes.extend(self.missing);
@@ -164,6 +167,36 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::journal::ShowResult;
+
+    #[test]
+    fn a_start_of_days_ago_that_is_told_again_ends_no_show_of_today() {
+        let show = json!({
+            "kind": "begin", "start": "2026-11-21T19:00:00.000Z", "hall": "h1", "cue": "storm", "sha256": "", "level": 1.0,
+            "vibration": 1.0, "trim_ms": 0, "effects_off": [], "seats_total": 2, "seats_available": 2, "operator": "ann",
+            "scheduled": false, "out_of_hours": false,
+        });
+        let start = |at| json!({ "kind": "start", "at": at, "version": "1" });
+        let (old, new) =
+            (("10", start("2026-11-10T08:00:00.000Z")), ("21", start("2026-11-21T08:00:00.000Z")));
+        let mut told = ToldByHall::default();
+        // The first two of today; then what the hall tells from its first line on, behind what was none of its records.
+        for (n, line, (file, record)) in [
+            (8, 1, new.clone()),
+            (9, 2, ("21", show.clone())),
+            (1, 1, old),
+            (2, 1, new),
+            (3, 2, ("21", show)),
+        ] {
+            if n == 1 {
+                told.take("kc.log.berlin.h1", b"none");
+            }
+            let record = json!({ "n": n, "told": {}, "file": file, "line": line, "record": record });
+            told.take("kc.log.berlin.h1", record.to_string().as_bytes());
+        }
+        let shows = told.report(jiff::civil::date(2026, 11, 21)).shows;
+        assert_eq!(shows.iter().map(|show| show.result).collect::<Vec<_>>(), [ShowResult::Running]);
+    }
 
     #[test]
     fn whatever_number_a_record_has_is_no_reason_to_end_and_what_is_between_two_is_missing() {
