@@ -278,7 +278,7 @@ impl<W: Write + Seek> Cutting<W> {
                 let octets = anonymous.as_ref().map_or_else(|| octets.to_vec(), |one| one.drain(chunk));
                 self.ticks_before(*began)?;
                 if let Some((chunk, _)) = AckChunk::parse(&octets) {
-                    self.fold.take_acks(&chunk);
+                    chunk.records().for_each(|record| self.fold.ack(&record));
                 }
                 if self.block.is_some() {
                     self.drains.extend(octets);
