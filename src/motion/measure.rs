@@ -61,7 +61,7 @@ pub struct Readings {
 #[derive(Debug, Clone)]
 pub struct Measure {
     times: MeasureTimes,
-    places: MeasurePlaces,
+    places: MeasurePlaces<1>,
 }
 
 impl Measure {
@@ -74,7 +74,9 @@ impl Measure {
     /// Takes the next pose, at a show time after the one before, and says what it showed.
     pub fn push(&mut self, at: ShowTime, position: f64) -> Readings {
         let spans = self.times.push(at);
-        self.places.push(&spans, position)
+        let mut newest = Readings::default();
+        self.places.push(&spans, &[position], |_, readings| newest = readings);
+        newest
     }
 }
 
@@ -162,35 +164,48 @@ impl MeasureTimes {
     }
 }
 
-/// Where the poses of one axis were.
+/// Where the poses of up to so many axes were: those of one instant side by side, as a pose needs seven of them of each axis.
 #[derive(Debug, Clone)]
-pub(crate) struct MeasurePlaces {
-    last_velocity: f64,
-    positions: [f64; HISTORY],
+pub(crate) struct MeasurePlaces<const N: usize> {
+    last_velocities: [f64; N],
+    positions: [[f64; N]; HISTORY],
 }
 
-impl MeasurePlaces {
+impl<const N: usize> MeasurePlaces<N> {
     /// None yet.
-    pub(crate) const NONE: Self = Self { last_velocity: 0.0, positions: [0.0; HISTORY] };
+    pub(crate) const NONE: Self = Self { last_velocities: [0.0; N], positions: [[0.0; N]; HISTORY] };
 
-    /// Takes the position of the next pose, and says what it showed.
-    pub(crate) fn push(&mut self, spans: &MeasureSpans, position: f64) -> Readings {
-        self.positions[spans.newest] = position;
+    /// Takes the positions of the next pose, and tells of each axis what it showed.
+    pub(crate) fn push(
+        &mut self,
+        spans: &MeasureSpans,
+        positions: &[f64],
+        mut tell: impl FnMut(usize, Readings),
+    ) {
+        for (place, position) in self.positions[spans.newest].iter_mut().zip(positions) {
+            *place = *position;
+        }
+        for axis in 0..positions.len().min(N) {
+            tell(axis, self.readings(spans, axis));
+        }
+    }
+
+    fn readings(&mut self, spans: &MeasureSpans, axis: usize) -> Readings {
         let mut readings = Readings::default();
         if let Some((before, seconds, at)) = spans.before {
-            let velocity = (position - self.positions[before]) / seconds;
+            let velocity = (self.positions[spans.newest][axis] - self.positions[before][axis]) / seconds;
             readings.velocity = Reading { value: velocity, at };
+            let last_velocity = std::mem::replace(&mut self.last_velocities[axis], velocity);
             if let Some(at) = spans.step_at {
-                readings.step = Reading { value: velocity - self.last_velocity, at };
+                readings.step = Reading { value: velocity - last_velocity, at };
             }
-            self.last_velocity = velocity;
         }
-        spans.apart.iter().flatten().for_each(|apart| self.differences(apart, &mut readings));
+        spans.apart.iter().flatten().for_each(|apart| self.differences(apart, axis, &mut readings));
         readings
     }
 
-    fn differences(&self, spans: &ApartSpans, readings: &mut Readings) {
-        let places = spans.slots.map(|slot| self.positions[slot]);
+    fn differences(&self, spans: &ApartSpans, axis: usize, readings: &mut Readings) {
+        let places = spans.slots.map(|slot| self.positions[slot][axis]);
         // Neighbours share the slope between them.
         let slope = |index: usize| (places[index] - places[index + 1]) / spans.one[index];
         let newest = (slope(0) - slope(1)) / spans.two[0];
