@@ -52,14 +52,26 @@ pub(crate) struct SeatSample {
     pub(crate) standing: Option<u8>,
 }
 
-impl SeatSample {
+/// What a sample comes to, without places: of long recordings most is read for that alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SeatSum {
+    pub(crate) film_s: f64,
+    pub(crate) sent: u32,
+    pub(crate) unsent: u32,
+    pub(crate) clamps: u64,
+    pub(crate) standing: Option<u8>,
+    /// It was sent somewhere, by a tick that asked for it.
+    pub(crate) is_sent: bool,
     /// How far asked and sent are apart at most, mm or degrees.
-    pub(crate) fn apart(&self) -> f64 {
-        self.asked_mm
-            .iter()
-            .zip(self.sent_mm.iter())
-            .map(|(asked, sent)| (asked - sent).abs())
-            .fold(0.0, f64::max)
+    pub(crate) apart: f64,
+}
+
+impl SeatSample {
+    pub(crate) fn sum(&self) -> SeatSum {
+        let Self { film_s, ref asked_mm, ref sent_mm, sent, unsent, clamps, standing, .. } = *self;
+        let apart = asked_mm.iter().zip(sent_mm.iter()).map(|(asked, sent)| (asked - sent).abs());
+        let is_sent = sent > 0 && !asked_mm.is_empty();
+        SeatSum { film_s, sent, unsent, clamps, standing, is_sent, apart: apart.fold(0.0, f64::max) }
     }
 }
 
