@@ -162,12 +162,13 @@ impl Margins {
         if !goes_on {
             lane.times = MeasureTimes::new(self.spacing);
         }
-        let LaneMargins { reached: now, times, places: seen, axes, .. } = lane;
-        seen.push(&times.push(*now), places, |index, seen| {
+        let now = lane.reached;
+        let all = lane.places.push(&lane.times.push(now), places);
+        for (index, (axis, seen)) in lane.axes.iter_mut().zip(&all[..places.len()]).enumerate() {
             let shown = [seen.velocity, seen.acceleration, seen.jerk];
-            axes[index].keep(shown, *now, head.film);
-            tell(frame.lane, index, parts(shown, *now, head.film, seat.axes()[index].limits()));
-        });
+            axis.keep(shown, now, head.film);
+            tell(frame.lane, index, parts(shown, now, head.film, seat.axes()[index].limits()));
+        }
     }
 
     /// The most of each axis.
