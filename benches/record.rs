@@ -49,6 +49,8 @@ const RATE_HZ: f64 = 1_000.0;
 /// What an incident begins with and goes on for.
 const INCIDENT_S: u64 = 70;
 const FLIGHT: u64 = 128 << 20;
+/// How often the recorder's thread looks.
+const LOOK_MS: u64 = 50;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -81,7 +83,7 @@ fn measure(words: &[&str]) {
     }
 }
 
-/// Flat out: every tick of some seconds is tapped, and taken every twenty.
+/// Flat out: every tick of some seconds is tapped, and taken as often as the thread looks.
 fn costs(rounds: usize, seconds: u64) {
     let all: Vec<Costs> = (0..rounds).map(|_| Costs::of(seconds)).collect();
     let spread = |figure: fn(&Costs) -> f64| Spread::of(all.iter().map(figure));
@@ -108,7 +110,7 @@ fn incident_s(seconds: u64) -> f64 {
         let at = MonoTime::from_nanos(tick * 1_000_000);
         tapped(&mut tap, tick, at, &frames(tick));
         replied(&mut acks, tick, at, &mut dice);
-        if tick % 20 == 19 {
+        if tick % LOOK_MS == LOOK_MS - 1 {
             rig.take();
         }
     }
@@ -153,7 +155,7 @@ impl Costs {
             drains_us.push(timed(|| replied(&mut acks, tick, at, &mut dice)));
             sends_us.push(timed(|| frames.iter().for_each(|frame| sockets.send(frame.datagram()))));
             sockets.empty();
-            if tick % 20 == 19 {
+            if tick % LOOK_MS == LOOK_MS - 1 {
                 let before = thread_cpu_time();
                 octets += rig.take();
                 cpu += thread_cpu_time().saturating_sub(before);
@@ -416,7 +418,7 @@ fn play(seconds: &str, to: &[&str], behind: Behind) -> Outcome {
                 if behind == Behind::Recorder {
                     rig.take();
                 }
-                Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(20));
+                Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(LOOK_MS));
             }
         });
         let taps: Option<(Tap, AckTap)> = (behind != Behind::Nobody).then_some((tap, acks));

@@ -61,7 +61,7 @@ pub struct Readings {
 #[derive(Debug, Clone)]
 pub struct Measure {
     times: MeasureTimes,
-    places: MeasurePlaces,
+    places: MeasurePlaces<1>,
 }
 
 impl Measure {
@@ -74,7 +74,8 @@ impl Measure {
     /// Takes the next pose, at a show time after the one before, and says what it showed.
     pub fn push(&mut self, at: ShowTime, position: f64) -> Readings {
         let spans = self.times.push(at);
-        self.places.push(&spans, position)
+        let [readings] = self.places.push(&spans, &[position]);
+        readings
     }
 }
 
@@ -130,7 +131,7 @@ impl MeasureTimes {
             newest: self.newest,
             before,
             step_at: (self.seen >= 3).then(|| self.time(1)),
-            apart: [self.spacing.n, self.spacing.m].map(|apart| self.apart(apart)),
+            apart: [self.apart(self.spacing.n), self.apart(self.spacing.m)],
         }
     }
 
@@ -140,9 +141,9 @@ impl MeasureTimes {
         let last = if has_third { 3 * apart } else { 2 * apart };
         let middle = || self.time(apart).as_nanos().midpoint(self.time(2 * apart).as_nanos());
         Some(ApartSpans {
-            slots: [0, apart, 2 * apart, last].map(|back| self.slot(back)),
-            one: [0, apart, 2 * apart].map(|back| self.seconds(back, apart)),
-            two: [0, apart].map(|back| self.seconds(back, 2 * apart)),
+            slots: [self.slot(0), self.slot(apart), self.slot(2 * apart), self.slot(last)],
+            one: [self.seconds(0, apart), self.seconds(apart, apart), self.seconds(2 * apart, apart)],
+            two: [self.seconds(0, 2 * apart), self.seconds(apart, 2 * apart)],
             second_at: self.time(apart),
             third: has_third.then(|| (self.seconds(0, 3 * apart), ShowTime::from_nanos(middle()))),
         })
@@ -162,42 +163,56 @@ impl MeasureTimes {
     }
 }
 
-/// Where the poses of one axis were.
+/// Where the poses of up to so many axes were: those of one instant side by side, as a pose needs seven of them of each axis.
 #[derive(Debug, Clone)]
-pub(crate) struct MeasurePlaces {
-    last_velocity: f64,
-    positions: [f64; HISTORY],
+pub(crate) struct MeasurePlaces<const N: usize> {
+    last_velocities: [f64; N],
+    positions: [[f64; N]; HISTORY],
 }
 
-impl MeasurePlaces {
+impl<const N: usize> MeasurePlaces<N> {
     /// None yet.
-    pub(crate) const NONE: Self = Self { last_velocity: 0.0, positions: [0.0; HISTORY] };
+    pub(crate) const NONE: Self = Self { last_velocities: [0.0; N], positions: [[0.0; N]; HISTORY] };
 
-    /// Takes the position of the next pose, and says what it showed.
-    pub(crate) fn push(&mut self, spans: &MeasureSpans, position: f64) -> Readings {
-        self.positions[spans.newest] = position;
-        let mut readings = Readings::default();
+    /// Takes the positions of the next pose, and says of each axis what it showed.
+    pub(crate) fn push(&mut self, spans: &MeasureSpans, positions: &[f64]) -> [Readings; N] {
+        let axes = positions.len().min(N);
+        self.positions[spans.newest][..axes].copy_from_slice(&positions[..axes]);
+        let mut readings = [Readings::default(); N];
         if let Some((before, seconds, at)) = spans.before {
-            let velocity = (position - self.positions[before]) / seconds;
-            readings.velocity = Reading { value: velocity, at };
-            if let Some(at) = spans.step_at {
-                readings.step = Reading { value: velocity - self.last_velocity, at };
+            let (newest, before) = (&self.positions[spans.newest], &self.positions[before]);
+            let all = readings.iter_mut().zip(&mut self.last_velocities).take(axes);
+            for (axis, (readings, last_velocity)) in all.enumerate() {
+                let velocity = (newest[axis] - before[axis]) / seconds;
+                readings.velocity = Reading { value: velocity, at };
+                let step = velocity - std::mem::replace(last_velocity, velocity);
+                readings.step = spans.step_at.map_or(readings.step, |at| Reading { value: step, at });
             }
-            self.last_velocity = velocity;
         }
-        spans.apart.iter().flatten().for_each(|apart| self.differences(apart, &mut readings));
+        spans.apart.iter().flatten().for_each(|apart| self.differences(apart, &mut readings[..axes]));
         readings
     }
 
-    fn differences(&self, spans: &ApartSpans, readings: &mut Readings) {
-        let places = spans.slots.map(|slot| self.positions[slot]);
-        // Neighbours share the slope between them.
-        let slope = |index: usize| (places[index] - places[index + 1]) / spans.one[index];
-        let newest = (slope(0) - slope(1)) / spans.two[0];
-        keep_larger(&mut readings.acceleration, 2.0 * newest, spans.second_at);
-        let Some((seconds, middle)) = spans.third else { return };
-        let older = (slope(1) - slope(2)) / spans.two[1];
-        keep_larger(&mut readings.jerk, 6.0 * ((newest - older) / seconds), middle);
+    fn differences(&self, spans: &ApartSpans, readings: &mut [Readings]) {
+        let ApartSpans { slots, one, two, second_at, third } = spans;
+        let places = |index: usize| &self.positions[slots[index]];
+        let places = [places(0), places(1), places(2), places(3)];
+        let (seconds, middle) = third.unwrap_or((f64::INFINITY, ShowTime::ZERO));
+        let (mut second, mut jerk) = ([0.0; N], [0.0; N]);
+        let both = second.iter_mut().zip(&mut jerk).take(readings.len());
+        for (axis, (second, jerk)) in both.enumerate() {
+            // Neighbours share the slope between them.
+            let slope = |index: usize| (places[index][axis] - places[index + 1][axis]) / one[index];
+            let [newest, older] = [(slope(0) - slope(1)) / two[0], (slope(1) - slope(2)) / two[1]];
+            *second = 2.0 * newest;
+            *jerk = 6.0 * ((newest - older) / seconds);
+        }
+        for (axis, readings) in readings.iter_mut().enumerate() {
+            keep_larger(&mut readings.acceleration, second[axis], *second_at);
+            if third.is_some() {
+                keep_larger(&mut readings.jerk, jerk[axis], middle);
+            }
+        }
     }
 }
 

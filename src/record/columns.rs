@@ -12,13 +12,31 @@ pub(super) struct Column {
     pub(super) packed: Vec<u8>,
 }
 
-/// A column on its way.
-#[derive(Debug, Default)]
-struct ColumnWriter {
-    /// The last number, the step to it, and how many numbers there were by then.
+/// What the next number of a column is held against: the last one, the step to it, and how many there were by then. Those of columns
+/// side by side are together, since most numbers go on as they were, and then nothing else of a column is looked at.
+#[derive(Debug, Clone, Copy, Default)]
+struct ColumnEnd {
     last: i64,
     step: i64,
     count: usize,
+}
+
+impl ColumnEnd {
+    /// The second difference of the number of a row; those of rows that were left out go on as before. Wraps, so that any numbers come
+    /// back.
+    #[inline]
+    fn second(&mut self, row: usize, number: i64) -> i64 {
+        let left_out = i64::try_from(row - self.count).unwrap_or_default();
+        let step = number.wrapping_sub(self.last.wrapping_add(self.step.wrapping_mul(left_out)));
+        let second = step.wrapping_sub(self.step);
+        *self = Self { last: number, step, count: row + 1 };
+        second
+    }
+}
+
+/// A column on its way.
+#[derive(Debug, Default)]
+struct ColumnWriter {
     /// Second differences that are in no octets yet, and the row of the first.
     group: [u64; GROUP],
     begun: usize,
@@ -26,16 +44,9 @@ struct ColumnWriter {
 }
 
 impl ColumnWriter {
-    /// The number of a row; those of rows that were left out go on as before. Wraps, so that any numbers come back.
+    /// The second difference of a row, which is not 0.
     #[inline]
-    fn push(&mut self, row: usize, number: i64) {
-        let left_out = i64::try_from(row - self.count).unwrap_or_default();
-        let step = number.wrapping_sub(self.last.wrapping_add(self.step.wrapping_mul(left_out)));
-        let second = step.wrapping_sub(self.step);
-        (self.last, self.step, self.count) = (number, step, row + 1);
-        if second == 0 {
-            return;
-        }
+    fn push(&mut self, row: usize, second: i64) {
         while row >= self.begun + GROUP {
             self.close_group();
         }
@@ -70,32 +81,40 @@ impl ColumnWriter {
     }
 }
 
-/// ColumnSet side by side, on their way.
+/// Columns side by side, on their way.
 #[derive(Debug, Default)]
-pub(super) struct ColumnSet(Vec<ColumnWriter>);
+pub(super) struct ColumnSet {
+    ends: Vec<ColumnEnd>,
+    writers: Vec<ColumnWriter>,
+}
 
 impl ColumnSet {
     /// The numbers of a row, which may be of fewer columns than there are.
     #[inline]
     pub(super) fn push(&mut self, row: usize, numbers: impl IntoIterator<Item = i64>) {
         for (at, number) in numbers.into_iter().enumerate() {
-            if at == self.0.len() {
-                self.0.push(ColumnWriter::default());
+            if at == self.ends.len() {
+                self.ends.push(ColumnEnd::default());
+                self.writers.push(ColumnWriter::default());
             }
-            self.0[at].push(row, number);
+            let second = self.ends[at].second(row, number);
+            if second != 0 {
+                self.writers[at].push(row, second);
+            }
         }
     }
 
     /// What they came to, without those at the end that hold nothing. The next begin anew.
     pub(super) fn take(&mut self) -> Vec<Column> {
-        let mut columns: Vec<Column> = self.0.iter_mut().map(ColumnWriter::take).collect();
+        self.ends.fill(ColumnEnd::default());
+        let mut columns: Vec<Column> = self.writers.iter_mut().map(ColumnWriter::take).collect();
         let used = columns.iter().rposition(|column| !column.packed.is_empty());
         columns.truncate(used.map_or(0, |last| last + 1));
         columns
     }
 }
 
-/// ColumnSet that are read, row by row; without end: they go on as they were.
+/// Columns that are read, row by row; without end: they go on as they were.
 pub(super) struct ColumnReaders<'a>(Vec<ColumnReader<'a>>);
 
 impl<'a> ColumnReaders<'a> {

@@ -7,7 +7,7 @@ use mcap::McapError;
 
 use super::anonymous::Anonymous;
 use super::block::Block;
-use super::read::{Contents, ReadError, Told, Wanted};
+use super::read::{Contents, ReadError, Told, Wanted, WantedSamples};
 use super::reading::read;
 use super::scene::SeatScene;
 use super::{About, AckChunk, Chunk, EntryMaker, Message, Mode, Opening, RecordedSeat, Recording, Sampled};
@@ -115,7 +115,7 @@ pub(crate) fn each_tick(
     let (mut ticks, mut is_whole) = (0_u64, false);
     let mut held =
         HeldTicks { ticks: VecDeque::new(), is_in: stretch.from == ShowTime::from_nanos(i64::MIN) };
-    let wanted = Wanted { samples: false, ..Wanted::ALL };
+    let wanted = Wanted { samples: WantedSamples::None, ..Wanted::ALL };
     let contents = read(input, wanted, &mut |contents, at, told| {
         let chunks = match told {
             Told::Chunks(chunks) => chunks,
@@ -278,7 +278,7 @@ impl<W: Write + Seek> Cutting<W> {
                 let octets = anonymous.as_ref().map_or_else(|| octets.to_vec(), |one| one.drain(chunk));
                 self.ticks_before(*began)?;
                 if let Some((chunk, _)) = AckChunk::parse(&octets) {
-                    self.fold.take_acks(&chunk);
+                    chunk.records().for_each(|record| self.fold.ack(&record));
                 }
                 if self.block.is_some() {
                     self.drains.extend(octets);

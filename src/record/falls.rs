@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::ack_record::standing_of;
-use super::sampled::SeatSample;
+use super::sampled::SeatSum;
 use crate::health::HealthState;
 use crate::time::MonoTime;
 
@@ -43,10 +43,9 @@ pub(crate) struct Falls {
 
 impl Falls {
     /// Takes the next sample.
-    pub(crate) fn take(&mut self, at: MonoTime, sample: &SeatSample) {
+    pub(crate) fn take(&mut self, at: MonoTime, sample: &SeatSum) {
         let now = (at, sample.film_s);
-        let is_sent = sample.sent > 0 && !sample.asked_mm.is_empty();
-        if is_sent {
+        if sample.is_sent {
             self.sent = Some(now);
         }
         if let Some(standing) = sample.standing.and_then(standing_of) {
@@ -64,7 +63,7 @@ impl Falls {
                 _ => {}
             }
         }
-        if let Some(fall) = self.first.as_mut().filter(|fall| is_sent && fall.back.is_some()) {
+        if let Some(fall) = self.first.as_mut().filter(|fall| sample.is_sent && fall.back.is_some()) {
             fall.moved.get_or_insert(now);
         }
     }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::chunk::{Handed, SentFrame};
-use super::{AckChunk, AckRecord, TickHead};
+use super::{AckRecord, TickHead};
 use crate::health::HealthState;
 use crate::state::State;
 use crate::time::MonoTime;
@@ -127,31 +127,29 @@ impl Watchman {
         more
     }
 
-    /// Looks at what the ack thread took.
-    pub(crate) fn look_at_acks(
+    /// Looks at something that the ack thread took in the drain of that instant.
+    pub(super) fn ack(
         &mut self,
-        chunk: &AckChunk<'_>,
+        at: MonoTime,
+        record: &AckRecord<'_>,
         found: &mut impl FnMut(IncidentCause, MonoTime),
     ) {
-        let at = chunk.drained.unwrap_or_default();
-        for record in chunk.records() {
-            match record {
-                AckRecord::Fate(_, _, Fate::Answered(code), _) if code.refused() => {
-                    found(IncidentCause::RefusedFrame, at);
-                }
-                AckRecord::Standing(lane, standing) => {
-                    let Some(may_move) = self.may_move.get_mut(lane) else { continue };
-                    let could = std::mem::replace(may_move, standing.may_move());
-                    let fell = matches!(
-                        standing,
-                        HealthState::Lost | HealthState::Stopped | HealthState::Error | HealthState::Excluded
-                    );
-                    if could && fell && self.is_moving {
-                        found(IncidentCause::LostSeat, at);
-                    }
-                }
-                _ => {}
+        match *record {
+            AckRecord::Fate(_, _, Fate::Answered(code), _) if code.refused() => {
+                found(IncidentCause::RefusedFrame, at);
             }
+            AckRecord::Standing(lane, standing) => {
+                let Some(may_move) = self.may_move.get_mut(lane) else { return };
+                let could = std::mem::replace(may_move, standing.may_move());
+                let fell = matches!(
+                    standing,
+                    HealthState::Lost | HealthState::Stopped | HealthState::Error | HealthState::Excluded
+                );
+                if could && fell && self.is_moving {
+                    found(IncidentCause::LostSeat, at);
+                }
+            }
+            _ => {}
         }
     }
 }

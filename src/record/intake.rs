@@ -213,15 +213,16 @@ impl Intake {
             }
             *drains = behind;
             counts.dropped_records += u64::from(chunk.dropped);
+            let at = chunk.drained.unwrap_or_default();
             for record in chunk.records() {
                 match record {
                     AckRecord::Fate(_, _, Fate::Answered(ReplyCode::Running), _) => counts.acked += 1,
                     AckRecord::Fate(_, _, Fate::Answered(_), _) => counts.refused += 1,
                     _ => {}
                 }
+                watchman.ack(at, &record, &mut |cause, at| found.push((cause, at)));
+                fold.ack(&record);
             }
-            watchman.look_at_acks(&chunk, &mut |cause, at| found.push((cause, at)));
-            fold.take_acks(&chunk);
         }
     }
 

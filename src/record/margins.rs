@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::chunk::{Chunk, Handed};
 use super::seat::{FrameMotion, ReadFrame};
 use super::{RecordedSeat, TickHead};
-use crate::motion::{MeasurePlaces, MeasureTimes, Reading, Spacing};
+use crate::motion::{MAX_AXES, MeasurePlaces, MeasureTimes, Reading, Spacing};
 use crate::plain::escaped;
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::wire::Timing;
@@ -87,15 +87,13 @@ struct LaneMargins {
     reached: ShowTime,
     time_ms: u32,
     times: MeasureTimes,
+    places: MeasurePlaces<MAX_AXES>,
     axes: Vec<AxisMargins>,
 }
 
-#[derive(Debug)]
-struct AxisMargins {
-    places: MeasurePlaces,
-    /// The greatest so far, and the show time of each.
-    most: [(f64, ShowTime); 3],
-}
+/// The greatest of an axis so far, and the show time of each.
+#[derive(Debug, Clone, Copy)]
+struct AxisMargins([(f64, ShowTime); 3]);
 
 /// What one frame showed of an axis, each as a part of its limit, and at which show time that was.
 pub(crate) type Parts = [(ShowTime, f64); 3];
@@ -104,13 +102,13 @@ impl Margins {
     /// A measure of frames at that rate.
     pub(crate) fn new(seats: &[RecordedSeat], rate: Rate) -> Self {
         let spacing = Spacing::at_rate(rate.hz());
-        let axis = || AxisMargins { places: MeasurePlaces::NONE, most: [(0.0, ShowTime::ZERO); 3] };
         let lane = |seat: &RecordedSeat| LaneMargins {
             last: None,
             reached: ShowTime::ZERO,
             time_ms: 0,
             times: MeasureTimes::new(spacing),
-            axes: seat.axes().iter().map(|_| axis()).collect(),
+            places: MeasurePlaces::NONE,
+            axes: vec![AxisMargins([(0.0, ShowTime::ZERO); 3]); seat.axes().len()],
         };
         Self { spacing, lanes: seats.iter().map(lane).collect() }
     }
@@ -164,9 +162,9 @@ impl Margins {
         if !goes_on {
             lane.times = MeasureTimes::new(self.spacing);
         }
-        let (now, spans) = (lane.reached, lane.times.push(lane.reached));
-        for (index, (axis, place)) in lane.axes.iter_mut().zip(places.iter()).enumerate() {
-            let seen = axis.places.push(&spans, *place);
+        let now = lane.reached;
+        let all = lane.places.push(&lane.times.push(now), places);
+        for (index, (axis, seen)) in lane.axes.iter_mut().zip(&all[..places.len()]).enumerate() {
             let shown = [seen.velocity, seen.acceleration, seen.jerk];
             axis.keep(shown, now, head.film);
             tell(frame.lane, index, parts(shown, now, head.film, seat.axes()[index].limits()));
@@ -186,7 +184,7 @@ impl Margins {
                 limit: limits[quantity as usize],
                 film_s: film.as_secs_f64(),
             };
-            Quantity::ALL.into_iter().zip(axis.most).map(margin).collect::<Vec<_>>()
+            Quantity::ALL.into_iter().zip(axis.0).map(margin).collect::<Vec<_>>()
         };
         let of_lane = |(lane, seat): (&LaneMargins, &RecordedSeat)| {
             lane.axes
@@ -202,7 +200,7 @@ impl Margins {
 impl AxisMargins {
     /// Keeps what is greater than all before.
     fn keep(&mut self, shown: [Reading; 3], now: ShowTime, film: ShowTime) {
-        for (most, reading) in self.most.iter_mut().zip(shown) {
+        for (most, reading) in self.0.iter_mut().zip(shown) {
             if reading.value.abs() > most.0 {
                 *most = (reading.value.abs(), then(reading, now, film));
             }

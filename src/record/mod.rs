@@ -65,7 +65,7 @@ pub(crate) use marks::{MarkBudget, MarkRefusal};
 pub(crate) use notes::{
     ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote, note_in_words,
 };
-pub(crate) use read::{Contents, ReadError, Told, Wanted, beginning};
+pub(crate) use read::{Contents, ReadError, Told, Wanted, WantedSamples, beginning};
 pub(crate) use reading::{read, read_ahead};
 pub(crate) use recorder::Recorder;
 pub(crate) use recording::{ACKS, About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ};

@@ -9,7 +9,7 @@ use mcap::records::op;
 use super::judging::Judging;
 use super::margins::Margin;
 use super::recording::VERSION;
-use super::sampled::{SeatSample, TickSample};
+use super::sampled::{SeatSample, SeatSum, TickSample};
 use super::seat::RecordedSeat;
 use crate::container::{self, Trouble};
 use crate::plain::escaped;
@@ -49,14 +49,12 @@ impl From<Trouble> for ReadError {
 }
 
 /// What a message tells.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nearly all of them are samples, which a box each would make slower"
-)]
 #[derive(Debug)]
 pub(crate) enum Told<'a> {
     /// A sample of the seat of that place.
-    Seat(usize, SeatSample),
+    Seat(usize, Box<SeatSample>),
+    /// The same, without places.
+    Sum(usize, SeatSum),
     /// A sample of the ticks.
     Tick(TickSample),
     /// The number of the hall's state from then on.
@@ -192,14 +190,25 @@ pub(crate) struct Wanted<'a> {
     /// The seat whose samples are; `None` for all.
     pub(crate) seat: Option<&'a str>,
     /// Samples of seats.
-    pub(crate) samples: bool,
+    pub(crate) samples: WantedSamples,
     /// Whole ticks.
     pub(crate) full: bool,
 }
 
 impl Wanted<'_> {
     /// All there is.
-    pub(crate) const ALL: Self = Self { seat: None, samples: true, full: true };
+    pub(crate) const ALL: Self = Self { seat: None, samples: WantedSamples::Whole, full: true };
+}
+
+/// What of samples of seats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum WantedSamples {
+    /// Nothing.
+    None,
+    /// What they come to, without places.
+    Sums,
+    /// All.
+    Whole,
 }
 
 /// The entries of a recording's first metadata record, which stands at its front.

@@ -1,7 +1,6 @@
 //! Recordings read back, record by record, so that a long one takes no more memory than a short one: taken apart on any thread, and told
 //! in the order of the file. Takes any bytes without a panic.
 
-use std::collections::BTreeMap;
 use std::io::Read;
 use std::sync::Arc;
 
@@ -11,7 +10,7 @@ use serde_json::Value;
 
 use super::ack_columns;
 use super::full;
-use super::read::{Contents, MOST, ReadError, Told, Wanted, owned};
+use super::read::{Contents, MOST, ReadError, Told, Wanted, WantedSamples, owned};
 use super::recording::{ACKS, END, RECOVERED, REPORT, SENT};
 use super::sample_text::seat_sample;
 use super::seat::RecordedSeat;
@@ -53,6 +52,8 @@ pub(crate) fn read_ahead(
 /// What the messages of a channel are.
 #[derive(Debug, Clone, Copy)]
 enum RecordedTopic {
+    /// Of them only the number is told.
+    Passed,
     Seat(usize),
     Tick,
     Hall,
@@ -66,18 +67,14 @@ enum RecordedTopic {
 struct KnownChannels {
     seats: Vec<RecordedSeat>,
     /// Topics of channels, by their numbers.
-    topics: BTreeMap<u16, (String, RecordedTopic)>,
+    topics: Vec<Option<(String, RecordedTopic)>>,
     /// The seat whose samples are wanted; `None` for all.
     seat: Option<String>,
-    samples: bool,
+    samples: WantedSamples,
     full: bool,
 }
 
 /// What a message says.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nearly all of them are samples, which a box each would make slower"
-)]
 #[derive(Debug)]
 enum ReadMessage {
     /// That, or why it says nothing.
@@ -89,10 +86,6 @@ enum ReadMessage {
 }
 
 /// What a record comes to.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nearly all of them are samples, which a box each would make slower"
-)]
 #[derive(Debug)]
 enum ReadPart {
     /// A message of that channel, with its log time.
@@ -106,36 +99,45 @@ impl KnownChannels {
         match topic {
             "/tick" => RecordedTopic::Tick,
             "/hall" => RecordedTopic::Hall,
+            SENT | ACKS if !self.full => RecordedTopic::Passed,
             SENT => RecordedTopic::Sent,
             ACKS => RecordedTopic::Acks,
             other => {
                 let name = other.strip_prefix("/seat/");
                 let seat = name.and_then(|name| self.seats.iter().position(|seat| seat.name == name));
-                seat.map_or(RecordedTopic::Other, RecordedTopic::Seat)
+                let is_wanted = self.samples != WantedSamples::None
+                    && self.seat.as_deref().is_none_or(|seat| name == Some(seat));
+                match seat {
+                    Some(_) if !is_wanted => RecordedTopic::Passed,
+                    Some(lane) => RecordedTopic::Seat(lane),
+                    None => RecordedTopic::Other,
+                }
             }
         }
+    }
+
+    /// The topic of a channel, and what it is.
+    fn channel(&self, channel: u16) -> Option<&(String, RecordedTopic)> {
+        self.topics.get(usize::from(channel))?.as_ref()
     }
 
     /// Takes a message apart; `None` where its channel is unknown.
     fn message(&self, body: &[u8]) -> Option<ReadPart> {
         let (channel, log_time, data) = container::message(body)?;
-        let (_, topic) = self.topics.get(&channel)?;
+        let (_, topic) = self.channel(channel)?;
         let told = match topic {
+            RecordedTopic::Passed => return Some(ReadPart::Message(channel, log_time, ReadMessage::Passed)),
             RecordedTopic::Seat(lane) => {
-                let is_wanted = self.seat.as_ref().is_none_or(|name| self.seats[*lane].name == *name);
-                if !self.samples || !is_wanted {
-                    return Some(ReadPart::Message(channel, log_time, ReadMessage::Passed));
-                }
                 let sample = seat_sample(data).map_or_else(|| json(data), Ok);
-                sample.map(|sample| Told::Seat(*lane, sample))
+                sample.map(|sample| match self.samples {
+                    WantedSamples::Sums => Told::Sum(*lane, sample.sum()),
+                    _ => Told::Seat(*lane, Box::new(sample)),
+                })
             }
             RecordedTopic::Tick => json(data).map(Told::Tick),
             RecordedTopic::Hall => json::<Value>(data).and_then(|hall| {
                 hall["state"].as_u64().map(Told::State).ok_or_else(|| "no state".to_owned())
             }),
-            RecordedTopic::Sent | RecordedTopic::Acks if !self.full => {
-                return Some(ReadPart::Message(channel, log_time, ReadMessage::Passed));
-            }
             RecordedTopic::Sent => {
                 let chunks = full::unpack(data, &self.seats);
                 chunks.map(Told::Chunks).ok_or_else(|| "not a block of ticks".to_owned())
@@ -167,7 +169,7 @@ struct Reading<'a> {
 impl<'a> Reading<'a> {
     fn new(wanted: Wanted<'_>, take: &'a mut dyn FnMut(&Contents, MonoTime, Told<'_>)) -> Self {
         let Wanted { seat, samples, full } = wanted;
-        let (seats, topics, seat) = (Vec::new(), BTreeMap::new(), seat.map(ToOwned::to_owned));
+        let (seats, topics, seat) = (Vec::new(), Vec::new(), seat.map(ToOwned::to_owned));
         let known = Arc::new(KnownChannels { seats, topics, seat, samples, full });
         Self { contents: Contents::default(), known, counts: Vec::new(), take }
     }
@@ -177,8 +179,7 @@ impl<'a> Reading<'a> {
     /// # Errors
     /// Where it is no recording.
     fn end(mut self, read: Result<(), ReadError>) -> Result<Contents, ReadError> {
-        let channels: Vec<u16> = self.known.topics.keys().copied().collect();
-        channels.into_iter().for_each(|channel| self.count(channel));
+        (0..self.counts.len()).for_each(|channel| self.count(channel));
         let mut contents = self.contents;
         match read {
             Err(ReadError::File(trouble)) if !contents.begin.is_empty() => contents.trouble = Some(trouble),
@@ -206,9 +207,12 @@ impl<'a> Reading<'a> {
             },
             op::CHANNEL => {
                 if let Some(ChannelRecord { id, topic, .. }) = ChannelRecord::parse(body) {
-                    self.count(id);
+                    let place = usize::from(id);
+                    self.count(place);
                     let as_what = self.known.topic(topic);
-                    Arc::make_mut(&mut self.known).topics.insert(id, (topic.to_owned(), as_what));
+                    let topics = &mut Arc::make_mut(&mut self.known).topics;
+                    topics.resize_with(topics.len().max(place + 1), || None);
+                    topics[place] = Some((topic.to_owned(), as_what));
                 }
             }
             op::MESSAGE => {
@@ -238,7 +242,7 @@ impl<'a> Reading<'a> {
         let Self { contents, known, counts, take } = self;
         let (first, last) = contents.span.unwrap_or((log_time, log_time));
         contents.span = Some((first.min(log_time), last.max(log_time)));
-        let Some((name, _)) = known.topics.get(&channel) else { return };
+        let Some((name, _)) = known.channel(channel) else { return };
         match message {
             ReadMessage::Passed => {}
             ReadMessage::Other(data) => take(contents, contents.instant(log_time), Told::Other(name, &data)),
@@ -252,9 +256,9 @@ impl<'a> Reading<'a> {
     }
 
     /// Adds the messages of a channel to those of its topic.
-    fn count(&mut self, channel: u16) {
-        let Some(count) = self.counts.get_mut(usize::from(channel)).map(std::mem::take) else { return };
-        let Some((name, _)) = self.known.topics.get(&channel).filter(|_| count > 0) else { return };
+    fn count(&mut self, channel: usize) {
+        let Some(count) = self.counts.get_mut(channel).map(std::mem::take) else { return };
+        let Some(Some((name, _))) = self.known.topics.get(channel).filter(|_| count > 0) else { return };
         *self.contents.messages.entry(name.clone()).or_default() += count;
     }
 }

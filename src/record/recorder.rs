@@ -9,7 +9,7 @@ use super::{Intake, Message, Recording};
 use crate::time::{Clock, MonoTime};
 
 /// How often it looks for ticks.
-const LOOK: Duration = Duration::from_millis(20);
+const LOOK: Duration = Duration::from_millis(50);
 /// How often what it has is given to the disk: so much is lost where the program is killed.
 const FLUSH: Duration = Duration::from_millis(500);
 

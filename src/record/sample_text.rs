@@ -45,8 +45,10 @@ struct SampleText<'a>(&'a [u8]);
 
 impl SampleText<'_> {
     /// The same behind a text that it begins with; `None` where it does not.
-    fn behind(&mut self, text: &[u8]) -> Option<&mut Self> {
-        self.0 = self.0.strip_prefix(text)?;
+    #[inline]
+    fn behind<const N: usize>(&mut self, text: &[u8; N]) -> Option<&mut Self> {
+        let (front, rest) = self.0.split_first_chunk()?;
+        (front == text).then(|| self.0 = rest)?;
         Some(self)
     }
 

@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::ack_record::{AckRecord, standing_number};
-use super::acks::AckChunk;
 use super::chunk::{Chunk, Handed};
 use super::notes::Note;
 use super::seat::ReadFrame;
@@ -53,14 +52,26 @@ pub(crate) struct SeatSample {
     pub(crate) standing: Option<u8>,
 }
 
-impl SeatSample {
+/// What a sample comes to, without places: of long recordings most is read for that alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SeatSum {
+    pub(crate) film_s: f64,
+    pub(crate) sent: u32,
+    pub(crate) unsent: u32,
+    pub(crate) clamps: u64,
+    pub(crate) standing: Option<u8>,
+    /// It was sent somewhere, by a tick that asked for it.
+    pub(crate) is_sent: bool,
     /// How far asked and sent are apart at most, mm or degrees.
-    pub(crate) fn apart(&self) -> f64 {
-        self.asked_mm
-            .iter()
-            .zip(self.sent_mm.iter())
-            .map(|(asked, sent)| (asked - sent).abs())
-            .fold(0.0, f64::max)
+    pub(crate) apart: f64,
+}
+
+impl SeatSample {
+    pub(crate) fn sum(&self) -> SeatSum {
+        let Self { film_s, ref asked_mm, ref sent_mm, sent, unsent, clamps, standing, .. } = *self;
+        let apart = asked_mm.iter().zip(sent_mm.iter()).map(|(asked, sent)| (asked - sent).abs());
+        let is_sent = sent > 0 && !asked_mm.is_empty();
+        SeatSum { film_s, sent, unsent, clamps, standing, is_sent, apart: apart.fold(0.0, f64::max) }
     }
 }
 
@@ -207,35 +218,33 @@ impl Sampled {
         }
     }
 
-    /// Takes what the ack thread took before the next tick.
-    pub(crate) fn take_acks(&mut self, chunk: &AckChunk<'_>) {
-        for record in chunk.records() {
-            let (AckRecord::Fate(controller, ..)
-            | AckRecord::Lost(controller, _)
-            | AckRecord::Measured(controller, ..)
-            | AckRecord::Standing(controller, _)) = record
-            else {
-                continue;
-            };
-            let (Some(seat), Some(window)) = (self.seats.get(controller), self.windows.get_mut(controller))
-            else {
-                continue;
-            };
-            let SeatWindow { sample, lost, standing, measured_mm, .. } = window;
-            match record {
-                AckRecord::Fate(_, _, Fate::Answered(ReplyCode::Running), latency_ns) => {
-                    sample.acked += 1;
-                    let us = Some(micros(latency_ns.into())).filter(|us| *us > 0.0);
-                    (sample.ack_us, sample.ack_max_us) = (us.or(sample.ack_us), max(us, sample.ack_max_us));
-                }
-                AckRecord::Fate(_, _, Fate::Answered(_), _) => sample.refused += 1,
-                AckRecord::Lost(_, total) => {
-                    sample.lost += total.saturating_sub(std::mem::replace(lost, total));
-                }
-                AckRecord::Measured(_, _, pulses) => *measured_mm = round(&seat.measured(&pulses)),
-                AckRecord::Standing(_, now) => *standing = Some(standing_number(now)),
-                _ => {}
+    /// Takes something that the ack thread took before the next tick.
+    pub(super) fn ack(&mut self, record: &AckRecord<'_>) {
+        let (AckRecord::Fate(controller, ..)
+        | AckRecord::Lost(controller, _)
+        | AckRecord::Measured(controller, ..)
+        | AckRecord::Standing(controller, _)) = *record
+        else {
+            return;
+        };
+        let (Some(seat), Some(window)) = (self.seats.get(controller), self.windows.get_mut(controller))
+        else {
+            return;
+        };
+        let SeatWindow { sample, lost, standing, measured_mm, .. } = window;
+        match record {
+            AckRecord::Fate(_, _, Fate::Answered(ReplyCode::Running), latency_ns) => {
+                sample.acked += 1;
+                let us = Some(micros((*latency_ns).into())).filter(|us| *us > 0.0);
+                (sample.ack_us, sample.ack_max_us) = (us.or(sample.ack_us), max(us, sample.ack_max_us));
             }
+            AckRecord::Fate(_, _, Fate::Answered(_), _) => sample.refused += 1,
+            AckRecord::Lost(_, total) => {
+                sample.lost += total.saturating_sub(std::mem::replace(lost, *total));
+            }
+            AckRecord::Measured(_, _, pulses) => *measured_mm = round(&seat.measured(pulses)),
+            AckRecord::Standing(_, now) => *standing = Some(standing_number(*now)),
+            _ => {}
         }
     }
 

@@ -5,7 +5,7 @@ use std::io::Read;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::read::{Contents, ReadError, Told, Wanted};
+use super::read::{Contents, ReadError, Told, Wanted, WantedSamples};
 use super::reading::read_ahead;
 use super::{Chunk, Falls, Margin, Margins, TickSample};
 use crate::plain::escaped;
@@ -175,21 +175,22 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
     let mut summary = Summary::default();
     let mut margins: Option<Margins> = None;
     let mut last = (MonoTime::default(), None);
-    let contents = read_ahead(input, Wanted::ALL, &mut |contents, at, told| {
+    let wanted = Wanted { samples: WantedSamples::Sums, ..Wanted::ALL };
+    let contents = read_ahead(input, wanted, &mut |contents, at, told| {
         if summary.seats.is_empty() {
             let named =
                 |seat: &super::RecordedSeat| SeatTotals { name: seat.name.clone(), ..SeatTotals::default() };
             summary.seats = contents.seats.iter().map(named).collect();
         }
         match told {
-            Told::Seat(lane, sample) => {
+            Told::Sum(lane, sample) => {
                 let seat = &mut summary.seats[lane];
                 seat.falls.take(at, &sample);
                 seat.sent += u64::from(sample.sent);
                 seat.unsent += u64::from(sample.unsent);
                 seat.clamps = seat.clamps.saturating_add(sample.clamps);
-                if sample.apart() > seat.apart {
-                    (seat.apart, seat.apart_film_s) = (sample.apart(), sample.film_s);
+                if sample.apart > seat.apart {
+                    (seat.apart, seat.apart_film_s) = (sample.apart, sample.film_s);
                 }
             }
             Told::Tick(sample) => summary.tick(at, &sample, &mut last, contents.rate_hz()),
@@ -202,7 +203,7 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
                 each_chunk(&chunks, |chunk| margins.take(chunk, &contents.seats, &mut |_, _, _| ()));
             }
             // Positions of the film come all the time.
-            Told::Drains(_) | Told::Other("/timecode", _) => {}
+            Told::Seat(..) | Told::Drains(_) | Told::Other("/timecode", _) => {}
             Told::Other(topic, data) => {
                 if topic == "/mark" {
                     summary.marked = seat_named(contents, data).or(summary.marked);

@@ -192,7 +192,7 @@ fn a_seat_that_falls_out_is_told_in_that_window_though_nothing_more_is_heard_of_
         });
     }
     let mut falls = Falls::default();
-    told.iter().for_each(|(at, sample)| falls.take(*at, sample));
+    told.iter().for_each(|(at, sample)| falls.take(*at, &sample.sum()));
     let SeatFall { out: (_, film_s), standing, still, .. } = falls.first.expect("it fell out");
     assert!(standing == HealthState::Lost && (0.2..0.25).contains(&film_s), "{film_s}");
     let (_, still_s) = still.expect("it was sent somewhere before");

@@ -13,7 +13,8 @@ use super::link::{RecordLink, RecordPart};
 use crate::app::recording::in_io;
 use crate::container::Trouble;
 use crate::record::{
-    self, Entry, EntryMaker, IncidentCause, Opening, Recording, RecoverError, Wanted, read_flight,
+    self, Entry, EntryMaker, IncidentCause, Opening, Recording, RecoverError, Wanted, WantedSamples,
+    read_flight,
 };
 use crate::time::MonoTime;
 
@@ -154,7 +155,7 @@ fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     }
     out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
     let again = Patient { file: BufReader::new(File::open(to)?), may };
-    let unwanted = Wanted { samples: false, full: false, ..Wanted::ALL };
+    let unwanted = Wanted { samples: WantedSamples::None, full: false, ..Wanted::ALL };
     let read = record::read(again, unwanted, &mut |_, _, _| ()).map_err(io::Error::other)?;
     if read.trouble.is_some() || read.messages != recovered.messages {
         return Err(io::Error::other("the written file does not read back; the disk may be failing"));

@@ -29,8 +29,9 @@ use crate::sys::file::want_of_files;
 use crate::sys::realtime;
 use crate::time::{Clock, MonoTime};
 
-/// How often it looks.
-const LOOK: Duration = Duration::from_millis(20);
+/// How often it looks: once in a sample. Each time it finds what it works with out of the caches, which of a large hall costs more than
+/// the rest.
+const LOOK: Duration = Duration::from_millis(50);
 /// How often files get what they have: so much is lost where the program is killed.
 const FLUSH: Duration = Duration::from_millis(500);
 /// How often they are put on the disk, what is free is looked at, and files that are too old or too many go.

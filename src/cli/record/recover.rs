@@ -8,7 +8,7 @@ use anyhow::{Context as _, anyhow};
 
 use super::super::{Exit, Failure, OrExit as _, print};
 use super::{beside, open, unread};
-use crate::record::{self, RecoverError, Wanted};
+use crate::record::{self, RecoverError, Wanted, WantedSamples};
 
 /// Repairs a recording that was cut short or damaged: writes all its complete messages, with an index, so that any viewer reads it.
 ///
@@ -65,7 +65,7 @@ fn written(args: &Args, out: File, part: &std::path::Path) -> Result<record::Rec
         return Err(error).or_exit(Exit::BadCue);
     }
     out.into_inner().map_err(|error| error.into_error()).or_exit(Exit::Io)?.sync_all().or_exit(Exit::Io)?;
-    let unwanted = Wanted { samples: false, full: false, ..Wanted::ALL };
+    let unwanted = Wanted { samples: WantedSamples::None, full: false, ..Wanted::ALL };
     let back = record::read(open(part)?, unwanted, &mut |_, _, _| ()).map_err(|error| unread(error, part))?;
     if back.trouble.is_some() || back.messages != recovered.messages {
         let error =

@@ -231,7 +231,7 @@ impl Gathered {
     fn seat(&mut self, at: MonoTime, sample: &SeatSample) {
         let Some((column, moment)) = self.place(at, sample.film_s) else { return };
         let falls = self.falls.count;
-        self.falls.take(at, sample);
+        self.falls.take(at, &sample.sum());
         self.on(OUT, column, self.falls.count - falls);
         self.measured.take(column, sample.measured_mm.iter().copied());
         let counts = &mut self.counts;

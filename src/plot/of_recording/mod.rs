@@ -222,7 +222,10 @@ mod tests {
     fn why_a_seat_fell_out_is_told_and_in_which_pass() {
         let number = |wanted| (0..=u8::MAX).find(|number| standing_of(*number) == Some(wanted));
         let stood = |film_s, standing| {
-            Told::Seat(0, SeatSample { film_s, standing: number(standing), ..SeatSample::default() })
+            Told::Seat(
+                0,
+                Box::new(SeatSample { film_s, standing: number(standing), ..SeatSample::default() }),
+            )
         };
         let error =
             br#"{"kind": "standing", "seat": "A1", "text": "error: Err12: alarm of the servo of axis 3"}"#;
