@@ -165,6 +165,10 @@ impl Kind {
         1_000.0 / self.hz
     }
 
+    pub(crate) fn asks_ms(&self) -> f64 {
+        f64::from(self.ack_every) * self.period_ms()
+    }
+
     fn config(&self) -> Config {
         let dialect = if self.dialect == Dialect::Mbox { ",dialect=mbox" } else { "" };
         let to = |(index, axes): (usize, &usize)| {

@@ -91,7 +91,9 @@ pub(crate) fn open<T>(
     lead: impl FnOnce(&mut Hall<'_, '_>) -> T,
 ) -> (T, Numbers) {
     let book = kind.book();
-    ether.world().lines.iter_mut().for_each(|line| line.seat.settings.period_ms = kind.period_ms());
+    for line in &mut ether.world().lines {
+        (line.seat.settings.period_ms, line.seat.settings.asks_ms) = (kind.period_ms(), kind.asks_ms());
+    }
     ether.world().outside = kind.outside;
     let halves = over(Arc::new(ether.clone()));
     let mut runtime =
@@ -158,6 +160,7 @@ pub(crate) fn seats(kind: &Kind) -> Vec<Settings> {
         stop_mode: 0,
         report_ms: 0,
         period_ms: kind.period_ms(),
+        asks_ms: kind.asks_ms(),
         jitter_ms: 0.0,
         address: ([127, 0, 1, index as u8 + 1], 7_408),
     };

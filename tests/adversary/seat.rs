@@ -64,6 +64,8 @@ pub(crate) struct Settings {
     pub(crate) report_ms: u32,
     /// How often the hall sends.
     pub(crate) period_ms: f64,
+    /// How often the hall asks for an ack.
+    pub(crate) asks_ms: f64,
     /// How much later than they were sent datagrams may be noticed, ms: none in virtual time, some on a busy machine.
     pub(crate) jitter_ms: f64,
     /// Where its controller listens, as it knows.
@@ -441,10 +443,10 @@ impl Seat {
 
     /// How far apart it and the frame before may have been sent.
     fn admitted_ms(&self, command: &Command) -> f64 {
-        let Settings { period_ms, jitter_ms, .. } = self.settings;
+        let Settings { period_ms, asks_ms, jitter_ms, .. } = self.settings;
         let (from, until) = self.untold;
         let is_untold = (from..until + ADMITTED).contains(&command.sent_ns);
-        admitted_ms(period_ms, jitter_ms, is_untold)
+        admitted_ms(period_ms, jitter_ms, is_untold) + asks_ms - period_ms
     }
 
     /// Whether the stroke has the place to which it is led.
