@@ -10,6 +10,7 @@ use crate::checks::Check;
 use crate::motion::{MAX_AXES, SeatType};
 
 mod accept;
+mod acks;
 mod api;
 mod axis;
 mod broadcast;

@@ -11,6 +11,7 @@ use crate::channel::{self, SWITCHES};
 use crate::motion::MAX_AXES;
 
 use super::accept::acceptances;
+use super::acks::refuse_late_losses;
 use super::api::api;
 use super::broadcast::broadcast;
 use super::buttons::buttons;
@@ -40,9 +41,6 @@ use super::{
     MAX_FILE_LEN, Record, Show, Station, Store, Timing, VibrationPort, check_effect_name, check_peer,
     check_window,
 };
-
-/// How much later a loss may be seen since not each frame asks for an ack, ms.
-const MOST_UNASKED_MS: f64 = 50.0;
 
 /// The text of a file of at most [`MAX_FILE_LEN`] bytes.
 pub(super) fn file(path: &Path) -> Result<String, ConfigFaults> {
@@ -200,22 +198,6 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
     section.finish();
     refuse_late_losses(entry, &show, faults);
     Some(show)
-}
-
-/// Notes acks that are asked for so seldom that a loss would last for over 50 ms more before one is missed.
-fn refuse_late_losses(entry: Entry<'_>, show: &Show, faults: &mut Faults<'_>) {
-    let apart_ms = f64::from(show.ack_every - 1) * 1_000.0 / show.rate_hz;
-    let value = entry.value.as_table().and_then(|table| table.get("ack_every"));
-    if let Some(value) = value.filter(|_| apart_ms > MOST_UNASKED_MS) {
-        let most = 1.0 + (MOST_UNASKED_MS * show.rate_hz / 1_000.0).floor();
-        let hz = show.rate_hz;
-        Entry::new("ack_every", value).fault(
-            faults,
-            &format!(
-                "a loss would be seen {apart_ms:.0} ms later, and the seat make up for it in one frame; {most} is the most at {hz} Hz"
-            ),
-        );
-    }
 }
 
 fn effects(entry: Entry<'_>, faults: &mut Faults<'_>) -> Vec<Effect> {
