@@ -126,7 +126,9 @@ fn what_motion_and_vibration_may_reach_together_has_defaults_and_is_no_less_than
 
 #[test]
 fn acks_are_asked_for_so_often_that_a_loss_is_seen_in_time() {
-    let hall = |hz: u32, every: u32| parse(&format!("[show]\nrate_hz = {hz}\nack_every = {every}\n{SEAT}"));
+    let hall = |hz: u32, every: u32| {
+        parse(&format!("[show]\nrate_hz = {hz}\nack_every = {every}\n{SEAT}{CONTROLLER}"))
+    };
     for (hz, most) in [(1_000, 51), (100, 6), (20, 2), (5, 1)] {
         assert!(hall(hz, most).is_ok(), "{hz}");
         let faults = hall(hz, most + 1).unwrap_err();
