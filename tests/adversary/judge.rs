@@ -61,9 +61,9 @@ impl fmt::Display for Breach {
 
 /// How far apart two frames may have been sent that are executed one after the other, where what was in between is admitted.
 /// It is twice as much where nobody told the hall which frames had come; where not each frame asks for an ack, the others come on top.
-pub(crate) fn admitted_ms(period_ms: f64, jitter_ms: f64, is_untold: bool) -> f64 {
+pub(crate) fn admitted_ms(period_ms: f64, asks_ms: f64, jitter_ms: f64, is_untold: bool) -> f64 {
     let lost = if is_untold { 2.0 * ADMITTED_MS } else { ADMITTED_MS };
-    lost + UNREAD_MS + 2.0 * period_ms + jitter_ms
+    lost + UNREAD_MS + 2.0 * period_ms + (asks_ms - period_ms) + jitter_ms
 }
 
 /// How long before it sends the first frame of a motion a hall may have read the seat.

@@ -446,7 +446,7 @@ impl Seat {
         let Settings { period_ms, asks_ms, jitter_ms, .. } = self.settings;
         let (from, until) = self.untold;
         let is_untold = (from..until + ADMITTED).contains(&command.sent_ns);
-        admitted_ms(period_ms, jitter_ms, is_untold) + asks_ms - period_ms
+        admitted_ms(period_ms, asks_ms, jitter_ms, is_untold)
     }
 
     /// Whether the stroke has the place to which it is led.
