@@ -1,6 +1,7 @@
 //! Lines by pseudo-terminals: what passes, who is refused, what is noticed.
 
 use std::fs;
+use std::iter;
 use std::path::Path;
 use std::time::Duration;
 
@@ -135,9 +136,10 @@ fn a_driver_that_takes_no_more_is_not_waited_for_past_the_deadline() {
     let pty = Pty::open().unwrap();
     let port = SerialPort::open(pty.path(), SETTINGS).unwrap();
     let many = vec![0x55; 1 << 20];
-    let taken = port.line().write(&many, past()).unwrap();
+    // The kernel makes room while it hands over what it took, so a write after one that was cut short may take a little more.
+    let tries = iter::repeat_with(|| port.line().write(&many, past()).unwrap());
+    let taken: usize = tries.take(many.len()).take_while(|taken| *taken > 0).sum();
     assert!((1..many.len()).contains(&taken), "{taken} octets of {}", many.len());
-    assert_eq!(port.line().write(b"x", past()), Ok(0));
     port.line().discard().unwrap();
 }
 
