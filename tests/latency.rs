@@ -233,6 +233,7 @@ fn wrong_use_is_refused() {
         &["--rate", "1001"],
         &["--spin-us", "901"],
         &["--no-acks", "--ack-every", "2"],
+        &["--rate", "100", "--ack-every", "7"],
         &["--to", "127.0.0.1"],
     ] {
         let run = kinocue(&[&["latency"], args].concat());

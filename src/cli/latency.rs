@@ -130,9 +130,8 @@ fn configuration(args: &Args) -> Result<Config, Failure> {
 
 /// Measures and reports; `of_our_own` says that the controllers are virtual ones.
 fn measure(args: &Args, mut config: Config, of_our_own: bool) -> Result<Exit, Failure> {
-    let show = &mut config.show;
-    show.rate_hz = args.rate;
-    args.stream.put_into(show);
+    config.show.rate_hz = args.rate;
+    args.stream.put_into(&mut config)?;
     let (config, refused) = standing(config)?;
     if config.controllers.is_empty() {
         let why = anyhow!("no seat left to measure; only reads were sent");

@@ -213,7 +213,7 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     if let Some(hz) = args.rate {
         config.show.rate_hz = hz;
     }
-    args.stream.put_into(&mut config.show);
+    args.stream.put_into(&mut config)?;
     match args.time.as_deref() {
         Some("absolute") => config.show.timing = Timing::Absolute,
         Some(_) => config.show.timing = Timing::Relative,

@@ -2,7 +2,10 @@
 
 use std::net::SocketAddrV4;
 
-use crate::config::Show;
+use anyhow::anyhow;
+
+use super::exit::{Exit, Failure, OrExit as _};
+use crate::config::{Config, too_seldom};
 
 /// The frame port, acks and spinning.
 #[derive(Debug, clap::Args)]
@@ -11,7 +14,7 @@ pub(super) struct StreamArgs {
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
 
-    /// Request an ack on every Nth frame, 1 to 1000 [default: 1, or the configuration's].
+    /// Request an ack on every Nth frame, as many as pass in 50 ms [default: 1, or the configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
     ack_every: Option<u32>,
 
@@ -26,10 +29,18 @@ pub(super) struct StreamArgs {
 }
 
 impl StreamArgs {
-    /// Puts what was said into `show`.
-    pub(super) fn put_into(&self, show: &mut Show) {
+    /// Puts what was said into a configuration whose rate is the one to come.
+    ///
+    /// # Errors
+    /// Why acks would be requested too seldom there.
+    pub(super) fn put_into(&self, config: &mut Config) -> Result<(), Failure> {
+        let (show, has_drives) = (&mut config.show, !config.links.is_empty());
         show.bind = self.bind.unwrap_or(show.bind);
         show.ack_every = self.ack_every.unwrap_or(show.ack_every);
         show.spin_us = self.spin_us.unwrap_or(show.spin_us);
+        match too_seldom(show, has_drives).filter(|_| !self.no_acks) {
+            None => Ok(()),
+            Some(why) => Err(anyhow!("--ack-every {}: {why}", show.ack_every)).or_exit(Exit::Usage),
+        }
     }
 }

@@ -11,7 +11,7 @@ use crate::channel::{self, SWITCHES};
 use crate::motion::MAX_AXES;
 
 use super::accept::acceptances;
-use super::acks::refuse_late_losses;
+use super::acks::refuse_seldom_acks;
 use super::api::api;
 use super::broadcast::broadcast;
 use super::buttons::buttons;
@@ -105,9 +105,12 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, &library, faults));
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let record = record_at.map_or_else(|| Some(Record::default()), |entry| record(entry, faults));
-    let stated = Stated { show: show_at, seat: seat_at, controller: controller_at, link: link_at };
+    let stated = Stated { seat: seat_at, controller: controller_at, link: link_at };
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let (controllers, absent, links) = stated.controllers(&site, faults);
+    if let Some((entry, show)) = show_at.zip(show.as_ref()) {
+        refuse_seldom_acks(entry, show, !links.is_empty(), faults);
+    }
     let frame_port = show.as_ref().map_or(0, |show| show.bind.port());
     let broadcast =
         broadcast_at.and_then(|entry| broadcast(entry, &controllers, &absent, frame_port, faults));
@@ -150,7 +153,6 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
 /// The sections that say together which controllers there are.
 #[derive(Clone, Copy)]
 struct Stated<'t> {
-    show: Option<Entry<'t>>,
     seat: Option<Entry<'t>>,
     controller: Option<Entry<'t>>,
     link: Option<Entry<'t>>,
@@ -168,7 +170,6 @@ impl Stated<'_> {
         let controllers = |entry| controllers(entry, site, (&links, &drives), faults);
         let mut peers = self.controller.map_or_else(Peers::default, controllers);
         find_twins(&mut peers.placed);
-        refuse_sparse_acks(self.show, &peers, faults);
         refuse_parted_groups(&peers.placed, &peers.by_udp(), faults);
         let links = settle(links, &peers.placed, faults);
         let (controllers, absent) = peers.into_lists();
@@ -196,7 +197,6 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
         accept_findings: acceptances(&mut section),
     };
     section.finish();
-    refuse_late_losses(entry, &show, faults);
     Some(show)
 }
 
@@ -278,16 +278,6 @@ impl Peers {
             }
         }
         (present, absent)
-    }
-}
-
-/// Notes a hall with drives that asks for few acks: what a drive does not answer is in doubt.
-fn refuse_sparse_acks(show: Option<Entry<'_>>, peers: &Peers, faults: &mut Faults<'_>) {
-    let table = show.and_then(|entry| entry.value.as_table()).filter(|_| !peers.placed.is_empty());
-    let Some(value) = table.and_then(|table| table.get("ack_every")) else { return };
-    let entry = Entry::new("ack_every", value);
-    if entry.value.as_integer().is_some_and(|every| every.as_str() != "1") {
-        entry.fault(faults, "drives answer each segment, and an unanswered one is in doubt; leave it at 1");
     }
 }
 
