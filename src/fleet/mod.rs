@@ -72,9 +72,9 @@ pub(crate) fn lease_of(hall: &str) -> String {
     format!("kc.lease.{hall}")
 }
 
-/// The stream of that, one for each hall.
+/// The stream of that, one for each hall: its name may have no point, and no site or hall has the sign that stands for it.
 pub(crate) fn lease_stream(hall: &str) -> String {
-    format!("kc_lease_{}", hall.replace('.', "_"))
+    format!("kc_lease_{}", hall.replace('.', "="))
 }
 
 /// Where a part of a file is kept; `sha256` is that of the whole file, `n` counts from 0; both may be wildcards.
@@ -85,6 +85,11 @@ pub(crate) fn chunk_of(sha256: &str, n: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn two_halls_never_have_the_lease_of_one() {
+        assert_ne!(lease_stream("north.a_b"), lease_stream("north_a.b"));
+    }
 
     #[test]
     fn the_logs_of_both_machines_of_a_hall_are_told_to_be_that_halls() {

@@ -164,11 +164,11 @@ fn what_the_engine_answers_is_no_answer_of_a_hall_and_no_stop_whatever_the_key_o
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     runtime.block_on(async {
         let pair = Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1").await;
-        let all = r#"{"name":"kc_lease_berlin_h1","subjects":["kc.cmd.>","kc.stop.>"],"storage":"memory"}"#;
-        let create = pair.client.request("$JS.API.STREAM.CREATE.kc_lease_berlin_h1", all.into());
+        let all = r#"{"name":"kc_lease_berlin=h1","subjects":["kc.cmd.>","kc.stop.>"],"storage":"memory"}"#;
+        let create = pair.client.request("$JS.API.STREAM.CREATE.kc_lease_berlin=h1", all.into());
         let made = timeout(PATIENCE, create).await.unwrap().unwrap();
         assert!(String::from_utf8_lossy(&made.payload).contains("\"subjects\":[\"kc.cmd."), "{made:?}");
-        let info = "$JS.API.STREAM.INFO.kc_lease_berlin_h1";
+        let info = "$JS.API.STREAM.INFO.kc_lease_berlin=h1";
         pair.client.publish_with_reply(info, "kc.stop.berlin.h2.office", "".into()).await.unwrap();
         pair.client.flush().await.unwrap();
     });
@@ -200,9 +200,9 @@ fn a_stolen_key_of_a_hall_tells_of_that_hall_alone_and_hears_no_other() {
                 assert!(hall.may_publish(may).await, "{may}");
             }
             for may_not in [
-                "$JS.API.STREAM.CREATE.kc_lease_berlin_h1",
-                "$JS.hub.API.STREAM.CREATE.kc_lease_berlin_h1",
-                "$JS.hub.API.STREAM.INFO.kc_lease_berlin_h1",
+                "$JS.API.STREAM.CREATE.kc_lease_berlin=h1",
+                "$JS.hub.API.STREAM.CREATE.kc_lease_berlin=h1",
+                "$JS.hub.API.STREAM.INFO.kc_lease_berlin=h1",
                 "kc.lease.berlin.h1",
                 "kc.status.berlin.h2",
                 "kc.log.berlin.h2",
