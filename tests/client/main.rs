@@ -340,16 +340,22 @@ fn a_file_is_uploaded_as_it_is_and_named_by_its_file() {
     let cue = folder.path().join("new-ride.csv");
     let text = "time_ms,a1\n".to_owned() + &"0,0.5\n".repeat(50_000);
     std::fs::write(&cue, &text).expect("it is ours");
-    let daemon = Daemon::start(|_, _| Answer::Reply(201, json!({"id": "new-ride"})));
+    let daemon = Daemon::start(|_, request| {
+        let is_there = request.path != "/api/v1/cues/new-ride" || request.method == "PUT";
+        Answer::Reply(if is_there { 200 } else { 404 }, json!({"id": "new-ride"}))
+    });
     let run = daemon.run(&["upload", cue.to_str().expect("text")]);
-    assert_eq!(run.code, Some(0), "{run:?}");
+    assert_eq!((run.code, daemon.request().method.as_str()), (Some(0), "GET"), "{run:?}");
     let request = daemon.request();
     assert_eq!((request.method.as_str(), request.path.as_str()), ("PUT", "/api/v1/cues/new-ride"));
     assert_eq!(request.header("content-type"), Some("text/csv"));
     assert!(request.body == text.as_bytes());
     told(&run, "new-ride is in the library; next: kinocue load new-ride");
     assert_eq!(daemon.run(&["upload", "no-such-file.csv"]).code, Some(66));
-    assert_eq!(daemon.run(&["upload", cue.to_str().expect("text"), "--id", "x"]).code, Some(0));
+    told(
+        &daemon.run(&["upload", cue.to_str().expect("text"), "--id", "x"]),
+        "x is in the library, in place of the one that was there; next: kinocue load x",
+    );
     assert_eq!(daemon.request().path, "/api/v1/cues/x");
 }
 

@@ -248,6 +248,7 @@ fn seats_that_do_not_take_part_each_have_a_mark_a_word_and_a_colour_of_their_own
         &browser,
         "const [first] = status.controllers;
          const all = ['lost', 'error', 'stopped', 'excluded', 'ok'];
+         status.state = 'playing';
          status.controllers = all.map((health) => ({ ...first, name: health, group: health, health, enabled: health !== 'ok' }));",
     );
     browser.wait("document.querySelectorAll('.field').length === 5");
@@ -260,4 +261,5 @@ fn seats_that_do_not_take_part_each_have_a_mark_a_word_and_a_colour_of_their_own
     assert_eq!(looks, json!([5, 5, 5]));
     browser.reads("map", "disabled");
     browser.reads("in-play", "0 of 5 seats");
+    browser.reads("state", "playing, no seat");
 }

@@ -119,11 +119,13 @@ fn upload(args: &UploadArgs) -> Result<Exit, Failure> {
     })?;
     let is_mcap = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
     let media = if is_mcap { "application/vnd.mcap" } else { "text/csv" };
-    let request = http::request(Method::PUT, &format!("/api/v1/cues/{}", in_path(&id)), Some(media), body)?;
+    let path = format!("/api/v1/cues/{}", in_path(&id));
+    let place = if server.get(&path)?.status == 200 { ", in place of the one that was there" } else { "" };
+    let request = http::request(Method::PUT, &path, Some(media), body)?;
     let reply = http::block_on(http::exchange(&server.socket()?, request, PATIENCE))?;
     server.show(&reply)?;
     reply::done(&reply)?;
-    print::tell(&format!("kinocue: {id} is in the library; next: kinocue load {id}"));
+    print::tell(&format!("kinocue: {id} is in the library{place}; next: kinocue load {id}"));
     Ok(Exit::Done)
 }
 

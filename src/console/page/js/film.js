@@ -68,8 +68,8 @@ export function showFilm(status) {
 
 /** What is loaded and how long it is; before it starts, with how long the seats take to get onto it. */
 function titleOf(show, state) {
-  const first = state === 'armed' && show.join_s > 0 ? `, ${words('film.first-move', { s: number(show.join_s, 1) })}` : '';
-  return `${show.title ?? show.cue}, ${clock(show.length_s, 0)}${first}`;
+  const first = state === 'armed' && show.join_s > 0 ? `${words('film.first-move', { s: number(show.join_s, 1) })}: ` : '';
+  return `${first}${show.title ?? show.cue}, ${clock(show.length_s, 0)}`;
 }
 
 /** The entry of the playlist that comes next, and when. */

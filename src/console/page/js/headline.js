@@ -11,6 +11,8 @@ import { causeOf, nextOf, stateName } from './said.js';
 import { lasting, number, percent, sentence, signed, timeOfDay } from './words.js';
 
 const BLINK_MS = 250;
+/** States in which the film leads seats: with none that takes part the large word would say what nobody sees in the hall. */
+const LEADING = new Set(['joining', 'playing']);
 let spoken = '';
 
 /** Keeps the time of day and the seconds of silence true while nothing comes. */
@@ -44,12 +46,14 @@ function showStatus(status, link) {
   setAttribute(document.documentElement, 'data-state', status.state);
   setText(byId('hall'), status.hall);
   setText(byId('version'), words('page.version', { version: status.version, time: lasting(status.uptime_s) }));
-  const state = stateName(status.state);
+  const seats = seatsInPlay(status.controllers);
+  const led = seats.playing > 0 || !LEADING.has(status.state);
+  const state = led ? stateName(status.state) : words('in-play.none', { state: stateName(status.state) });
   setText(byId('state'), link === 'lost' ? `${state}?` : state);
   setText(byId('cause'), sentence(causeOf(status)));
   setText(byId('since'), times(status));
   setText(byId('next'), sentence(nextOf(status)));
-  showInPlay(status.controllers);
+  showInPlay(seats);
   const start = status.state === 'armed' ? status.playlist?.next_start : null;
   badge('starts', start ? words('badge.starts', { at: timeOfDay(start) }) : '', 'weak', words('badge.starts.why'));
   badge('realtime', status.realtime.refusals.length > 0 ? words('badge.not-real-time') : '', 'weak', status.realtime.refusals.join('; '));
@@ -68,8 +72,8 @@ function times(status) {
   return `${words('since.for', { time: lasting(status.since_s) })}${lapses}`;
 }
 
-/** Seats that take part, of all that the configuration has; a seat of several controllers needs them all. */
-function showInPlay(controllers) {
+/** How many seats take part, and how many the configuration has; a seat of several controllers needs them all. */
+function seatsInPlay(controllers) {
   const seats = new Map();
   for (const controller of controllers) {
     if (controller.health === 'out') continue;
@@ -77,9 +81,13 @@ function showInPlay(controllers) {
   }
   const playing = [...seats.values()].filter(Boolean).length;
   const failed = controllers.some((controller) => controller.enabled && !takesPart(controller) && controller.health !== 'out');
-  setProperty(byId('in-play'), 'hidden', seats.size === 0);
-  setProperty(byId('in-play'), 'className', `in-play look-${playing === seats.size ? 'good' : failed ? 'bad' : 'weak'}`);
-  setText(byId('in-play'), words('in-play', { playing, all: seats.size }));
+  return { playing, all: seats.size, failed };
+}
+
+function showInPlay({ playing, all, failed }) {
+  setProperty(byId('in-play'), 'hidden', all === 0);
+  setProperty(byId('in-play'), 'className', `in-play look-${playing === all ? 'good' : failed ? 'bad' : 'weak'}`);
+  setText(byId('in-play'), words('in-play', { playing, all }));
 }
 
 /** What is less or other than the whole cue in time with the film, and whether the entry that is loaded plans just that. */

@@ -236,6 +236,7 @@ export default {
   "history.title": "Letzte Shows",
   "home.empty": "SITZE LEER?",
   "in-play": "{playing} von {all} Sitzen",
+  "in-play.none": "{state}, kein Sitz",
   "journal.command": "Befehl",
   "journal.done": "erledigt",
   "journal.times": "{came} ({n} mal)",

@@ -139,6 +139,7 @@ export default {
   "history.title": "Last shows",
   "home.empty": "SEATS EMPTY?",
   "in-play": "{playing} of {all} seats",
+  "in-play.none": "{state}, no seat",
   "journal.command": "Command",
   "journal.done": "done",
   "journal.times": "{came} ({n} times)",

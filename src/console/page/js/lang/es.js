@@ -236,6 +236,7 @@ export default {
   "history.title": "Últimos espectáculos",
   "home.empty": "¿BUTACAS VACÍAS?",
   "in-play": "{playing} de {all} butacas",
+  "in-play.none": "{state}, ninguna butaca",
   "journal.command": "Orden",
   "journal.done": "hecho",
   "journal.times": "{came} ({n} veces)",

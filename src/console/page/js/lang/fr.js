@@ -236,6 +236,7 @@ export default {
   "history.title": "Derniers spectacles",
   "home.empty": "SIÈGES VIDES ?",
   "in-play": "{playing} sièges sur {all}",
+  "in-play.none": "{state}, aucun siège",
   "journal.command": "Commande",
   "journal.done": "fait",
   "journal.times": "{came} ({n} fois)",

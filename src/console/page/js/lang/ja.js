@@ -236,6 +236,7 @@ export default {
   "history.title": "最近のショー",
   "home.empty": "座席は無人？",
   "in-play": "座席 {playing}/{all}",
+  "in-play.none": "{state}：座席なし",
   "journal.command": "コマンド",
   "journal.done": "完了",
   "journal.times": "{came}（{n} 回）",

@@ -236,6 +236,7 @@ export default {
   "history.title": "最近的演出",
   "home.empty": "座椅无人？",
   "in-play": "座椅 {playing}/{all}",
+  "in-play.none": "{state}：无座椅",
   "journal.command": "命令",
   "journal.done": "完成",
   "journal.times": "{came}（{n} 次）",
