@@ -13,13 +13,15 @@ use hyper::header::{ACCEPT, CONTENT_TYPE, HOST};
 use hyper::{Method, Request, Response};
 use hyper_util::rt::TokioIo;
 use tokio::net::UnixStream;
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::sys::clock::wall_now_ns;
 
 /// How long the socket may take to let us in.
 const ENTRY: Duration = Duration::from_secs(2);
+/// How soon after it was full it is asked again.
+const AGAIN: Duration = Duration::from_millis(5);
 /// The longest reply that is read, bytes.
 const LONGEST: usize = 64 << 20;
 
@@ -103,9 +105,17 @@ where
     sender.send_request(request).await.with_context(|| cut_off(socket)).or_exit(Exit::Unavailable)
 }
 
-/// Connects to a socket, however busy whoever serves it is.
+/// Connects to a socket, however busy whoever serves it is: the kernel refuses at once while too many wait to be let in.
 pub(super) async fn connect(socket: &Path) -> io::Result<UnixStream> {
-    timeout(ENTRY, UnixStream::connect(socket)).await.unwrap_or_else(|_| Err(ErrorKind::TimedOut.into()))
+    let let_in = async {
+        loop {
+            match UnixStream::connect(socket).await {
+                Err(error) if error.kind() == ErrorKind::WouldBlock => sleep(AGAIN).await,
+                done => return done,
+            }
+        }
+    };
+    timeout(ENTRY, let_in).await.unwrap_or_else(|_| Err(ErrorKind::TimedOut.into()))
 }
 
 /// Why there is no way in, and what to do.
@@ -116,7 +126,7 @@ fn unreachable_at(socket: &Path, error: io::Error) -> Failure {
             let group = "operators have to be in the group kinocue: `sudo usermod -aG kinocue $USER`, then log in again";
             (Exit::NotAllowed, format!("may not open {path}; {group}"))
         }
-        ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+        ErrorKind::TimedOut => {
             (Exit::TryAgain, format!("the daemon at {path} accepts no connection at the moment; try again"))
         }
         _ => {
@@ -145,6 +155,11 @@ fn key() -> String {
 
 #[cfg(test)]
 mod tests {
+    use rustix::io::Errno;
+    use rustix::net::{
+        AddressFamily, SocketAddrUnix, SocketFlags, SocketType, accept, bind, listen, socket_with,
+    };
+
     use super::*;
 
     #[test]
@@ -157,12 +172,33 @@ mod tests {
     }
 
     #[test]
+    fn whoever_comes_while_too_many_wait_is_let_in_once_there_is_room() {
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("full.sock");
+        let address = SocketAddrUnix::new(&socket).unwrap();
+        let line =
+            || socket_with(AddressFamily::UNIX, SocketType::STREAM, SocketFlags::NONBLOCK, None).unwrap();
+        let door = line();
+        bind(&door, &address).and_then(|()| listen(&door, 0)).unwrap();
+        let waiting = line();
+        rustix::net::connect(&waiting, &address).unwrap();
+        assert_eq!(rustix::net::connect(line(), &address), Err(Errno::AGAIN));
+        let entered = block_on(async {
+            let entered = tokio::spawn(async move { connect(&socket).await });
+            tokio::task::yield_now().await; // it has knocked
+            drop(accept(&door).unwrap());
+            Ok(entered.await.unwrap())
+        });
+        assert!(entered.unwrap().is_ok());
+    }
+
+    #[test]
     fn what_stands_in_the_way_decides_the_exit_code_and_what_to_do() {
         for (kind, exit, says) in [
             (ErrorKind::NotFound, Exit::Unavailable, "systemctl start kinocue"),
             (ErrorKind::ConnectionRefused, Exit::Unavailable, "kinocue serve"),
             (ErrorKind::PermissionDenied, Exit::NotAllowed, "group kinocue"),
-            (ErrorKind::WouldBlock, Exit::TryAgain, "try again"),
+            (ErrorKind::TimedOut, Exit::TryAgain, "try again"),
         ] {
             let failure = unreachable_at(Path::new("/run/k.sock"), kind.into());
             assert_eq!(failure.exit, exit);

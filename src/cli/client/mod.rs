@@ -26,6 +26,7 @@ pub(super) use record::dump as dump_record;
 pub(super) use reply::ServiceProblem;
 pub(super) use server::ServerArgs;
 pub(super) use show::{home, preflight};
+pub(super) use stop::ask_stop;
 
 use super::{Exit, Failure};
 

@@ -42,7 +42,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let beside = || args.server.first_socket().with_file_name("stop.sock");
     let socket = args.stop_socket.clone().unwrap_or_else(beside);
     let path = socket.display();
-    match block_on(async { Ok(say_stop(&socket).await) })? {
+    match block_on(async { Ok(ask_stop(&socket, PATIENCE).await) })? {
         Ok(()) => {
             if args.server.json {
                 print::json(&json!({ "state": "stopping", "by": "stop-socket" }))?;
@@ -59,8 +59,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
 }
 
-/// Writes the line and reads the answer.
-async fn say_stop(socket: &Path) -> io::Result<()> {
+/// Has whoever serves a stop socket stop, within so long.
+///
+/// # Errors
+/// Those of the system, or that it said something else.
+pub(in crate::cli) async fn ask_stop(socket: &Path, patience: Duration) -> io::Result<()> {
     let talk = async {
         let mut stream = connect(socket).await?;
         stream.write_all(b"stop\n").await?;
@@ -72,7 +75,7 @@ async fn say_stop(socket: &Path) -> io::Result<()> {
         let said = String::from_utf8_lossy(&answer).trim_end().to_owned();
         Err(io::Error::new(ErrorKind::InvalidData, format!("it said {said:?}")))
     };
-    timeout(PATIENCE, talk).await.unwrap_or_else(|_| Err(ErrorKind::TimedOut.into()))
+    timeout(patience, talk).await.unwrap_or_else(|_| Err(ErrorKind::TimedOut.into()))
 }
 
 fn by_control_socket(server: &ServerArgs) -> Result<Exit, Failure> {

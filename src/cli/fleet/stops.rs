@@ -1,25 +1,22 @@
 //! Stops on their way to a hall, by a socket of their own that waits for nothing. Of a hall with two show machines both links hear each:
 //! the one whose machine does not serve the hall keeps it for as long as a takeover lasts, unless the other one lives on.
 
-use std::io::ErrorKind;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::anyhow;
+use anyhow::Context as _;
 use async_nats::Message;
 use futures_util::StreamExt as _;
 use hyper::body::Bytes;
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
-use tokio::net::UnixStream;
 use tokio::sync::mpsc;
-use tokio::time::{Instant, sleep, timeout};
+use tokio::time::{Instant, sleep};
 
 use super::engine;
 use super::hall::Link;
 use super::lease::Renewed;
 use super::link::{Messages, away};
+use crate::cli::client::ask_stop;
 use crate::cli::print;
 use crate::fleet;
 
@@ -91,8 +88,7 @@ impl Link {
     /// Has the hall stop now.
     async fn stop(&self) -> anyhow::Result<()> {
         let socket = self.socket.with_file_name("fleet-stop.sock");
-        let asked = timeout(STOPPED, ask(&socket)).await;
-        Ok(asked.map_err(|_| anyhow!("the hall did not answer within {} s", STOPPED.as_secs()))??)
+        ask_stop(&socket, STOPPED).await.context("the hall did not say that it stops")
     }
 }
 
@@ -109,14 +105,6 @@ fn stopping() -> (u16, Value) {
 fn is_of_engine(message: &Message) -> bool {
     let is_kept = message.headers.as_ref().is_some_and(|headers| headers.get("Nats-Stream").is_some());
     message.status.is_some() || is_kept || engine::is_said_by_engine(&message.payload)
-}
-
-async fn ask(socket: &Path) -> std::io::Result<()> {
-    let mut stream = UnixStream::connect(socket).await?;
-    stream.write_all(b"stop\n").await?;
-    let mut reply = [0; 9];
-    stream.read_exact(&mut reply).await?;
-    if &reply == b"stopping\n" { Ok(()) } else { Err(ErrorKind::InvalidData.into()) }
 }
 
 #[cfg(test)]
