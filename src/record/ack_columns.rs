@@ -91,7 +91,7 @@ pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
             }
         }
         let began = chunk.drained.unwrap_or_default().as_nanos().cast_signed();
-        chunks.push(ends, [chunk.dropped.into(), chunk.drained.is_some().into(), began]);
+        chunks.push(ends, &[chunk.dropped.into(), chunk.drained.is_some().into(), began]);
         ends += 1;
         runs.push([END, 0, 1]);
     }
@@ -105,7 +105,7 @@ pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
     let controllers = writers.into_iter().enumerate().filter_map(replies).collect();
     let count = u32::try_from(runs.len()).unwrap_or(u32::MAX);
     let mut columns = ColumnSet::default();
-    runs.into_iter().enumerate().for_each(|(row, run)| columns.push(row, run));
+    runs.into_iter().enumerate().for_each(|(row, run)| columns.push(row, &run));
     Acks { runs: columns.take(), count, chunks: chunks.take(), controllers, others }.encode_to_vec()
 }
 
@@ -129,13 +129,13 @@ fn take(record: &AckRecord<'_>, writers: &mut Vec<ReplyWriter>, others: &mut Vec
     let kind = match *record {
         AckRecord::Reply(Reply { frame, code, error, inputs, at, .. }) => {
             *at_us = (at.as_nanos() / NS).cast_signed();
-            replies.push(*replied, [frame.0.into(), code as i64, error.into(), inputs.into(), *at_us]);
+            replies.push(*replied, &[frame.0.into(), code as i64, error.into(), inputs.into(), *at_us]);
             *replied += 1;
             REPLY
         }
         AckRecord::Fate(_, frame, fate, latency) => {
             let left_us = at_us.wrapping_sub(i64::from(latency) / NS.cast_signed());
-            fates.push(*fated, [frame.0.into(), number(fate), left_us]);
+            fates.push(*fated, &[frame.0.into(), number(fate), left_us]);
             *fated += 1;
             FATE
         }

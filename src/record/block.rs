@@ -4,11 +4,12 @@ use prost::Message as _;
 
 use super::chunk::{Chunk, TickHead};
 use super::columns::ColumnSet;
-use super::full::{Lane, Sent};
-use super::seat::{FrameKind, ReadFrame, RecordedAxis, RecordedSeat};
+use super::full::{Lane, OF_FRAME, Sent};
+use super::seat::{FrameKind, ReadFrame, RecordedSeat};
+use crate::motion::MAX_AXES;
 use crate::state::State;
 use crate::time::MonoTime;
-use crate::wire::{MAX_LEN, MotionRequest, Timing};
+use crate::wire::{MAX_LEN, MotionRequest, PerAxis, Timing};
 
 /// Ticks that become a block. Its memory is used again for the next.
 #[derive(Debug, Default)]
@@ -56,7 +57,7 @@ impl Block {
         let [index, due, late, missed] =
             [index, deadline.as_nanos(), late_ns / 1_000, missed].map(u64::cast_signed);
         let row = [index, due, late, missed, film.as_nanos(), state, chunk.dropped.into()];
-        self.columns.push(self.ticks, row);
+        self.columns.push(self.ticks, &row);
         self.lanes.resize_with(lanes, LaneWriter::default);
         self.woken = (deadline.as_nanos() / 1_000).wrapping_add(late_ns / 1_000);
         self.ticks += 1;
@@ -97,21 +98,33 @@ impl LaneWriter {
             motion.as_ref().and_then(|motion| whole(seat.frames, motion.request.as_ref()?, frame.datagram));
         let in_raw = if request.is_some() { 0 } else { frame.datagram.len() as i64 + 1 };
         let of_all = [tick, after, handed, asked.slots as i64, level, asked.clamps.cast_signed(), in_raw];
+        let mut all = [0; OF_FRAME];
+        all[..of_all.len()].copy_from_slice(&of_all);
+        let told = request.map_or(of_all.len(), |request| {
+            all[of_all.len()..].copy_from_slice(&fields(request));
+            OF_FRAME
+        });
         let row = self.frames;
         self.frames += 1;
-        self.fields.push(row, of_all.into_iter().chain(request.into_iter().flat_map(fields)));
+        self.fields.push(row, &all[..told]);
         let sent = read.sent();
-        let farther = |(axis, (geometry, wanted)): (usize, (&RecordedAxis, &f64))| {
-            geometry.pulses(*wanted) - sent.get(axis).map_or(0, |place| geometry.pulses(*place))
+        let farther = |axis: usize| {
+            let geometry = &seat.axes()[axis];
+            geometry.pulses(wanted[axis]) - sent.get(axis).map_or(0, |place| geometry.pulses(*place))
         };
-        self.asked.push(row, seat.axes().iter().zip(wanted.iter()).enumerate().map(farther));
+        self.asked.push(row, &PerAxis::from_fn(wanted.len(), farther));
         let Some(request) = request else {
             self.raw.extend_from_slice(frame.datagram);
             return;
         };
-        self.positions.push(row, request.positions.iter().map(|at| at.0.into()));
-        let shakes = request.vibration.iter().flat_map(|all| all.iter());
-        self.vibration.push(row, shakes.flat_map(|one| [one.period.into(), one.amplitude.into()]));
+        let positions = &request.positions;
+        self.positions.push(row, &PerAxis::from_fn(positions.len(), |axis| positions[axis].0.into()));
+        let mut shakes = [[0; 2]; MAX_AXES];
+        let shaken = request.vibration.map_or(0, |all| all.len());
+        for (shake, one) in shakes.iter_mut().zip(request.vibration.iter().flat_map(|all| all.iter())) {
+            *shake = [one.period.into(), one.amplitude.into()];
+        }
+        self.vibration.push(row, shakes[..shaken].as_flattened());
     }
 
     fn take(&mut self, lane: usize) -> Lane {

@@ -12,28 +12,6 @@ pub(super) struct Column {
     pub(super) packed: Vec<u8>,
 }
 
-/// What the next number of a column is held against: the last one, the step to it, and how many there were by then. Those of columns
-/// side by side are together, since most numbers go on as they were, and then nothing else of a column is looked at.
-#[derive(Debug, Clone, Copy, Default)]
-struct ColumnEnd {
-    last: i64,
-    step: i64,
-    count: usize,
-}
-
-impl ColumnEnd {
-    /// The second difference of the number of a row; those of rows that were left out go on as before. Wraps, so that any numbers come
-    /// back.
-    #[inline]
-    fn second(&mut self, row: usize, number: i64) -> i64 {
-        let left_out = i64::try_from(row - self.count).unwrap_or_default();
-        let step = number.wrapping_sub(self.last.wrapping_add(self.step.wrapping_mul(left_out)));
-        let second = step.wrapping_sub(self.step);
-        *self = Self { last: number, step, count: row + 1 };
-        second
-    }
-}
-
 /// A column on its way.
 #[derive(Debug, Default)]
 struct ColumnWriter {
@@ -81,37 +59,65 @@ impl ColumnWriter {
     }
 }
 
-/// Columns side by side, on their way.
+/// Columns side by side, on their way. What the next number of each is held against lies together: most numbers go on as they were, and then
+/// nothing else of a column is looked at.
 #[derive(Debug, Default)]
 pub(super) struct ColumnSet {
-    ends: Vec<ColumnEnd>,
+    /// Rows so far.
+    rows: usize,
+    /// The last number of each, the step to it, and how that differs from the one before.
+    last: Vec<i64>,
+    step: Vec<i64>,
+    second: Vec<i64>,
     writers: Vec<ColumnWriter>,
 }
 
 impl ColumnSet {
-    /// The numbers of a row, which may be of fewer columns than there are.
+    /// The numbers of a row, which may be of fewer columns than there are: those that are left out, and whole rows, go on as before. Wraps, so
+    /// that any numbers come back.
     #[inline]
-    pub(super) fn push(&mut self, row: usize, numbers: impl IntoIterator<Item = i64>) {
-        for (at, number) in numbers.into_iter().enumerate() {
-            if at == self.ends.len() {
-                self.ends.push(ColumnEnd::default());
-                self.writers.push(ColumnWriter::default());
-            }
-            let second = self.ends[at].second(row, number);
-            if second != 0 {
-                self.writers[at].push(row, second);
+    pub(super) fn push(&mut self, row: usize, numbers: &[i64]) {
+        let columns = numbers.len().max(self.writers.len());
+        if columns > self.writers.len() {
+            [&mut self.last, &mut self.step, &mut self.second]
+                .into_iter()
+                .for_each(|all| all.resize(columns, 0));
+            self.writers.resize_with(columns, ColumnWriter::default);
+        }
+        let left_out = i64::try_from(row - self.rows).unwrap_or_default();
+        self.rows = row + 1;
+        if left_out != 0 {
+            go_on(&mut self.last, &self.step, left_out);
+        }
+        let told = numbers.len();
+        go_on(&mut self.last[told..], &self.step[told..], 1);
+        // Nothing here but numbers, so that several are taken at once.
+        let kept = self.last.iter_mut().zip(&mut self.step).zip(&mut self.second);
+        for (number, ((last, step), second)) in numbers.iter().zip(kept) {
+            let now = number.wrapping_sub(*last);
+            (*second, *last, *step) = (now.wrapping_sub(*step), *number, now);
+        }
+        for (at, second) in self.second[..told].iter().enumerate() {
+            if *second != 0 {
+                self.writers[at].push(row, *second);
             }
         }
     }
 
     /// What they came to, without those at the end that hold nothing. The next begin anew.
     pub(super) fn take(&mut self) -> Vec<Column> {
-        self.ends.fill(ColumnEnd::default());
+        self.rows = 0;
+        [&mut self.last, &mut self.step].into_iter().for_each(|all| all.fill(0));
         let mut columns: Vec<Column> = self.writers.iter_mut().map(ColumnWriter::take).collect();
         let used = columns.iter().rposition(|column| !column.packed.is_empty());
         columns.truncate(used.map_or(0, |last| last + 1));
         columns
     }
+}
+
+/// The last numbers so many rows later.
+fn go_on(last: &mut [i64], step: &[i64], rows: i64) {
+    last.iter_mut().zip(step).for_each(|(last, step)| *last = last.wrapping_add(step.wrapping_mul(rows)));
 }
 
 /// Columns that are read, row by row; without end: they go on as they were.
@@ -199,7 +205,7 @@ mod tests {
             let mut columns = ColumnSet::default();
             for _ in 0..2 {
                 for (row, number) in rows.iter().enumerate() {
-                    columns.push(row, *number);
+                    columns.push(row, number.as_slice());
                 }
                 let taken = columns.take();
                 let mut readers = ColumnReaders::new(&taken);
@@ -223,10 +229,10 @@ mod tests {
     #[test]
     fn what_moves_evenly_takes_a_few_octets_and_what_trembles_by_a_pulse_two_bits() {
         let mut columns = ColumnSet::default();
-        (0..500).for_each(|row| columns.push(row, [7 + 3 * i64::try_from(row).expect("few"), 0]));
+        (0..500).for_each(|row| columns.push(row, &[7 + 3 * i64::try_from(row).expect("few"), 0]));
         assert!(columns.take()[0].packed.len() < 40);
         // Second differences of -1, 0 and 1.
-        (0..512_usize).for_each(|row| columns.push(row, [i64::try_from(row * row / 4).expect("few")]));
+        (0..512_usize).for_each(|row| columns.push(row, &[i64::try_from(row * row / 4).expect("few")]));
         assert!(columns.take()[0].packed.len() <= 512 / 4 + 16 + 8);
     }
 }

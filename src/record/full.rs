@@ -18,7 +18,7 @@ const MOST: usize = 5_000;
 /// Numbers of a tick: index, deadline ns, lateness µs, missed, film ns, state, dropped.
 const OF_TICK: usize = 7;
 /// Numbers of a frame, in the order of `FrameFields`.
-const OF_FRAME: usize = 17;
+pub(super) const OF_FRAME: usize = 17;
 
 /// Half a second of ticks: `kinocue.Sent`.
 #[derive(Clone, PartialEq, prost::Message)]
