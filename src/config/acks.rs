@@ -10,7 +10,9 @@ const MOST_UNASKED_MS: f64 = 50.0;
 /// Why acks are requested too seldom, if they are.
 pub(crate) fn too_seldom(show: &Show, has_drives: bool) -> Option<String> {
     if has_drives && show.ack_every > 1 {
-        return Some("drives answer each segment, and an unanswered one is in doubt; leave it at 1".to_owned());
+        return Some(
+            "drives answer each segment, and an unanswered one is in doubt; leave it at 1".to_owned(),
+        );
     }
     let (hz, apart_ms) = (show.rate_hz, f64::from(show.ack_every - 1) * 1_000.0 / show.rate_hz);
     let most = 1.0 + (MOST_UNASKED_MS * hz / 1_000.0).floor();

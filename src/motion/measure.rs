@@ -93,7 +93,7 @@ pub(crate) struct MeasureTimes {
 #[derive(Debug, Clone)]
 pub(crate) struct MeasureSpans {
     newest: usize,
-    /// The pose before, s before the newest, and the middle of both; none of the first pose.
+    /// The pose before, one over the seconds from it to the newest, and the middle of both; none of the first pose.
     before: Option<(usize, f64, ShowTime)>,
     /// When the pose before was, where there was one before that.
     step_at: Option<ShowTime>,
@@ -101,15 +101,16 @@ pub(crate) struct MeasureSpans {
     apart: [Option<ApartSpans>; 2],
 }
 
-/// The poses of a third difference, the newest first.
+/// The poses of a third difference, the newest first, and what its steps are multiplied with: a division of each would cost most of a
+/// measure, and the spans are those of all axes.
 #[derive(Debug, Clone, Copy)]
 struct ApartSpans {
     slots: [usize; 4],
-    /// Seconds between each and the next, and between those two apart.
+    /// One over the seconds between each and the next; two over those between two apart.
     one: [f64; 3],
     two: [f64; 2],
     second_at: ShowTime,
-    /// Seconds between all, and the middle; none where there are no four.
+    /// Three over the seconds between all, and the middle; none where there are no four.
     third: Option<(f64, ShowTime)>,
 }
 
@@ -125,7 +126,7 @@ impl MeasureTimes {
         self.seen += 1;
         let before = (self.seen >= 2).then(|| {
             let middle = self.times[self.slot(1)].midpoint(self.times[self.newest]);
-            (self.slot(1), self.seconds(0, 1), ShowTime::from_nanos(middle))
+            (self.slot(1), 1.0 / self.seconds(0, 1), ShowTime::from_nanos(middle))
         });
         MeasureSpans {
             newest: self.newest,
@@ -142,10 +143,10 @@ impl MeasureTimes {
         let middle = || self.time(apart).as_nanos().midpoint(self.time(2 * apart).as_nanos());
         Some(ApartSpans {
             slots: [self.slot(0), self.slot(apart), self.slot(2 * apart), self.slot(last)],
-            one: [self.seconds(0, apart), self.seconds(apart, apart), self.seconds(2 * apart, apart)],
-            two: [self.seconds(0, 2 * apart), self.seconds(apart, 2 * apart)],
+            one: [0, 1, 2].map(|before| 1.0 / self.seconds(before * apart, apart)),
+            two: [0, 1].map(|before| 2.0 / self.seconds(before * apart, 2 * apart)),
             second_at: self.time(apart),
-            third: has_third.then(|| (self.seconds(0, 3 * apart), ShowTime::from_nanos(middle()))),
+            third: has_third.then(|| (3.0 / self.seconds(0, 3 * apart), ShowTime::from_nanos(middle()))),
         })
     }
 
@@ -179,11 +180,11 @@ impl<const N: usize> MeasurePlaces<N> {
         let axes = positions.len().min(N);
         self.positions[spans.newest][..axes].copy_from_slice(&positions[..axes]);
         let mut readings = [Readings::default(); N];
-        if let Some((before, seconds, at)) = spans.before {
+        if let Some((before, per_second, at)) = spans.before {
             let (newest, before) = (&self.positions[spans.newest], &self.positions[before]);
             let all = readings.iter_mut().zip(&mut self.last_velocities).take(axes);
             for (axis, (readings, last_velocity)) in all.enumerate() {
-                let velocity = (newest[axis] - before[axis]) / seconds;
+                let velocity = (newest[axis] - before[axis]) * per_second;
                 readings.velocity = Reading { value: velocity, at };
                 let step = velocity - std::mem::replace(last_velocity, velocity);
                 readings.step = spans.step_at.map_or(readings.step, |at| Reading { value: step, at });
@@ -197,15 +198,14 @@ impl<const N: usize> MeasurePlaces<N> {
         let ApartSpans { slots, one, two, second_at, third } = spans;
         let places = |index: usize| &self.positions[slots[index]];
         let places = [places(0), places(1), places(2), places(3)];
-        let (seconds, middle) = third.unwrap_or((f64::INFINITY, ShowTime::ZERO));
+        let (three, middle) = third.unwrap_or((0.0, ShowTime::ZERO));
         let (mut second, mut jerk) = ([0.0; N], [0.0; N]);
         let both = second.iter_mut().zip(&mut jerk).take(readings.len());
         for (axis, (second, jerk)) in both.enumerate() {
             // Neighbours share the slope between them.
-            let slope = |index: usize| (places[index][axis] - places[index + 1][axis]) / one[index];
-            let [newest, older] = [(slope(0) - slope(1)) / two[0], (slope(1) - slope(2)) / two[1]];
-            *second = 2.0 * newest;
-            *jerk = 6.0 * ((newest - older) / seconds);
+            let slope = |index: usize| (places[index][axis] - places[index + 1][axis]) * one[index];
+            let [newest, older] = [(slope(0) - slope(1)) * two[0], (slope(1) - slope(2)) * two[1]];
+            (*second, *jerk) = (newest, (newest - older) * three);
         }
         for (axis, readings) in readings.iter_mut().enumerate() {
             keep_larger(&mut readings.acceleration, second[axis], *second_at);
