@@ -132,7 +132,7 @@ impl Belief {
             own: window.own(),
             within: 0,
             known: Known::Nothing,
-            spans: Spans::over(GAP + window.acked_after(), period),
+            spans: Spans::over(GAP + window.acked_after()),
             history: History::at([0.0; MAX_AXES]),
             acked: None,
             shaking: Shaking::default(),
@@ -274,7 +274,7 @@ impl Belief {
         let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
         let later = self.acked_after;
         let is_missed = |since| told.since(since) > GAP + later || now.since(since) > GAP_UNTOLD + later;
-        let unheard = || self.spans.waiting_since(self.acked).is_some_and(is_missed);
+        let unheard = || self.spans.waiting_since(self.acked, self.period).is_some_and(is_missed);
         refused || (self.asks && unheard())
     }
 

@@ -61,8 +61,6 @@ pub(super) struct Spans {
     spans: [Span; SPANS],
     /// How long each is.
     length: Duration,
-    /// Frames are so far apart, at the least.
-    period: Duration,
     /// How many hold frames; the first also holds the place that they began at.
     count: usize,
     last: Pose,
@@ -73,12 +71,12 @@ pub(super) struct Spans {
 impl Spans {
     /// No frame yet; spans that are long enough for frames that are open for so long.
     #[expect(clippy::cast_possible_truncation, reason = "a handful")]
-    pub(super) fn over(open: Duration, period: Duration) -> Self {
+    pub(super) fn over(open: Duration) -> Self {
         let (at, last) = (MonoTime::from_nanos(0), [0.0; MAX_AXES]);
         let empty = Span { first: FrameNo::FIRST, at, asked: None, reach: Reach::at(last) };
         // The one that is being filled may have just begun.
         let length = SPAN.max(open / (SPANS as u32 - 1));
-        Self { spans: [empty; SPANS], length, period, count: 0, last, newest: FrameNo::FIRST, newest_at: at }
+        Self { spans: [empty; SPANS], length, count: 0, last, newest: FrameNo::FIRST, newest_at: at }
     }
 
     /// No frame since the axes were there.
@@ -136,16 +134,16 @@ impl Spans {
         self.count = 0;
     }
 
-    /// Since when an ack is waited for: about when the frame behind `acked` left, and no later than its span was over. Numbers may be left out, and
-    /// would tell of a time to come.
-    pub(super) fn waiting_since(&self, acked: Option<FrameNo>) -> Option<MonoTime> {
+    /// Since when an ack is waited for, where frames are a `period` apart at the least: about when the frame behind `acked` left, and no later than
+    /// its span was over. Numbers may be left out, and would tell of a time to come.
+    pub(super) fn waiting_since(&self, acked: Option<FrameNo>, period: Duration) -> Option<MonoTime> {
         let open = |last: FrameNo| acked.is_none_or(|acked| last.since(acked) > 0);
         let spans = &self.spans[..self.count];
         let over = spans.iter().skip(1).map(|next| next.at).chain([self.newest_at]);
         spans.iter().zip(over).find_map(|(span, over)| {
             let (since, _) = span.asked.filter(|(_, last)| open(*last))?;
             let taken = acked.map_or(0, |acked| acked.since(span.first).saturating_add(1));
-            let left = span.at + self.period * u32::try_from(taken).unwrap_or(0);
+            let left = span.at + period * u32::try_from(taken).unwrap_or(0);
             Some(since.max(left.min(over)))
         })
     }

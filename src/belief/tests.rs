@@ -149,7 +149,7 @@ fn fifty_milliseconds_without_an_ack_are_a_gap_and_what_is_sent_then_is_slow_fro
 fn a_frame_is_missed_after_fifty_milliseconds_however_many_of_its_neighbours_were_acked() {
     let mut bench = Bench::found(0.0);
     bench.belief = Belief { period: Duration::from_millis(1), ..bench.belief };
-    bench.belief.spans = Spans::over(GAP, Duration::from_millis(1));
+    bench.belief.spans = Spans::over(GAP);
     bench.read(0.0, 0, true);
     let gap = (0_u32..400).find(|when| {
         // Frame n leaves at n - 1 ms and is acked 49 ms later, until frame 203, which is not.
@@ -165,7 +165,7 @@ fn a_frame_is_missed_after_fifty_milliseconds_however_many_of_its_neighbours_wer
 fn a_frame_is_missed_within_a_span_though_numbers_before_it_were_left_out() {
     let mut bench = Bench::found(0.0);
     bench.belief = Belief { period: Duration::from_millis(1), ..bench.belief };
-    bench.belief.spans = Spans::over(GAP, Duration::from_millis(1));
+    bench.belief.spans = Spans::over(GAP);
     bench.read(0.0, 0, true);
     // The lane goes on with the number of others at 203 ms. Acks come after 5 ms, and for what leaves from 206 ms on none.
     let number = |when: u32| when + if when < 203 { 1 } else { 1_001 };
