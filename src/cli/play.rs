@@ -14,7 +14,7 @@ use super::{Exit, Failure, OrExit as _, exit, metres, print};
 use crate::app::film::{FilmReader, SourceRules};
 use crate::app::runtime::RuntimeError;
 use crate::app::{Play, PlayError, Played, RollCall};
-use crate::config::{Config, from_to_args, parse_level};
+use crate::config::{Config, from_to_args, late_losses, parse_level};
 use crate::control::model::Ending;
 use crate::drive::Manner;
 use crate::engine::Show;
@@ -218,6 +218,10 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
         Some("absolute") => config.show.timing = Timing::Absolute,
         Some(_) => config.show.timing = Timing::Relative,
         None => {}
+    }
+    // Also of a configuration whose rate is another here.
+    if let Some(why) = late_losses(&config.show).filter(|_| !args.stream.no_acks) {
+        return Err(anyhow!("--ack-every {}: {why}", config.show.ack_every)).or_exit(Exit::Usage);
     }
     Ok(config)
 }

@@ -11,7 +11,8 @@ pub(super) struct StreamArgs {
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
 
-    /// Request an ack on every Nth frame, 1 to 1000 [default: 1, or the configuration's].
+    /// Request an ack on every Nth frame, 1 to 1000 [default: 1, or the configuration's]; a play takes no more than lets a loss be seen 50 ms
+    /// later, as 6 at 100 frames a second.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
     ack_every: Option<u32>,
 

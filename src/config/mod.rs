@@ -47,6 +47,7 @@ mod tests;
 mod text;
 
 pub(crate) use crate::wire::{Dialect, Timing, VibrationPort};
+pub(crate) use acks::late_losses;
 pub(crate) use api::api;
 pub use api::{Api, ApiToken, Role};
 pub use broadcast::BroadcastNetwork;

@@ -103,12 +103,12 @@ fn people_read_the_report_on_stderr_and_stdout_stays_empty() {
 #[test]
 fn with_few_replies_asked_for_the_books_are_of_the_frames_that_ask() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
-    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--ack-every", "10", "--json"]);
+    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--ack-every", "5", "--json"]);
     let report = run.report_of(0);
     assert_sound(&report);
     let one = &report["controllers"][0];
     let sent = one["sent"].as_u64().expect("a count");
-    assert_eq!((&one["asked"], &one["acked"]), (&sent.div_ceil(10).into(), &one["asked"]), "{one}");
+    assert_eq!((&one["asked"], &one["acked"]), (&sent.div_ceil(5).into(), &one["asked"]), "{one}");
     assert_eq!((&one["lost"], &one["stray"]), (&0.into(), &0.into()), "{one}");
     let seen = sim.end();
     assert_eq!((seen.controllers[0]["executed"].as_u64(), seen.rows.len() as u64), (Some(sent), sent));
@@ -118,7 +118,7 @@ fn with_few_replies_asked_for_the_books_are_of_the_frames_that_ask() {
 #[test]
 fn a_controller_that_answers_no_frame_is_played_nothing_though_few_would_ask() {
     let (folder, sim) = (Folder::new(), Sim::one(&["--mute"]));
-    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--ack-every", "10", "--json"]);
+    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--ack-every", "5", "--json"]);
     assert_eq!((run.code, run.stdout.as_str()), (Some(69), ""));
     assert!(run.stderr.contains("c1: nobody answers, so nothing is played"), "{}", run.stderr);
     let seen = sim.end();
