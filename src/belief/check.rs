@@ -65,7 +65,9 @@ impl Belief {
         self.history.push(self.spans.last(), pose, shakes.max(self.sways), (at, self.busy_until));
         // What was refused before it is missing as well, until it is acked.
         let since = self.refused_since.take().unwrap_or(at);
-        self.spans.push(frame, asked, pose, since);
+        // Of numbers that were refused, or left out, one may have been to ask: who took this frame has to ack a later one all the sooner.
+        let waits = asked || self.spans.passes_one_that_asks(frame, self.ack_every);
+        self.spans.push(frame, waits, pose, since);
         if !matches!(self.known, Known::Commanded(_)) {
             self.known = Known::Commanded(at);
         }
