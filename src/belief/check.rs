@@ -63,9 +63,11 @@ impl Belief {
         self.shaking.on_frame(frame, shakes);
         // One that vibrates on does so until this frame arrives.
         self.history.push(self.spans.last(), pose, shakes.max(self.sways), (at, self.busy_until));
-        // What was refused before it is missing as well, until it is acked.
-        let since = self.refused_since.take().unwrap_or(at);
-        self.spans.push(frame, asked, pose, since);
+        // What was refused before it is missing as well, until it is acked. One of these may have been to ask: whoever took this frame has to ack
+        // a later one all the sooner.
+        let refused = self.refused_since.take();
+        let waits = asked || refused.is_some() && self.spans.passes_one_that_asks(frame, self.ack_every);
+        self.spans.push(frame, waits, pose, refused.unwrap_or(at));
         if !matches!(self.known, Known::Commanded(_)) {
             self.known = Known::Commanded(at);
         }

@@ -105,8 +105,8 @@ pub(crate) struct Belief {
     busy_at_most: MonoTime,
     /// When the kernel first refused a frame since it last took one.
     refused_since: Option<MonoTime>,
-    /// Whether acks are asked for: else what the kernel takes is all that can be known.
-    asks: bool,
+    /// One of so many frames asks for an ack; 0 where none does: then what the kernel takes is all that can be known.
+    ack_every: u32,
     gap: bool,
     period: Duration,
     /// How long before the seat executes them its frames are made, and how much later they may be confirmed.
@@ -116,10 +116,10 @@ pub(crate) struct Belief {
 }
 
 impl Belief {
-    /// Nothing is known of a lane with that window, which gets a frame in each `period`; `asks` says whether frames ask for
-    /// acks.
+    /// Nothing is known of a lane with that window, which gets a frame in each `period`; one of `ack_every` asks for an ack, none where
+    /// that is 0.
     #[must_use]
-    pub(crate) fn new(window: &Window, period: Duration, asks: bool) -> Self {
+    pub(crate) fn new(window: &Window, period: Duration, ack_every: u32) -> Self {
         let (mut speed, mut near) = ([f64::INFINITY; MAX_AXES], [f64::INFINITY; MAX_AXES]);
         for (index, slot) in window.slots().iter().enumerate().filter(|(_, slot)| slot.is_own) {
             speed[index] = ROUNDING * slot.limits.velocity * 1e-3;
@@ -141,7 +141,7 @@ impl Belief {
             busy_until: MonoTime::default(),
             busy_at_most: MonoTime::default(),
             refused_since: None,
-            asks,
+            ack_every,
             gap: false,
             period,
             lead: window.lead(),
@@ -200,7 +200,7 @@ impl Belief {
     /// Where the seat has been led once all frames are confirmed and their Time is over. Where no acks are asked for, what
     /// the kernel took counts as confirmed then, and README says what that costs.
     fn settle(&mut self, now: MonoTime) {
-        let confirmed = !self.asks || self.acked.is_some_and(|acked| self.spans.are_confirmed(acked));
+        let confirmed = !self.asks() || self.acked.is_some_and(|acked| self.spans.are_confirmed(acked));
         if !confirmed || now + self.period / 2 < self.executed_until() {
             return;
         }
@@ -209,8 +209,8 @@ impl Belief {
         (self.within, self.sways) = (self.own, 0.0);
         // Since then it may have been moved.
         let over = self.executed_until().min(now);
-        self.known = if self.asks { Known::Confirmed(over) } else { Known::Commanded(over) };
-        self.gap &= self.asks;
+        self.known = if self.asks() { Known::Confirmed(over) } else { Known::Commanded(over) };
+        self.gap &= self.asks();
     }
 
     /// Takes a reading of where the seat is. One from before the last frame was over tells only whether the seat follows. One that
@@ -275,7 +275,7 @@ impl Belief {
         let later = self.acked_after;
         let is_missed = |since| told.since(since) > GAP + later || now.since(since) > GAP_UNTOLD + later;
         let unheard = || self.spans.waiting_since(self.acked, self.period).is_some_and(is_missed);
-        refused || (self.asks && unheard())
+        refused || (self.asks() && unheard())
     }
 
     /// The pose in which the seat is known to be at rest at `now`; none where an axis of it may be elsewhere, or where that was
@@ -290,8 +290,12 @@ impl Belief {
     #[must_use]
     pub(crate) fn start(&self, now: MonoTime) -> Option<KnownPose> {
         // Where no acks are asked for nobody reads either.
-        let within = if self.asks { BEGINS + self.period + self.acked_after } else { FRESH };
+        let within = if self.asks() { BEGINS + self.period + self.acked_after } else { FRESH };
         self.pose(now).filter(|_| self.is_recent(now, within))
+    }
+
+    const fn asks(&self) -> bool {
+        self.ack_every > 0
     }
 
     fn is_a_point(&self) -> bool {
@@ -315,7 +319,7 @@ impl Belief {
     /// rest; where no acks are asked for, whether it is known at all.
     #[must_use]
     pub(crate) fn may_begin(&self, since: MonoTime, now: MonoTime) -> bool {
-        let read = !self.asks || matches!(self.known, Known::Measured(at, _) if at >= since);
+        let read = !self.asks() || matches!(self.known, Known::Measured(at, _) if at >= since);
         read && self.start(now).is_some()
     }
 
@@ -351,7 +355,7 @@ impl Belief {
     fn is_recent(&self, now: MonoTime, within: Duration) -> bool {
         match self.known {
             Known::Measured(at, _) | Known::Confirmed(at) => now.since(at) <= within,
-            Known::Commanded(_) => !self.asks,
+            Known::Commanded(_) => !self.asks(),
             Known::Nothing | Known::Contradicted(_) => false,
         }
     }

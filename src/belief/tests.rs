@@ -31,7 +31,7 @@ impl Bench {
     }
 
     fn of(window: &Window) -> Self {
-        Self { belief: Belief::new(window, PERIOD, true), evidence: EvidenceTable::of(1), next: 1 }
+        Self { belief: Belief::new(window, PERIOD, 1), evidence: EvidenceTable::of(1), next: 1 }
     }
 
     /// One that was read at rest there at 0 ms.
@@ -204,8 +204,8 @@ fn that_the_ack_thread_is_slow_is_no_gap_for_a_tenth_of_a_second() {
 
 #[test]
 fn frames_that_the_kernel_does_not_take_for_fifty_milliseconds_are_a_gap_with_acks_or_without() {
-    for asks in [true, false] {
-        let mut belief = Belief::new(&window(), PERIOD, asks);
+    for ack_every in [1, 0] {
+        let mut belief = Belief::new(&window(), PERIOD, ack_every);
         let table = EvidenceTable::of(1);
         let evidence = table.lane(0).unwrap();
         let begins = |belief: &mut Belief, when| belief.look(evidence, ms(when), ms(when)) == Found::Gap;
@@ -215,6 +215,35 @@ fn frames_that_the_kernel_does_not_take_for_fifty_milliseconds_are_a_gap_with_ac
         assert!(begins(&mut belief, 60) && !begins(&mut belief, 70), "it begins once");
         assert_eq!(belief.tally().gaps, 1);
     }
+}
+
+#[test]
+fn an_ack_is_missed_in_time_though_the_frame_that_was_to_ask_was_refused() {
+    // Of numbers 1 to 40 those of 1, 6, 11 … ask; 1 is acked, and nothing after it.
+    let missed = |refused: &[u32]| {
+        let mut bench = Bench { belief: Belief::new(&window(), PERIOD, 5), ..Bench::found(0.0) };
+        bench.read(0.0, 0, true);
+        (1..40).find(|number| {
+            let (frame, when) = (FrameNo(*number), 10 * u64::from(*number));
+            let begins = bench.look(when) == Found::Gap;
+            if refused.contains(number) {
+                bench.belief.refused(ms(when));
+            } else {
+                let (pose, asked) = (at(0.0), frame.asks(5));
+                let (lasts_ms, at) = (10, ms(when));
+                let taken = Taken { frame, asked, pose: &pose, lasts_ms, at_most_ms: 10, shakes: 0.0, at };
+                bench.belief.taken(&taken);
+            }
+            if *number == 1 {
+                bench.ack(1);
+            }
+            begins
+        })
+    };
+    assert_eq!(missed(&[]), Some(12), "the sixth left at 60 ms");
+    assert_eq!(missed(&[6]), Some(12));
+    assert_eq!(missed(&[5, 6, 7]), Some(11), "the fifth was to leave at 50 ms");
+    assert_eq!(missed(&[2, 3, 4]), Some(12), "none of these was to ask");
 }
 
 #[test]
@@ -252,7 +281,7 @@ fn a_frame_that_waits_for_another_is_counted_as_late_and_one_that_waits_for_seve
 
 #[test]
 fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() {
-    let mut belief = Belief::new(&window(), PERIOD, false);
+    let mut belief = Belief::new(&window(), PERIOD, 0);
     let table = EvidenceTable::of(1);
     let evidence = table.lane(0).unwrap();
     let pose = at(0.0);
@@ -275,7 +304,7 @@ fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() 
 fn axes_that_no_reading_tells_are_known_by_confirmed_frames_alone() {
     let seat = SeatType::bench3(2);
     let window = Window::new((0..2).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect());
-    let (mut belief, table) = (Belief::new(&window, PERIOD, true), EvidenceTable::of(1));
+    let (mut belief, table) = (Belief::new(&window, PERIOD, 1), EvidenceTable::of(1));
     let evidence = table.lane(0).unwrap();
     let half = Reading { slots: 1, ..Reading::at_rest(at(0.2), ms(0)) };
     evidence.on_reading(&half);

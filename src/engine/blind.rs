@@ -303,7 +303,7 @@ mod tests {
     /// A belief of which the last ack is of a frame 70 ms back, and the axis led on from there at that speed, mm/s; and where it
     /// is led.
     fn in_a_gap(window: &Window, speed: f64) -> (Belief, Pose) {
-        let mut belief = Belief::new(window, Duration::from_millis(10), true);
+        let mut belief = Belief::new(window, Duration::from_millis(10), 1);
         let table = EvidenceTable::of(1);
         let evidence = table.lane(0).unwrap();
         let mut pose = [0.0; MAX_AXES];

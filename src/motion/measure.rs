@@ -270,6 +270,30 @@ mod tests {
     }
 
     #[test]
+    fn axes_side_by_side_are_measured_as_each_by_itself() {
+        let spacing = Spacing::at_rate(200.0);
+        for axes in [1, 3, 11] {
+            let (mut times, mut together) = (MeasureTimes::new(spacing), MeasurePlaces::<12>::NONE);
+            let mut alone = vec![Measure::new(spacing); axes];
+            for k in 0..400_i32 {
+                if k == 250 {
+                    // Anew, over what is left of before.
+                    times = MeasureTimes::new(spacing);
+                    alone.fill(Measure::new(spacing));
+                }
+                let at = ShowTime::from_millis(i64::from(5 * k + k % 3));
+                let place = |axis: u8| (0.001 * f64::from(k * k) + f64::from(axis)).sin();
+                let places: Vec<f64> = (0..12).take(axes).map(place).collect();
+                let seen = together.push(&times.push(at), &places);
+                let each: Vec<_> =
+                    alone.iter_mut().zip(&places).map(|(one, place)| one.push(at, *place)).collect();
+                assert_eq!(seen[..axes], each, "pose {k} of {axes} axes");
+                assert!(seen[axes..].iter().all(|none| *none == Readings::default()));
+            }
+        }
+    }
+
+    #[test]
     fn rounding_to_pulses_alone_stays_far_below_the_limits() {
         let (_, a, j, _) = worst(1000, 2, |t| ((20.0 * t) / 0.0005).round() * 0.0005);
         assert!(a < 30.0 && j < 3000.0, "{a} {j}");

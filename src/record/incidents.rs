@@ -17,6 +17,8 @@ const LONGEST: Duration = Duration::from_secs(300);
 /// So many an hour that nobody asked for.
 const AN_HOUR: usize = 6;
 const HOUR: Duration = Duration::from_secs(3_600);
+/// What nobody asked for tries no file for so long after one has failed.
+const AGAIN: Duration = Duration::from_secs(30);
 /// Ticks that leave no frame for longer than this leave seats without a lead.
 const GAP: Duration = Duration::from_millis(50);
 
@@ -171,6 +173,8 @@ pub(crate) struct Incidents {
     /// Since when one is under way, and until when.
     open: Option<(MonoTime, MonoTime)>,
     begun: VecDeque<MonoTime>,
+    /// When what nobody asked for may try a file again.
+    again_at: MonoTime,
 }
 
 impl Incidents {
@@ -184,7 +188,7 @@ impl Incidents {
             while self.begun.front().is_some_and(|begun| at.since(*begun) > HOUR) {
                 self.begun.pop_front();
             }
-            if self.begun.len() >= AN_HOUR {
+            if at < self.again_at || self.begun.len() >= AN_HOUR {
                 return IncidentStep::TooMany;
             }
             self.begun.push_back(at);
@@ -193,9 +197,11 @@ impl Incidents {
         IncidentStep::Begin
     }
 
-    /// Nothing is under way: its file failed. What happens next begins another.
-    pub(crate) const fn give_up(&mut self) {
-        self.open = None;
+    /// Nothing is under way: its file failed, and is none of those of the hour. What happens later begins another.
+    pub(crate) fn give_up(&mut self, now: MonoTime) {
+        let since = self.open.take().map(|(since, _)| since);
+        self.begun.pop_back_if(|begun| Some(*begun) == since);
+        self.again_at = now + AGAIN;
     }
 
     /// True once the one that is under way is over.
@@ -230,8 +236,28 @@ mod tests {
     fn what_happens_after_a_file_has_failed_gets_another() {
         let mut incidents = Incidents::default();
         assert_eq!(incidents.on(IncidentCause::Mark, s(100)), IncidentStep::Begin);
-        incidents.give_up();
+        incidents.give_up(s(100));
         assert_eq!(incidents.on(IncidentCause::Mark, s(103)), IncidentStep::Begin);
+    }
+
+    #[test]
+    fn files_that_fail_take_none_from_the_hour_and_are_tried_each_half_a_minute() {
+        let mut incidents = Incidents::default();
+        let mut tried = Vec::new();
+        for second in 100..400 {
+            if incidents.on(IncidentCause::Clamp, s(second)) == IncidentStep::Begin {
+                tried.push(second);
+                incidents.give_up(s(second));
+            }
+        }
+        assert_eq!(tried, (100..400).step_by(30).collect::<Vec<_>>());
+        // The disk takes files again.
+        let begun = (0..8).filter(|at| {
+            let step = incidents.on(IncidentCause::Stop, s(400 + at * 60));
+            incidents.take_over(s(410 + at * 60));
+            step == IncidentStep::Begin
+        });
+        assert_eq!(begun.count(), AN_HOUR);
     }
 
     #[test]

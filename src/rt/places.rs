@@ -55,7 +55,7 @@ impl Places {
     #[must_use]
     pub fn new(lanes: &[Lane], rate: Rate) -> Self {
         let place = |lane: &Lane| Place {
-            belief: Belief::new(&lane.window, rate.period(), lane.ack_every > 0),
+            belief: Belief::new(&lane.window, rate.period(), lane.ack_every),
             longest_ms: lane.longest_ms,
         };
         Self {

@@ -86,6 +86,15 @@ pub(crate) const OTHERS: [Kind; 9] = [
     Kind { axes: &[3, 6, 3, 6, 3, 6], hz: 100.0, ..PLAIN },
 ];
 
+/// Halls that ask for as few acks as a configuration may, or for a few more.
+pub(crate) const SELDOM: [Kind; 5] = [
+    Kind { hz: 20.0, ack_every: 2, ..PLAIN },
+    Kind { hz: 100.0, ack_every: 3, ..PLAIN },
+    Kind { hz: 100.0, ack_every: 6, ..PLAIN },
+    Kind { hz: 250.0, ack_every: 13, ..PLAIN },
+    Kind { hz: 1_000.0, ack_every: 51, ..PLAIN },
+];
+
 /// What configurations the same seats may have, one after the other; what a hall does not drive has no place in its frames.
 pub(crate) const RELOADED: [[Kind; 4]; 4] = [
     [
@@ -224,12 +233,19 @@ impl Kind {
 
     /// What there is for halls of this kind; made once.
     pub(crate) fn book(&self) -> &'static Book {
-        const ALL: usize =
-            KINDS.len() + MBOXES.len() + 24 + OTHERS.len() + TURNTABLES.len() + 2 * TOGETHER.len() + 1;
+        const ALL: usize = KINDS.len()
+            + MBOXES.len()
+            + 24
+            + OTHERS.len()
+            + SELDOM.len()
+            + TURNTABLES.len()
+            + 2 * TOGETHER.len()
+            + 1;
         static BOOKS: [OnceLock<Book>; ALL] = [const { OnceLock::new() }; ALL];
         let mut all = KINDS
             .iter()
             .chain(&OTHERS)
+            .chain(&SELDOM)
             .chain(&MBOXES)
             .chain(&TURNTABLES)
             .chain(&TOGETHER)

@@ -46,6 +46,7 @@ mod plays;
 mod processes;
 mod rules;
 mod seat;
+mod seldom;
 mod soak;
 mod together;
 mod town;

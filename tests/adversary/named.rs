@@ -27,7 +27,12 @@ pub(super) fn ether(kind: Kind, set: impl Fn(&mut Settings)) -> Ether {
 }
 
 /// A hall that opens and is led; what the seats executed is left.
-fn lead<T>(kind: Kind, ether: &Ether, before: LedBefore, lead: impl FnOnce(&mut Hall<'_, '_>) -> T) -> T {
+pub(super) fn lead<T>(
+    kind: Kind,
+    ether: &Ether,
+    before: LedBefore,
+    lead: impl FnOnce(&mut Hall<'_, '_>) -> T,
+) -> T {
     let (led, _) = open(ether, kind, before, &BTreeMap::new(), lead);
     ether.world().asked = false;
     ether.pass_to(ether.ns() + 50 * MS);
@@ -36,7 +41,7 @@ fn lead<T>(kind: Kind, ether: &Ether, before: LedBefore, lead: impl FnOnce(&mut 
 
 /// That no seat made a move that it may not make.
 #[track_caller]
-fn assert_no_breach(ether: &Ether) {
+pub(super) fn assert_no_breach(ether: &Ether) {
     let found = breaches(ether);
     let worst = found.iter().max_by(|a, b| a.mm_s().total_cmp(&b.mm_s()));
     let told: Vec<String> = found.iter().take(8).map(ToString::to_string).collect();

@@ -53,8 +53,9 @@ fn wrong_use_is_64_and_says_what_is_wrong() {
         (&["--to", to, "--bind", "here"], "--bind"),
         (&["--to", to, "--ack-every", "0"], "1..=1000"),
         (&["--to", to, "--ack-every", "1001"], "1..=1000"),
-        (&["--to", to, "--ack-every", "7"], "6 is the most at 100 Hz"),
         (&["--to", to, "--ack-every", "2", "--no-acks"], "--no-acks"),
+        (&["--to", to, "--ack-every", "7"], "--ack-every 7: a loss would be seen 60 ms later"),
+        (&["--to", to, "--ack-every", "2", "--rate", "19"], "1 is the most at 19 Hz"),
         (&["--to", to, "--spin-us", "901"], "0..=900"),
     ];
     for (args, said) in cases {

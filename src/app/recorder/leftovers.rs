@@ -59,8 +59,13 @@ pub(super) fn clear_up(
         cut_short.retain(|path| match recover(path, may) {
             Ok(()) => false,
             Err(error) if is_its_own(&error) => {
-                // It stays, and is not tried at each start again.
-                let _ = fs::rename(path, path.with_extension("unreadable"));
+                // It stays, and is not tried at each start again; one that was killed before anything was in it goes.
+                let is_empty = fs::metadata(path).is_ok_and(|about| about.len() == 0);
+                let _ = if is_empty {
+                    fs::remove_file(path)
+                } else {
+                    fs::rename(path, path.with_extension("unreadable"))
+                };
                 false
             }
             Err(error) => {
@@ -250,6 +255,18 @@ mod tests {
             assert_eq!(fs::read(&part).unwrap(), octets);
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         }
+    }
+
+    #[test]
+    fn of_a_file_that_was_only_just_begun_nothing_is_left_and_of_one_that_is_none_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let disk = Disk::new(&crate::config::Record::default(), folder.path());
+        for (name, octets) in [("one", &b""[..]), ("two", b"no recording at all")] {
+            fs::write(folder.path().join(format!("2026-01-01T10-00-00-show-{name}{PART}")), octets).unwrap();
+        }
+        clear_up(&disk, &RecordLink::default(), None, disk.cut_short(), &|| true);
+        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|one| one.unwrap().file_name()).collect();
+        assert_eq!(left, ["2026-01-01T10-00-00-show-two.part.unreadable"]);
     }
 
     /// Of a show that was killed behind its hundredth message.

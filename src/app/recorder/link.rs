@@ -1,8 +1,8 @@
 //! The way to a recorder: what it is told, bounded and never waited for; and how it stands.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -11,7 +11,8 @@ use crate::record::{IncidentCause, MarkBudget, MarkNote, MarkRefusal, Note};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
-/// What waits at the most; more is lost, and counted.
+/// Notes that wait at the most; more are lost, and counted. What begins and ends files, and what somebody marked, always finds a place:
+/// there is little of it.
 const WAITING: usize = 1_024;
 /// A recorder that has not looked at its taps for so long waits for a disk, or for a turn, and cannot say so itself; the taps hold two
 /// seconds.
@@ -78,13 +79,14 @@ pub(crate) enum RecordAsk {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RecordLink {
     /// None where nobody records.
-    asks: Option<SyncSender<(MonoTime, RecordAsk)>>,
+    asks: Option<Sender<(MonoTime, RecordAsk)>>,
     shared: Arc<SharedFigures>,
 }
 
 #[derive(Debug, Default)]
 struct SharedFigures {
     dropped: AtomicU64,
+    waiting: AtomicUsize,
     /// Octets that a second of a show takes, and for which there is room, what may go for them included; 0 where nothing is known.
     octets_a_s: AtomicU64,
     room: AtomicU64,
@@ -94,12 +96,13 @@ struct SharedFigures {
     dir: OnceLock<PathBuf>,
     status: Mutex<RecordStatus>,
     marks: Mutex<MarkBudget>,
+    dumps: Mutex<MarkBudget>,
 }
 
 impl RecordLink {
     /// The way to a recorder, and its other end.
     pub(crate) fn new() -> (Self, Receiver<(MonoTime, RecordAsk)>) {
-        let (asks, end) = sync_channel(WAITING);
+        let (asks, end) = channel();
         (Self { asks: Some(asks), shared: Arc::default() }, end)
     }
 
@@ -109,11 +112,19 @@ impl RecordLink {
     }
 
     fn put_of(&self, at: MonoTime, ask: RecordAsk) {
-        if let Some(asks) = &self.asks
-            && asks.try_send((at, ask)).is_err()
-        {
-            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+        let Some(asks) = &self.asks else { return };
+        let SharedFigures { dropped, waiting, .. } = &*self.shared;
+        let may_be_lost = matches!(&ask, RecordAsk::Keep(note) if !matches!(note, Note::Mark(_)));
+        let is_full = may_be_lost && waiting.load(Ordering::Relaxed) >= WAITING;
+        waiting.fetch_add(usize::from(!is_full), Ordering::Relaxed);
+        if is_full || asks.send((at, ask)).is_err() {
+            dropped.fetch_add(1, Ordering::Relaxed);
         }
+    }
+
+    /// The recorder has taken so much of what waited.
+    pub(super) fn took(&self, count: usize) {
+        self.shared.waiting.fetch_sub(count, Ordering::Relaxed);
     }
 
     /// Has that kept.
@@ -137,6 +148,16 @@ impl RecordLink {
             Err(_) => self.tell(|status| status.more_marks += 1),
         }
         taken
+    }
+
+    /// Has what the flight recorder holds written out.
+    ///
+    /// # Errors
+    /// Why that was asked once too often.
+    pub(crate) fn dump(&self, now: MonoTime) -> Result<(), MarkRefusal> {
+        self.shared.dumps.lock().unwrap_or_else(PoisonError::into_inner).take(now)?;
+        self.put(RecordAsk::Incident(IncidentCause::Dump));
+        Ok(())
     }
 
     /// Marks that were not kept since this was asked last.
@@ -236,5 +257,34 @@ impl RecordLink {
                 None => status.troubles.remove(part.word()),
             };
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{EventNote, HallNote};
+
+    #[test]
+    fn what_begins_and_ends_a_file_and_what_is_marked_finds_a_place_however_many_notes_wait() {
+        let (link, asks) = RecordLink::new();
+        let seats = 2 * WAITING;
+        for _ in 0..seats {
+            link.keep(Note::Event(EventNote { kind: "standing", seat: String::new(), text: String::new() }));
+        }
+        let mark = MarkNote { film_s: 0.0, text: String::new(), who: String::new() };
+        assert_eq!(link.mark(mark, Monotonic.now()), Ok(()));
+        link.put(RecordAsk::Incident(IncidentCause::EmergencyStop));
+        link.put(RecordAsk::End);
+        link.put(RecordAsk::Close);
+        let told: Vec<_> = asks.try_iter().map(|(_, ask)| ask).collect();
+        assert_eq!((told.len(), usize::try_from(link.status().dropped_notes)), (WAITING + 4, Ok(WAITING)));
+        assert!(
+            matches!(told.last_chunk(), Some([RecordAsk::Incident(_), RecordAsk::End, RecordAsk::Close])),
+            "in the order in which they were told"
+        );
+        link.took(told.len());
+        link.keep(Note::Hall(HallNote::default()));
+        assert_eq!(asks.try_iter().count(), 1, "there is room again");
     }
 }

@@ -102,7 +102,7 @@ impl HallRecorder {
             realtime::stand_back();
             let _ends: Sender<()> = ends;
             let _told = TellsOfPanic(told);
-            let worker = worker.attaching(safe).flying(&ring, flight_len);
+            let worker = worker.attaching(safe).flying(&ring, flight_len, octets_a_s);
             worker.clear_up(leftover, move || !live.is_moving());
             worker.run(&Monotonic);
         });

@@ -55,6 +55,8 @@ pub(super) struct Worker {
     record: Record,
     safe: Option<String>,
     flight: Option<Flight>,
+    /// How far back it reaches at the least, seconds.
+    reach_s: f64,
     /// Samples of the last ten seconds.
     recent: VecDeque<Entry>,
     halls: HallNotes,
@@ -91,6 +93,7 @@ impl Worker {
             record,
             safe: None,
             flight: None,
+            reach_s: 0.0,
             recent: VecDeque::new(),
             halls: HallNotes::default(),
             states: VecDeque::new(),
@@ -108,13 +111,16 @@ impl Worker {
         Self { safe, ..self }
     }
 
-    /// The same with the flight recorder's file.
-    pub(super) fn flying(mut self, path: &Path, len: u64) -> Self {
+    /// The same with the flight recorder's file, which takes so many octets a second.
+    pub(super) fn flying(mut self, path: &Path, len: u64, octets_a_s: u64) -> Self {
         if self.record.flight_s == 0 {
             return self;
         }
         match Flight::create(path, &self.opening.clone().with("of", "incident").to_octets(), len) {
-            Ok(flight) => self.flight = Some(flight),
+            Ok(flight) => {
+                (self.flight, self.reach_s) =
+                    (Some(flight), reach_s(len, octets_a_s).min(self.record.flight_s.into()))
+            }
             Err(error) => {
                 let path = path.display();
                 let remedy = "give the service a runtime folder (RuntimeDirectory= in the unit)";
@@ -158,6 +164,7 @@ impl Worker {
         self.link.looks(now);
         // Ticks first: of what was told so far the ticks are there.
         let asks: Vec<_> = self.asks.try_iter().take(ASKS).collect();
+        self.link.took(asks.len());
         self.take_taps();
         self.take_asks(asks, now);
         self.mind_ends(now);
@@ -247,7 +254,7 @@ impl Worker {
             flight.put(&entry);
         }
         if let Some(Err(error)) = self.incident.as_mut().map(|incident| incident.file.put(&entry)) {
-            self.fail_incident(&in_io(error));
+            self.fail_incident(&in_io(error), at);
         }
         let is_full = self.maker.is_full(entry.channel);
         if !is_full || self.record.mode == RecordMode::Full {
@@ -406,7 +413,7 @@ impl Worker {
 
     fn flush(&mut self, now: MonoTime) {
         if let Some(Err(error)) = self.incident.as_mut().map(|open| open.file.flush()) {
-            self.fail_incident(&in_io(error));
+            self.fail_incident(&in_io(error), now);
         }
         let file = self.show.as_mut().and_then(|show| show.file.as_mut());
         let flushed = file.map(|open| open.file.flush().map_err(in_io).and_then(|()| open.disk.is_there()));
@@ -414,10 +421,9 @@ impl Worker {
             self.fail_show(&error, now);
         }
         let counts = self.intake.counts();
-        let flight_s = self.flight.as_ref().map_or(0.0, |_| f64::from(self.record.flight_s));
         self.link.tell(|status| {
             (status.dropped_ticks, status.dropped_records) = (counts.dropped, counts.dropped_records);
-            status.flight_s = flight_s;
+            status.flight_s = self.reach_s;
         });
     }
 
@@ -442,6 +448,12 @@ impl Worker {
         self.link.tell(|status| (status.recording, status.flight_s) = (None, 0.0));
         self.link.ends();
     }
+}
+
+/// How far back a file of that length reaches where a second takes so many octets.
+#[expect(clippy::cast_precision_loss, reason = "far fewer octets than a double counts")]
+fn reach_s(len: u64, octets_a_s: u64) -> f64 {
+    len as f64 / octets_a_s as f64
 }
 
 #[cfg(test)]

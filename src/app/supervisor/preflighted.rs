@@ -55,13 +55,15 @@ impl Preflighted {
         Self { at: Monotonic.now(), answered, passed, findings }
     }
 
-    /// As surfaces show it, of the controllers that take part.
+    /// As surfaces show it, of the controllers that take part: what was found at these is first.
     pub(super) fn status(&self, now: MonoTime, is_on: impl Fn(usize) -> bool) -> PreflightStatus {
+        let (of_these, of_others): (Vec<_>, Vec<_>) =
+            self.findings.iter().partition(|(controller, _)| is_on(*controller));
         PreflightStatus {
             passed: self.has_passed(is_on),
             age_s: now.since(self.at).as_secs_f64(),
             answered: self.answered,
-            findings: self.findings.iter().map(|(_, warning)| warning.clone()).collect(),
+            findings: of_these.into_iter().chain(of_others).map(|(_, warning)| warning.clone()).collect(),
         }
     }
 
@@ -119,4 +121,23 @@ fn told(controller: &str, finding: preflight::Finding) -> Option<Warning> {
 
 fn id(check: Check) -> String {
     check.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_found_at_a_seat_that_is_out_does_not_hide_why_preflight_fails() {
+        let found = |controller: &str| {
+            let controller = Some(controller.to_owned());
+            Warning { severity: Severity::Error, controller, ..Warning::default() }
+        };
+        let mut preflighted = Preflighted::failing_at(1, 2);
+        preflighted.passed[0] = false;
+        preflighted.findings = vec![(0, found("A1")), (1, found("A2"))];
+        let status = |out: usize| preflighted.status(preflighted.at, |lane| lane != out);
+        assert_eq!(status(0).findings[0].controller.as_deref(), Some("A2"), "A1 is out for a week");
+        assert_eq!(status(2).findings[0].controller.as_deref(), Some("A1"));
+    }
 }

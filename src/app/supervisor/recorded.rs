@@ -217,11 +217,21 @@ fn one_too_many(refusal: MarkRefusal) -> Problem {
 /// Has what the flight recorder holds written out.
 ///
 /// # Errors
-/// Where there is none.
+/// Where there is none, or that is asked too often: each makes a file, or makes one longer, and older files go for it.
 pub(super) fn dump(hall: &HallContext) -> Result<Vec<Act>, Problem> {
     records(hall)?;
-    hall.recorder.put(RecordAsk::Incident(IncidentCause::Dump));
+    hall.recorder.dump(hall.now).map_err(one_dump_too_many)?;
     Ok(Vec::new())
+}
+
+fn one_dump_too_many(refusal: MarkRefusal) -> Problem {
+    let (detail, wait) = match refusal {
+        MarkRefusal::Same => ("this was asked within the last second", Duration::ZERO),
+        MarkRefusal::TooMany(wait) => {
+            ("this was asked too often: 60 times, and once a minute, it is done", wait)
+        }
+    };
+    Problem::new(Code::Busy, detail, format!("ask again in {} s", wait.as_secs() + 1))
 }
 
 fn records(hall: &HallContext) -> Result<(), Problem> {
@@ -289,6 +299,25 @@ mod tests {
         let RecordAsk::Keep(Note::Action(last)) = &told[3] else { panic!("{told:?}") };
         assert!(last.result.ends_with(", 998 times"), "{last:?}");
         assert_eq!(hall.recorder.status_at(hall.now).more_marks, 999);
+    }
+
+    #[test]
+    fn a_program_that_has_the_flight_recorder_written_out_again_and_again_takes_no_room_from_other_incidents()
+    {
+        let mut hall = hall(State::Playing(crate::state::PlayMode::Following), "one");
+        let (link, told_asks) = crate::app::recorder::RecordLink::new();
+        link.flies();
+        hall.recorder = link;
+        let mut refused = 0;
+        for _ in 0..36_000 {
+            hall.now = hall.now + Duration::from_millis(100);
+            if let Err(problem) = dump(&hall) {
+                assert!(problem.status == 429 && problem.remedy.starts_with("ask again in "), "{problem}");
+                refused += 1;
+            }
+        }
+        let begun = told_asks.try_iter().count();
+        assert_eq!((begun, refused), (60 + 59, 36_000 - 60 - 59), "a minute of them, and one a minute");
     }
 
     #[test]

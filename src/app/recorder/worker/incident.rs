@@ -21,10 +21,10 @@ impl Worker {
         }
     }
 
-    pub(super) fn fail_incident(&mut self, error: &io::Error) {
+    pub(super) fn fail_incident(&mut self, error: &io::Error, now: MonoTime) {
         // Its file, or the folder where there is none yet.
         let file = self.incident.take().map_or_else(|| self.disk.dir().to_owned(), |open| open.disk.path);
-        self.incidents.give_up();
+        self.incidents.give_up(now);
         let file = file.display();
         let remedy = want_of_files(error).unwrap_or("free space on that disk, or set [record] dir");
         let trouble = format!("an incident is not kept: {file}: {error}; {remedy}");
@@ -41,7 +41,7 @@ impl Worker {
             IncidentStep::Join => self.say_incident(cause, now),
             IncidentStep::Begin => match self.begin_incident(cause, at) {
                 Ok(()) => self.say_incident(cause, now),
-                Err(error) => self.fail_incident(&error),
+                Err(error) => self.fail_incident(&error, now),
             },
         }
     }
@@ -80,7 +80,7 @@ impl Worker {
         }
         self.cut();
         if let Some(Err(error)) = self.incident.take().map(|open| self.close_file(open, None)) {
-            self.fail_incident(&error);
+            self.fail_incident(&error, now);
         }
     }
 }

@@ -352,7 +352,7 @@ fn an_incident_begins_with_how_the_hall_stood_then_and_not_with_how_it_stands_no
     let mut bench = Bench::new();
     bench.worker.record.flight_s = 2;
     let ring = bench.folder.path().join("flight.ring");
-    let mut bench = Bench { worker: bench.worker.flying(&ring, 16 << 20), ..bench };
+    let mut bench = Bench { worker: bench.worker.flying(&ring, 16 << 20, 1), ..bench };
     for (state, ticks) in [(4, 3_000), (9, 500), (12, 200)] {
         let note = HallNote { state, ..HallNote::default() };
         bench.worker.keep(at(bench.tick), Note::Hall(note));
@@ -370,6 +370,18 @@ fn an_incident_begins_with_how_the_hall_stood_then_and_not_with_how_it_stands_no
     };
     read(file.as_slice(), Wanted::ALL, &mut take).expect("a recording");
     assert_eq!(states, [4, 9, 12]);
+}
+
+#[test]
+fn a_flight_recorder_that_so_many_seats_fill_sooner_says_how_far_back_it_reaches() {
+    for (octets_a_s, reaches_s) in [(1 << 10, 60.0), (1 << 18, 8.0)] {
+        let mut bench = Bench::new();
+        bench.worker.record.flight_s = 60;
+        let ring = bench.folder.path().join("flight.ring");
+        let mut bench = Bench { worker: bench.worker.flying(&ring, 2 << 20, octets_a_s), ..bench };
+        bench.ticks(20);
+        assert_eq!(bench.worker.link.status().flight_s, reaches_s);
+    }
 }
 
 #[test]
