@@ -3,8 +3,6 @@
 //!
 //! Two distances without a common factor are used, since either is blind to motion at its own frequency.
 
-use std::hint::select_unpredictable;
-
 use crate::time::ShowTime;
 
 /// The poses one third difference spans at the most: 3 x 27 periods at 1,000 Hz, and its own end.
@@ -218,9 +216,10 @@ impl<const N: usize> MeasurePlaces<N> {
     }
 }
 
-/// Which of the two distances shows more is a coin's toss, so that a branch would be mistaken every other time.
 fn keep_larger(kept: &mut Reading, value: f64, at: ShowTime) {
-    *kept = select_unpredictable(value.abs() > kept.value.abs(), Reading { value, at }, *kept);
+    if value.abs() > kept.value.abs() {
+        *kept = Reading { value, at };
+    }
 }
 
 #[cfg(test)]
