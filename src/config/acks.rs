@@ -23,8 +23,13 @@ pub(crate) fn too_seldom(show: &Show, has_drives: bool) -> Option<String> {
     })
 }
 
-/// Notes that in a file.
-pub(super) fn refuse_seldom_acks(entry: Entry<'_>, show: &Show, has_drives: bool, faults: &mut Faults<'_>) {
+/// Notes that in a file, where its `[show]` stands there.
+pub(super) fn refuse_seldom_acks(
+    stated: Option<(Entry<'_>, &Show)>,
+    has_drives: bool,
+    faults: &mut Faults<'_>,
+) {
+    let Some((entry, show)) = stated else { return };
     let value = entry.value.as_table().and_then(|table| table.get("ack_every"));
     if let Some((value, why)) = value.zip(too_seldom(show, has_drives)) {
         Entry::new("ack_every", value).fault(faults, &why);

@@ -108,9 +108,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let stated = Stated { seat: seat_at, controller: controller_at, link: link_at };
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let (controllers, absent, links) = stated.controllers(&site, faults);
-    if let Some((entry, show)) = show_at.zip(show.as_ref()) {
-        refuse_seldom_acks(entry, show, !links.is_empty(), faults);
-    }
+    refuse_seldom_acks(show_at.zip(show.as_ref()), !links.is_empty(), faults);
     let frame_port = show.as_ref().map_or(0, |show| show.bind.port());
     let broadcast =
         broadcast_at.and_then(|entry| broadcast(entry, &controllers, &absent, frame_port, faults));
