@@ -1,7 +1,6 @@
 //! The cue library with the real process that checks what is uploaded.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -9,6 +8,9 @@ use kinocue::harness::control::{Code, Problem};
 use kinocue::harness::library::{Awaited, Bounds, CueInfo, Hall, Library, Proved};
 use kinocue::harness::playlist::Playlist;
 use tempfile::TempDir;
+
+#[path = "common/script.rs"]
+mod script;
 
 const GOOD: &str = "# title: Ride\ntime_ms,a1,a2,a3,fx_air\n0,0,0,0,0\n1000,0,0,0,1\n2000,0,0,0,0\n";
 /// Out of the stroke in one row, and far too fast.
@@ -188,11 +190,10 @@ fn a_bomb_is_refused_within_its_bounds() {
 }
 
 /// An upload whose check is a script.
-fn upload_with(script: &str, time: Duration, awaited: Option<&Awaited>) -> Problem {
+fn upload_with(text: &str, time: Duration, awaited: Option<&Awaited>) -> Problem {
     let fixture = Fixture::new();
     let program = fixture.dir.path().join("check");
-    fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("it is ours");
-    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    script::make(&program, &format!("#!/bin/sh\n{text}\n"));
     let bounds = Bounds { time, ..Bounds::default() };
     let hall = Hall { config: fixture.dir.path().join("hall.toml"), program, bounds };
     let library = Library::open(&fixture.cues(), hall).expect("the folder is ours");

@@ -3,11 +3,13 @@
 
 #[path = "common/programs.rs"]
 mod programs;
+#[path = "common/script.rs"]
+mod script;
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::net::SocketAddr;
-use std::os::unix::fs::{PermissionsExt as _, symlink};
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -323,8 +325,7 @@ fn sources_elsewhere() -> tempfile::TempDir {
     fs::create_dir_all(&built).expect("the folder is ours");
     let program = |name: &str, text: String| {
         let path = built.join(name);
-        fs::write(&path, format!("#!/bin/sh\n{text}\n")).expect("the folder is ours");
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("the file is ours");
+        script::make(&path, &format!("#!/bin/sh\n{text}\n"));
     };
     program("kinocue", format!("exec '{}' \"$@\"", env!("CARGO_BIN_EXE_kinocue")));
     program("cargo-deb", "exit 1".to_owned()); // which would strip the program: it is none

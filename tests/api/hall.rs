@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::net::SocketAddr;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -24,6 +23,7 @@ use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 
 use crate::client::To;
+use crate::script;
 
 /// One token for each role.
 pub const TOKENS: [(&str, Role); 3] =
@@ -54,11 +54,10 @@ impl Hall {
     }
 
     /// One whose cues are checked by a script, which finds its own folder in `$0`.
-    pub fn with_checks_by(script: &str) -> Self {
+    pub fn with_checks_by(text: &str) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let program = dir.path().join("check");
-        fs::write(&program, format!("#!/bin/bash\n{script}\n")).unwrap();
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        script::make(&program, &format!("#!/bin/bash\n{text}\n"));
         Self::of(dir, program, Status::starting("Hall 1"), |api| api)
     }
 

@@ -19,3 +19,5 @@ mod limits;
 mod programs;
 mod replies;
 mod routes;
+#[path = "../common/script.rs"]
+mod script;
