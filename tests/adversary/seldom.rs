@@ -47,6 +47,6 @@ fn wherever_a_loss_begins_between_two_acks_it_is_made_up_for_by_no_more_than_is_
 }
 
 #[test]
-fn nor_by_more_where_the_kernel_refused_just_the_frame_that_was_to_ask() {
+fn nor_by_more_where_the_kernel_refuses_a_frame_of_it() {
     ride_all(true);
 }
