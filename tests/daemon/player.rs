@@ -139,9 +139,9 @@ fn a_film_that_is_kept_when_the_seats_stop_runs_on_and_they_join_it_where_it_is(
     hall.comes_to("stopped");
     hall.wait(|status| at(status, "film") > at(&before, "film") + 2.0);
     hall.done(&["clear"]);
+    hall.wait(|status| status["next"] == "park, or home");
     hall.done(&["park"]);
-    hall.comes_to("parked");
-    let parked = hall.status();
+    let parked = hall.comes_to("parked");
     hall.done(&["preflight"]);
     hall.done(&["arm"]);
     hall.done(&["go"]);
