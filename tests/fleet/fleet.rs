@@ -223,8 +223,9 @@ impl Engine {
         let until = Monotonic.now() + PATIENCE;
         loop {
             let run = self.desk(&["have", hall, "--json"]);
+            // There is none where the engine did not answer in time.
             let table: Value = serde_json::from_str(&run.stdout).unwrap_or_default();
-            if wanted(&table[0]) {
+            if table.get(0).is_some_and(&mut wanted) {
                 return table[0].clone();
             }
             assert!(Monotonic.now() < until, "it did not come to that: {run:?}");
@@ -237,7 +238,7 @@ impl Engine {
         loop {
             let run = self.desk(&["status", "--json"]);
             let table: Value = serde_json::from_str(&run.stdout).unwrap_or_default();
-            if wanted(&table) {
+            if !table.is_null() && wanted(&table) {
                 return table;
             }
             assert!(Monotonic.now() < until, "it did not come to that: {run:?}");
