@@ -129,10 +129,11 @@ fn each_entry_of_a_playlist_waits_for_its_own_place_in_one_reel() {
         "playlists/reel.toml",
         &format!("title = \"Reel\"\n{}{}", entry("01:10:00:00", "go"), entry("01:10:08:00", "hold")),
     );
-    let _reel = film(1, "01:09:56:00");
     hall.done(&["playlist", "reel"]);
     hall.done(&["preflight"]);
     hall.done(&["arm"]);
+    // Only now: it goes on however long these take.
+    let _reel = film(1, "01:09:52:00");
     hall.done(&["go"]);
     let first = hall.comes_to("playing");
     assert_eq!(first["playlist"]["current"], 0);
