@@ -14,7 +14,7 @@ pub(super) struct StreamArgs {
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
 
-    /// Request an ack on every Nth frame, as many as pass in 50 ms [default: 1, or the configuration's].
+    /// Request an ack on every Nth frame, N - 1 periods of at most 50 ms in all [default: 1, or the configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
     ack_every: Option<u32>,
 

@@ -12,6 +12,7 @@ mod ack_words;
 mod acks;
 mod anonymous;
 mod block;
+mod budget;
 mod chunk;
 mod columns;
 mod compare;
@@ -25,7 +26,6 @@ mod incidents;
 mod intake;
 mod judging;
 mod margins;
-mod marks;
 mod notes;
 mod read;
 mod reading;
@@ -49,6 +49,7 @@ mod waiting;
 pub(crate) use ack_record::{AckRecord, latency_ns, standing_of};
 pub(crate) use acks::{AckChunk, AckStanding};
 pub use acks::{AckTap, ack_tap};
+pub(crate) use budget::{AskBudget, TooOften};
 pub(crate) use chunk::Chunk;
 pub use chunk::{Asked, TickHead};
 #[cfg(feature = "harness")]
@@ -61,7 +62,6 @@ pub(crate) use incidents::{IncidentCause, IncidentStep, Incidents, Watchman};
 pub(crate) use intake::{Counts, Intake, Taps};
 pub(crate) use judging::{JudgedController, Judging};
 pub(crate) use margins::{Margin, Margins, Quantity};
-pub(crate) use marks::{MarkBudget, MarkRefusal};
 pub(crate) use notes::{
     ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote, note_in_words,
 };

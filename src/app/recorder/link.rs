@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use crate::control::RecordStatus;
-use crate::record::{IncidentCause, MarkBudget, MarkNote, MarkRefusal, Note};
+use crate::record::{AskBudget, IncidentCause, MarkNote, Note, TooOften};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -95,8 +95,8 @@ struct SharedFigures {
     /// The folder of recordings.
     dir: OnceLock<PathBuf>,
     status: Mutex<RecordStatus>,
-    marks: Mutex<MarkBudget>,
-    dumps: Mutex<MarkBudget>,
+    marks: Mutex<AskBudget>,
+    dumps: Mutex<AskBudget>,
 }
 
 impl RecordLink {
@@ -141,7 +141,7 @@ impl RecordLink {
     ///
     /// # Errors
     /// Why it is one too many; the recorder says how many there were.
-    pub(crate) fn mark(&self, note: MarkNote, now: MonoTime) -> Result<(), MarkRefusal> {
+    pub(crate) fn mark(&self, note: MarkNote, now: MonoTime) -> Result<(), TooOften> {
         let taken = self.shared.marks.lock().unwrap_or_else(PoisonError::into_inner).take(now);
         match taken {
             Ok(()) => self.keep(Note::Mark(note)),
@@ -154,7 +154,7 @@ impl RecordLink {
     ///
     /// # Errors
     /// Why that was asked once too often.
-    pub(crate) fn dump(&self, now: MonoTime) -> Result<(), MarkRefusal> {
+    pub(crate) fn dump(&self, now: MonoTime) -> Result<(), TooOften> {
         self.shared.dumps.lock().unwrap_or_else(PoisonError::into_inner).take(now)?;
         self.put(RecordAsk::Incident(IncidentCause::Dump));
         Ok(())

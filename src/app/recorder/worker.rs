@@ -55,8 +55,6 @@ pub(super) struct Worker {
     record: Record,
     safe: Option<String>,
     flight: Option<Flight>,
-    /// How far back it reaches at the least, seconds.
-    reach_s: f64,
     /// Samples of the last ten seconds.
     recent: VecDeque<Entry>,
     halls: HallNotes,
@@ -93,7 +91,6 @@ impl Worker {
             record,
             safe: None,
             flight: None,
-            reach_s: 0.0,
             recent: VecDeque::new(),
             halls: HallNotes::default(),
             states: VecDeque::new(),
@@ -118,8 +115,9 @@ impl Worker {
         }
         match Flight::create(path, &self.opening.clone().with("of", "incident").to_octets(), len) {
             Ok(flight) => {
-                (self.flight, self.reach_s) =
-                    (Some(flight), reach_s(len, octets_a_s).min(self.record.flight_s.into()))
+                self.flight = Some(flight);
+                let reach_s = reach_s(len, octets_a_s).min(self.record.flight_s.into());
+                self.link.tell(|status| status.flight_s = reach_s);
             }
             Err(error) => {
                 let path = path.display();
@@ -423,7 +421,6 @@ impl Worker {
         let counts = self.intake.counts();
         self.link.tell(|status| {
             (status.dropped_ticks, status.dropped_records) = (counts.dropped, counts.dropped_records);
-            status.flight_s = self.reach_s;
         });
     }
 

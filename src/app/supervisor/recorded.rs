@@ -11,7 +11,7 @@ use crate::film::point::FilmState;
 use crate::health::HealthState;
 use crate::journal::{Action, FoldedAction, Folds};
 use crate::record::{
-    ActionNote, EventNote, HallNote, IncidentCause, MarkNote, MarkRefusal, Note, TimecodeNote, state_number,
+    ActionNote, EventNote, HallNote, IncidentCause, MarkNote, Note, TimecodeNote, TooOften, state_number,
 };
 use crate::rt::Row;
 use crate::settings::{LONGEST_WHY, Out};
@@ -20,6 +20,15 @@ use crate::time::MonoTime;
 
 /// How the hall stands is told so often, even if nothing changes.
 const ANYWAY: Duration = Duration::from_secs(10);
+
+const MARKS: [&str; 2] = [
+    "this moment was marked within the last second, and that mark stands for both",
+    "too many moments are marked: 60, and one a minute, are kept; the recording counts the rest",
+];
+const DUMPS: [&str; 2] = [
+    "this was asked within the last second",
+    "this was asked too often: 60 times, and once a minute, it is done",
+];
 
 /// What was told so far.
 #[derive(Debug, Default)]
@@ -192,26 +201,8 @@ pub(super) fn mark(text: Option<&str>, who: &Who, hall: &HallContext) -> Result<
     })?;
     let film_s = hall.live.show().as_secs_f64();
     let note = MarkNote { film_s, text: text.unwrap_or_default(), who: name_of(who, hall) };
-    hall.recorder.mark(note, hall.now).map_err(one_too_many)?;
+    hall.recorder.mark(note, hall.now).map_err(|refusal| too_often(refusal, MARKS, "mark"))?;
     Ok(Vec::new())
-}
-
-fn one_too_many(refusal: MarkRefusal) -> Problem {
-    match refusal {
-        MarkRefusal::Same => Problem::new(
-            Code::Busy,
-            "this moment was marked within the last second",
-            "that mark stands for both; mark again in a second if it is another moment",
-        ),
-        MarkRefusal::TooMany(wait) => Problem::new(
-            Code::Busy,
-            "too many moments are marked: 60, and one a minute, are kept",
-            format!(
-                "mark again in {} s; how many are left out is counted in the recording",
-                wait.as_secs() + 1
-            ),
-        ),
-    }
 }
 
 /// Has what the flight recorder holds written out.
@@ -220,18 +211,17 @@ fn one_too_many(refusal: MarkRefusal) -> Problem {
 /// Where there is none, or that is asked too often: each makes a file, or makes one longer, and older files go for it.
 pub(super) fn dump(hall: &HallContext) -> Result<Vec<Act>, Problem> {
     records(hall)?;
-    hall.recorder.dump(hall.now).map_err(one_dump_too_many)?;
+    hall.recorder.dump(hall.now).map_err(|refusal| too_often(refusal, DUMPS, "ask"))?;
     Ok(Vec::new())
 }
 
-fn one_dump_too_many(refusal: MarkRefusal) -> Problem {
+/// That something is asked for too often: what is said so soon after the last and of one too many, and how to ask again.
+fn too_often(refusal: TooOften, [again, too_many]: [&'static str; 2], ask: &str) -> Problem {
     let (detail, wait) = match refusal {
-        MarkRefusal::Same => ("this was asked within the last second", Duration::ZERO),
-        MarkRefusal::TooMany(wait) => {
-            ("this was asked too often: 60 times, and once a minute, it is done", wait)
-        }
+        TooOften::Same => (again, Duration::ZERO),
+        TooOften::TooMany(wait) => (too_many, wait),
     };
-    Problem::new(Code::Busy, detail, format!("ask again in {} s", wait.as_secs() + 1))
+    Problem::new(Code::Busy, detail, format!("{ask} again in {} s", wait.as_secs() + 1))
 }
 
 fn records(hall: &HallContext) -> Result<(), Problem> {

@@ -1,42 +1,42 @@
-//! How many moments may be marked. Pure: told the time.
+//! How often somebody may have a moment marked, or what the flight recorder holds written out. Pure: told the time.
 
 use std::time::Duration;
 
 use crate::time::MonoTime;
 
-/// So many may be marked one after the other, and one more in each [`REFILL`]: some 180 in a show of two hours.
+/// So many may be asked for one after the other, and one more in each [`REFILL`]: some 180 in a show of two hours.
 const ROOM: u32 = 60;
 const REFILL: Duration = Duration::from_secs(60);
-/// A mark stands for all that is marked so soon after it.
+/// One stands for all that are asked for so soon after it.
 const APART: Duration = Duration::from_secs(1);
 
-/// Which marks are kept, so that a key that is held or a program that repeats itself fills no file.
+/// Which of them are granted, so that a key that is held or a program that repeats itself fills no file and no disk.
 #[derive(Debug, Default)]
-pub(crate) struct MarkBudget {
+pub(crate) struct AskBudget {
     /// Places that are taken.
     used: u32,
     /// Since when the next place is on its way.
     since: MonoTime,
     last: Option<MonoTime>,
-    /// Marks that were not kept since somebody asked.
+    /// Those that were refused since somebody asked how many.
     more: u64,
 }
 
-/// Why a mark is not kept.
+/// Why one is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum MarkRefusal {
-    /// Another was kept within the last second.
+pub(crate) enum TooOften {
+    /// Another was granted within the last second.
     Same,
-    /// There were too many; the next may be kept after so long.
+    /// There were too many; the next may be granted after so long.
     TooMany(Duration),
 }
 
-impl MarkBudget {
-    /// Takes a mark.
+impl AskBudget {
+    /// Grants one.
     ///
     /// # Errors
     /// Why it is one too many: it is counted.
-    pub(crate) fn take(&mut self, now: MonoTime) -> Result<(), MarkRefusal> {
+    pub(crate) fn take(&mut self, now: MonoTime) -> Result<(), TooOften> {
         while self.used > 0 && now.since(self.since) >= REFILL {
             self.used -= 1;
             self.since = self.since + REFILL;
@@ -45,7 +45,7 @@ impl MarkBudget {
         if is_same || self.used >= ROOM {
             self.more += 1;
             let wait = REFILL.saturating_sub(now.since(self.since));
-            return Err(if is_same { MarkRefusal::Same } else { MarkRefusal::TooMany(wait) });
+            return Err(if is_same { TooOften::Same } else { TooOften::TooMany(wait) });
         }
         if self.used == 0 {
             self.since = now;
@@ -55,7 +55,7 @@ impl MarkBudget {
         Ok(())
     }
 
-    /// How many were not kept since this was asked last.
+    /// How many were refused since this was asked last.
     pub(crate) fn take_more(&mut self) -> u64 {
         std::mem::take(&mut self.more)
     }
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn a_key_that_is_held_for_two_hours_is_some_marks_and_a_count_of_the_rest() {
-        let mut budget = MarkBudget::default();
+        let mut budget = AskBudget::default();
         let kept: Vec<u64> =
             (0..2 * 3_600_000).step_by(33).filter(|ms| budget.take(at(*ms)).is_ok()).collect();
         assert!(kept.windows(2).all(|pair| pair[1] - pair[0] >= 1_000), "one a second");
@@ -83,15 +83,15 @@ mod tests {
 
     #[test]
     fn whoever_marks_scene_by_scene_is_never_refused_and_who_was_is_told_how_long_to_wait() {
-        let mut budget = MarkBudget::default();
+        let mut budget = AskBudget::default();
         assert!((0..1_000).all(|scene| budget.take(at(scene * 60_000)).is_ok()));
         let later = 2_000 * 60_000;
         assert!((0..60).all(|second| budget.take(at(later + second * 1_000)).is_ok()));
         let refused = budget.take(at(later + 60_000 - 1));
-        assert_eq!(refused, Err(MarkRefusal::Same));
-        let full = |budget: &mut MarkBudget, ms| budget.take(at(later + ms));
+        assert_eq!(refused, Err(TooOften::Same));
+        let full = |budget: &mut AskBudget, ms| budget.take(at(later + ms));
         assert_eq!(full(&mut budget, 60_000), Ok(()), "the first has made room");
-        assert_eq!(full(&mut budget, 61_500), Err(MarkRefusal::TooMany(Duration::from_millis(58_500))));
+        assert_eq!(full(&mut budget, 61_500), Err(TooOften::TooMany(Duration::from_millis(58_500))));
         assert_eq!(full(&mut budget, 120_000), Ok(()));
     }
 }
