@@ -129,6 +129,18 @@ fn after_a_late_wakeup_one_frame_leaves_and_the_lag_is_taken_back_gently() {
 }
 
 #[test]
+fn a_tick_is_as_late_as_its_first_frame_left_and_as_it_was_woken_where_none_leaves() {
+    let played = Virtual::new(swell(1, 6, 40.0, 0.4))
+        .with(200, Event::Late(Duration::from_millis(3)))
+        .with(300, Event::Alarm(Alarm::Leave(0)))
+        .with(400, Event::Late(Duration::from_millis(4)))
+        .play();
+    assert!(played.frames.len() < 400, "the only seat is out");
+    let late: Vec<_> = played.late_ns.iter().enumerate().filter(|(_, ns)| **ns > 0).collect();
+    assert_eq!(late, [(200, &3_000_000), (400, &4_000_000)]);
+}
+
+#[test]
 fn after_a_long_stall_the_seat_holds_and_then_joins_the_cue_where_the_film_is() {
     let smooth = Virtual::new(swell(1, 20, 60.0, 0.25)).play();
     let played =

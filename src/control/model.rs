@@ -228,6 +228,11 @@ pub(crate) fn us(ns: u64) -> f64 {
     (ns as f64 / 100.0).round() / 10.0
 }
 
+/// How long so many of all of them are at the most, µs. The end of a bucket may be beyond the longest.
+pub(crate) fn quantile_us(times: &tracker::Histogram, part: f64) -> Option<f64> {
+    (!times.is_empty()).then(|| us(times.value_at_quantile(part).min(times.max())))
+}
+
 /// Percentiles in µs; null if nothing was counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
@@ -246,13 +251,8 @@ impl Percentiles {
     /// Those of a histogram of nanoseconds.
     #[must_use]
     pub(crate) fn of(times: &tracker::Histogram) -> Self {
-        let at = |ns: u64| (!times.is_empty()).then(|| us(ns));
-        Self {
-            p50_us: at(times.value_at_quantile(0.5)),
-            p99_us: at(times.value_at_quantile(0.99)),
-            p999_us: at(times.value_at_quantile(0.999)),
-            max_us: at(times.max()),
-        }
+        let [p50_us, p99_us, p999_us, max_us] = [0.5, 0.99, 0.999, 1.0].map(|part| quantile_us(times, part));
+        Self { p50_us, p99_us, p999_us, max_us }
     }
 }
 

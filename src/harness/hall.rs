@@ -22,6 +22,7 @@ use crate::film::chase::ChaseRules;
 use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::motion::{AxisGeometry, MAX_AXES, Pose, Window};
 use crate::net::Delivery;
+use crate::record::TickHead;
 use crate::rt::{
     Alarm, Answer, Broadcast, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places,
     PlanLoop, Planning, Task, TickLoop, mailboxes,
@@ -197,16 +198,17 @@ impl Virtual {
         } else {
             Conductor::of_a_play(clock.now(), true).chasing(film)
         };
-        let sink = Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new() };
+        let sink =
+            Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new(), late_ns: Vec::new() };
         let (places, clock) = (Places::new(&lanes, rate), &clock);
         let (desk, leave) = (&desk, &leave);
         let mut run = TickLoop { places, clock, grid, engine, conductor, lanes, sink, mail, desk, leave };
         let ended = run.run();
         let clamps = (0..run.lanes.len()).map(|lane| *run.engine.lane(lane).clamps()).collect();
-        let frames = run.sink.frames;
+        let Link { frames, late_ns, .. } = run.sink;
         let mut news = news;
         let news = std::iter::from_fn(|| news.pop().ok()).collect();
-        Played { ended, frames, happened: clock.happened.take(), news, clamps, join, timeline, rate }
+        Played { ended, frames, late_ns, happened: clock.happened.take(), news, clamps, join, timeline, rate }
     }
 }
 
@@ -400,6 +402,7 @@ struct Link<'a> {
     live: &'a Live,
     stands: &'a RefCell<Vec<Pose>>,
     frames: Vec<Frame>,
+    late_ns: Vec<u64>,
 }
 
 impl FrameSink for Link<'_> {
@@ -419,5 +422,9 @@ impl FrameSink for Link<'_> {
         self.stands.borrow_mut()[lane] = std::array::from_fn(there);
         self.frames.push(Frame { lane, at: self.now.get(), request, bytes: datagram.to_vec() });
         Delivery::Sent
+    }
+
+    fn tick_over(&mut self, head: &TickHead) {
+        self.late_ns.push(head.late_ns);
     }
 }

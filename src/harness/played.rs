@@ -25,6 +25,8 @@ pub struct Frame {
 pub struct Played {
     pub ended: Ended,
     pub frames: Vec<Frame>,
+    /// How late each wake-up was told to be.
+    pub late_ns: Vec<u64>,
     /// The events of the script, and when each came.
     pub happened: Vec<(MonoTime, Event)>,
     /// What the hall made known.

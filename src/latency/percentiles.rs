@@ -27,7 +27,7 @@ impl Percentiles {
     #[must_use]
     pub fn of(times: &Histogram) -> Self {
         let model::Percentiles { p50_us, p99_us, p999_us, max_us } = model::Percentiles::of(times);
-        let p90 = p50_us.map(|_| model::us(times.value_at_quantile(0.9)));
+        let p90 = model::quantile_us(times, 0.9);
         Self { count: times.len(), p50: p50_us, p90, p99: p99_us, p999: p999_us, max: max_us }
     }
 
@@ -54,5 +54,8 @@ mod tests {
         assert_eq!((count, p50, p90), (100, Some(10.0), Some(10.0)));
         assert_eq!(p99, max);
         assert!(max.is_some_and(|us| (us - 2_000.0).abs() < 2.0), "{max:?}");
+        let mut at_once = histogram();
+        at_once.record(0).unwrap();
+        assert!(Percentiles::of(&at_once).named().iter().all(|(_, us)| *us == Some(0.0)), "none is beyond");
     }
 }

@@ -301,14 +301,14 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
     }
 
-    /// Sends to every lane that gets a frame; says how long after its deadline the first left, nanoseconds.
+    /// Sends to every lane that gets a frame; says how long after its deadline the first left, or the tick began where none did, nanoseconds.
     fn send(&mut self, tick: Tick, now: MonoTime) -> u64 {
         let mut buf = [0; MAX_LEN];
         let Self { lanes, places, engine, mail, sink, clock, .. } = self;
         let mut sending =
             Sending { lanes, places, engine, mail, sink, clock: *clock, tick: now, first: None };
         sending.send_all(&mut buf);
-        let late_ns = nanos(sending.first.unwrap_or(tick.deadline).since(tick.deadline));
+        let late_ns = nanos(sending.first.map_or(tick.late, |first| first.since(tick.deadline)));
         self.mail.report(TickReport { late_ns, missed: tick.missed });
         late_ns
     }
