@@ -3,6 +3,8 @@
 //!
 //! Two distances without a common factor are used, since either is blind to motion at its own frequency.
 
+use std::array::from_fn;
+
 use crate::time::ShowTime;
 
 /// The poses one third difference spans at the most: 3 x 27 periods at 1,000 Hz, and its own end.
@@ -73,9 +75,8 @@ impl Measure {
 
     /// Takes the next pose, at a show time after the one before, and says what it showed.
     pub fn push(&mut self, at: ShowTime, position: f64) -> Readings {
-        let spans = self.times.push(at);
-        let [readings] = self.places.push(&spans, &[position]);
-        readings
+        self.times.push(at);
+        self.places.push(&self.times, &[position]).of(0)
     }
 }
 
@@ -87,67 +88,66 @@ pub(crate) struct MeasureTimes {
     /// Where the newest pose stands.
     newest: usize,
     times: [i64; HISTORY],
+    /// The time from the pose before to the newest, and how many in a row were as long: over even ones nothing is divided anew.
+    step: i64,
+    even: usize,
+    /// Of each distance.
+    factors: [Factors; 2],
 }
 
-/// Where the poses stand that the newest makes differences with, and how long is between them.
-#[derive(Debug, Clone)]
-pub(crate) struct MeasureSpans {
-    newest: usize,
-    /// The pose before, one over the seconds from it to the newest, and the middle of both; none of the first pose.
-    before: Option<(usize, f64, ShowTime)>,
-    /// When the pose before was, where there was one before that.
-    step_at: Option<ShowTime>,
-    /// Of each distance; none before there are enough poses.
-    apart: [Option<ApartSpans>; 2],
-}
-
-/// The poses of a third difference, the newest first, and what its steps are multiplied with: a division of each would cost most of a
-/// measure, and the spans are those of all axes.
+/// What the steps of a third difference are multiplied with: a division of each would cost most of a measure, and the spans are those of
+/// all axes.
 #[derive(Debug, Clone, Copy)]
-struct ApartSpans {
-    slots: [usize; 4],
-    /// One over the seconds between each and the next; two over those between two apart.
+struct Factors {
+    /// One over the seconds between each pose and the next; two over those between two apart; three over those between all.
     one: [f64; 3],
     two: [f64; 2],
-    second_at: ShowTime,
-    /// Three over the seconds between all, and the middle; none where there are no four.
-    third: Option<(f64, ShowTime)>,
+    three: f64,
 }
 
 impl MeasureTimes {
     pub(crate) const fn new(spacing: Spacing) -> Self {
-        Self { spacing, seen: 0, newest: HISTORY - 1, times: [0; HISTORY] }
-    }
-
-    /// Takes the time of the next pose, after that of the one before.
-    pub(crate) fn push(&mut self, at: ShowTime) -> MeasureSpans {
-        self.newest = if self.newest + 1 < HISTORY { self.newest + 1 } else { 0 };
-        self.times[self.newest] = at.as_nanos();
-        self.seen += 1;
-        let before = (self.seen >= 2).then(|| {
-            let middle = self.times[self.slot(1)].midpoint(self.times[self.newest]);
-            (self.slot(1), 1.0 / self.seconds(0, 1), ShowTime::from_nanos(middle))
-        });
-        MeasureSpans {
-            newest: self.newest,
-            before,
-            step_at: (self.seen >= 3).then(|| self.time(1)),
-            apart: [self.apart(self.spacing.n), self.apart(self.spacing.m)],
+        const NONE: Factors = Factors { one: [0.0; 3], two: [0.0; 2], three: 0.0 };
+        Self {
+            spacing,
+            seen: 0,
+            newest: HISTORY - 1,
+            times: [0; HISTORY],
+            step: 0,
+            even: 0,
+            factors: [NONE; 2],
         }
     }
 
-    fn apart(&self, apart: usize) -> Option<ApartSpans> {
-        (self.seen > 2 * apart).then_some(())?;
-        let has_third = self.seen > 3 * apart;
-        let last = if has_third { 3 * apart } else { 2 * apart };
-        let middle = || self.time(apart).as_nanos().midpoint(self.time(2 * apart).as_nanos());
-        Some(ApartSpans {
-            slots: [self.slot(0), self.slot(apart), self.slot(2 * apart), self.slot(last)],
-            one: [0, 1, 2].map(|before| 1.0 / self.seconds(before * apart, apart)),
-            two: [0, 1].map(|before| 2.0 / self.seconds(before * apart, 2 * apart)),
-            second_at: self.time(apart),
-            third: has_third.then(|| (3.0 / self.seconds(0, 3 * apart), ShowTime::from_nanos(middle()))),
-        })
+    /// Takes the time of the next pose, after that of the one before.
+    pub(crate) fn push(&mut self, at: ShowTime) {
+        let step = at.as_nanos() - self.times[self.newest];
+        self.even = if step == self.step { self.even + 1 } else { 1 };
+        self.step = step;
+        self.newest = if self.newest + 1 < HISTORY { self.newest + 1 } else { 0 };
+        self.times[self.newest] = at.as_nanos();
+        self.seen += 1;
+        for distance in 0..2 {
+            let apart = self.apart(distance);
+            // Once all that it spans is even, it is so until something is not.
+            if self.even <= 3 * apart && self.seen > 2 * apart {
+                self.factors[distance] = Factors {
+                    one: [0, 1, 2].map(|before| 1.0 / self.seconds(before * apart, apart)),
+                    two: [0, 1].map(|before| 2.0 / self.seconds(before * apart, 2 * apart)),
+                    three: 3.0 / self.seconds(0, 3 * apart),
+                };
+            }
+        }
+    }
+
+    /// How many poses the poses of a difference are apart.
+    const fn apart(&self, distance: usize) -> usize {
+        if distance == 0 { self.spacing.n } else { self.spacing.m }
+    }
+
+    /// Half way between two poses.
+    fn middle(&self, back: usize, farther: usize) -> ShowTime {
+        ShowTime::from_nanos(self.time(back).as_nanos().midpoint(self.time(farther).as_nanos()))
     }
 
     #[expect(clippy::cast_precision_loss, reason = "spans of some milliseconds")]
@@ -164,7 +164,8 @@ impl MeasureTimes {
     }
 }
 
-/// Where the poses of up to so many axes were: those of one instant side by side, as a pose needs seven of them of each axis.
+/// Where the poses of up to so many axes were: those of one instant side by side, as a pose needs seven of them of each axis. Axes that
+/// there are not stay at 0: to work them out as well is quicker than to leave them out.
 #[derive(Debug, Clone)]
 pub(crate) struct MeasurePlaces<const N: usize> {
     last_velocities: [f64; N],
@@ -175,50 +176,105 @@ impl<const N: usize> MeasurePlaces<N> {
     /// None yet.
     pub(crate) const NONE: Self = Self { last_velocities: [0.0; N], positions: [[0.0; N]; HISTORY] };
 
-    /// Takes the positions of the next pose, and says of each axis what it showed.
-    pub(crate) fn push(&mut self, spans: &MeasureSpans, positions: &[f64]) -> [Readings; N] {
+    /// Takes the positions of the pose whose time was taken last, and says what it showed.
+    #[inline]
+    pub(crate) fn push(&mut self, times: &MeasureTimes, positions: &[f64]) -> PoseReadings<N> {
         let axes = positions.len().min(N);
-        self.positions[spans.newest][..axes].copy_from_slice(&positions[..axes]);
-        let mut readings = [Readings::default(); N];
-        if let Some((before, per_second, at)) = spans.before {
-            let (newest, before) = (&self.positions[spans.newest], &self.positions[before]);
-            let all = readings.iter_mut().zip(&mut self.last_velocities).take(axes);
-            for (axis, (readings, last_velocity)) in all.enumerate() {
-                let velocity = (newest[axis] - before[axis]) * per_second;
-                readings.velocity = Reading { value: velocity, at };
-                let step = velocity - std::mem::replace(last_velocity, velocity);
-                readings.step = spans.step_at.map_or(readings.step, |at| Reading { value: step, at });
+        self.positions[times.newest][..axes].copy_from_slice(&positions[..axes]);
+        let mut shown = PoseReadings::NONE;
+        if times.seen >= 2 {
+            let [newest, before] = [0, 1].map(|back| &self.positions[times.slot(back)]);
+            let per_second = 1.0 / times.seconds(0, 1);
+            let velocity = from_fn(|axis| (newest[axis] - before[axis]) * per_second);
+            let last = std::mem::replace(&mut self.last_velocities, velocity);
+            shown.velocity = Kind { values: velocity, at: times.middle(0, 1) };
+            if times.seen >= 3 {
+                shown.step = Kind { values: from_fn(|axis| velocity[axis] - last[axis]), at: times.time(1) };
             }
         }
-        spans.apart.iter().flatten().for_each(|apart| self.differences(apart, &mut readings[..axes]));
-        readings
+        for distance in 0..2 {
+            self.differences(times, distance, &mut shown);
+        }
+        shown
     }
 
-    fn differences(&self, spans: &ApartSpans, readings: &mut [Readings]) {
-        let ApartSpans { slots, one, two, second_at, third } = spans;
-        let places = |index: usize| &self.positions[slots[index]];
-        let places = [places(0), places(1), places(2), places(3)];
-        let (three, middle) = third.unwrap_or((0.0, ShowTime::ZERO));
-        let (mut second, mut jerk) = ([0.0; N], [0.0; N]);
-        let both = second.iter_mut().zip(&mut jerk).take(readings.len());
-        for (axis, (second, jerk)) in both.enumerate() {
+    #[inline]
+    fn differences(&self, times: &MeasureTimes, distance: usize, shown: &mut PoseReadings<N>) {
+        let apart = times.apart(distance);
+        if times.seen <= 2 * apart {
+            return;
+        }
+        let Factors { one, two, three } = times.factors[distance];
+        // Where there are but three poses, what the fourth makes is not used.
+        let places: [_; 4] = from_fn(|index| &self.positions[times.slot(index * apart)]);
+        let (mut second, mut third) = ([0.0; N], [0.0; N]);
+        for (axis, (second, third)) in second.iter_mut().zip(&mut third).enumerate() {
             // Neighbours share the slope between them.
             let slope = |index: usize| (places[index][axis] - places[index + 1][axis]) * one[index];
             let [newest, older] = [(slope(0) - slope(1)) * two[0], (slope(1) - slope(2)) * two[1]];
-            (*second, *jerk) = (newest, (newest - older) * three);
+            (*second, *third) = (newest, (newest - older) * three);
         }
-        for (axis, readings) in readings.iter_mut().enumerate() {
-            keep_larger(&mut readings.acceleration, second[axis], *second_at);
-            if third.is_some() {
-                keep_larger(&mut readings.jerk, jerk[axis], middle);
-            }
+        shown.acceleration[distance] = Kind { values: second, at: times.time(apart) };
+        if times.seen > 3 * apart {
+            shown.jerk[distance] = Kind { values: third, at: times.middle(apart, 2 * apart) };
         }
     }
 }
 
-fn keep_larger(kept: &mut Reading, value: f64, at: ShowTime) {
-    if value.abs() > kept.value.abs() {
-        *kept = Reading { value, at };
+/// What one more pose showed of up to so many axes; zeros until enough poses have come. Values of a kind are side by side, so that several
+/// are worked out at once.
+#[derive(Debug, Clone)]
+pub(crate) struct PoseReadings<const N: usize> {
+    velocity: Kind<N>,
+    step: Kind<N>,
+    /// By each of the two distances.
+    acceleration: [Kind<N>; 2],
+    jerk: [Kind<N>; 2],
+}
+
+/// A value of each axis, and the show time in the middle of the poses that gave them.
+#[derive(Debug, Clone, Copy)]
+struct Kind<const N: usize> {
+    values: [f64; N],
+    at: ShowTime,
+}
+
+impl<const N: usize> Kind<N> {
+    const NONE: Self = Self { values: [0.0; N], at: ShowTime::ZERO };
+
+    const fn of(&self, axis: usize) -> Reading {
+        Reading { value: self.values[axis], at: self.at }
+    }
+}
+
+impl<const N: usize> PoseReadings<N> {
+    const NONE: Self =
+        Self { velocity: Kind::NONE, step: Kind::NONE, acceleration: [Kind::NONE; 2], jerk: [Kind::NONE; 2] };
+
+    /// Those of one axis.
+    #[inline]
+    pub(crate) fn of(&self, axis: usize) -> Readings {
+        let larger = |kinds: &[Kind<N>; 2]| {
+            let [one, other] = kinds.each_ref().map(|kind| kind.of(axis));
+            if other.value.abs() > one.value.abs() { other } else { one }
+        };
+        Readings {
+            velocity: self.velocity.of(axis),
+            step: self.step.of(axis),
+            acceleration: larger(&self.acceleration),
+            jerk: larger(&self.jerk),
+        }
+    }
+
+    /// How large speed, acceleration and jerk of each axis are.
+    pub(crate) fn sizes(&self) -> [[f64; N]; 3] {
+        let larger = |[one, other]: [&Kind<N>; 2]| {
+            from_fn(|axis| {
+                let (one, other) = (one.values[axis].abs(), other.values[axis].abs());
+                if other > one { other } else { one }
+            })
+        };
+        [larger([&self.velocity; 2]), larger(self.acceleration.each_ref()), larger(self.jerk.each_ref())]
     }
 }
 
@@ -283,11 +339,52 @@ mod tests {
                 let at = ShowTime::from_millis(i64::from(5 * k + k % 3));
                 let place = |axis: u8| (0.001 * f64::from(k * k) + f64::from(axis)).sin();
                 let places: Vec<f64> = (0..12).take(axes).map(place).collect();
-                let seen = together.push(&times.push(at), &places);
-                let each: Vec<_> =
-                    alone.iter_mut().zip(&places).map(|(one, place)| one.push(at, *place)).collect();
-                assert_eq!(seen[..axes], each, "pose {k} of {axes} axes");
-                assert!(seen[axes..].iter().all(|none| *none == Readings::default()));
+                times.push(at);
+                let seen = together.push(&times, &places);
+                let [speed, acceleration, jerk] = seen.sizes();
+                for (axis, (one, place)) in alone.iter_mut().zip(&places).enumerate() {
+                    let readings = one.push(at, *place);
+                    assert_eq!(seen.of(axis), readings, "pose {k} of {axes} axes");
+                    let sizes = [readings.velocity, readings.acceleration, readings.jerk];
+                    assert_eq!(
+                        [speed[axis], acceleration[axis], jerk[axis]],
+                        sizes.map(|one| one.value.abs())
+                    );
+                }
+            }
+        }
+    }
+
+    /// The third divided difference by its definition, times six.
+    fn jerk_of(poses: &[(f64, f64)]) -> f64 {
+        fn divided(poses: &[(f64, f64)]) -> f64 {
+            let [(from, _), .., (to, _)] = poses else { return poses[0].1 };
+            (divided(&poses[1..]) - divided(&poses[..poses.len() - 1])) / (to - from)
+        }
+        6.0 * divided(poses)
+    }
+
+    #[test]
+    fn even_times_and_times_that_are_not_are_measured_by_the_differences_themselves() {
+        let spacing = Spacing::at_rate(200.0);
+        for step_ms in
+            [|_| 5, |k: i64| 5 + k % 2, |k| if k < 60 { 5 } else { 7 }, |k| if k == 90 { 23 } else { 5 }]
+        {
+            let mut measure = Measure::new(spacing);
+            let (mut at_ms, mut poses) = (0, Vec::new());
+            for k in 0..200 {
+                at_ms += step_ms(k);
+                let (at, place) = (ShowTime::from_millis(at_ms), (0.3 * k as f64).sin());
+                poses.push((at.as_secs_f64(), place));
+                let seen = measure.push(at, place).jerk.value;
+                let of = |apart: usize| {
+                    let back = (0..4).map(|index| poses.len().checked_sub(1 + (3 - index) * apart));
+                    let four: Option<Vec<_>> = back.map(|pose| Some(poses[pose?])).collect();
+                    four.map_or(0.0, |four| jerk_of(&four))
+                };
+                let (one, other) = (of(spacing.n), of(spacing.m));
+                let wanted = if other.abs() > one.abs() { other } else { one };
+                assert!((seen - wanted).abs() <= 1e-6 * wanted.abs().max(1.0), "{k}: {seen}, not {wanted}");
             }
         }
     }

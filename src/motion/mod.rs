@@ -12,10 +12,8 @@ pub use axis::AxisGeometry;
 pub(crate) use axis::{AxisUnit, PARKS_WITHIN_S};
 pub(crate) use brake::{AxisState, Brake};
 pub(crate) use halt::{Begun, Halt, Means};
-#[cfg(test)]
-pub(crate) use measure::Readings;
 pub use measure::{Measure, Spacing};
-pub(crate) use measure::{MeasurePlaces, MeasureTimes, Reading};
+pub(crate) use measure::{MeasurePlaces, MeasureTimes, PoseReadings, Reading, Readings};
 pub(crate) use seat::{FACTORY_INTERVAL_MS, PulseRange, in_stroke};
 pub use seat::{Pulses, SeatAxis, SeatType};
 pub(crate) use window::MAX_LEAD;

@@ -5,9 +5,9 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::chunk::{Chunk, Handed};
-use super::seat::{FrameMotion, ReadFrame};
+use super::seat::{FrameMotion, ReadFrame, RecordedAxis};
 use super::{RecordedSeat, TickHead};
-use crate::motion::{MAX_AXES, MeasurePlaces, MeasureTimes, Reading, Spacing};
+use crate::motion::{MAX_AXES, MeasurePlaces, MeasureTimes, PoseReadings, Reading, Readings, Spacing};
 use crate::plain::escaped;
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::wire::Timing;
@@ -80,7 +80,7 @@ pub(crate) struct Margins {
     lanes: Vec<LaneMargins>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct LaneMargins {
     last: Option<MonoTime>,
     /// When its last frame is reached by the Times of its frames, which seats go by; and the Time of that.
@@ -88,12 +88,10 @@ struct LaneMargins {
     time_ms: u32,
     times: MeasureTimes,
     places: MeasurePlaces<MAX_AXES>,
-    axes: Vec<AxisMargins>,
+    /// The greatest of each quantity and axis so far, and the show time of each.
+    most: [[f64; MAX_AXES]; 3],
+    most_at: [[ShowTime; MAX_AXES]; 3],
 }
-
-/// The greatest of an axis so far, and the show time of each.
-#[derive(Debug, Clone, Copy)]
-struct AxisMargins([(f64, ShowTime); 3]);
 
 /// What one frame showed of an axis, each as a part of its limit, and at which show time that was.
 pub(crate) type Parts = [(ShowTime, f64); 3];
@@ -102,15 +100,16 @@ impl Margins {
     /// A measure of frames at that rate.
     pub(crate) fn new(seats: &[RecordedSeat], rate: Rate) -> Self {
         let spacing = Spacing::at_rate(rate.hz());
-        let lane = |seat: &RecordedSeat| LaneMargins {
+        let lane = LaneMargins {
             last: None,
             reached: ShowTime::ZERO,
             time_ms: 0,
             times: MeasureTimes::new(spacing),
             places: MeasurePlaces::NONE,
-            axes: vec![AxisMargins([(0.0, ShowTime::ZERO); 3]); seat.axes().len()],
+            most: [[0.0; MAX_AXES]; 3],
+            most_at: [[ShowTime::ZERO; MAX_AXES]; 3],
         };
-        Self { spacing, lanes: seats.iter().map(lane).collect() }
+        Self { spacing, lanes: seats.iter().map(|_| lane.clone()).collect() }
     }
 
     /// Takes a tick.
@@ -163,54 +162,58 @@ impl Margins {
             lane.times = MeasureTimes::new(self.spacing);
         }
         let now = lane.reached;
-        let all = lane.places.push(&lane.times.push(now), places);
-        for (index, (axis, seen)) in lane.axes.iter_mut().zip(&all[..places.len()]).enumerate() {
-            let shown = [seen.velocity, seen.acceleration, seen.jerk];
-            axis.keep(shown, now, head.film);
-            tell(frame.lane, index, parts(shown, now, head.film, seat.axes()[index].limits()));
+        lane.times.push(now);
+        let shown = lane.places.push(&lane.times, places);
+        lane.keep(&shown, now, head.film);
+        for (index, axis) in seat.axes().iter().enumerate().take(places.len()) {
+            tell(frame.lane, index, parts(&shown.of(index), now, head.film, axis.limits()));
         }
     }
 
     /// The most of each axis.
     pub(crate) fn most(&self, seats: &[RecordedSeat]) -> Vec<Margin> {
-        let of_axis = |seat: &RecordedSeat, index: usize, axis: &AxisMargins| {
-            let limits = seat.axes()[index].limits();
-            let name = seat.name.clone();
-            let margin = move |(quantity, (value, film)): (Quantity, (f64, ShowTime))| Margin {
-                seat: name.clone(),
-                axis: index + 1,
-                quantity,
-                value,
-                limit: limits[quantity as usize],
-                film_s: film.as_secs_f64(),
-            };
-            Quantity::ALL.into_iter().zip(axis.0).map(margin).collect::<Vec<_>>()
-        };
         let of_lane = |(lane, seat): (&LaneMargins, &RecordedSeat)| {
-            lane.axes
-                .iter()
-                .enumerate()
-                .flat_map(|(index, axis)| of_axis(seat, index, axis))
-                .collect::<Vec<_>>()
+            let of_axis = |(axis, recorded): (usize, &RecordedAxis)| {
+                let limits = recorded.limits();
+                Quantity::ALL.map(|quantity| Margin {
+                    seat: seat.name.clone(),
+                    axis: axis + 1,
+                    quantity,
+                    value: lane.most[quantity as usize][axis],
+                    limit: limits[quantity as usize],
+                    film_s: lane.most_at[quantity as usize][axis].as_secs_f64(),
+                })
+            };
+            seat.axes().iter().enumerate().flat_map(of_axis).collect::<Vec<_>>()
         };
         self.lanes.iter().zip(seats).flat_map(of_lane).collect()
     }
 }
 
-impl AxisMargins {
-    /// Keeps what is greater than all before.
-    fn keep(&mut self, shown: [Reading; 3], now: ShowTime, film: ShowTime) {
-        for (most, reading) in self.0.iter_mut().zip(shown) {
-            if reading.value.abs() > most.0 {
-                *most = (reading.value.abs(), then(reading, now, film));
+impl LaneMargins {
+    /// Keeps what is greater than all before, which next to nothing is.
+    fn keep(&mut self, shown: &PoseReadings<MAX_AXES>, now: ShowTime, film: ShowTime) {
+        for (quantity, (sizes, most)) in shown.sizes().iter().zip(&mut self.most).enumerate() {
+            if !sizes.iter().zip(&*most).fold(false, |any, (size, most)| any | (size > most)) {
+                continue;
+            }
+            for (axis, most) in most.iter_mut().enumerate().filter(|(axis, most)| sizes[*axis] > **most) {
+                *most = sizes[axis];
+                self.most_at[quantity][axis] = then(of_quantities(&shown.of(axis))[quantity], now, film);
             }
         }
     }
 }
 
+/// In the order of [`Quantity`].
+fn of_quantities(readings: &Readings) -> [Reading; 3] {
+    [readings.velocity, readings.acceleration, readings.jerk]
+}
+
 /// What was shown as parts of the limits. Nobody asks for it while it is recorded, and it costs nothing there.
 #[inline]
-fn parts(shown: [Reading; 3], now: ShowTime, film: ShowTime, limits: [f64; 3]) -> Parts {
+fn parts(readings: &Readings, now: ShowTime, film: ShowTime, limits: [f64; 3]) -> Parts {
+    let shown = of_quantities(readings);
     std::array::from_fn(|order| (then(shown[order], now, film), shown[order].value.abs() / limits[order]))
 }
 
