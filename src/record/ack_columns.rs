@@ -60,7 +60,7 @@ const END: i64 = 3;
 const FATES: [Fate; 3] = [Fate::Duplicate, Fate::Stale, Fate::Stray];
 
 /// What a controller replied, on its way.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct ReplyWriter {
     replies: ColumnSet,
     fates: ColumnSet,
@@ -70,43 +70,54 @@ struct ReplyWriter {
     at_us: i64,
 }
 
-/// Drains, as they crossed, as a message.
-pub(super) fn packed(drains: &[u8]) -> Vec<u8> {
-    let mut runs = Vec::<[i64; 3]>::new();
-    let (mut chunks, mut ends) = (ColumnSet::default(), 0);
-    let (mut writers, mut others) = (Vec::<ReplyWriter>::new(), Vec::new());
-    let mut rest = drains;
-    while let Some((chunk, behind)) = AckChunk::parse(rest) {
-        rest = behind;
-        for record in chunk.records() {
-            let (kind, controller) = take(&record, &mut writers, &mut others);
-            match runs.last_mut() {
-                // Others are of no controller.
-                Some([last, first, count])
-                    if *last == kind && (kind == OTHER || *first + *count == controller) =>
-                {
-                    *count += 1;
-                }
-                _ => runs.push([kind, controller, 1]),
-            }
-        }
-        let began = chunk.drained.unwrap_or_default().as_nanos().cast_signed();
-        chunks.push(ends, &[chunk.dropped.into(), chunk.drained.is_some().into(), began]);
-        ends += 1;
-        runs.push([END, 0, 1]);
-    }
-    let replies = |(controller, mut writer): (usize, ReplyWriter)| {
-        (writer.counts != [0; 2]).then(|| ReplyColumns {
+impl ReplyWriter {
+    /// What it came to, where it came to anything. The next begins anew, in the same memory.
+    fn take(&mut self, controller: usize) -> Option<ReplyColumns> {
+        self.at_us = 0;
+        (std::mem::take(&mut self.counts) != [0; 2]).then(|| ReplyColumns {
             controller: u32::try_from(controller).unwrap_or(u32::MAX),
-            replies: writer.replies.take(),
-            fates: writer.fates.take(),
+            replies: self.replies.take(),
+            fates: self.fates.take(),
         })
-    };
-    let controllers = writers.into_iter().enumerate().filter_map(replies).collect();
-    let count = u32::try_from(runs.len()).unwrap_or(u32::MAX);
-    let mut columns = ColumnSet::default();
-    runs.into_iter().enumerate().for_each(|(row, run)| columns.push(row, &run));
-    Acks { runs: columns.take(), count, chunks: chunks.take(), controllers, others }.encode_to_vec()
+    }
+}
+
+/// Packs drains. Its memory is used again for the next.
+#[derive(Debug, Default)]
+pub(super) struct AckPacker(Vec<ReplyWriter>);
+
+impl AckPacker {
+    /// Drains, as they crossed, as a message.
+    pub(super) fn pack(&mut self, drains: &[u8]) -> Vec<u8> {
+        let mut runs = Vec::<[i64; 3]>::new();
+        let (mut chunks, mut ends) = (ColumnSet::default(), 0);
+        let (mut others, mut rest) = (Vec::new(), drains);
+        while let Some((chunk, behind)) = AckChunk::parse(rest) {
+            rest = behind;
+            for record in chunk.records() {
+                let (kind, controller) = take(&record, &mut self.0, &mut others);
+                match runs.last_mut() {
+                    // Others are of no controller.
+                    Some([last, first, count])
+                        if *last == kind && (kind == OTHER || *first + *count == controller) =>
+                    {
+                        *count += 1;
+                    }
+                    _ => runs.push([kind, controller, 1]),
+                }
+            }
+            let began = chunk.drained.unwrap_or_default().as_nanos().cast_signed();
+            chunks.push(ends, &[chunk.dropped.into(), chunk.drained.is_some().into(), began]);
+            ends += 1;
+            runs.push([END, 0, 1]);
+        }
+        let controllers = self.0.iter_mut().enumerate().filter_map(|(place, writer)| writer.take(place));
+        let controllers = controllers.collect();
+        let count = u32::try_from(runs.len()).unwrap_or(u32::MAX);
+        let mut columns = ColumnSet::default();
+        runs.into_iter().enumerate().for_each(|(row, run)| columns.push(row, &run));
+        Acks { runs: columns.take(), count, chunks: chunks.take(), controllers, others }.encode_to_vec()
+    }
 }
 
 /// Puts a record where it belongs; gives its kind and its controller.
@@ -291,15 +302,18 @@ mod tests {
         fn drains_come_back_from_columns_octet_by_octet(
             drains in prop::collection::vec((any::<u64>(), prop::collection::vec(record(), 0..20)), 0..12),
         ) {
-            let crossed = crossed(&drains);
-            prop_assert_eq!(unpacked(&packed(&crossed)), Some(crossed));
+            let (crossed, mut packer) = (crossed(&drains), AckPacker::default());
+            for _ in 0..2 {
+                let back = unpacked(&packer.pack(&crossed));
+                prop_assert_eq!(back.as_ref(), Some(&crossed), "the memory of the last says nothing");
+            }
         }
 
         #[test]
         fn no_message_panics(mut message in prop::collection::vec(any::<u8>(), 0..200), at in 0..600_usize, flip: u8) {
             unpacked(&message);
             let record = AckRecord::Fate(1, FrameNo(7), Fate::Stale, 1_000);
-            message = packed(&crossed(&[(1, vec![record; 9]), (9, vec![record; 9])]));
+            message = AckPacker::default().pack(&crossed(&[(1, vec![record; 9]), (9, vec![record; 9])]));
             if let Some(octet) = message.get_mut(at) {
                 *octet ^= flip;
             }
@@ -330,7 +344,7 @@ mod tests {
             ((tick + 1) * 1_000_000 + tick, (0..6).map(reply).chain((0..6).map(fate)).collect())
         };
         let drains: Vec<_> = (0..500).map(drain).collect();
-        let octets = packed(&crossed(&drains)).len();
+        let octets = AckPacker::default().pack(&crossed(&drains)).len();
         assert!(octets < 500 * 6 * 5 / 2 + 500 * 14, "{octets} for {} replies", 500 * 6);
     }
 }

@@ -5,6 +5,7 @@ use std::io::{Read, Seek, Write};
 
 use mcap::McapError;
 
+use super::ack_columns::AckPacker;
 use super::anonymous::Anonymous;
 use super::block::Block;
 use super::read::{Contents, ReadError, Told, Wanted, WantedSamples};
@@ -340,7 +341,7 @@ fn put_block<W: Write + Seek>(
     drains: &mut Vec<u8>,
 ) -> Result<(), McapError> {
     file.write(at, &Message::Ticks(block))?;
-    file.write(at, &Message::Drains(std::mem::take(drains)))
+    file.write(at, &Message::Drains(AckPacker::default().pack(&std::mem::take(drains))))
 }
 
 /// Writes what is of a seat that was asked for, by the clock or, where the film is given, by that.

@@ -2,6 +2,7 @@
 
 use rtrb::Consumer;
 
+use super::ack_columns::AckPacker;
 use super::block::Block;
 use super::margins::Margins;
 use super::{
@@ -96,6 +97,7 @@ pub(crate) struct Intake {
 struct Whole {
     ticks: Block,
     drains: Vec<u8>,
+    packer: AckPacker,
     /// When the last tick was due.
     last: MonoTime,
 }
@@ -247,7 +249,8 @@ impl Whole {
 
     fn tell_drains(&mut self, at: MonoTime, tell: &mut impl FnMut(MonoTime, Message)) {
         if !self.drains.is_empty() {
-            tell(at, Message::Drains(std::mem::take(&mut self.drains)));
+            tell(at, Message::Drains(self.packer.pack(&self.drains)));
+            self.drains.clear();
         }
     }
 }

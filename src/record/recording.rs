@@ -8,7 +8,6 @@ use mcap::{Attachment, Compression, McapResult, WriteOptions, Writer};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::ack_columns::packed;
 use super::descriptors::descriptors;
 use super::flight::Entry;
 use super::judging::Judging;
@@ -204,8 +203,8 @@ impl EntryMaker {
                 (self.seats + 1, serde_json::to_vec(&json!({"state": state_number(*state)}))?)
             }
             Message::Note(note) => (self.seats + 1 + note.topic(), note.json(self.wall(at))?),
-            Message::Ticks(block) => (self.seats + 1 + NOTE_TOPICS, block.clone()),
-            Message::Drains(drains) => (self.seats + 2 + NOTE_TOPICS, packed(drains)),
+            Message::Ticks(octets) => (self.seats + 1 + NOTE_TOPICS, octets.clone()),
+            Message::Drains(octets) => (self.seats + 2 + NOTE_TOPICS, octets.clone()),
         };
         let channel = u16::try_from(channel).unwrap_or(u16::MAX);
         Ok(Entry { channel, log_time: self.wall(at), data })

@@ -110,7 +110,7 @@ pub(crate) enum Message {
     Note(Note),
     /// A block of whole ticks, of which the last was then.
     Ticks(Vec<u8>),
-    /// What the ack thread took, as it crossed.
+    /// What the ack thread took, packed.
     Drains(Vec<u8>),
 }
 

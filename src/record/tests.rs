@@ -6,6 +6,7 @@ use mcap::MessageStream;
 use proptest::prelude::*;
 use serde_json::Value;
 
+use super::ack_columns::unpacked;
 use super::chunk::{ChunkWriter, Handed, SentFrame};
 use super::*;
 use crate::health::HealthState;
@@ -241,6 +242,7 @@ fn acks_that_come_after_the_last_tick_are_in_samples_and_drains_as_they_are_in_t
     let mut tell = |_, message| match message {
         Message::Seat(0, sample) => acked += sample.acked,
         Message::Drains(drains) => {
+            let drains = unpacked(&drains).expect("they are ours");
             let mut rest = drains.as_slice();
             while let Some((chunk, behind)) = AckChunk::parse(rest) {
                 fates += chunk.records().filter(|one| matches!(one, AckRecord::Fate(..))).count();
