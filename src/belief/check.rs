@@ -65,17 +65,17 @@ impl Belief {
         self.history.push(self.spans.last(), pose, shakes.max(self.sways), (at, self.busy_until));
         // What was refused before it is missing as well, until it is acked. One of these may have been to ask: whoever took this frame has to ack
         // a later one all the sooner.
-        let refused = self.refused_since.take();
-        let waits = asked || refused.is_some() && self.spans.passes_one_that_asks(frame, self.ack_every);
-        self.spans.push(frame, waits, pose, refused.unwrap_or(at));
+        let (since, asked_then) = self.refused.take().unwrap_or((at, false));
+        self.spans.push(frame, asked || asked_then, pose, since);
         if !matches!(self.known, Known::Commanded(_)) {
             self.known = Known::Commanded(at);
         }
     }
 
-    /// Notes that the kernel did not take a frame.
-    pub(crate) fn refused(&mut self, at: MonoTime) {
-        self.refused_since.get_or_insert(at);
+    /// Notes that the kernel did not take a frame, and whether that was to ask for an ack.
+    pub(crate) fn refused(&mut self, at: MonoTime, asked: bool) {
+        let (_, one_asked) = self.refused.get_or_insert((at, false));
+        *one_asked |= asked;
     }
 
     /// Notes that a frame was not sent.

@@ -103,8 +103,8 @@ pub(crate) struct Belief {
     busy_until: MonoTime,
     /// Until when it is at the most, were all that it got since its seat was last seen to follow overtaken on the way.
     busy_at_most: MonoTime,
-    /// When the kernel first refused a frame since it last took one.
-    refused_since: Option<MonoTime>,
+    /// When the kernel first refused a frame since it last took one, and whether one of those was to ask for an ack.
+    refused: Option<(MonoTime, bool)>,
     /// One of so many frames asks for an ack; 0 where none does: then what the kernel takes is all that can be known.
     ack_every: u32,
     gap: bool,
@@ -140,7 +140,7 @@ impl Belief {
             reading: 0,
             busy_until: MonoTime::default(),
             busy_at_most: MonoTime::default(),
-            refused_since: None,
+            refused: None,
             ack_every,
             gap: false,
             period,
@@ -271,7 +271,7 @@ impl Belief {
 
     /// That the ack thread is slow is no gap at first: what an ack may still be read for is not missing.
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
-        let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
+        let refused = self.refused.is_some_and(|(since, _)| now.since(since) > GAP);
         let later = self.acked_after;
         let is_missed = |since| told.since(since) > GAP + later || now.since(since) > GAP_UNTOLD + later;
         let unheard = || self.spans.waiting_since(self.acked, self.period).is_some_and(is_missed);

@@ -114,12 +114,6 @@ impl Spans {
         (self.last, self.newest, self.newest_at) = (*pose, frame, at);
     }
 
-    /// True if one of the numbers between the newest frame and that one would have asked for an ack.
-    pub(super) fn passes_one_that_asks(&self, frame: FrameNo, every: u32) -> bool {
-        let between = u32::try_from(frame.since(self.newest).saturating_sub(1)).unwrap_or(0);
-        between > 0 && self.count > 0 && self.newest.next().asking(between, every) > 0
-    }
-
     /// A frame was acked: those before its span say nothing any more.
     pub(super) fn confirm(&mut self, acked: FrameNo) {
         let over =

@@ -209,9 +209,9 @@ fn frames_that_the_kernel_does_not_take_for_fifty_milliseconds_are_a_gap_with_ac
         let table = EvidenceTable::of(1);
         let evidence = table.lane(0).unwrap();
         let begins = |belief: &mut Belief, when| belief.look(evidence, ms(when), ms(when)) == Found::Gap;
-        belief.refused(ms(0));
+        belief.refused(ms(0), true);
         assert!(!begins(&mut belief, 50));
-        belief.refused(ms(50));
+        belief.refused(ms(50), true);
         assert!(begins(&mut belief, 60) && !begins(&mut belief, 70), "it begins once");
         assert_eq!(belief.tally().gaps, 1);
     }
@@ -227,7 +227,7 @@ fn an_ack_is_missed_in_time_though_the_frame_that_was_to_ask_was_refused() {
             let (frame, when) = (FrameNo(*number), 10 * u64::from(*number));
             let begins = bench.look(when) == Found::Gap;
             if refused.contains(number) {
-                bench.belief.refused(ms(when));
+                bench.belief.refused(ms(when), frame.asks(5));
             } else {
                 let (pose, asked) = (at(0.0), frame.asks(5));
                 let (lasts_ms, at) = (10, ms(when));
@@ -244,6 +244,7 @@ fn an_ack_is_missed_in_time_though_the_frame_that_was_to_ask_was_refused() {
     assert_eq!(missed(&[6]), Some(12));
     assert_eq!(missed(&[5, 6, 7]), Some(11), "the fifth was to leave at 50 ms");
     assert_eq!(missed(&[2, 3, 4]), Some(12), "none of these was to ask");
+    assert_eq!(missed(&[2, 3, 4, 5, 6]), Some(8), "nor was any frame open when the first was refused");
 }
 
 #[test]
@@ -353,7 +354,7 @@ fn what_the_kernel_refused_and_what_was_lost_behind_it_are_one_gap() {
     bench.ack(1);
     assert_eq!(bench.look(10), Found::Nothing);
     for tick in 1..=3 {
-        bench.belief.refused(ms(10 * tick));
+        bench.belief.refused(ms(10 * tick), true);
         assert_eq!(bench.look(10 * tick + 5), Found::Nothing);
     }
     bench.send(0.002, 10, 40);

@@ -242,7 +242,7 @@ impl Places {
         let belief = &mut self.lanes[lane].belief;
         match delivery {
             Delivery::Sent | Delivery::SentAfterRefusal => belief.taken(taken),
-            Delivery::Failed(_) => belief.refused(taken.at),
+            Delivery::Failed(_) => belief.refused(taken.at, taken.asked),
         }
     }
 }

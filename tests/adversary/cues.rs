@@ -87,9 +87,10 @@ pub(crate) const OTHERS: [Kind; 9] = [
 ];
 
 /// Halls that ask for as few acks as a configuration may, or for a few more.
-pub(crate) const SELDOM: [Kind; 5] = [
+pub(crate) const SELDOM: [Kind; 6] = [
     Kind { hz: 20.0, ack_every: 2, ..PLAIN },
     Kind { hz: 100.0, ack_every: 3, ..PLAIN },
+    Kind { hz: 100.0, ack_every: 5, ..PLAIN },
     Kind { hz: 100.0, ack_every: 6, ..PLAIN },
     Kind { hz: 250.0, ack_every: 13, ..PLAIN },
     Kind { hz: 1_000.0, ack_every: 51, ..PLAIN },

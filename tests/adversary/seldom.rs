@@ -50,3 +50,24 @@ fn wherever_a_loss_begins_between_two_acks_it_is_made_up_for_by_no_more_than_is_
 fn nor_by_more_where_the_kernel_refuses_a_frame_of_it() {
     ride_all(true);
 }
+
+#[test]
+fn nor_by_more_where_it_refuses_all_from_an_ack_on_for_as_long_as_that_is_no_gap() {
+    let mut dice = Dice::new(setting("KINOCUE_SEED").unwrap_or(7));
+    for kind in SELDOM {
+        let (period, every) = (kind.period_ms() as u64, (kind.asks_ms() / kind.period_ms()) as u64);
+        for _ in 0..setting("KINOCUE_HISTORIES").unwrap_or(60) {
+            let ether = ether(kind, |_| {});
+            lead(kind, &ether, LedBefore::Ended, |hall| {
+                hall.ride(0);
+                hall.pass(period * dice.range(0, 40 * every));
+                let refuses = period * dice.range(1, 2 + 50 / period);
+                hall.ether.turns(0, Weather::Refused, refuses);
+                hall.pass(refuses);
+                hall.ether.turns(0, Weather::Lost, dice.range(period, LONGEST));
+                hall.pass(LONGEST + 1_300);
+            });
+            assert_no_breach(&ether);
+        }
+    }
+}
