@@ -232,6 +232,8 @@ impl Belief {
             self.known = Known::Contradicted(now);
             return Found::Nothing;
         }
+        // What was refused before has led it nowhere: a gap that this was is over with it.
+        self.refused.take_if(|_| self.gap);
         let mut pose = *self.spans.last();
         slots_in(told).for_each(|slot| pose[slot] = reading.pose[slot]);
         self.within = told | if agrees { self.within } else { 0 };

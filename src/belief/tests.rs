@@ -248,6 +248,19 @@ fn an_ack_is_missed_in_time_though_the_frame_that_was_to_ask_was_refused() {
 }
 
 #[test]
+fn a_refusal_that_was_a_gap_is_none_any_more_once_the_seat_was_read_at_rest() {
+    let mut bench = Bench::found(0.0);
+    bench.send(0.001, 10, 0);
+    bench.ack(1);
+    assert_eq!(bench.look(10), Found::Nothing);
+    bench.belief.refused(ms(10), true);
+    assert_eq!(bench.look(70), Found::Gap);
+    bench.read(0.001, 300, true);
+    assert_eq!((bench.look(310), bench.belief.is_in_a_gap()), (Found::Nothing, false));
+    assert_eq!(bench.belief.tally().gaps, 1);
+}
+
+#[test]
 fn a_motion_begins_from_evidence_after_half_a_second_without_frames() {
     let mut bench = Bench::found(0.0);
     bench.send(0.01, 10, 100);

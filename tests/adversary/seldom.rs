@@ -4,9 +4,10 @@
 use kinocue::harness::state::LedBefore;
 
 use super::chance::setting;
-use super::cues::{Kind, SELDOM};
+use super::cues::{KINDS, Kind, SELDOM};
 use super::dice::Dice;
 use super::ether::Weather;
+use super::hall::Hall;
 use super::named::{assert_no_breach, ether, lead};
 
 /// What lies between two acks, and all that is admitted beside it, is less than so much longer, ms.
@@ -69,5 +70,25 @@ fn nor_by_more_where_it_refuses_all_from_an_ack_on_for_as_long_as_that_is_no_gap
             });
             assert_no_breach(&ether);
         }
+    }
+}
+
+#[test]
+fn a_seat_whose_frames_the_kernel_refused_for_long_rejoins_and_stays() {
+    for kind in SELDOM.into_iter().chain([KINDS[0], KINDS[7]]) {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, LedBefore::Ended, |hall| {
+            let takes_part = |hall: &mut Hall<'_, '_>| {
+                hall.pass(10);
+                hall.runtime.live.table()[0].standing.may_move()
+            };
+            hall.ride(3);
+            hall.ether.turns(0, Weather::Refused, 3_000);
+            hall.pass(3_000);
+            assert!(!takes_part(hall), "{kind:?}");
+            assert!((0..200).any(|_| takes_part(hall)), "{kind:?}");
+            assert!((0..500).all(|_| takes_part(hall)), "it falls out once more: {kind:?}");
+        });
+        assert_no_breach(&ether);
     }
 }
