@@ -102,14 +102,18 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
         if !one.permits(self.tick) {
             return Err(Apart::NoPermit(one.permit()));
         }
-        let mut number: Option<FrameNo> = None;
+        let (mut number, mut skips): (Option<FrameNo>, bool) = (None, false);
         for lane in &one.lanes {
             if !places.belief(*lane).allows(engine.lane(*lane).pose(), engine.beat_of(*lane).lasts_ms, at) {
                 return Err(Apart::Out(*lane));
             }
             let next = lanes[*lane].next_frame();
+            skips |= number.is_some_and(|one| one != next);
             number = Some(number.filter(|newest| newest.since(next) >= 0).unwrap_or(next));
         }
+        // Whoever leaves numbers out may leave out the one that was to ask for an ack: this one does.
+        let every = one.lanes.first().map_or(0, |lane| lanes[*lane].ack_every);
+        let number = number.map(|one| if skips { one.that_asks(every) } else { one });
         // Numbers go round: of some that lie all over the round none is later than all.
         let is_taken = |lane: &&usize| number.is_some_and(|one| one.since(lanes[**lane].next_frame()) < 0);
         if let Some(later) = one.lanes.iter().find(is_taken) {

@@ -25,6 +25,13 @@ impl FrameNo {
         every > 0 && self.0.wrapping_sub(1).is_multiple_of(every)
     }
 
+    /// The first from this one on that asks; this one where none does.
+    #[must_use]
+    pub(crate) fn that_asks(self, every: u32) -> Self {
+        let mut later = (0..every).map(|later| Self(self.0.wrapping_add(later)));
+        later.find(|frame| frame.asks(every)).unwrap_or(self)
+    }
+
     /// How many of the `count` frames from this one on ask, where each `every`-th does.
     #[must_use]
     pub(crate) fn asking(self, count: u32, every: u32) -> u32 {
@@ -71,6 +78,9 @@ mod tests {
     fn each_nth_frame_asks_from_the_first_on() {
         let asks = |every| (1..=7).filter(|&number| FrameNo(number).asks(every)).collect::<Vec<_>>();
         assert_eq!((asks(1), asks(3), asks(0)), (vec![1, 2, 3, 4, 5, 6, 7], vec![1, 4, 7], vec![]));
+        let next = |first, every| FrameNo(first).that_asks(every).0;
+        assert_eq!([next(4, 3), next(5, 3), next(6, 3), next(5, 1), next(5, 0)], [4, 7, 7, 5, 5]);
+        assert_eq!(next(u32::MAX, 4), 1, "the count goes round");
     }
 
     #[test]

@@ -366,6 +366,42 @@ fn numbers_that_lie_all_over_the_round_have_none_that_is_later_than_all() {
 }
 
 #[test]
+fn a_seat_that_goes_on_with_the_numbers_of_others_is_asked_for_acks_as_often_as_before() {
+    let kind = TOGETHER[2];
+    let every = (kind.asks_ms() / kind.period_ms()) as u32;
+    for out in 0..u64::from(every) {
+        let ether = quiet(kind);
+        ether.world().frames = Some(Vec::new());
+        lead(kind, &ether, |hall| {
+            hall.ride(3);
+            hall.pass(1_500);
+            assert!(plays(hall, 600)[0] > 10);
+            switch(hall, 1, false);
+            // It parks, and is sent nothing for some seconds.
+            hall.pass(8_000 + 10 * out);
+            switch(hall, 1, true);
+            assert!((0..60).any(|_| plays(hall, 100)[0] > 0));
+            assert_accounts(hall);
+        });
+        let frames = ether.world().frames.take().expect("they are kept");
+        for seat in ["seat 1: ", "seat 2: "] {
+            let numbers = frames.iter().filter_map(|line| line.split_once(seat)?.1.strip_prefix("frame "));
+            let numbers = numbers.map(|line| line.split(',').next().and_then(|text| text.parse().ok()));
+            let asks =
+                numbers.map(|number: Option<u32>| (number.expect("a number") - 1).is_multiple_of(every));
+            let unasked = asks.scan(0, |run, asks| {
+                *run = if asks { 0 } else { *run + 1 };
+                Some(*run)
+            });
+            assert!(
+                unasked.max().is_some_and(|most| most < every),
+                "{seat}after {out} more frames of the other"
+            );
+        }
+    }
+}
+
+#[test]
 fn while_somebody_else_asks_a_permit_is_ten_seconds_old_at_most() {
     let kind = TOGETHER[0];
     lead(kind, &quiet(kind), |hall| {
