@@ -80,6 +80,7 @@ impl House {
         let mut engine = Engine { machine: engine, folder: fleet, process: None };
         engine.start();
         let table = fs::read_to_string(engine.folder.join("h1/kinocue-fleet.toml")).unwrap();
+        let table = table.replace("allow = []", "allow = [\"preflight\"]");
         let shows = [(a, "a"), (b, "b")].map(|(machine, name)| {
             let folder = dir.path().join(name);
             furnish(&folder, &table);
@@ -145,11 +146,25 @@ impl House {
         Guarded::start_command(&mut command)
     }
 
+    /// A controller stands still, or goes on.
+    pub(crate) fn signal_seat(&self, seat: usize, signal: Signal) {
+        self.sims[seat].guarded.signal(signal);
+    }
+
     /// A command at the desk of the fleet.
     pub(crate) fn desk(&self, args: &[&str]) -> Run {
+        self.at_the_desk(args).stdin(Stdio::null()).output().unwrap().into()
+    }
+
+    /// The same of one that takes its time.
+    pub(crate) fn begin_at_desk(&self, args: &[&str]) -> Guarded {
+        Guarded::start_command(&mut self.at_the_desk(args))
+    }
+
+    fn at_the_desk(&self, args: &[&str]) -> Command {
         let mut command = self.engine.machine.command(env!("CARGO_BIN_EXE_kinocue"));
         command.arg("fleet").args(args).arg("--desk").arg(self.engine.folder.join("office/desk.toml"));
-        command.stdin(Stdio::null()).output().unwrap().into()
+        command
     }
 
     /// How the desk sees the hall once that is so.

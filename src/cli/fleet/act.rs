@@ -28,8 +28,9 @@ const PATIENCE: Duration = Duration::from_secs(3);
 const LONG: Duration = Duration::from_secs(70);
 /// How often it is looked whether the engine is there.
 const LOOK: Duration = Duration::from_millis(20);
-/// The status by which a link says that the hall behind it did not answer.
-const AWAY: u16 = 503;
+/// The status by which a link says that nobody behind it has taken what was asked, and the one for a hall that had it and came to nothing.
+pub(super) const AWAY: u16 = 502;
+pub(super) const UNANSWERED: u16 = 503;
 
 /// Brings the seats of halls to rest at once.
 ///
@@ -321,7 +322,7 @@ fn no_answer_within(patience: Duration) -> Answer {
 
 /// What the hall's own link answers; `None` where nobody hears. Others may answer as well, such as an engine that was told to keep what is
 /// asked: that says nothing of the hall. The links of both show machines of a hall hear the same: that a service is down, kept in `away`,
-/// is the answer only where no other one comes.
+/// is the answer only where no other one comes. A service that had it and ended says that at once: no other one has it.
 async fn answer_of(
     client: &Client,
     hall: &str,
@@ -382,7 +383,7 @@ impl Answer {
         }
         let text = serde_json::from_value::<ServiceProblem>(answer.reply).unwrap_or_default().line();
         // The link is there, and the hall behind it did not answer.
-        Err(if answer.status == AWAY { Self::Silent(text) } else { Self::Refused(text) })
+        Err(if matches!(answer.status, AWAY | UNANSWERED) { Self::Silent(text) } else { Self::Refused(text) })
     }
 
     pub(super) fn line(&self) -> String {
@@ -432,6 +433,7 @@ mod tests {
         assert_eq!(of(&[200, 200]), Exit::Done);
         assert_eq!(of(&[200, 403]), Exit::CheckFailed);
         assert_eq!(of(&[403, 503, 200]), Exit::TryAgain);
+        assert_eq!(of(&[502, 403]), Exit::TryAgain);
         assert_eq!(answer(403).line(), "refused: x; y");
         assert_eq!(answer(200).line(), "parked");
     }

@@ -13,6 +13,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
+use super::act::{AWAY, UNANSWERED};
 use super::clock::Rounds;
 use super::hall::Link;
 use super::log::LogTeller;
@@ -182,7 +183,8 @@ impl Link {
                 let _place = place;
                 match link.carry(&message).await {
                     Ok(reply) => link.answer(message, reply).await,
-                    Err(_) if link.is_of_two() => {}
+                    // The other machine may have it, but not what this one hung up on.
+                    Err(why) if link.is_of_two() && !is_cut_off(&why) => {}
                     Err(why) => link.answer(message, away(&why)).await,
                 }
             });
@@ -294,7 +296,13 @@ async fn told_after(told: &mut watch::Receiver<Option<BriefStatus>>, seq: u64) -
 /// That the hall cannot be asked.
 pub(super) fn away(why: &anyhow::Error) -> (u16, Value) {
     let remedy = "look at the hall: its service may be down";
-    (503, json!({ "code": "timeout", "detail": format!("{why:#}"), "remedy": remedy }))
+    let status = if is_cut_off(why) { UNANSWERED } else { AWAY };
+    (status, json!({ "code": "timeout", "detail": format!("{why:#}"), "remedy": remedy }))
+}
+
+/// True if the service had been reached by then.
+fn is_cut_off(why: &anyhow::Error) -> bool {
+    why.is::<hyper::Error>()
 }
 
 /// What goes wrong, told once until it is over.
