@@ -81,11 +81,27 @@ pub(in crate::cli) async fn ask_stop(socket: &Path, patience: Duration) -> io::R
 fn by_control_socket(server: &ServerArgs) -> Result<Exit, Failure> {
     let server = ServerArgs { socket: Some(server.first_socket()), ..server.clone() };
     let stopped = server.post_within("/api/v1/show/stop", &json!({}), LAST_PATIENCE);
-    let status = stopped.map_err(|failure| {
-        let error = failure.error.context("THE STOP IS NOT CONFIRMED; use the hard-wired emergency stop");
-        Failure { error, ..failure }
-    })?;
+    let status = stopped.map_err(unconfirmed)?;
     let (line, socket) = (status.line(), server.first_socket());
     print::tell(&format!("kinocue: {line}; via {}; {NO_EMERGENCY}", socket.display()));
     Ok(Exit::Done)
+}
+
+/// Nobody tries a stop again as long as it takes: what would be told so elsewhere is as if no daemon were there.
+fn unconfirmed(Failure { exit, error }: Failure) -> Failure {
+    let error = error.context("THE STOP IS NOT CONFIRMED; use the hard-wired emergency stop");
+    Failure { exit: if exit == Exit::TryAgain { Exit::Unavailable } else { exit }, error }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_that_nobody_confirmed_ends_with_69_also_where_the_socket_lets_nobody_in() {
+        let of = |exit| unconfirmed(Failure { exit, error: anyhow::anyhow!("no room") });
+        assert_eq!(of(Exit::TryAgain).exit, Exit::Unavailable);
+        assert_eq!(of(Exit::NotAllowed).exit, Exit::NotAllowed);
+        assert!(of(Exit::TryAgain).to_string().starts_with("THE STOP IS NOT CONFIRMED"));
+    }
 }
