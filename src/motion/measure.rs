@@ -187,9 +187,10 @@ impl<const N: usize> MeasurePlaces<N> {
             let per_second = 1.0 / times.seconds(0, 1);
             let velocity = from_fn(|axis| (newest[axis] - before[axis]) * per_second);
             let last = std::mem::replace(&mut self.last_velocities, velocity);
-            shown.velocity = Kind { values: velocity, at: times.middle(0, 1) };
+            shown.velocity = AxesReading { values: velocity, at: times.middle(0, 1) };
             if times.seen >= 3 {
-                shown.step = Kind { values: from_fn(|axis| velocity[axis] - last[axis]), at: times.time(1) };
+                shown.step =
+                    AxesReading { values: from_fn(|axis| velocity[axis] - last[axis]), at: times.time(1) };
             }
         }
         for distance in 0..2 {
@@ -214,9 +215,9 @@ impl<const N: usize> MeasurePlaces<N> {
             let [newest, older] = [(slope(0) - slope(1)) * two[0], (slope(1) - slope(2)) * two[1]];
             (*second, *third) = (newest, (newest - older) * three);
         }
-        shown.acceleration[distance] = Kind { values: second, at: times.time(apart) };
+        shown.acceleration[distance] = AxesReading { values: second, at: times.time(apart) };
         if times.seen > 3 * apart {
-            shown.jerk[distance] = Kind { values: third, at: times.middle(apart, 2 * apart) };
+            shown.jerk[distance] = AxesReading { values: third, at: times.middle(apart, 2 * apart) };
         }
     }
 }
@@ -225,21 +226,21 @@ impl<const N: usize> MeasurePlaces<N> {
 /// are worked out at once.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseReadings<const N: usize> {
-    velocity: Kind<N>,
-    step: Kind<N>,
+    velocity: AxesReading<N>,
+    step: AxesReading<N>,
     /// By each of the two distances.
-    acceleration: [Kind<N>; 2],
-    jerk: [Kind<N>; 2],
+    acceleration: [AxesReading<N>; 2],
+    jerk: [AxesReading<N>; 2],
 }
 
 /// A value of each axis, and the show time in the middle of the poses that gave them.
 #[derive(Debug, Clone, Copy)]
-struct Kind<const N: usize> {
+struct AxesReading<const N: usize> {
     values: [f64; N],
     at: ShowTime,
 }
 
-impl<const N: usize> Kind<N> {
+impl<const N: usize> AxesReading<N> {
     const NONE: Self = Self { values: [0.0; N], at: ShowTime::ZERO };
 
     const fn of(&self, axis: usize) -> Reading {
@@ -248,14 +249,18 @@ impl<const N: usize> Kind<N> {
 }
 
 impl<const N: usize> PoseReadings<N> {
-    const NONE: Self =
-        Self { velocity: Kind::NONE, step: Kind::NONE, acceleration: [Kind::NONE; 2], jerk: [Kind::NONE; 2] };
+    const NONE: Self = Self {
+        velocity: AxesReading::NONE,
+        step: AxesReading::NONE,
+        acceleration: [AxesReading::NONE; 2],
+        jerk: [AxesReading::NONE; 2],
+    };
 
     /// Those of one axis.
     #[inline]
     pub(crate) fn of(&self, axis: usize) -> Readings {
-        let larger = |kinds: &[Kind<N>; 2]| {
-            let [one, other] = kinds.each_ref().map(|kind| kind.of(axis));
+        let larger = |pair: &[AxesReading<N>; 2]| {
+            let [one, other] = pair.each_ref().map(|one| one.of(axis));
             if other.value.abs() > one.value.abs() { other } else { one }
         };
         Readings {
@@ -268,7 +273,7 @@ impl<const N: usize> PoseReadings<N> {
 
     /// How large speed, acceleration and jerk of each axis are.
     pub(crate) fn sizes(&self) -> [[f64; N]; 3] {
-        let larger = |[one, other]: [&Kind<N>; 2]| {
+        let larger = |[one, other]: [&AxesReading<N>; 2]| {
             from_fn(|axis| {
                 let (one, other) = (one.values[axis].abs(), other.values[axis].abs());
                 if other > one { other } else { one }
@@ -372,9 +377,9 @@ mod tests {
         {
             let mut measure = Measure::new(spacing);
             let (mut at_ms, mut poses) = (0, Vec::new());
-            for k in 0..200 {
-                at_ms += step_ms(k);
-                let (at, place) = (ShowTime::from_millis(at_ms), (0.3 * k as f64).sin());
+            for k in 0..200_i32 {
+                at_ms += step_ms(k.into());
+                let (at, place) = (ShowTime::from_millis(at_ms), (0.3 * f64::from(k)).sin());
                 poses.push((at.as_secs_f64(), place));
                 let seen = measure.push(at, place).jerk.value;
                 let of = |apart: usize| {

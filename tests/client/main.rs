@@ -330,7 +330,7 @@ fn a_stop_goes_by_the_control_socket_where_its_own_fails() {
 fn a_stop_that_nobody_takes_points_at_the_emergency_stop() {
     let daemon = Daemon::refusing(503, "timeout");
     let run = daemon.run(&["stop"]);
-    assert_eq!(run.code, Some(75));
+    assert_eq!(run.code, Some(69));
     told(&run, "THE STOP IS NOT CONFIRMED; use the hard-wired emergency stop");
 }
 

@@ -275,7 +275,7 @@ mod tests {
             let result = mark(None, &desired.who, &hall).map(|_| ());
             if let Err(problem) = &result {
                 assert!(
-                    number > 0 && problem.status == 429 && problem.remedy.contains("in a second"),
+                    number > 0 && problem.status == 429 && problem.remedy == "mark again in 1 s",
                     "{problem}"
                 );
             }
