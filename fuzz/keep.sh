@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 mapfile -t doors < <(if [ $# -gt 0 ]; then printf '%s\n' "$@"; else ls fuzz/corpus; fi)
 for door in "${doors[@]}"; do
   least=$(mktemp -d)
-  KINOCUE_DOOR=$door cargo +nightly fuzz run --release door "$least" "fuzz/corpus/$door" -- -merge=1 -max_len=1024 -rss_limit_mb=2048 >/dev/null 2>&1
+  KINOCUE_DOOR=$door cargo +nightly fuzz run --release --sanitizer "${KINOCUE_SANITIZER:-none}" --codegen-units 16 door "$least" "fuzz/corpus/$door" -- -merge=1 -max_len=1024 -rss_limit_mb=2048 >/dev/null 2>&1
   rm -rf "fuzz/seeds/$door"
   mkdir -p "fuzz/seeds/$door"
   octets=0
