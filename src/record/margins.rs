@@ -80,7 +80,7 @@ pub(crate) struct Margins {
     lanes: Vec<LaneMargins>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct LaneMargins {
     last: Option<MonoTime>,
     /// When its last frame is reached by the Times of its frames, which seats go by; and the Time of that.
@@ -100,16 +100,7 @@ impl Margins {
     /// A measure of frames at that rate.
     pub(crate) fn new(seats: &[RecordedSeat], rate: Rate) -> Self {
         let spacing = Spacing::at_rate(rate.hz());
-        let lane = LaneMargins {
-            last: None,
-            reached: ShowTime::ZERO,
-            time_ms: 0,
-            times: MeasureTimes::new(spacing),
-            places: MeasurePlaces::NONE,
-            most: [[0.0; MAX_AXES]; 3],
-            most_at: [[ShowTime::ZERO; MAX_AXES]; 3],
-        };
-        Self { spacing, lanes: seats.iter().map(|_| lane.clone()).collect() }
+        Self { spacing, lanes: seats.iter().map(|_| LaneMargins::new(spacing)).collect() }
     }
 
     /// Takes a tick.
@@ -191,6 +182,18 @@ impl Margins {
 }
 
 impl LaneMargins {
+    const fn new(spacing: Spacing) -> Self {
+        Self {
+            last: None,
+            reached: ShowTime::ZERO,
+            time_ms: 0,
+            times: MeasureTimes::new(spacing),
+            places: MeasurePlaces::NONE,
+            most: [[0.0; MAX_AXES]; 3],
+            most_at: [[ShowTime::ZERO; MAX_AXES]; 3],
+        }
+    }
+
     /// Keeps what is greater than all before, which next to nothing is.
     fn keep(&mut self, shown: &PoseReadings<MAX_AXES>, now: ShowTime, film: ShowTime) {
         for (quantity, (sizes, most)) in shown.sizes().iter().zip(&mut self.most).enumerate() {
@@ -221,4 +224,29 @@ fn parts(readings: &Readings, now: ShowTime, film: ShowTime, limits: [f64; 3]) -
 #[inline]
 fn then(reading: Reading, now: ShowTime, film: ShowTime) -> ShowTime {
     if reading.value == 0.0 { film } else { film.since(now.since(reading.at)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_greatest_of_each_axis_is_kept_also_where_all_show_it_in_one_tick() {
+        let mut lane = LaneMargins::new(Spacing::at_rate(100.0));
+        let mut wanted = [[0.0_f64; 2]; 3];
+        for tick in 0..40 {
+            let at = ShowTime::from_millis(10 * (tick + 1));
+            let there = if tick < 20 { [0.0; 2] } else { [1.0, -3.0] };
+            lane.times.push(at);
+            let shown = lane.places.push(&lane.times, &there);
+            lane.keep(&shown, at, at);
+            for axis in 0..2 {
+                for (most, seen) in wanted.iter_mut().zip(of_quantities(&shown.of(axis))) {
+                    most[axis] = most[axis].max(seen.value.abs());
+                }
+            }
+        }
+        assert_eq!(lane.most.map(|most| [most[0], most[1]]), wanted);
+        assert!(lane.most.iter().all(|most| most[0] > 0.0 && most[2..] == [0.0; MAX_AXES - 2]));
+    }
 }
