@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Searches each door (or those named) for so many seconds: fuzz/run.sh 60 [DOOR ...]. Needs a nightly toolchain and cargo-fuzz.
-# KINOCUE_SANITIZER=address looks for what is wrong with memory as well: far fewer runs, and a build of an hour on two slow processors.
+# KINOCUE_SANITIZER=address looks for what is wrong with memory as well: far fewer runs, and a build that did not end in 45 minutes beside others.
 # Begins with what is true at the door, with what earlier searches left in fuzz/seeds, and with what the last one here found (fuzz/corpus).
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -35,14 +35,14 @@ pub(crate) fn wait(
 ) -> Result<Value, Option<Value>> {
     let mut last = None;
     // A connection that finds no room, or whose daemon is between two configurations, is made anew.
-    for _ in 0..MOST {
-        let told = statuses(socket).unwrap_or_else(|why| panic!("{why}; last {last:#?}\n{}", dead()));
-        for status in told.take(MOST) {
-            if wanted(&status) {
-                return Ok(status);
-            }
-            last = Some(status);
+    let connections = std::iter::repeat_with(|| {
+        statuses(socket).unwrap_or_else(|why| panic!("nobody listens: {why}; {}", dead()))
+    });
+    for status in connections.take(MOST).flatten().take(MOST) {
+        if wanted(&status) {
+            return Ok(status);
         }
+        last = Some(status);
     }
     Err(last)
 }
