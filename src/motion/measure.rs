@@ -88,8 +88,7 @@ pub(crate) struct MeasureTimes {
     /// Where the newest pose stands.
     newest: usize,
     times: [i64; HISTORY],
-    /// The time from the pose before to the newest, and how many in a row were as long: over even ones nothing is divided anew.
-    step: i64,
+    /// How many steps in a row were as long as the last: over even ones nothing is divided anew.
     even: usize,
     /// Of each distance.
     factors: [Factors; 2],
@@ -108,22 +107,14 @@ struct Factors {
 impl MeasureTimes {
     pub(crate) const fn new(spacing: Spacing) -> Self {
         const NONE: Factors = Factors { one: [0.0; 3], two: [0.0; 2], three: 0.0 };
-        Self {
-            spacing,
-            seen: 0,
-            newest: HISTORY - 1,
-            times: [0; HISTORY],
-            step: 0,
-            even: 0,
-            factors: [NONE; 2],
-        }
+        Self { spacing, seen: 0, newest: HISTORY - 1, times: [0; HISTORY], even: 0, factors: [NONE; 2] }
     }
 
     /// Takes the time of the next pose, after that of the one before.
     pub(crate) fn push(&mut self, at: ShowTime) {
-        let step = at.as_nanos() - self.times[self.newest];
-        self.even = if step == self.step { self.even + 1 } else { 1 };
-        self.step = step;
+        let last = self.times[self.newest];
+        let is_even = at.as_nanos() - last == last - self.times[self.slot(1)];
+        self.even = if is_even { self.even + 1 } else { 1 };
         self.newest = if self.newest + 1 < HISTORY { self.newest + 1 } else { 0 };
         self.times[self.newest] = at.as_nanos();
         self.seen += 1;
