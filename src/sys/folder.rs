@@ -212,6 +212,13 @@ impl Folder {
     }
 }
 
+impl Drop for Folder {
+    /// Closing alone keeps a claim for as long as a child that is just being started has the same open folder.
+    fn drop(&mut self) {
+        let _ = rustix::fs::flock(&self.fd, FlockOperation::Unlock);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -266,6 +273,16 @@ mod tests {
         drop(file);
         folder.remove_abandoned("new").unwrap();
         assert!(folder.stamp("new").unwrap().is_none());
+    }
+
+    #[test]
+    fn a_claim_ends_with_who_made_it_though_a_child_that_is_being_started_has_the_folder_open() {
+        let inside = tempfile::tempdir().unwrap();
+        let [writer, reader] = [(), ()].map(|()| Folder::open(inside.path()).unwrap());
+        assert!(writer.claim() && reader.is_claimed());
+        let _of_child = writer.fd.try_clone().unwrap(); // as between fork and exec
+        drop(writer);
+        assert!(!reader.is_claimed());
     }
 
     #[test]

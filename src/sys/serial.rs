@@ -203,8 +203,9 @@ impl SerialPort {
 
 impl Drop for SerialPort {
     fn drop(&mut self) {
-        // A terminal that somebody else holds open would stay closed to all others.
+        // A terminal that somebody else holds open would stay closed to all others, and a child that is just being started keeps the lock.
         let _ = ioctl_tiocnxcl(&self.line); // it may be gone
+        let _ = flock(&self.line, FlockOperation::Unlock);
     }
 }
 
