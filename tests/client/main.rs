@@ -224,6 +224,21 @@ fn without_a_daemon_it_says_how_to_start_one() {
 }
 
 #[test]
+fn whoever_asks_a_daemon_that_stands_still_hears_of_it_soon() {
+    let daemon = Daemon::start(|_, _| Answer::Silence);
+    let mut pause = Running(daemon.command(&["pause"]).spawn().expect("it starts"));
+    let run = daemon.run(&["status"]);
+    assert_eq!(run.code, Some(69), "{run:?}");
+    told(&run, "did not answer within 5 s; it stands still, or is overloaded");
+    let mut said = BufReader::new(pause.0.stderr.take().expect("piped")).lines();
+    let line = said.next().expect("a line").expect("text");
+    assert!(
+        line.starts_with("kinocue: no answer from the daemon yet; waiting for it for up to 65 s"),
+        "{line}"
+    );
+}
+
+#[test]
 fn wrong_use_asks_nothing() {
     let daemon = Daemon::with(hall("armed"));
     for args in [

@@ -199,6 +199,12 @@ impl Hall {
         self.relay(controller).wait_for(|frame| frame.positions[0].0 > 10_000);
     }
 
+    /// Waits until it is parked; whether ticks went on until then: whoever waits for a disk misses hundreds, and beside other programs a few are.
+    pub(crate) fn parks_in_time(&self) -> bool {
+        let parked = self.comes_to("parked");
+        parked["missed_ticks"].as_u64().is_some_and(|missed| missed < 100)
+    }
+
     /// How all of it stands.
     pub(crate) fn status(&self) -> Value {
         self.socket().get("/api/v1/status").value()

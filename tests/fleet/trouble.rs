@@ -1,5 +1,7 @@
 //! Links and engines that die, hang or come back while a show plays.
 
+use std::time::{Duration, Instant};
+
 use rustix::process::Signal;
 
 use crate::fleet::{ALL, Engine};
@@ -48,11 +50,16 @@ fn a_desk_is_told_that_the_hall_behind_a_link_is_away_and_hears_it_again_once_it
     hall.close();
     link.heard("the hall: ");
     engine.wait(|table| table[0]["silent"] == true && table[0]["status"]["state"] == "parked");
-    for word in [&["pause", "all"][..], &["stop"]] {
+    let asked = Instant::now();
+    for word in [&["pause", "all"][..], &["stop"], &["preflight", "all"], &["load", "ride", "all"]] {
         let run = engine.desk(word);
         assert_eq!(run.code, Some(75), "{run:?}");
         assert!(run.stdout.contains("look at the hall"), "{run:?}");
     }
+    assert!(
+        asked.elapsed() < Duration::from_secs(60),
+        "nobody is waited for as for a cue that is being proved"
+    );
     // What a service left that was one of two machines: its link would wait for the other one.
     let left = ["pair.sock", "pair-journal.sock"].map(|name| hall.path(name));
     left.iter().for_each(|file| std::fs::write(file, "").unwrap());

@@ -70,6 +70,11 @@ where
     B::Data: Send,
     B::Error: Into<Box<dyn std::error::Error + Send + Sync>>,
 {
+    let remedy = if *request.method() == Method::GET {
+        "it stands still, or is overloaded; `systemctl status kinocue` and `journalctl -u kinocue` may say why"
+    } else {
+        "check `kinocue status` before you repeat the command: it may still take effect"
+    };
     let whole = async {
         let response = send(socket, request).await?;
         let status = response.status().as_u16();
@@ -80,11 +85,7 @@ where
     };
     timeout(patience, whole).await.unwrap_or_else(|_| {
         let seconds = patience.as_secs();
-        let why = anyhow!(
-            "the daemon at {} did not answer within {seconds} s; check `kinocue status` before you repeat the command: \
-             it may still take effect",
-            socket.display()
-        );
+        let why = anyhow!("the daemon at {} did not answer within {seconds} s; {remedy}", socket.display());
         Err(why).or_exit(Exit::Unavailable)
     })
 }

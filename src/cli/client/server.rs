@@ -1,6 +1,7 @@
 //! Where the daemon is, and the one way in which all commands ask it.
 
 use std::path::PathBuf;
+use std::pin::pin;
 use std::time::Duration;
 
 use anyhow::anyhow;
@@ -8,6 +9,7 @@ use http_body_util::Full;
 use hyper::Method;
 use hyper::body::Bytes;
 use serde_json::Value;
+use tokio::time::timeout;
 
 use super::http::{self, HttpReply};
 use super::reply;
@@ -20,6 +22,10 @@ const SOCKET_VARIABLE: &str = "KINOCUE_SOCKET";
 const SOCKET: &str = "/run/kinocue/control.sock";
 /// How long an answer may take: the daemon itself gives up after a minute.
 const PATIENCE: Duration = Duration::from_secs(65);
+/// The same where it has only to look something up.
+const LOOKED_UP: Duration = Duration::from_secs(5);
+/// After so long a person hears that an answer takes its time.
+const SILENT: Duration = Duration::from_secs(4);
 
 // Where the daemon is, and how its replies are shown. No documentation: clap would show it as the help of `arm` and others.
 #[derive(Debug, Clone, clap::Args)]
@@ -63,7 +69,7 @@ impl ServerArgs {
     /// Looks something up.
     pub(super) fn get(&self, path: &str) -> Result<HttpReply, Failure> {
         let request = http::request(Method::GET, path, None, Full::<Bytes>::default())?;
-        http::block_on(http::exchange(&self.socket()?, request, PATIENCE))
+        http::block_on(http::exchange(&self.socket()?, request, LOOKED_UP))
     }
 
     /// The status of the hall.
@@ -116,7 +122,8 @@ impl ServerArgs {
     ) -> Result<Status, Failure> {
         let body = Full::new(Bytes::from(body.to_string()));
         let request = http::request(method, path, Some("application/json"), body)?;
-        let reply = http::exchange(&self.socket()?, request, patience).await?;
+        let socket = self.socket()?;
+        let reply = awaited(http::exchange(&socket, request, patience), patience).await?;
         self.show(&reply)?;
         reply::status(&reply)
     }
@@ -125,6 +132,19 @@ impl ServerArgs {
     pub(super) fn show(&self, reply: &HttpReply) -> Result<(), Failure> {
         if self.json { print::json_text(&reply.text) } else { Ok(()) }
     }
+}
+
+/// What a person waits for, who is told once that it takes its time.
+async fn awaited<T>(asked: impl Future<Output = T>, patience: Duration) -> T {
+    let mut asked = pin!(asked);
+    if let Ok(done) = timeout(SILENT, asked.as_mut()).await {
+        return done;
+    }
+    let seconds = patience.as_secs();
+    print::tell(&format!(
+        "kinocue: no answer from the daemon yet; waiting for it for up to {seconds} s in all (`kinocue stop` does not)"
+    ));
+    asked.await
 }
 
 /// A name as a part of a path: whatever is no plain letter or digit is written as bytes.

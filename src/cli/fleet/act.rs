@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use anyhow::anyhow;
+use anyhow::{Context as _, anyhow};
 use async_nats::connection::State as EngineState;
 use async_nats::{Client, StatusCode};
 use futures_util::StreamExt as _;
@@ -28,9 +28,13 @@ const PATIENCE: Duration = Duration::from_secs(3);
 const LONG: Duration = Duration::from_secs(70);
 /// How often it is looked whether the engine is there.
 const LOOK: Duration = Duration::from_millis(20);
-/// The status by which a link says that nobody behind it has taken what was asked, and the one for a hall that had it and came to nothing.
+/// The status by which a link says that nobody behind it has taken what was asked, the one for a hall that had it and came to nothing, and
+/// the one for a hall that is still at it, whose answer is yet to come.
 pub(super) const AWAY: u16 = 502;
 pub(super) const UNANSWERED: u16 = 503;
+pub(super) const AT_IT: u16 = 102;
+/// A hall that has something is heard to be at it after so long: well before [`PATIENCE`] is over.
+pub(super) const AT_IT_AFTER: Duration = Duration::from_secs(1);
 
 /// Brings the seats of halls to rest at once.
 ///
@@ -298,14 +302,13 @@ pub(super) async fn request(
     if timeout_at(until, reached(client)).await.is_err() {
         return Err(Answer::Silent("not asked: the engine is away".to_owned()));
     }
-    let mut away = None;
-    match timeout_at(until, answer_of(client, hall, subject, letter, &mut away)).await {
-        Ok(Ok(Some(answer))) => Answer::of(answer),
-        Ok(Ok(None)) => {
-            Err(Answer::Silent("nobody hears it there: its link or its network is down".to_owned()))
-        }
-        Ok(Err(error)) => Err(Answer::Silent(format!("not asked: {error:#}"))),
-        Err(_) => away.map_or_else(|| Err(no_answer_within(asked.patience)), Answer::of),
+    match answer_of(client, hall, subject, letter, until).await {
+        Ok(Some(answer)) => Answer::of(answer),
+        Ok(None) => Err(Answer::Silent(format!(
+            "no answer within {} s; it may still take effect",
+            asked.patience.as_secs()
+        ))),
+        Err(error) => Err(Answer::Silent(format!("{error:#}"))),
     }
 }
 
@@ -316,35 +319,43 @@ async fn reached(client: &Client) {
     }
 }
 
-fn no_answer_within(patience: Duration) -> Answer {
-    Answer::Silent(format!("no answer within {} s; it may still take effect", patience.as_secs()))
-}
-
-/// What the hall's own link answers; `None` where nobody hears. Others may answer as well, such as an engine that was told to keep what is
-/// asked: that says nothing of the hall. The links of both show machines of a hall hear the same: that a service is down, kept in `away`,
-/// is the answer only where no other one comes. A service that had it and ended says that at once: no other one has it.
+/// What the hall's own link answers; `None` where it does not until then. Others may answer as well, such as an engine that was told to
+/// keep what is asked: that says nothing of the hall. The links of both show machines of a hall hear the same: that a service is down is the
+/// answer only where no other one is at it. A service that had it and ended says that at once: no other one has it.
 async fn answer_of(
     client: &Client,
     hall: &str,
     subject: String,
     letter: String,
-    away: &mut Option<LinkReply>,
+    until: Instant,
 ) -> anyhow::Result<Option<LinkReply>> {
     let inbox = client.new_inbox();
-    let mut answers = client.subscribe(inbox.clone()).await?;
-    client.publish_with_reply(subject, inbox, letter.into()).await?;
-    while let Some(message) = answers.next().await {
+    let asked = async {
+        let answers = client.subscribe(inbox.clone()).await?;
+        client.publish_with_reply(subject, inbox, letter.into()).await?;
+        anyhow::Ok(answers)
+    };
+    let Ok(answers) = timeout_at(until, asked).await else { return Ok(None) };
+    let mut answers = answers.context("not asked")?;
+    let (mut away, mut is_at_it, mut wait) = (None, false, until);
+    loop {
+        let Ok(message) = timeout_at(wait, answers.next()).await else { return Ok(away) };
+        let message = message.context("not asked: the engine is away")?;
         if message.status == Some(StatusCode::NO_RESPONDERS) {
-            return Ok(None);
+            anyhow::bail!("nobody hears it there: its link or its network is down");
         }
         let answer = serde_json::from_slice::<LinkReply>(&message.payload).ok();
         match answer.filter(|answer| answer.hall == hall) {
-            Some(answer) if answer.status == AWAY => *away = Some(answer),
+            Some(answer) if answer.status == AWAY => {
+                // If another machine has it, that one is heard by then.
+                wait = if is_at_it { until } else { until.min(Instant::now() + PATIENCE) };
+                away = Some(answer);
+            }
+            Some(answer) if answer.status == AT_IT => (is_at_it, wait) = (true, until),
             Some(answer) => return Ok(Some(answer)),
             None => {}
         }
     }
-    anyhow::bail!("the engine is away")
 }
 
 /// What is asked, signed now for that hall.

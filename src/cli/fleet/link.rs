@@ -2,18 +2,19 @@
 //! are checked by the hall. While it is away, or the engine, the hall plays on as ever.
 
 use std::path::PathBuf;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
-use async_nats::Message;
+use async_nats::{Message, Subject};
 use futures_util::{StreamExt as _, stream};
 use serde_json::{Value, json};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
-use super::act::{AWAY, UNANSWERED};
+use super::act::{AT_IT, AT_IT_AFTER, AWAY, UNANSWERED};
 use super::clock::Rounds;
 use super::hall::Link;
 use super::log::LogTeller;
@@ -168,7 +169,7 @@ impl Link {
         while let Some(message) = orders.next().await {
             let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
                 self.answer(
-                    message,
+                    message.reply.as_ref(),
                     (
                         429,
                         json!({ "code": "busy", "detail": "too many orders at once",
@@ -182,10 +183,10 @@ impl Link {
             tokio::spawn(async move {
                 let _place = place;
                 match link.carry(&message).await {
-                    Ok(reply) => link.answer(message, reply).await,
+                    Ok(reply) => link.answer(message.reply.as_ref(), reply).await,
                     // The other machine may have it, but not what this one hung up on.
                     Err(why) if link.is_of_two() && !is_cut_off(&why) => {}
-                    Err(why) => link.answer(message, away(&why)).await,
+                    Err(why) => link.answer(message.reply.as_ref(), away(&why)).await,
                 }
             });
         }
@@ -198,15 +199,22 @@ impl Link {
             self.get("/api/v1/status").await?
         } else {
             anyhow::ensure!(message.payload.len() <= LONGEST, "a letter is at most {LONGEST} bytes long");
-            self.post("/api/v1/fleet/order", message.payload.clone(), ASKED).await?
+            let mut asked = pin!(self.post("/api/v1/fleet/order", message.payload.clone(), ASKED));
+            match timeout(AT_IT_AFTER, asked.as_mut()).await {
+                Ok(reply) => reply?,
+                Err(_) => {
+                    self.answer(message.reply.as_ref(), (AT_IT, Value::Null)).await;
+                    asked.await?
+                }
+            }
         };
         Ok((reply.status, serde_json::from_str(&reply.text).unwrap_or(Value::Null)))
     }
 
-    pub(super) async fn answer(&self, message: Message, (status, reply): (u16, Value)) {
-        let Some(to) = message.reply else { return };
+    pub(super) async fn answer(&self, to: Option<&Subject>, (status, reply): (u16, Value)) {
+        let Some(to) = to else { return };
         let text = json!({ "hall": self.hall, "status": status, "reply": reply }).to_string();
-        let _ = self.client.publish(to, text.into()).await; // whoever asked is told nothing, and says so
+        let _ = self.client.publish(to.clone(), text.into()).await; // whoever asked is told nothing, and says so
     }
 
     /// Passes the journal on, for as long as there is more.
