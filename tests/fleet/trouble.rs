@@ -2,10 +2,14 @@
 
 use std::time::{Duration, Instant};
 
+use futures_util::StreamExt as _;
 use rustix::process::Signal;
+use serde_json::{Value, json};
+use tokio::time::sleep;
 
 use crate::fleet::{ALL, Engine};
 use crate::hall::swell;
+use crate::rights::Member;
 
 #[test]
 fn no_frame_changes_though_link_and_engine_are_killed_stopped_and_started_again_in_mid_show() {
@@ -67,4 +71,59 @@ fn a_desk_is_told_that_the_hall_behind_a_link_is_away_and_hears_it_again_once_it
     link.heard("the hall: well again");
     engine.hears_all();
     assert!(!left.iter().any(|file| file.exists()));
+}
+
+#[test]
+fn of_two_machines_the_one_that_is_at_it_is_waited_for_though_the_other_has_no_service() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let machine =
+        || runtime.block_on(Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1")).client;
+    let (down, at_it) = (machine(), machine());
+    let mut heard = [&down, &at_it].map(|machine| {
+        let heard = runtime.block_on(machine.subscribe("kc.cmd.berlin.h1.office.preflight")).unwrap();
+        runtime.block_on(machine.flush()).unwrap();
+        heard
+    });
+    let run = std::thread::scope(|scope| {
+        let asked = scope.spawn(|| engine.desk(&["preflight", "all"]));
+        runtime.block_on(async {
+            let mut to = Vec::new();
+            for heard in &mut heard {
+                to.push(heard.next().await.unwrap().reply.unwrap());
+            }
+            for (machine, status) in [(&down, 502), (&at_it, 102), (&at_it, 200)] {
+                if status == 200 {
+                    sleep(Duration::from_secs(4)).await; // one that is not at it has been given up by then
+                }
+                let answer = json!({ "hall": "berlin.h1", "status": status, "reply": {} }).to_string();
+                machine.publish(to[0].clone(), answer.into()).await.unwrap();
+                machine.flush().await.unwrap();
+            }
+        });
+        asked.join().unwrap()
+    });
+    assert_eq!(run.code, Some(0), "{run:?}");
+}
+
+#[test]
+fn a_hall_that_takes_its_time_says_that_it_is_at_it_and_then_what_came_of_it() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", ALL);
+    let _link = engine.link("h1", &hall);
+    engine.hears_all();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let inbox = "_INBOX_desk.office";
+    let desk = runtime.block_on(Member::connect(&engine, "office/desk.nk", inbox)).client;
+    let mut heard = runtime.block_on(desk.subscribe(format!("{inbox}.>"))).unwrap();
+    runtime.block_on(desk.flush()).unwrap();
+    hall.serving().signal(Signal::STOP);
+    let run = std::thread::scope(|scope| {
+        let asked = scope.spawn(|| engine.desk(&["preflight", "all"]));
+        let first = runtime.block_on(heard.next()).unwrap();
+        hall.serving().signal(Signal::CONT);
+        assert_eq!(serde_json::from_slice::<Value>(&first.payload).unwrap()["status"], 102);
+        asked.join().unwrap()
+    });
+    assert_eq!(run.code, Some(0), "{run:?}");
 }

@@ -235,7 +235,8 @@ fn user(text: &mut String, name: &str, public: &str, rights: &Rights, answers: b
         let all: Vec<_> = subjects.iter().map(|subject| format!("\"{subject}\"")).collect();
         all.join(",\n        ")
     };
-    let answers = if answers { "      allow_responses: { max: 1, expires: \"90s\" }\n" } else { "" };
+    // That a hall is at it, and what came of it.
+    let answers = if answers { "      allow_responses: { max: 2, expires: \"90s\" }\n" } else { "" };
     let _ = write!(
         text,
         "    # {name}\n    {{ nkey: {public}, permissions: {{\n      publish: {{ allow: [\n        {}] }}\n      \
