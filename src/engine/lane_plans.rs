@@ -30,9 +30,9 @@ impl LaneMotion {
         apart && !self.refused
     }
 
-    /// Whether it may still come to park: it has just stepped out and is looked at, or is about to.
+    /// Whether it may still come to park: it has just stepped out and is looked at, or is about to, or its seat is to be read first.
     pub(super) const fn is_awaited(&self) -> bool {
-        self.wanted.on && (self.awaited > 0 || self.is_blind())
+        self.is_unseen() || (self.wanted.on && (self.awaited > 0 || self.is_blind()))
     }
 
     /// Whether it is there again, and the others left for park without it.
