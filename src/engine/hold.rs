@@ -92,10 +92,12 @@ impl Engine {
         }
     }
 
-    /// Another frame tells lanes at rest to stay there.
+    /// Another frame tells lanes at rest to stay there. One whose seat is to be read first gets none yet: what its last frame before a
+    /// sleep has switched on is on until it does.
     pub(super) fn count_hold(&mut self) {
+        let is_told = !self.lanes.all.iter().any(LaneMotion::is_unseen);
         if let Phase::Holding(Holding { why, frames, .. }) = &mut self.phase {
-            *frames = frames.saturating_sub(1);
+            *frames = frames.saturating_sub(u16::from(is_told));
             if matches!(why, Rest::Paused | Rest::Stopped) {
                 self.stamps.hold();
             }

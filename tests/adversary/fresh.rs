@@ -6,10 +6,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use kinocue::harness::engine::Mix;
 use kinocue::harness::state::{LedBefore, PlayMode, State, Transition};
 
-use super::cues::{KINDS, Kind, OTHERS};
+use super::cues::{KINDS, Kind, OTHERS, TOGETHER};
 use super::dice::Dice;
 use super::ether::{Ether, Weather};
 use super::hall::{Hall, Thread, breaches, open, seats};
+use super::judge::PULSES_PER_MM;
 use super::named::ether;
 use super::seat::{MS, Settings};
 
@@ -167,6 +168,42 @@ fn no_effect_is_left_on_at_a_seat_that_stays_out_since_it_went_astray_or_was_cut
         }
     }
     assert!(bad.is_empty(), "{bad:#?}");
+}
+
+/// What somebody asks for while the machine is asleep, or nothing.
+const ASLEEP_ASKS: [Option<Transition>; 4] =
+    [None, Some(Transition::Stop), Some(Transition::Pause), Some(Transition::Park)];
+
+#[test]
+fn nothing_is_left_on_at_seats_whose_hall_was_asleep_and_who_asked_for_park_meanwhile_finds_them_there() {
+    let mut bad = Vec::new();
+    for kind in [KINDS[0], KINDS[2], OTHERS[0], TOGETHER[0], TOGETHER[1]] {
+        for asleep_ms in [300, 600, 1_900, 2_300, 9_000] {
+            for ask in ASLEEP_ASKS {
+                let ether = ether(kind, |_| {});
+                let (left, state, mm) = lead(kind, &ether, |hall| {
+                    hall.ride(WET);
+                    hall.pass(700);
+                    assert_eq!(wet(hall, 0).0, 1);
+                    hall.still(Thread::All, asleep_ms);
+                    hall.pass(asleep_ms / 2);
+                    ask.into_iter().for_each(|ask| hall.ask(ask));
+                    hall.pass(asleep_ms - asleep_ms / 2 + 8_000);
+                    let place = hall.ether.world().lines[0].seat.place(hall.ether.ns())[0];
+                    (wet(hall, 0).0, hall.state, place / PULSES_PER_MM)
+                });
+                // A short one is over by itself.
+                let goes_on = matches!(state, State::Playing(_));
+                let is_left = left != 0 && !goes_on;
+                let is_up = state == State::Parked && mm > 0.5;
+                if is_left || is_up || !breaches(&ether).is_empty() {
+                    let what = format!("{state:?} at {mm:.1} mm, outputs {left}, {:?}", told(&ether));
+                    bad.push(format!("{:?} {} Hz, {asleep_ms} ms, {ask:?}: {what}", kind.axes, kind.hz));
+                }
+            }
+        }
+    }
+    assert!(bad.is_empty(), "{}: {bad:#?}", bad.len());
 }
 
 /// How long after a seat was taken by its keys the last frame went to it, ms.
