@@ -5,6 +5,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::AckRecord;
 use super::cursor::Cursor;
+use super::tap::DroppedAtEnd;
 use crate::health::HealthState;
 use crate::motion::{MAX_AXES, Pulses};
 use crate::time::{MonoTime, Rate};
@@ -41,7 +42,14 @@ pub struct AckTap {
     records: u32,
     /// Records lost since the last that found room.
     dropped: u32,
+    at_end: DroppedAtEnd,
     told: Vec<AckStanding>,
+}
+
+impl Drop for AckTap {
+    fn drop(&mut self) {
+        self.at_end.put(self.dropped);
+    }
 }
 
 /// A tap of so many controllers, of each of which `rate` frames a second may be answered, and the end from which its chunks are read.
@@ -53,10 +61,15 @@ pub fn ack_tap(controllers: usize, rate: Rate) -> (AckTap, Consumer<u8>) {
     let mut octets = Vec::with_capacity(ROOM);
     octets.resize(HEAD_LEN, 0);
     let told = vec![AckStanding::default(); controllers];
-    (AckTap { ring, octets, records: 0, dropped: 0, told }, end)
+    (AckTap { ring, octets, records: 0, dropped: 0, at_end: DroppedAtEnd::default(), told }, end)
 }
 
 impl AckTap {
+    /// What is lost at its end.
+    pub(super) fn at_end(&self) -> DroppedAtEnd {
+        self.at_end.clone()
+    }
+
     /// The next frame of each controller has that number: so far nothing was taken.
     pub(crate) fn begin(&mut self, firsts: &[FrameNo]) {
         for (controller, first) in firsts.iter().enumerate() {

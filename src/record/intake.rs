@@ -5,6 +5,7 @@ use rtrb::Consumer;
 use super::ack_columns::AckPacker;
 use super::block::Block;
 use super::margins::Margins;
+use super::tap::DroppedAtEnd;
 use super::{
     AckChunk, AckRecord, AckTap, Chunk, IncidentCause, Message, RecordedSeat, Sampled, Tap, Watchman,
     ack_tap, tap,
@@ -80,6 +81,8 @@ impl Counts {
 pub(crate) struct Intake {
     ticks: Consumer<u8>,
     acks: Consumer<u8>,
+    /// Ticks and records.
+    at_end: [DroppedAtEnd; 2],
     held: Vec<u8>,
     held_acks: Vec<u8>,
     seats: Vec<RecordedSeat>,
@@ -110,6 +113,7 @@ impl Intake {
         let intake = Self {
             ticks: of_ticks,
             acks: of_acks,
+            at_end: [ticks.at_end(), acks.at_end()],
             held: Vec::new(),
             held_acks: Vec::new(),
             margins: Margins::new(&seats, rate),
@@ -176,6 +180,15 @@ impl Intake {
         }
         self.take_acks(&mut drains, None);
         (self.held, self.held_acks) = (held, held_acks);
+        self.take_end();
+    }
+
+    /// Counts what was lost last, where its thread has let go of its end.
+    fn take_end(&mut self) {
+        let [ticks, records] = [0, 1].map(|end: usize| self.at_end[end].take());
+        self.counts.dropped += u64::from(ticks);
+        self.counts.dropped_records += u64::from(records);
+        self.fold.lose(ticks);
     }
 
     fn take_tick(&mut self, chunk: &Chunk<'_>, tell: &mut impl FnMut(MonoTime, Message)) {

@@ -213,9 +213,15 @@ impl Sampled {
             }
         }
         // Last: by it a file knows that all samples up to then are told.
-        if let Some(last) = last {
-            tell(last.deadline, Message::Tick(std::mem::take(&mut self.tick)));
+        if last.is_some() || self.tick.dropped > 0 {
+            let tick = std::mem::take(&mut self.tick);
+            tell(closed_at, Message::Tick(TickSample { film_s: closed_s, ..tick }));
         }
+    }
+
+    /// So many ticks were lost, and no other comes that would say so.
+    pub(super) fn lose(&mut self, ticks: u32) {
+        self.tick.dropped += u64::from(ticks);
     }
 
     /// Takes something that the ack thread took before the next tick.

@@ -1,5 +1,8 @@
 //! The tick thread's end: copies what leaves into a ring, and waits for nobody.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::chunk::{ChunkWriter, Handed};
@@ -23,6 +26,29 @@ pub struct Tap {
     asked: Asked,
     /// Ticks lost since the last that found room.
     dropped: u32,
+    at_end: DroppedAtEnd,
+}
+
+/// What was lost since the last that found room, once a thread has let go of its tap: no chunk says so any more.
+#[derive(Debug, Clone, Default)]
+pub(super) struct DroppedAtEnd(Arc<AtomicU32>);
+
+impl DroppedAtEnd {
+    /// A tap is let go.
+    pub(super) fn put(&self, dropped: u32) {
+        self.0.store(dropped, Ordering::Release);
+    }
+
+    /// How much there is, once.
+    pub(super) fn take(&self) -> u32 {
+        self.0.swap(0, Ordering::Acquire)
+    }
+}
+
+impl Drop for Tap {
+    fn drop(&mut self) {
+        self.at_end.put(self.dropped);
+    }
 }
 
 /// A tap of the lanes of these seats, in their order, and the end from which its chunks are read.
@@ -33,7 +59,7 @@ pub fn tap(seats: &[RecordedSeat], rate: Rate) -> (Tap, Consumer<u8>) {
     let chunks = (rate.hz() * HELD_S).ceil().max(2.0);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "two thousand at the most")]
     let (ring, end) = RingBuffer::new(chunk.room() * chunks as usize);
-    (Tap { ring, chunk, asked: Asked::NOTHING, dropped: 0 }, end)
+    (Tap { ring, chunk, asked: Asked::NOTHING, dropped: 0, at_end: DroppedAtEnd::default() }, end)
 }
 
 /// Octets a second that all of these seats takes in the flight recorder: samples, and columns of ticks and replies, of which a frame
@@ -58,6 +84,11 @@ pub(crate) fn file_octets_a_second(
 }
 
 impl Tap {
+    /// What is lost at its end.
+    pub(super) fn at_end(&self) -> DroppedAtEnd {
+        self.at_end.clone()
+    }
+
     /// The next frame comes of that.
     #[inline]
     pub fn asked(&mut self, asked: Asked) {

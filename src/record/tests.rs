@@ -11,7 +11,7 @@ use super::chunk::{ChunkWriter, Handed, SentFrame};
 use super::*;
 use crate::health::HealthState;
 use crate::motion::{MAX_AXES, SeatType, Slot, Window};
-use crate::net::{Delivery, SendFault};
+use crate::net::{Delivery, Origin, SendFault};
 use crate::state::{PlayMode, State};
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::tracker::Fate;
@@ -220,6 +220,31 @@ fn a_sample_is_the_worst_of_its_window_and_its_counts_are_of_all() {
     assert_eq!((ticks.len(), &ticks[1].2["ticks"], &ticks[1].2["late_max_us"]), (2, &5.into(), &90.0.into()));
     let states: Vec<_> = all.iter().filter(|(topic, ..)| topic == "/hall").collect();
     assert_eq!(states.len(), 1, "a state is told when it changes");
+}
+
+#[test]
+fn what_found_no_room_before_the_threads_let_go_of_their_taps_is_counted_in_the_file() {
+    let seats = [seat()];
+    let (Taps { ticks: mut tap, mut acks }, intake) =
+        Intake::new(seats.to_vec(), Rate::from_hz(100.0), SAMPLE_HZ);
+    let file = Recording::begin(Cursor::new(Vec::new()), &about(), &seats).unwrap();
+    let mut recorder = Recorder::new(intake, file);
+    // Nobody takes anything for five seconds; the taps hold two.
+    for tick in 0..500 {
+        let mut buf = [0; MAX_LEN];
+        tap.asked(asked(0.5));
+        tap.frame(0, frame(0.5, &mut buf), MonoTime::from_nanos(10 * tick * MS), Delivery::Sent);
+        tap.tick(&head(10 * tick));
+        acks.take(&AckRecord::Heard(Origin::Controller(0), MonoTime::default(), &[0; 1_400]));
+        acks.drained(MonoTime::from_nanos((10 * tick + 5) * MS));
+    }
+    drop((tap, acks));
+    recorder.take().unwrap();
+    let file = recorder.finish(None).unwrap().into_inner();
+    let (contents, summary) = summarize(file.as_slice()).unwrap();
+    assert!(summary.dropped > 200 && summary.ticks + summary.dropped == 500, "{summary:?}");
+    assert_eq!(contents.end["dropped"], summary.dropped.to_string());
+    assert!(contents.end["dropped_records"].parse::<u32>().unwrap() > 300, "{:?}", contents.end);
 }
 
 #[test]
