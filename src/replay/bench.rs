@@ -204,6 +204,8 @@ impl Bench {
         if self.known.iter().any(|known| known.first.is_some()) {
             self.forget();
         }
+        // It goes on: health has counted less than was sent since it began as well.
+        self.groups.fill(GroupKnown::Not);
         self.on_frames(frames, tracker);
     }
 

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::belief::Fall;
-use crate::health::{HealthInput, HealthState};
+use crate::health::{Continuity, HealthInput, HealthState, Identity, Sighting};
 use crate::motion::{Pulses, SeatType, Slot, Window};
 use crate::net::{Delivery, Origin};
 use crate::record::{
@@ -33,6 +33,15 @@ fn recorded(records: impl Fn(u64) -> Vec<AckRecord<'static>>) -> Vec<u8> {
 
 /// The same where the recorder takes what is there only after some ticks.
 fn recorded_by(takes: impl Fn(u64) -> bool, records: impl Fn(u64) -> Vec<AckRecord<'static>>) -> Vec<u8> {
+    recorded_for(300, takes, records)
+}
+
+/// The same of so many ticks.
+fn recorded_for(
+    ticks_of_it: u64,
+    takes: impl Fn(u64) -> bool,
+    records: impl Fn(u64) -> Vec<AckRecord<'static>>,
+) -> Vec<u8> {
     let seat = SeatType::bench3(3);
     let window = Window::new((0..3).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect());
     let seats = vec![RecordedSeat::new("F4", &window, FrameKind::Datagram(VibrationPort::Two))];
@@ -45,7 +54,7 @@ fn recorded_by(takes: impl Fn(u64) -> bool, records: impl Fn(u64) -> Vec<AckReco
     let file = Recording::open(Cursor::default(), &opening, EntryMaker::new(1, clocks)).expect("memory");
     let (Taps { mut ticks, mut acks }, intake) = Intake::new(seats, rate, SAMPLE_HZ);
     let mut recorder = Recorder::new(intake.in_full(), file);
-    for tick in 0..300 {
+    for tick in 0..ticks_of_it {
         let motion = Motion {
             timing: Timing::Relative,
             channel: 0,
@@ -102,6 +111,27 @@ fn a_recording_of_a_play_is_judged_as_it_was_from_its_start() {
         seat.frames.acked == 300 && seat.ack_us.max_us.is_some_and(|us| (us - 2_000.0).abs() < 2.0),
         "{seat:?}"
     );
+}
+
+#[test]
+fn what_a_controller_counted_while_ticks_found_no_room_is_not_held_against_the_frames_that_are_there() {
+    // For four seconds nobody takes anything: there is room for two of ticks, and for all replies.
+    let takes = |tick: u64| !(100..500).contains(&tick);
+    let file = recorded_for(1_000, takes, |tick| {
+        let mut records = well(tick);
+        // It is looked at in the gap, and twice behind it.
+        if [350, 600, 800].contains(&tick) {
+            let identity = Identity { version: 7, minor_version: 8, work_mode: 2, axes: 3 };
+            let counted = u16::try_from(tick + 1).expect("few");
+            let continuity = Continuity::Packets(counted);
+            let sighting = Sighting { identity, error: 0, alarm: 0, continuity, homed: true };
+            records.push(AckRecord::Health(HealthInput::Seen(0, sighting, at(10 * tick + 4))));
+        }
+        records
+    });
+    let verdict = judged(&file);
+    assert_eq!(verdict.differences, []);
+    assert!(verdict.gaps == 1 && (700..900).contains(&verdict.frames), "{verdict:?}");
 }
 
 #[test]
