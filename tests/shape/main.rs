@@ -98,7 +98,8 @@ const ROWS: &[Row] = &[
     // 140 more: preflight and trim from a desk, stops between two halls, and axes of a seat that are measured one beside the other.
     // 75 more: acks behind frames that the kernel refused, incidents after a full disk, and who knocks while too many wait.
     // 57 more: requests of acks where frames were refused or numbers left out, and services that end over what they were asked.
-    ("lines of code", counts::lines_of_code, Less, 105_528.0, 39_800.0),
+    // 78 more: what found no room before the end of a recording, and daemons and halls that give no answer.
+    ("lines of code", counts::lines_of_code, Less, 105_606.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
