@@ -270,6 +270,17 @@ mod tests {
         (prop_oneof![60 => Just(0_u32), 1 => 1..9_u32], apart, [sent(), sent(), sent()])
     }
 
+    /// Where an axis is sent then.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "a few minutes, and few pulses"
+    )]
+    fn pulses(ms: u64, lane: usize, axis: usize, phase: f64) -> Pulses {
+        let turn = phase + 0.002 * ms as f64 * (1.0 + axis as f64 / 5.0) + lane as f64;
+        Pulses((150_000.0 + 90_000.0 * turn.sin()) as i32)
+    }
+
     /// The divided difference of poses, newest first.
     fn divided(poses: &[(f64, f64)]) -> f64 {
         let [(from, _), .., (to, _)] = poses else { return poses[0].1 };
@@ -320,9 +331,7 @@ mod tests {
                 writer.clear();
                 for (lane, sent) in sent.iter().enumerate() {
                     let lasts = if let Sent::There(ms) = sent { *ms } else { 10 };
-                    let pulses: Vec<Pulses> = (0..axes[lane])
-                        .map(|axis| Pulses((150_000.0 + 90_000.0 * (phase + 0.002 * ms as f64 * (1.0 + axis as f64 / 5.0) + lane as f64).sin()) as i32))
-                        .collect();
+                    let pulses: Vec<Pulses> = (0..axes[lane]).map(|axis| pulses(ms, lane, axis, phase)).collect();
                     let stamp = if absolute { stamps[lane] + lasts } else { lasts };
                     let motion = Motion {
                         timing: if absolute { Timing::Absolute } else { Timing::Relative },
