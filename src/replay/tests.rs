@@ -125,7 +125,8 @@ fn what_a_controller_counted_while_ticks_found_no_room_is_not_held_against_the_f
             let counted = u16::try_from(tick + 1).expect("few");
             let continuity = Continuity::Packets(counted);
             let sighting = Sighting { identity, error: 0, alarm: 0, continuity, homed: true };
-            records.push(AckRecord::Health(HealthInput::Seen(0, sighting, at(10 * tick + 4))));
+            let look = [HealthInput::ReadSent(0, 1), HealthInput::Seen(0, sighting, at(10 * tick + 4))];
+            records.extend(look.map(AckRecord::Health));
         }
         records
     });
