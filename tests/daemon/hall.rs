@@ -199,10 +199,10 @@ impl Hall {
         self.relay(controller).wait_for(|frame| frame.positions[0].0 > 10_000);
     }
 
-    /// Waits until it is parked; whether ticks went on until then: whoever waits for a disk misses hundreds, and beside other programs a few are.
-    pub(crate) fn parks_in_time(&self) -> bool {
+    /// Waits until it is parked, and ticks went on until then: whoever waits for a disk misses hundreds, and beside other programs a few are.
+    pub(crate) fn parks_in_time(&self) {
         let parked = self.comes_to("parked");
-        parked["missed_ticks"].as_u64().is_some_and(|missed| missed < 100)
+        assert!(parked["missed_ticks"].as_u64().is_some_and(|missed| missed < 100), "{parked}");
     }
 
     /// How all of it stands.

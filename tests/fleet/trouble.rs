@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
+use async_nats::{Client, Subject};
 use futures_util::StreamExt as _;
 use kinocue::harness::sys::clock::Monotonic;
 use kinocue::harness::time::Clock as _;
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use tokio::time::sleep;
 
 use crate::fleet::{ALL, Engine};
 use crate::hall::swell;
@@ -83,29 +83,32 @@ fn of_two_machines_the_one_that_is_at_it_is_waited_for_though_the_other_has_no_s
         || runtime.block_on(Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1")).client;
     let (down, at_it) = (machine(), machine());
     let mut heard = [&down, &at_it].map(|machine| {
-        let heard = runtime.block_on(machine.subscribe("kc.cmd.berlin.h1.office.preflight")).unwrap();
+        let heard = runtime.block_on(machine.subscribe("kc.cmd.berlin.h1.office.*")).unwrap();
         runtime.block_on(machine.flush()).unwrap();
         heard
     });
-    let run = std::thread::scope(|scope| {
-        let asked = scope.spawn(|| engine.desk(&["preflight", "all"]));
-        runtime.block_on(async {
-            let mut to = Vec::new();
-            for heard in &mut heard {
-                to.push(heard.next().await.unwrap().reply.unwrap());
-            }
-            for (machine, status) in [(&down, 502), (&at_it, 102), (&at_it, 200)] {
-                if status == 200 {
-                    sleep(Duration::from_secs(4)).await; // one that is not at it has been given up by then
-                }
-                let answer = json!({ "hall": "berlin.h1", "status": status, "reply": {} }).to_string();
-                machine.publish(to[0].clone(), answer.into()).await.unwrap();
-                machine.flush().await.unwrap();
-            }
-        });
-        asked.join().unwrap()
+    // Both hear what is asked.
+    let mut hear =
+        || heard.each_mut().map(|heard| runtime.block_on(heard.next()).unwrap().reply.unwrap())[0].clone();
+    let say = |machine: &Client, to: &Subject, status| {
+        let answer = json!({ "hall": "berlin.h1", "status": status, "reply": {} }).to_string();
+        runtime.block_on(machine.publish(to.clone(), answer.into())).unwrap();
+        runtime.block_on(machine.flush()).unwrap();
+    };
+    std::thread::scope(|scope| {
+        let waiting = scope.spawn(|| engine.desk(&["preflight", "all"]));
+        let to = hear();
+        say(&down, &to, 502);
+        say(&at_it, &to, 102);
+        // What is asked later, and nobody is at, is given up before.
+        let given_up = scope.spawn(|| engine.desk(&["load", "ride", "all"]));
+        say(&down, &hear(), 502);
+        let given_up = given_up.join().unwrap();
+        assert_eq!(given_up.code, Some(75), "{given_up:?}");
+        say(&at_it, &to, 200);
+        let waiting = waiting.join().unwrap();
+        assert_eq!(waiting.code, Some(0), "{waiting:?}");
     });
-    assert_eq!(run.code, Some(0), "{run:?}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
-use async_nats::{Message, Subject};
+use async_nats::Message;
 use futures_util::{StreamExt as _, stream};
 use serde_json::{Value, json};
 use tokio::signal::unix::{SignalKind, signal};
@@ -169,7 +169,7 @@ impl Link {
         while let Some(message) = orders.next().await {
             let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
                 self.answer(
-                    message.reply.as_ref(),
+                    &message,
                     (
                         429,
                         json!({ "code": "busy", "detail": "too many orders at once",
@@ -183,10 +183,10 @@ impl Link {
             tokio::spawn(async move {
                 let _place = place;
                 match link.carry(&message).await {
-                    Ok(reply) => link.answer(message.reply.as_ref(), reply).await,
+                    Ok(reply) => link.answer(&message, reply).await,
                     // The other machine may have it, but not what this one hung up on.
                     Err(why) if link.is_of_two() && !is_cut_off(&why) => {}
-                    Err(why) => link.answer(message.reply.as_ref(), away(&why)).await,
+                    Err(why) => link.answer(&message, away(&why)).await,
                 }
             });
         }
@@ -203,7 +203,7 @@ impl Link {
             match timeout(AT_IT_AFTER, asked.as_mut()).await {
                 Ok(reply) => reply?,
                 Err(_) => {
-                    self.answer(message.reply.as_ref(), (AT_IT, Value::Null)).await;
+                    self.answer(message, (AT_IT, Value::Null)).await;
                     asked.await?
                 }
             }
@@ -211,10 +211,10 @@ impl Link {
         Ok((reply.status, serde_json::from_str(&reply.text).unwrap_or(Value::Null)))
     }
 
-    pub(super) async fn answer(&self, to: Option<&Subject>, (status, reply): (u16, Value)) {
-        let Some(to) = to else { return };
+    pub(super) async fn answer(&self, message: &Message, (status, reply): (u16, Value)) {
+        let Some(to) = message.reply.clone() else { return };
         let text = json!({ "hall": self.hall, "status": status, "reply": reply }).to_string();
-        let _ = self.client.publish(to.clone(), text.into()).await; // whoever asked is told nothing, and says so
+        let _ = self.client.publish(to, text.into()).await; // whoever asked is told nothing, and says so
     }
 
     /// Passes the journal on, for as long as there is more.

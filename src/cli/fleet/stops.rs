@@ -56,9 +56,9 @@ impl Link {
                 let who = message.subject.rsplit('.').next().unwrap_or_default();
                 print::tell(&format!("{who} asks for a stop"));
                 match link.stop().await {
-                    Ok(()) => link.answer(message.reply.as_ref(), stopping()).await,
+                    Ok(()) => link.answer(&message, stopping()).await,
                     Err(_) if link.is_of_two() => drop(wait.try_send((asked, message))),
-                    Err(why) => link.answer(message.reply.as_ref(), away(&why)).await,
+                    Err(why) => link.answer(&message, away(&why)).await,
                 }
             });
         }
@@ -72,7 +72,7 @@ impl Link {
                 if self.stop().await.is_ok() {
                     print::tell("the hall stops, as was asked while this machine did not serve it yet");
                     for (_, message) in all.drain(..) {
-                        self.answer(message.reply.as_ref(), stopping()).await;
+                        self.answer(&message, stopping()).await;
                     }
                     break;
                 }
