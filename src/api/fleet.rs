@@ -166,7 +166,7 @@ impl Letterbox {
 #[cfg(feature = "harness")]
 pub(crate) fn try_order(text: &str) {
     use nkeys::{KeyPair, KeyPairType};
-    let pair = KeyPair::new_from_raw(KeyPairType::User, [7; 32]).expect("any 32 octets are a key");
+    let pair = KeyPair::new_from_raw(KeyPairType::Service, [7; 32]).expect("any 32 octets are a key");
     let key = config::FleetKey {
         name: "office".to_owned(),
         role: config::Role::Operate,

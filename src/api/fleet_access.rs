@@ -171,6 +171,7 @@ mod tests {
     use super::*;
     use crate::config::Fleet;
     use crate::control::Command;
+    use crate::fleet::new_letter_key;
 
     const NOW_MS: i64 = 1_795_306_800_123;
 
@@ -180,7 +181,7 @@ mod tests {
     }
 
     fn access() -> (FleetAccess, KeyPair) {
-        let pair = KeyPair::new_user();
+        let pair = new_letter_key();
         let key = FleetKey { name: "office".to_owned(), role: Role::Operate, public: pair.public_key() };
         let fleet = fleet(vec![key]);
         (FleetAccess::of(Some(&fleet)), pair)
@@ -216,7 +217,7 @@ mod tests {
                 "{age}"
             );
         }
-        let stranger = letter(&KeyPair::new_user(), "5", "berlin.h3", "pause", "{}", NOW_MS);
+        let stranger = letter(&new_letter_key(), "5", "berlin.h3", "pause", "{}", NOW_MS);
         assert_eq!(open(&access, &stranger).err(), Some(Code::Token));
         let forged = Letter { key: pair.public_key(), ..stranger };
         assert_eq!(open(&access, &forged).err(), Some(Code::Token));
@@ -253,7 +254,7 @@ mod tests {
         access.set(fleet(Role::Operate, &[FleetWord::Cues]).as_ref());
         assert_eq!(open(&pair, "berlin.h3", 5), Ok(("office".to_owned(), 5)));
         assert_eq!(open(&pair, "berlin.h4", 5), Err(Code::Origin));
-        assert_eq!(open(&KeyPair::new_user(), "berlin.h3", 5), Err(Code::Token));
+        assert_eq!(open(&new_letter_key(), "berlin.h3", 5), Err(Code::Token));
         let day = 86_400_000;
         assert!(open(&pair, "berlin.h3", NOW_MS + day).is_ok());
         assert_eq!(open(&pair, "berlin.h3", NOW_MS + day + 1), Err(Code::Late));

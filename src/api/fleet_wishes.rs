@@ -148,15 +148,13 @@ mod tests {
     use std::sync::mpsc::channel;
     use std::thread;
 
-    use nkeys::KeyPair;
-
     use super::*;
     use crate::api::access::Access;
     use crate::api::fleet_access::FleetAccess;
     use crate::api::{Setup, shared};
     use crate::config::{self, FleetKey, FleetWord, Role};
     use crate::control::handle;
-    use crate::fleet::HadState;
+    use crate::fleet::{HadState, new_letter_key};
     use crate::library::{self, Library};
     use crate::log::Log;
     use crate::playlist::Shelf;
@@ -164,7 +162,7 @@ mod tests {
 
     /// A hall that is parked, in that folder, and a letter of a desk that it allows to wish for cues.
     fn hall(folder: &Path, wish: &str) -> (Arc<Shared>, Letter) {
-        let pair = KeyPair::new_user();
+        let pair = new_letter_key();
         let key = FleetKey { name: "office".to_owned(), role: Role::Operate, public: pair.public_key() };
         let fleet = config::Fleet {
             name: "berlin.h3".to_owned(),

@@ -205,21 +205,26 @@ fn key_name(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
     Some(text.to_owned())
 }
 
-/// The public half of a key, which begins with U. The other half, which begins with S, has no place in a configuration.
+/// The public half of a key for letters, which begins with V. The other half, which begins with S, has no place in a configuration; nor
+/// has a key that logs in at the engine, which begins with U: an engine that is none could have it sign anything.
 fn public(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
     let text = entry.text(faults)?;
-    let is_seed = text.starts_with('S');
-    let is_user = |pair: KeyPair| pair.key_pair_type() == KeyPairType::User;
-    if is_seed || !KeyPair::from_public_key(text).is_ok_and(is_user) {
-        let what = if is_seed {
-            "is the secret half of a key: make a new key, and write the public half here, which begins with U"
-        } else {
-            "is not the public half of a key, which begins with U; `kinocue fleet init` makes keys"
-        };
-        entry.fault(faults, what);
-        return None;
-    }
-    Some(text.to_owned())
+    let kind = KeyPair::from_public_key(text).ok().map(|pair| pair.key_pair_type());
+    let fault = match kind {
+        _ if text.starts_with('S') => {
+            "is the secret half of a key: make a new key, and write the public half here, which begins with V"
+        }
+        Some(KeyPairType::Service) => return Some(text.to_owned()),
+        Some(KeyPairType::User) => {
+            "is a key that logs in at the engine, and no longer signs letters: run `kinocue fleet init --migrate desk.toml` at the desk, \
+             and write the key here that it prints, which begins with V"
+        }
+        _ => {
+            "is not the public half of a key for letters, which begins with V; `kinocue fleet init` makes keys"
+        }
+    };
+    entry.fault(faults, fault);
+    None
 }
 
 #[cfg(test)]
@@ -237,7 +242,7 @@ mod tests {
         let alone = hall_with("[fleet]\nname = \"berlin.h3\"\n").fleet.unwrap();
         assert_eq!((alone.start, alone.start_bound), (false, Duration::from_millis(2)));
         assert_eq!((alone.name.as_str(), alone.allow, alone.keys), ("berlin.h3", vec![], vec![]));
-        let public = KeyPair::new_user().public_key();
+        let public = KeyPair::new_service().public_key();
         let fleet = hall_with(&format!(
             "[fleet]\nname = \"berlin.h3\"\nallow = [\"pause\", \"stop\", \"levels\"]\n[[fleet.key]]\nname = \"office\"\n\
              role = \"operate\"\npublic = \"{public}\"\n"
@@ -249,7 +254,7 @@ mod tests {
 
     #[test]
     fn what_the_fleet_may_never_ask_and_what_is_no_key_is_refused_with_its_place() {
-        let (pair, account) = (KeyPair::new_user(), KeyPair::new_account());
+        let (pair, login, account) = (KeyPair::new_service(), KeyPair::new_user(), KeyPair::new_account());
         let key = |name: &str, role: &str, public: &str| {
             format!("[[fleet.key]]\nname = \"{name}\"\nrole = \"{role}\"\npublic = \"{public}\"\n")
         };
@@ -270,6 +275,10 @@ mod tests {
             (named(&key("of.fice", "view", &public)), "\"of.fice\" is not a name here"),
             (named(&key("office", "view", &seed)), "is the secret half of a key"),
             (named(&key("office", "view", &account.public_key())), "is not the public half"),
+            (
+                named(&key("office", "operate", &login.public_key())),
+                "run `kinocue fleet init --migrate desk.toml`",
+            ),
             (named(&key("office", "view", &public[1..])), "is not the public half"),
             (named(&(key("a", "view", &public) + &key("b", "view", &public))), "the same key as another"),
         ];

@@ -2,14 +2,29 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use nkeys::KeyPair;
+use nkeys::{KeyPair, KeyPairType};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+/// The beginning of all that is signed, before the text: a signature that was made for another protocol is none of a letter.
+const DOMAIN: &[u8] = b"kinocue letter 1\n";
 /// The longest id of an order.
 const LONGEST_ID: usize = 64;
 
-/// A text and the signature of its octets (Ed25519).
+/// A new key for letters. It is of another type than those that log in at the engine: a client signs whatever the engine sends it as a
+/// challenge, so that an engine that is none could have such a key sign a letter.
+#[must_use]
+pub(crate) fn new_letter_key() -> KeyPair {
+    KeyPair::new_service()
+}
+
+/// True of a key whose signature a letter may have.
+#[must_use]
+fn is_letter_key(pair: &KeyPair) -> bool {
+    pair.key_pair_type() == KeyPairType::Service
+}
+
+/// A text and its signature (Ed25519).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Letter {
@@ -39,10 +54,11 @@ pub(crate) struct Order {
 }
 
 impl Letter {
-    /// Signs a text; `None` where the key has no secret half.
+    /// Signs a text; `None` where the key is none for letters, or has no secret half.
     #[must_use]
     pub(crate) fn sign(pair: &KeyPair, body: String) -> Option<Self> {
-        let sig = STANDARD.encode(pair.sign(body.as_bytes()).ok()?);
+        let sig = pair.sign(&signed_octets(&body)).ok().filter(|_| is_letter_key(pair))?;
+        let sig = STANDARD.encode(sig);
         Some(Self { key: pair.public_key(), sig, body })
     }
 
@@ -50,8 +66,14 @@ impl Letter {
     #[must_use]
     pub(crate) fn is_signed(&self) -> bool {
         let Ok(pair) = KeyPair::from_public_key(&self.key) else { return false };
-        STANDARD.decode(&self.sig).is_ok_and(|sig| pair.verify(self.body.as_bytes(), &sig).is_ok())
+        let signed = || signed_octets(&self.body);
+        is_letter_key(&pair)
+            && STANDARD.decode(&self.sig).is_ok_and(|sig| pair.verify(&signed(), &sig).is_ok())
     }
+}
+
+fn signed_octets(body: &str) -> Vec<u8> {
+    [DOMAIN, body.as_bytes()].concat()
 }
 
 impl Order {
@@ -79,7 +101,7 @@ mod tests {
     use super::*;
 
     fn letter() -> (Letter, KeyPair) {
-        let pair = KeyPair::new_user();
+        let pair = new_letter_key();
         let body = r#"{"id":"1","to":"berlin.h3","word":"pause","args":{},"sent_ms":5}"#.to_owned();
         (Letter::sign(&pair, body).unwrap(), pair)
     }
@@ -90,11 +112,29 @@ mod tests {
         assert!(letter.is_signed());
         let order = Order::of(&letter).unwrap();
         assert_eq!((order.word.as_str(), order.sent_ms), ("pause", 5));
-        assert!(!Letter { key: KeyPair::new_user().public_key(), ..letter.clone() }.is_signed());
+        assert!(!Letter { key: new_letter_key().public_key(), ..letter.clone() }.is_signed());
         assert!(!Letter { body: letter.body.replace("pause", "park"), ..letter.clone() }.is_signed());
         assert!(!Letter { sig: STANDARD.encode([0; 64]), ..letter.clone() }.is_signed());
         let public = KeyPair::from_public_key(&pair.public_key()).unwrap();
         assert_eq!(Letter::sign(&public, letter.body), None, "the public half signs nothing");
+    }
+
+    #[test]
+    fn a_key_that_logs_in_at_an_engine_signs_no_letter_whatever_it_was_given_as_a_challenge() {
+        let (letter, body) = (letter().0, letter().0.body);
+        let login = KeyPair::new_user();
+        assert_eq!(Letter::sign(&login, body.clone()), None);
+        let prefixed = signed_octets(&body);
+        for challenge in [body.as_bytes(), &prefixed] {
+            let sig = STANDARD.encode(login.sign(challenge).unwrap());
+            assert!(!Letter { key: login.public_key(), sig, body: body.clone() }.is_signed());
+        }
+        let letters = new_letter_key();
+        let sig = STANDARD.encode(letters.sign(body.as_bytes()).unwrap());
+        assert!(
+            !Letter { key: letters.public_key(), sig, ..letter }.is_signed(),
+            "signed for another protocol"
+        );
     }
 
     #[test]

@@ -13,7 +13,7 @@ pub(crate) use brief::BriefStatus;
 #[cfg(test)]
 pub(crate) use brief::SeatCounts;
 pub(crate) use have::{HadState, HaveReport, WishHad};
-pub(crate) use letter::{Letter, Order};
+pub(crate) use letter::{Letter, Order, new_letter_key};
 #[cfg(feature = "harness")]
 pub(crate) use ntp::try_answer as try_ntp;
 pub(crate) use ntp::{ClockSample, LEN as NTP_LEN, answer as ntp_answer, question as ntp_question};

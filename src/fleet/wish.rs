@@ -182,14 +182,14 @@ impl WishedCue {
 
 #[cfg(test)]
 mod tests {
-    use nkeys::KeyPair;
     use proptest::prelude::*;
 
+    use super::super::new_letter_key;
     use super::*;
 
     fn wish(cues: &str) -> Result<Wish, String> {
         let body = format!("{{\"to\":\"berlin.h3\",\"rev\":7,\"cues\":{cues}}}");
-        Wish::of(&Letter::sign(&KeyPair::new_user(), body).unwrap())
+        Wish::of(&Letter::sign(&new_letter_key(), body).unwrap())
     }
 
     #[test]
@@ -243,7 +243,7 @@ mod tests {
             text,
             r#"{"to":"berlin.h3","rev":7,"cues":{},"drops":{"cues":["storm"],"playlists":["today"]}}"#
         );
-        let of = |body: &str| Wish::of(&Letter::sign(&KeyPair::new_user(), body.to_owned()).unwrap());
+        let of = |body: &str| Wish::of(&Letter::sign(&new_letter_key(), body.to_owned()).unwrap());
         assert_eq!(of(&text).unwrap(), wish);
         let both = r#""playlists":{"today":{"text":""}},"drops""#;
         assert!(of(&text.replace(r#""drops""#, both)).unwrap_err().contains("shall come and go"));
@@ -254,7 +254,7 @@ mod tests {
 
     #[test]
     fn an_order_is_no_wish_and_a_wish_is_no_order() {
-        let pair = KeyPair::new_user();
+        let pair = new_letter_key();
         let order = r#"{"id":"1","to":"a.b","word":"load","args":{},"sent_ms":5}"#;
         assert!(Wish::of(&Letter::sign(&pair, order.to_owned()).unwrap()).is_err());
         let wish = r#"{"to":"a.b","rev":5,"cues":{}}"#;

@@ -25,8 +25,7 @@ impl Forger {
     fn of(engine: &Engine) -> Self {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         let desk = runtime.block_on(Member::connect(engine, "office/desk.nk", "_INBOX_desk.office"));
-        let seed = fs::read_to_string(engine.path("fleet/office/desk.nk")).unwrap();
-        Self { runtime, desk, pair: KeyPair::from_seed(seed.trim()).unwrap() }
+        Self { runtime, desk, pair: key(engine, "office/letters.nk") }
     }
 
     /// Publishes something as a desk may.
@@ -43,10 +42,21 @@ impl Forger {
     }
 }
 
-fn letter(pair: &KeyPair, body: &Value) -> Value {
+/// A key of the fleet, by its file.
+pub(crate) fn key(engine: &Engine, name: &str) -> KeyPair {
+    let seed = fs::read_to_string(engine.path(&format!("fleet/{name}"))).unwrap();
+    KeyPair::from_seed(seed.trim()).unwrap()
+}
+
+pub(crate) fn letter(pair: &KeyPair, body: &Value) -> Value {
     let body = body.to_string();
-    let sig = STANDARD.encode(pair.sign(body.as_bytes()).unwrap());
+    let sig = STANDARD.encode(pair.sign(&signed(&body)).unwrap());
     json!({ "key": pair.public_key(), "sig": sig, "body": body })
+}
+
+/// What a letter of that text has signed.
+pub(crate) fn signed(body: &str) -> Vec<u8> {
+    [b"kinocue letter 1\n", body.as_bytes()].concat()
 }
 
 fn sha256(bytes: &[u8]) -> String {
@@ -72,7 +82,7 @@ fn no_wish_counts_that_was_altered_is_another_s_is_old_or_names_a_path_and_nothi
     let next = wish(rev + 1, "other", &bytes);
     let mut altered = own(next.clone());
     altered["body"] = altered["body"].as_str().unwrap().replace("other", "ride").into();
-    let stranger = letter(&KeyPair::new_user(), &next);
+    let stranger = letter(&KeyPair::new_service(), &next);
     let mut borrowed = stranger.clone();
     borrowed["key"] = forger.pair.public_key().into();
     let mut foreign = next.clone();
@@ -147,14 +157,14 @@ fn no_playlist_counts_that_was_altered_is_another_s_is_old_or_names_a_path_and_n
     foreign["to"] = "berlin.h2".into();
     for (what, says) in [
         (altered, "no key of [fleet] has signed this"),
-        (letter(&KeyPair::new_user(), &next), "no key of [fleet] has signed this"),
+        (letter(&KeyPair::new_service(), &next), "no key of [fleet] has signed this"),
         (own(foreign), "the wish is for berlin.h2, and this hall is berlin.h1"),
         (own(of(rev - 1, "today", json!({}))), "is older than the one that the hall keeps"),
         (own(of(rev, "today", json!({}))), "there are two wishes of rev"),
         (own(of(rev + 1, "../today", json!({}))), "is not an id"),
         (own(of(rev + 1, "today", json!({ "from_ms": u64::MAX }))), "is no time"),
         (own(of(rev + 1, "today", json!({ "load": true }))), "unknown field"),
-        (letter(&KeyPair::new_user(), &drops("today")), "no key of [fleet] has signed this"),
+        (letter(&KeyPair::new_service(), &drops("today")), "no key of [fleet] has signed this"),
         (own(drops("../today")), "is not an id"),
     ] {
         forger.wish(&what);

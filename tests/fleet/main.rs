@@ -33,6 +33,7 @@ mod desk;
 mod drops;
 mod fleet;
 mod forged;
+mod keys;
 mod lists;
 mod log;
 mod page;

@@ -7,8 +7,6 @@ use std::net::UdpSocket;
 use std::thread;
 use std::time::Duration;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use kinocue::harness::sys::clock::{Monotonic, wall_now_ns};
 use kinocue::harness::time::{Clock as _, MonoTime};
 use kinocue::wire::MotionRequest;
@@ -16,6 +14,7 @@ use nkeys::KeyPair;
 use serde_json::{Value, json};
 
 use crate::fleet::{Engine, Link};
+use crate::forged::key;
 use crate::hall::Hall;
 use crate::http::{Request, To};
 
@@ -254,12 +253,9 @@ fn now_ms() -> i64 {
 
 /// Has a hall take a letter of the desk, at its own socket.
 fn letter(engine: &Engine, hall: &Hall, to: &str, word: &str, args: &Value) -> (u16, Value) {
-    let seed = fs::read_to_string(engine.path("fleet/office/desk.nk")).unwrap();
-    let pair = KeyPair::from_seed(seed.trim()).unwrap();
     let id = KeyPair::new_user().public_key();
-    let body = json!({ "id": id, "to": to, "word": word, "args": args, "sent_ms": now_ms() }).to_string();
-    let sig = STANDARD.encode(pair.sign(body.as_bytes()).unwrap());
-    let letter = json!({ "key": pair.public_key(), "sig": sig, "body": body }).to_string();
+    let body = json!({ "id": id, "to": to, "word": word, "args": args, "sent_ms": now_ms() });
+    let letter = crate::forged::letter(&key(engine, "office/letters.nk"), &body).to_string();
     let socket = To::Unix(hall.path("fleet.sock"));
     let reply = Request::new("POST", "/api/v1/fleet/order").json(letter).send(&socket);
     (reply.status, reply.value())

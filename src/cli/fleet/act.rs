@@ -367,7 +367,7 @@ fn letter(settings: &DeskSettings, hall: &str, asked: &Asked) -> Option<String> 
         args: asked.args.clone(),
         sent_ms: i64::try_from(wall_now_ns() / 1_000_000).unwrap_or(i64::MAX),
     };
-    let letter = Letter::sign(&settings.access.pair, serde_json::to_string(&order).ok()?)?;
+    let letter = Letter::sign(&settings.letters, serde_json::to_string(&order).ok()?)?;
     serde_json::to_string(&letter).ok()
 }
 

@@ -10,22 +10,24 @@ use anyhow::{Context as _, anyhow};
 use nkeys::KeyPair;
 
 use super::engine::inbox;
+use super::migrate::migrate;
 use super::settings::is_loopback;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::is_fleet_id;
-use crate::fleet::{self, CUES, DOMAIN, HAVE, LOG, SEEN, WANT};
+use crate::fleet::{self, CUES, DOMAIN, HAVE, LOG, SEEN, WANT, new_letter_key};
 
 /// Makes keys and configurations of a fleet in a new folder.
 ///
 /// nats-server.conf is for the engine: it says what each member may, by its key. A folder for each hall has fleet.toml with its key, and what
-/// goes into its kinocue.toml; one for the desk has desk.toml. The halls allow nothing yet but a stop. Nothing is installed or started.
+/// goes into its kinocue.toml; one for the desk has desk.toml and its two keys: one logs in at the engine, the other signs orders. The
+/// halls allow nothing yet but a stop. Nothing is installed or started. With --migrate, a desk of an earlier version gets the second key.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The site of the halls.
-    #[arg(long, value_name = "NAME", value_parser = name)]
-    site: String,
+    #[arg(long, value_name = "NAME", value_parser = name, required_unless_present = "migrate")]
+    site: Option<String>,
     /// The halls.
-    #[arg(long, value_name = "NAME,…", value_delimiter = ',', required = true, value_parser = name)]
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', required_unless_present = "migrate", value_parser = name)]
     halls: Vec<String>,
     /// Those of them with two show machines: their keys may keep a lease at the engine.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = name)]
@@ -39,6 +41,9 @@ pub(super) struct Args {
     /// The folder to be made.
     #[arg(long, value_name = "DIR", default_value = "fleet")]
     folder: PathBuf,
+    /// Makes nothing but the key for letters of this desk, whose settings are of an earlier version, and prints what each hall needs.
+    #[arg(long, value_name = "DESK.TOML", exclusive = true)]
+    migrate: Option<PathBuf>,
 }
 
 /// What is made, and for whom.
@@ -65,7 +70,11 @@ fn name(text: &str) -> Result<String, String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let Args { site, halls, pairs, desk, engine, folder } = args;
+    let Args { site, halls, pairs, desk, engine, folder, migrate: old } = args;
+    if let Some(settings) = old {
+        return migrate(settings);
+    }
+    let site = site.as_deref().unwrap_or_default(); // it is required beside the halls
     let plan = Plan { site, halls, pairs, desk, engine, store: "/var/lib/nats/jetstream", allow: "[]" };
     if let Some(nobody) = pairs.iter().find(|pair| !halls.contains(pair)) {
         let error = anyhow!("--pairs: {nobody} is none of --halls, {}", halls.join(", "));
@@ -91,7 +100,7 @@ fn host(engine: &str) -> Result<bool, Failure> {
 
 /// Makes all files.
 pub(super) fn make(plan: &Plan<'_>, folder: &Path) -> Result<(), Failure> {
-    let desk = KeyPair::new_user();
+    let (desk, letters) = (KeyPair::new_user(), new_letter_key());
     let halls: Vec<_> = plan.halls.iter().map(|hall| (hall, KeyPair::new_user())).collect();
     let engine = engine_conf(plan, &desk, &halls)?;
     put(&folder.join("nats-server.conf"), &engine, 0o644)?;
@@ -105,19 +114,27 @@ pub(super) fn make(plan: &Plan<'_>, folder: &Path) -> Result<(), Failure> {
         put(&of_hall.join("fleet.nk"), &seed(pair)?, 0o600)?;
         let settings = format!("{}site = \"{}\"\nhall = \"{hall}\"\n", access("fleet.nk"), plan.site);
         put(&of_hall.join("fleet.toml"), &settings, 0o644)?;
-        put(&of_hall.join("kinocue-fleet.toml"), &hall_table(plan, hall, &desk), 0o644)?;
+        put(&of_hall.join("kinocue-fleet.toml"), &hall_table(plan, hall, &letters), 0o644)?;
     }
     let of_desk = folder.join(plan.desk);
     let names: Vec<_> = halls.iter().map(|(hall, _)| format!("\"{}.{hall}\"", plan.site)).collect();
     put(&of_desk.join("desk.nk"), &seed(&desk)?, 0o600)?;
+    put(&of_desk.join(LETTERS), &seed(&letters)?, 0o600)?;
     let names = names.join(", ");
     // Which of them start together the site knows.
     let groups = format!(
         "\n# Halls that start together, as `kinocue fleet start --group house`:\n# [groups]\n# house = [{names}]\n"
     );
-    let settings = format!("{}name = \"{}\"\nhalls = [{names}]\n{groups}", access("desk.nk"), plan.desk);
+    let settings = format!(
+        "{}letters = \"{LETTERS}\"\nname = \"{}\"\nhalls = [{names}]\n{groups}",
+        access("desk.nk"),
+        plan.desk
+    );
     put(&of_desk.join("desk.toml"), &(settings + PAGE), 0o644)
 }
+
+/// The file of the key for letters of a desk, beside its settings.
+pub(super) const LETTERS: &str = "letters.nk";
 
 /// What the settings of a desk say of its page.
 const PAGE: &str = "
@@ -130,8 +147,8 @@ const PAGE: &str = "
 ";
 
 /// The lines of a hall's own configuration.
-fn hall_table(plan: &Plan<'_>, hall: &str, desk: &KeyPair) -> String {
-    let (site, name, public) = (plan.site, plan.desk, desk.public_key());
+fn hall_table(plan: &Plan<'_>, hall: &str, letters: &KeyPair) -> String {
+    let (site, name, public) = (plan.site, plan.desk, letters.public_key());
     format!(
         "# Add this to kinocue.toml, and restart the service. A stop is always taken; name in allow what else the desk may ask:\n\
          # pause, park, disarm, load, levels, trim, preflight, cues and playlists, which come into its folders, and pull, which fetches its cues. With start = true it may also start\n\
@@ -246,12 +263,12 @@ fn user(text: &mut String, name: &str, public: &str, rights: &Rights, answers: b
     );
 }
 
-fn seed(pair: &KeyPair) -> Result<String, Failure> {
+pub(super) fn seed(pair: &KeyPair) -> Result<String, Failure> {
     Ok(pair.seed().context("the key has no secret half").or_exit(Exit::Internal)? + "\n")
 }
 
 /// Writes a new file, with its mode from the start on.
-fn put(path: &Path, text: &str, mode: u32) -> Result<(), Failure> {
+pub(super) fn put(path: &Path, text: &str, mode: u32) -> Result<(), Failure> {
     let write = || {
         fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
         let mut file = OpenOptions::new().write(true).create_new(true).mode(mode).open(path)?;
@@ -269,7 +286,7 @@ fn next_steps(plan: &Plan<'_>, folder: &Path, is_alone: bool) -> String {
          1. The engine: {folder}/nats-server.conf to its machine (Debian: nats-server), then nats-server -c nats-server.conf\n\
          2. Each hall, as {hall}: {folder}/{hall}/kinocue-fleet.toml into its kinocue.toml; fleet.toml and fleet.nk to /etc/kinocue;\n   \
          systemctl restart kinocue; systemctl enable --now kinocue-link\n\
-         3. The desk: {folder}/{}/desk.toml and desk.nk to /etc/kinocue; kinocue fleet status\n",
+         3. The desk: {folder}/{}/desk.toml, desk.nk and {LETTERS} to /etc/kinocue; kinocue fleet status\n",
         plan.halls.len(),
         plan.desk,
         plan.desk

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow};
-use nkeys::KeyPair;
+use nkeys::{KeyPair, KeyPairType};
 use toml::de::DeTable;
 
 use crate::cli::{Exit, Failure, OrExit as _};
@@ -20,7 +20,7 @@ const LONGEST: u64 = 1 << 20;
 pub(super) struct Access {
     /// Where the engine listens, in the order in which it is tried.
     pub(super) engine: Vec<String>,
-    /// The key.
+    /// The key that logs in. It signs whatever the engine sends as a challenge, and therefore nothing else.
     pub(super) pair: KeyPair,
     /// Who signed the engine's certificate, if not an authority that the system knows.
     pub(super) ca: Option<PathBuf>,
@@ -40,6 +40,8 @@ pub(super) struct LinkSettings {
 #[derive(Debug)]
 pub(super) struct DeskSettings {
     pub(super) access: Access,
+    /// The key that signs orders and wishes.
+    pub(super) letters: KeyPair,
     /// Who asks.
     pub(super) name: String,
     /// The halls that there are, `SITE.HALL` each.
@@ -68,6 +70,7 @@ pub(super) fn link(path: &Path) -> Result<LinkSettings, Failure> {
 pub(super) fn desk(path: &Path) -> Result<DeskSettings, Failure> {
     read(path, |section| {
         let access = access(section, path);
+        let letters = letters(section, path);
         let name = section.get("name").and_then(|entry| id(entry, section.faults));
         let halls = section.get("halls").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
         let halls = halls.into_iter().filter_map(|entry| member(entry, section.faults)).collect();
@@ -76,7 +79,7 @@ pub(super) fn desk(path: &Path) -> Result<DeskSettings, Failure> {
         let consoles =
             section.get("consoles").map(|entry| consoles(entry, section.faults)).unwrap_or_default();
         section.require(&["name", "halls"]);
-        Some(DeskSettings { access: access?, name: name?, halls, groups, api, consoles })
+        Some(DeskSettings { access: access?, letters: letters?, name: name?, halls, groups, api, consoles })
     })
 }
 
@@ -130,13 +133,37 @@ fn access(section: &mut Section<'_, '_, '_>, path: &Path) -> Option<Access> {
     section.require(&["engine", "seed"]);
     let entries = section.get("engine").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
     let engine: Vec<_> = entries.into_iter().filter_map(|entry| address(entry, section.faults)).collect();
-    let beside = |name: &str| path.parent().unwrap_or(Path::new(".")).join(name);
-    let pair = section.get("seed").and_then(|entry| {
-        let name = entry.text(section.faults)?;
-        seed(&beside(name)).map_err(|why| entry.fault(section.faults, &why)).ok()
-    });
-    let ca = section.text("ca").map(|name| beside(&name));
+    let pair = key(section, "seed", KeyPairType::User, path);
+    let ca = section.text("ca").map(|name| beside(path, &name));
     Some(Access { engine, pair: pair?, ca })
+}
+
+/// The key for letters of a desk. Settings of earlier versions have none: the key that logged in signed them as well.
+fn letters(section: &mut Section<'_, '_, '_>, path: &Path) -> Option<KeyPair> {
+    if section.get("letters").is_none() {
+        let file = path.display();
+        let message = format!(
+            "letters, the key that signs orders, is missing: `kinocue fleet init --migrate {file}` makes it, and prints what each hall needs"
+        );
+        section.faults.note_missing(0, message);
+    }
+    key(section, "letters", KeyPairType::Service, path)
+}
+
+/// The key of that kind whose file is named under `name`.
+fn key(
+    section: &mut Section<'_, '_, '_>,
+    name: &'static str,
+    kind: KeyPairType,
+    path: &Path,
+) -> Option<KeyPair> {
+    let entry = section.get(name)?;
+    let file = beside(path, entry.text(section.faults)?);
+    seed(&file, kind).map_err(|why| entry.fault(section.faults, &why)).ok()
+}
+
+fn beside(path: &Path, name: &str) -> PathBuf {
+    path.parent().unwrap_or(Path::new(".")).join(name)
 }
 
 /// `tls://engine.example:4222`; without TLS nothing leaves this machine.
@@ -168,13 +195,15 @@ pub(super) fn is_loopback(host: &str) -> bool {
 }
 
 /// The key in a file that nobody else may read.
-fn seed(path: &Path) -> Result<KeyPair, String> {
+fn seed(path: &Path, kind: KeyPairType) -> Result<KeyPair, String> {
     let name = path.display();
     let unread = |error| format!("cannot read {name}: {error}");
     let Some(text) = secret(path, LONGEST).map_err(unread)? else {
         return Err(format!("others may read {name}; `chmod 600` it, and make a new key if somebody did"));
     };
-    KeyPair::from_seed(text.trim()).map_err(|_| format!("{name} has no key; `kinocue fleet init` makes keys"))
+    let pair = KeyPair::from_seed(text.trim()).ok().filter(|pair| pair.key_pair_type() == kind);
+    let what = if kind == KeyPairType::User { "to log in at an engine" } else { "for letters" };
+    pair.ok_or_else(|| format!("{name} has no key {what}; `kinocue fleet init` makes keys"))
 }
 
 fn id(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
@@ -227,14 +256,22 @@ mod tests {
         link(&file).map_err(|failure| failure.to_string())
     }
 
+    /// The keys of a desk in that folder; where its settings go.
+    fn desk_in(folder: &Path) -> PathBuf {
+        for (name, pair) in [("desk.nk", KeyPair::new_user()), ("letters.nk", KeyPair::new_service())] {
+            fs::write(folder.join(name), pair.seed().unwrap()).unwrap();
+            fs::set_permissions(folder.join(name), fs::Permissions::from_mode(0o600)).unwrap();
+        }
+        folder.join("desk.toml")
+    }
+
     #[test]
     fn a_desk_knows_which_halls_are_started_together() {
         let dir = tempfile::tempdir().unwrap();
-        let (file, key) = (dir.path().join("desk.toml"), dir.path().join("desk.nk"));
-        fs::write(&key, KeyPair::new_user().seed().unwrap()).unwrap();
-        fs::set_permissions(&key, fs::Permissions::from_mode(0o600)).unwrap();
+        let file = desk_in(dir.path());
         let of = |groups: &str| {
-            let access = "engine = [\"nats://127.0.0.1:4222\"]\nseed = \"desk.nk\"\n";
+            let access =
+                "engine = [\"nats://127.0.0.1:4222\"]\nseed = \"desk.nk\"\nletters = \"letters.nk\"\n";
             let text = format!("{access}name = \"office\"\nhalls = [\"berlin.h1\", \"berlin.h2\"]\n{groups}");
             fs::write(&file, text).unwrap();
             desk(&file).map(|settings| settings.groups).map_err(|failure| failure.to_string())
@@ -248,6 +285,28 @@ mod tests {
             ("[groups]\ntrio = [\"h1\"]\n", "is not SITE.HALL"),
         ] {
             let fault = of(groups).unwrap_err();
+            assert!(fault.contains(says), "{fault}");
+        }
+    }
+
+    #[test]
+    fn a_desk_has_two_keys_and_neither_does_for_the_other() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = desk_in(dir.path());
+        let of = |keys: &str| {
+            let text = format!(
+                "engine = [\"nats://127.0.0.1:4222\"]\n{keys}name = \"office\"\nhalls = [\"berlin.h1\"]\n"
+            );
+            fs::write(&file, text).unwrap();
+            desk(&file).map(drop).map_err(|failure| failure.to_string())
+        };
+        assert_eq!(of("seed = \"desk.nk\"\nletters = \"letters.nk\"\n"), Ok(()));
+        for (keys, says) in [
+            ("seed = \"desk.nk\"\n", "kinocue fleet init --migrate "),
+            ("seed = \"desk.nk\"\nletters = \"desk.nk\"\n", "desk.nk has no key for letters"),
+            ("seed = \"letters.nk\"\nletters = \"letters.nk\"\n", "letters.nk has no key to log in"),
+        ] {
+            let fault = of(keys).unwrap_err();
             assert!(fault.contains(says), "{fault}");
         }
     }

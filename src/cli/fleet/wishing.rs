@@ -130,7 +130,7 @@ fn next_rev(before: u64, kept: u64, now_ms: u64) -> u64 {
 /// anew here.
 pub(super) fn own_wish(payload: &[u8], settings: &DeskSettings, hall: &str) -> Result<Wish, &'static str> {
     let letter: Letter = serde_json::from_slice(payload).map_err(|_| "is no wish")?;
-    if letter.key != settings.access.pair.public_key() || !letter.is_signed() {
+    if letter.key != settings.letters.public_key() || !letter.is_signed() {
         return Err("was not signed by this desk");
     }
     let wish = Wish::of(&letter).map_err(|_| "is no wish")?;
@@ -141,7 +141,7 @@ fn signed(settings: &DeskSettings, wish: &Wish) -> Result<String, Failure> {
     let too_many = |why: String| anyhow!("{}: {why}; wish for less with --only", wish.to);
     wish.check_count().map_err(too_many).or_exit(Exit::Usage)?;
     let body = serde_json::to_string(wish).expect("text and numbers are written");
-    let letter = Letter::sign(&settings.access.pair, body);
+    let letter = Letter::sign(&settings.letters, body);
     let letter = letter.context("the key of this desk cannot sign").or_exit(Exit::Config)?;
     let text = serde_json::to_string(&letter).expect("text is written");
     if text.len() <= LONGEST_WISH {

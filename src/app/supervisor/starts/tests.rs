@@ -8,7 +8,7 @@ use crate::api::Letterbox;
 use crate::app::supervisor::testing::{Rig, desired, hall, told};
 use crate::config::{Fleet, FleetKey, FleetWord};
 use crate::control::{ClockReading, LevelsChange, Role, Surface};
-use crate::fleet::{Letter, Order};
+use crate::fleet::{Letter, Order, new_letter_key};
 use crate::harness::asked::Chance;
 use crate::time::{MonoTime, WallAt};
 
@@ -526,7 +526,7 @@ fn does(starts: &mut FleetStarts, asked: &Desired, hall: &HallContext) -> Vec<Ac
 
 #[test]
 fn ten_thousand_letters_start_no_hall_that_no_person_has_armed_for_it() {
-    let keys = [KeyPair::new_user(), KeyPair::new_user()];
+    let keys = [new_letter_key(), new_letter_key()];
     let known = FleetKey { name: "office".to_owned(), role: Role::Operate, public: keys[0].public_key() };
     let mut of_fleet = fleet(vec![known]);
     of_fleet.allow = FleetWord::ALL.map(|(_, word)| word).to_vec();
