@@ -30,6 +30,8 @@ pub(crate) struct Beat {
     pub(crate) to: u64,
     /// Its number, from 1.
     pub(crate) number: u64,
+    /// The newest beat of whom it is for that came: it is from after that one was sent. 0 for none.
+    pub(crate) echo: u64,
     /// True if it leads.
     pub(crate) leads: bool,
     /// True if it wants to lead and asks for the other's word.
@@ -110,7 +112,7 @@ pub(crate) struct Answered {
 #[derive(Debug, Clone, Copy, Default)]
 struct Partner {
     session: u64,
-    /// The newest beat of it that knew who we are.
+    /// The newest beat of it that counted.
     number: u64,
     /// A beat of it that is not answered yet.
     unanswered: u64,
@@ -118,6 +120,13 @@ struct Partner {
     wants: bool,
     print: u64,
     heard: Option<MonoTime>,
+}
+
+/// Whom beats are for, and the newest of its beats, which they echo. It may be nobody: an old beat, sent again, is from somebody as well.
+#[derive(Debug, Clone, Copy, Default)]
+struct Addressee {
+    session: u64,
+    number: u64,
 }
 
 /// The key, and since when it was seen so.
@@ -154,6 +163,7 @@ pub(crate) struct Claim {
     /// It has promised not to lead before that.
     bound_until: MonoTime,
     partner: Partner,
+    addressee: Addressee,
     number: u64,
     sent: [MonoTime; BEATS],
     lease: Lease,
@@ -176,6 +186,7 @@ impl Claim {
             role: Role::Follows,
             bound_until: now + KEPT,
             partner: Partner::default(),
+            addressee: Addressee::default(),
             number: 0,
             sent: [MonoTime::default(); BEATS],
             lease: Lease::Unknown,
@@ -254,8 +265,9 @@ impl Claim {
         }
         Beat {
             from: self.session,
-            to: self.partner.session,
+            to: self.addressee.session,
             number: self.number,
+            echo: self.addressee.number,
             leads: matches!(self.role, Role::Leads { .. }),
             wants: self.wants(now),
             word,
@@ -269,35 +281,56 @@ impl Claim {
         may_begin && !self.partner.leads && self.misfit(now).is_none()
     }
 
-    /// Takes a heartbeat that is authentic. One that is old, or from before we or the other machine started, says nothing; true of others.
+    /// Takes a heartbeat that is authentic; true if it counts. None does that is for somebody else, that came before, or that does not
+    /// echo a beat of ours of just now: whatever was recorded is older.
     pub(crate) fn hear(&mut self, beat: &Beat, now: MonoTime) -> bool {
         self.age(now);
-        let Partner { session, number, .. } = self.partner;
-        if beat.from != session {
-            // Who was heard a moment ago is not given up for what may have been recorded on another day.
-            if !self.hears(now) && beat.from != self.session {
-                self.partner = Partner { session: beat.from, ..Partner::default() };
-            } else {
-                return false;
-            }
-        } else if beat.number <= number {
+        if beat.from == self.session || ![0, self.session].contains(&beat.to) {
             return false;
         }
-        if beat.to != self.session {
+        let is_partner = beat.from == self.partner.session;
+        // Whoever was heard a moment ago is not given up for another one.
+        if !is_partner && self.hears(now) {
+            return false;
+        }
+        self.answer_to(beat);
+        if beat.to == 0 || !self.is_fresh(beat.echo, now) || is_partner && beat.number <= self.partner.number
+        {
             return false;
         }
         let Beat { number, leads, wants, word, print, .. } = *beat;
         let (session, unanswered, heard) = (beat.from, number, Some(now));
         self.partner = Partner { session, number, unanswered, leads, wants, print, heard };
+        // Our clock stood still while the other one took over: this is a virtual machine that was paused. The other one leads by now.
+        if leads && matches!(self.role, Role::Leads { .. }) {
+            self.role = Role::Lost;
+        }
         self.take_word(word, now);
         true
     }
 
-    fn take_word(&mut self, word: u64, now: MonoTime) {
-        if word == 0 || word > self.number || self.number - word >= BEATS as u64 {
-            return;
+    /// Has the next beats be for whoever sent that one.
+    fn answer_to(&mut self, beat: &Beat) {
+        if self.addressee.session != beat.from {
+            self.addressee = Addressee { session: beat.from, number: 0 };
         }
-        let until = self.sent[slot(word)] + PROMISED;
+        self.addressee.number = self.addressee.number.max(beat.number);
+    }
+
+    /// True if that is a beat of ours that left just now.
+    fn is_fresh(&self, number: u64, now: MonoTime) -> bool {
+        self.sent_at(number).is_some_and(|sent| now.since(sent) < AWAY)
+    }
+
+    /// When the beat of that number left; `None` of one that did not, or long ago.
+    fn sent_at(&self, number: u64) -> Option<MonoTime> {
+        let is_known = number > 0 && number <= self.number && self.number - number < BEATS as u64;
+        is_known.then(|| self.sent[slot(number)])
+    }
+
+    fn take_word(&mut self, word: u64, now: MonoTime) {
+        let Some(sent) = self.sent_at(word) else { return };
+        let until = sent + PROMISED;
         match self.role {
             Role::Leads { until: before } => self.role = Role::Leads { until: before.max(until) },
             Role::Follows if self.wants(now) && now < until => self.role = Role::Leads { until },

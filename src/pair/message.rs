@@ -5,9 +5,9 @@ use super::mac::CODE;
 use super::{Beat, PairKey};
 
 /// What it begins with, the version among it.
-const MAGIC: &[u8; 4] = b"kcp2";
+const MAGIC: &[u8; 4] = b"kcp3";
 /// The octets before the settings.
-const HEAD: usize = 4 + 5 * 8 + 1 + 4 + 8 + 4;
+const HEAD: usize = 4 + 6 * 8 + 1 + 4 + 8 + 4;
 /// The longest text of settings that is carried: a datagram takes no more.
 pub(crate) const LONGEST: usize = 48 << 10;
 
@@ -51,7 +51,7 @@ impl Message {
         let Self { beat, carried } = self;
         let mut octets = Vec::with_capacity(HEAD + CODE);
         octets.extend(MAGIC);
-        for number in [beat.from, beat.to, beat.number, beat.word, beat.print] {
+        for number in [beat.from, beat.to, beat.number, beat.echo, beat.word, beat.print] {
             octets.extend(number.to_be_bytes());
         }
         let flags = [
@@ -82,10 +82,11 @@ impl Message {
             return None;
         }
         let mut number = || Some(u64::from_be_bytes(take(rest)?));
-        let (from, to, nth, word, print) = (number()?, number()?, number()?, number()?, number()?);
+        let (from, to, nth) = (number()?, number()?, number()?);
+        let (echo, word, print) = (number()?, number()?, number()?);
         let [flags] = take(rest)?;
         let is = |flag: u8| flags & flag != 0;
-        let beat = Beat { from, to, number: nth, leads: is(LEADS), wants: is(WANTS), word, print };
+        let beat = Beat { from, to, number: nth, echo, leads: is(LEADS), wants: is(WANTS), word, print };
         let (frame, film_ms) = (u32::from_be_bytes(take(rest)?), i64::from_be_bytes(take(rest)?));
         let revision = u32::from_be_bytes(take(rest)?);
         let settings = str::from_utf8(rest).ok()?;
@@ -112,7 +113,7 @@ mod tests {
     }
 
     fn message() -> Message {
-        let beat = Beat { from: 1, to: 2, number: 3, leads: true, wants: false, word: 4, print: 5 };
+        let beat = Beat { from: 1, to: 2, number: 3, echo: 6, leads: true, wants: false, word: 4, print: 5 };
         let settings = Some("{\"levels\":1}".to_owned());
         let (moves, is_on_cue, runs) = (true, true, false);
         let carried = Carried { frame: 70, film_ms: -5, moves, is_on_cue, runs, revision: 6, settings };
@@ -139,7 +140,7 @@ mod tests {
         let read = Message::parse(&long.emit(&key("a1")), &key("a1")).unwrap();
         assert_eq!(read.carried, Carried { settings: None, ..message().carried });
         for text in
-            [&b""[..], b"kcp2", b"kcp1 and more than that, much more than there has to be in such a message"]
+            [&b""[..], b"kcp3", b"kcp2 and more than that, much more than there has to be in such a message"]
         {
             let mut octets = text.to_vec();
             octets.extend(key("a1").code(text));

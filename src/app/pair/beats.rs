@@ -1,14 +1,12 @@
 //! Heartbeats: one each 20 ms over every network between the machines, and what comes from the other one.
 
-use std::net::{SocketAddrV4, UdpSocket};
+use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use rustix::net::{RecvFlags, recv};
-
 use super::settings::PairSettings;
 use super::{Heard, PairError, PairShared, thread};
-use crate::pair::{AWAY, BEAT, Carried, Message};
+use crate::pair::{BEAT, Carried, Message};
 use crate::state::State;
 use crate::sys::clock::Monotonic;
 use crate::sys::lock::lock;
@@ -16,19 +14,18 @@ use crate::time::{Clock as _, ShowTime};
 
 /// The longest datagram there is.
 const DATAGRAM: usize = 1 << 16;
-/// No socket has room for more of them.
-const WAITING: u32 = 10_000;
 
 /// The sockets of this machine, each with the address of the other one in that network.
 pub(super) type Ways = Vec<(UdpSocket, SocketAddrV4)>;
 
 /// Starts the threads: one that sends, one that hears for each network.
 pub(super) fn start(shared: &Arc<PairShared>) -> Result<(), PairError> {
-    for (socket, _) in &*lock(&shared.ways) {
+    for (socket, other) in &*lock(&shared.ways) {
         // Whoever sends waits for no network that takes nothing.
         socket.set_write_timeout(Some(BEAT)).map_err(PairError::System)?;
         let (shared, socket) = (Arc::clone(shared), socket.try_clone().map_err(PairError::System)?);
-        thread("pair-hears", move || hear(&shared, &socket))?;
+        let other = (*other).into();
+        thread("pair-hears", move || hear(&shared, &socket, other))?;
     }
     let shared = Arc::clone(shared);
     thread("pair-beats", move || {
@@ -79,21 +76,17 @@ fn whole_ms(at: ShowTime) -> i64 {
     (at.as_secs_f64() * 1e3) as i64
 }
 
-fn hear(shared: &PairShared, socket: &UdpSocket) {
+/// Takes what comes. Where this machine stood still, what waits then is from whenever: it echoes no beat of ours of just now, and counts
+/// for nothing.
+fn hear(shared: &PairShared, socket: &UdpSocket, other: SocketAddr) {
     let mut buf = vec![0; DATAGRAM];
-    let mut before = Monotonic.now();
     loop {
-        let came = socket.recv(&mut buf);
-        let now = Monotonic.now();
-        let waited = now.since(std::mem::replace(&mut before, now));
-        let Ok(len) = came else {
+        let Ok((len, from)) = socket.recv_from(&mut buf) else {
             // Where the system is out of something it may be so for a while.
-            Monotonic.sleep_until(now + BEAT);
+            Monotonic.sleep_until(Monotonic.now() + BEAT);
             continue;
         };
-        if waited >= AWAY {
-            // Either nobody has sent, or this machine stood still: what waits then is from whenever, and tells of no now.
-            let _ = (0..WAITING).find(|_| recv(socket, &mut buf[..], RecvFlags::DONTWAIT).is_err());
+        if from != other {
             continue;
         }
         let Some(Message { beat, carried }) = Message::parse(&buf[..len], &shared.key) else { continue };

@@ -92,13 +92,19 @@ fn of_two_that_start_the_first_leads_and_one_that_is_alone_does_not_without_a_ke
 }
 
 fn beat(from: u64, to: u64, number: u64, leads: bool, word: u64) -> Beat {
-    Beat { from, to, number, leads, wants: false, word, print: 0 }
+    Beat { from, to, number, echo: 0, leads, wants: false, word, print: 0 }
+}
+
+/// Has a machine receive a beat that echoes what it has sent at that very time.
+fn hear(claim: &mut Claim, beat: &Beat, now: MonoTime) -> bool {
+    let echo = claim.beat(now).number;
+    claim.hear(&Beat { echo, ..*beat }, now)
 }
 
 #[test]
 fn what_was_recorded_and_is_sent_again_promises_nothing() {
     let mut claim = Claim::new(7, true, ms(0));
-    claim.hear(&beat(9, 7, 1, false, 0), ms(1_300));
+    hear(&mut claim, &beat(9, 7, 1, false, 0), ms(1_300));
     let asked = claim.beat(ms(1_310));
     assert!(asked.wants && asked.to == 9);
     for (old, why) in [
@@ -106,27 +112,88 @@ fn what_was_recorded_and_is_sent_again_promises_nothing() {
         (beat(8, 7, 2, false, asked.number), "of another session"),
         (beat(9, 7, 1, false, asked.number), "a number that came before"),
         (beat(7, 7, 2, false, asked.number), "our own"),
-        (beat(9, 7, 2, false, asked.number + 1), "the word for what was not asked"),
+        (beat(9, 7, 2, false, asked.number + 2), "the word for what was not asked"),
     ] {
         let mut claim = claim.clone();
-        claim.hear(&old, ms(1_320));
+        hear(&mut claim, &old, ms(1_320));
         assert_eq!(claim.role(ms(1_320)), Role::Follows, "{why}");
     }
-    claim.hear(&beat(9, 7, 2, false, asked.number), ms(1_320));
+    hear(&mut claim, &beat(9, 7, 2, false, asked.number), ms(1_320));
     assert_eq!(claim.role(ms(1_320)), Role::Leads { until: ms(2_310) }, "from when it was asked for");
-    claim.hear(&beat(9, 7, 2, false, asked.number), ms(1_330));
+    hear(&mut claim, &beat(9, 7, 2, false, asked.number), ms(1_330));
     assert_eq!(claim.role(ms(2_310)), Role::Lost);
-    claim.hear(&beat(9, 7, 3, false, asked.number), ms(2_320));
+    hear(&mut claim, &beat(9, 7, 3, false, asked.number), ms(2_320));
     assert_eq!(claim.role(ms(2_320)), Role::Lost, "it never leads again");
+}
+
+#[test]
+fn beats_that_were_recorded_count_for_nothing_once_their_machine_is_silent_whatever_comes_between() {
+    let mut claim = Claim::new(7, false, ms(0));
+    let mut recorded = Vec::new();
+    for (number, at) in (1..).zip((1_300..2_300).step_by(20)) {
+        let echo = claim.beat(ms(at)).number;
+        let beat = Beat { echo, ..beat(9, 7, number, true, 0) };
+        assert!(claim.hear(&beat, ms(at + 1)));
+        recorded.push(beat);
+    }
+    let silent = 2_300 + 600;
+    for between in [
+        vec![],
+        vec![beat(8, 6, 40, true, 0)],
+        vec![beat(8, 0, 1, false, 0)],
+        vec![beat(8, 7, 1, true, 0), beat(8, 0, 2, false, 0)],
+    ] {
+        let mut claim = claim.clone();
+        between.iter().for_each(|beat| assert!(!claim.hear(beat, ms(silent)), "{beat:?}"));
+        for (beat, at) in recorded.iter().zip((silent..).step_by(20)) {
+            assert!(!claim.hear(beat, ms(at)), "{beat:?} after {between:?}");
+            claim.beat(ms(at + 10));
+        }
+        assert!(!claim.hears(ms(silent)));
+        // The machine itself is back, started anew: it introduces itself, and is heard as soon as it echoes.
+        let at = ms(silent + 1_100);
+        assert!(!claim.hear(&beat(10, 0, 1, false, 0), at));
+        let ours = claim.beat(at);
+        assert_eq!((ours.to, ours.echo), (10, 1));
+        assert!(claim.hear(&Beat { echo: ours.number, ..beat(10, 7, 2, false, 0) }, at));
+    }
+}
+
+#[test]
+fn a_beat_counts_once_and_only_where_it_is_newer_than_a_beat_of_ours_of_just_now() {
+    let mut claim = Claim::new(7, false, ms(0));
+    let asked = claim.beat(ms(1_300)).number;
+    let answer = |number, echo| Beat { echo, ..beat(9, 7, number, true, 0) };
+    assert!(claim.clone().hear(&answer(1, asked), ms(1_899)));
+    assert!(!claim.clone().hear(&answer(1, asked), ms(1_900)), "late");
+    assert!(!claim.clone().hear(&answer(1, asked + 1), ms(1_301)), "it echoes what has not left");
+    assert!(!claim.clone().hear(&answer(1, 0), ms(1_301)), "it echoes nothing");
+    assert!(claim.hear(&answer(5, asked), ms(1_301)));
+    assert!(!claim.hear(&answer(5, asked), ms(1_302)) && !claim.hear(&answer(4, asked), ms(1_302)));
+    assert!(claim.hear(&answer(6, asked), ms(1_302)));
+}
+
+#[test]
+fn a_leader_whose_clock_stood_still_leads_no_more_once_it_hears_the_other_one_lead() {
+    let mut claim = Claim::new(7, true, ms(0));
+    hear(&mut claim, &beat(9, 7, 1, false, 0), ms(1_300));
+    let asked = claim.beat(ms(1_310)).number;
+    hear(&mut claim, &beat(9, 7, 2, false, asked), ms(1_320));
+    assert_eq!(claim.role(ms(1_320)), Role::Leads { until: ms(2_310) });
+    // It is paused here, with its clock; the other one waits for 1.2 s and leads.
+    assert!(hear(&mut claim, &beat(9, 7, 80, true, 0), ms(1_330)));
+    assert_eq!(claim.role(ms(1_331)), Role::Lost);
+    hear(&mut claim, &beat(9, 7, 81, false, asked), ms(1_340));
+    assert_eq!(claim.role(ms(1_341)), Role::Lost, "for good");
 }
 
 #[test]
 fn a_word_is_given_once_for_each_beat_that_asks_and_by_no_machine_that_leads_or_claims() {
     let mut claim = Claim::new(7, false, ms(0));
-    claim.hear(&beat(9, 7, 5, true, 0), ms(100));
+    hear(&mut claim, &beat(9, 7, 5, true, 0), ms(100));
     assert_eq!(claim.beat(ms(110)).word, 5);
     assert_eq!(claim.beat(ms(130)).word, 0);
-    claim.hear(&beat(9, 7, 6, false, 0), ms(140));
+    hear(&mut claim, &beat(9, 7, 6, false, 0), ms(140));
     assert_eq!(claim.beat(ms(150)).word, 0, "nobody asked");
     // It sees a key that nobody renews, and asks for it once its own word is over.
     let holder = Holder { session: 9, count: 3, print: 0 };
@@ -141,7 +208,7 @@ fn a_word_is_given_once_for_each_beat_that_asks_and_by_no_machine_that_leads_or_
     }
     assert_eq!(now, 1_450, "1.2 s after it was seen first");
     assert!(matches!(wanted, Want::Swap { revision: 40, .. }));
-    claim.hear(&beat(9, 7, 7, true, 0), ms(now + 10));
+    hear(&mut claim, &beat(9, 7, 7, true, 0), ms(now + 10));
     assert_eq!(claim.beat(ms(now + 20)).word, 0);
     let mut leads = claim.clone();
     leads.answer(claim_ticket(&wanted), Answer::Granted { revision: 41 }, ms(now + 90));
@@ -193,7 +260,7 @@ fn a_machine_that_hears_a_leader_or_has_given_it_its_word_leaves_a_key_alone_tha
     look(&mut claim, 100);
     look(&mut claim, 1_400);
     assert!(matches!(claim.clone().ask(ms(1_420)).want, Want::Swap { .. }), "nobody is heard");
-    claim.hear(&beat(9, 7, 1, true, 0), ms(1_410));
+    hear(&mut claim, &beat(9, 7, 1, true, 0), ms(1_410));
     assert_eq!(claim.ask(ms(1_420)).want, Want::Read, "it hears that the other one leads");
     assert_eq!(claim.beat(ms(1_430)).word, 1);
     // The other one is away since 2,010 ms, and may lead by this word alone until 2,430 ms.
@@ -237,14 +304,14 @@ fn of_two_with_different_configurations_neither_begins_to_lead_until_they_are_th
     let other = |print| Beat { print, ..beat(9, 7, 1, false, 0) };
     let mut claim = Claim::new(7, true, ms(0));
     claim.set_print(5);
-    claim.hear(&other(6), ms(1_290));
+    hear(&mut claim, &other(6), ms(1_290));
     assert_eq!((claim.beat(ms(1_310)).wants, claim.misfit(ms(1_310))), (false, Some(PairMisfit::Other)));
     let mut by_word = claim.clone();
     let number = by_word.beat(ms(1_320)).number;
-    by_word.hear(&Beat { print: 6, number: 2, ..beat(9, 7, 2, false, number) }, ms(1_330));
+    hear(&mut by_word, &Beat { print: 6, number: 2, ..beat(9, 7, 2, false, number) }, ms(1_330));
     assert_eq!(by_word.role(ms(1_330)), Role::Follows);
     // The one that is heard counts, whoever led on another day.
     let mut claim = alone_with(5, 6);
-    claim.hear(&other(5), ms(1_290));
+    hear(&mut claim, &other(5), ms(1_290));
     assert_eq!((claim.beat(ms(1_310)).wants, claim.misfit(ms(1_310))), (true, None));
 }

@@ -2,7 +2,7 @@
 //! order, or be forgotten. In each instant in which a frame leaves, the other machine must not lead.
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::{BinaryHeap, HashMap, HashSet};
 use std::time::Duration;
 
 use super::super::{Answer, Ask, BEAT, Beat, Claim, Holder, RENEW, Role, Want};
@@ -11,6 +11,8 @@ use crate::time::MonoTime;
 const MS: u64 = 1_000_000;
 /// From one frame to the next.
 const FRAME: u64 = 10 * MS;
+/// A beat that counts is not older.
+const NEWS: u64 = 601 * MS;
 /// The longest that a thread is held up between its look at the time and its frame: what the margins are for.
 const HELD_UP: u64 = 197 * MS;
 
@@ -103,6 +105,10 @@ pub(crate) struct World {
     engine_cut: [u64; 2],
     partner_cut: u64,
     last_frame: u64,
+    /// Every beat that was sent to a machine, and when: somebody records them, and sends some again.
+    recorded: [Vec<(u64, Beat)>; 2],
+    /// Which of them have counted, at which start of which machine.
+    counted: HashSet<(usize, u64, u64, u64)>,
     pub(crate) takeovers: u64,
     pub(crate) frames: u64,
 }
@@ -133,6 +139,8 @@ impl World {
             engine_cut: [0, 0],
             partner_cut: 0,
             last_frame: 0,
+            recorded: [Vec::new(), Vec::new()],
+            counted: HashSet::new(),
             takeovers: 0,
             frames: 0,
         };
@@ -285,12 +293,24 @@ impl World {
                 self.plan_at(number, nanos(RENEW), What::Ask);
             }
             What::Hear(beat) => {
-                self.machines[number].claim.hear(&beat, now);
+                if self.machines[number].claim.hear(&beat, now) {
+                    self.counts(number, &beat);
+                }
             }
             What::Answered(ticket, answer) => self.machines[number].claim.answer(ticket, answer, now),
             What::Told(_) | What::Frame | What::Leaves => unreachable!("the tick thread's"),
         }
         self.tell(number, now, after);
+    }
+
+    /// What counts as a beat has just been sent, and has not counted before.
+    fn counts(&mut self, number: usize, beat: &Beat) {
+        let recorded = &self.recorded[number];
+        let index = recorded.iter().rposition(|(_, one)| one == beat).expect("nobody else has the key");
+        let age = self.now - recorded[index].0;
+        assert!(age < NEWS, "seed {}: a beat counts {} ms after it was sent", self.seed, age / MS);
+        let is_first = self.counted.insert((number, self.machines[number].start, beat.from, beat.number));
+        assert!(is_first, "seed {}: {beat:?} counts twice", self.seed);
     }
 
     fn tell(&mut self, number: usize, now: MonoTime, after: u64) {
@@ -309,6 +329,7 @@ impl World {
     }
 
     fn send_beat(&mut self, number: usize, after: u64, beat: Beat) {
+        self.recorded[1 - number].push((self.now, beat));
         // Two networks.
         for _ in 0..2 {
             if let Some(way) = self.way(self.partner_cut) {
@@ -317,6 +338,11 @@ impl World {
         }
         if let Some(way) = self.again() {
             self.plan_at(1 - number, after + way, What::Hear(beat));
+        }
+        if self.faults.loses && self.below(20) == 0 {
+            let old = self.below(self.recorded[1 - number].len() as u64);
+            let (_, beat) = self.recorded[1 - number][usize::try_from(old).expect("a place in it")];
+            self.plan_at(1 - number, after, What::Hear(beat));
         }
     }
 
