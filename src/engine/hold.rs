@@ -24,6 +24,13 @@ impl Engine {
             }
             return;
         }
+        // Nothing was set in motion: a frame that says so would be the first.
+        if why == Rest::Stopped
+            && self.playhead.frames() == 0
+            && !self.lanes.all.iter().any(LaneMotion::is_blind)
+        {
+            return self.rest_untold();
+        }
         (0..self.lanes.all.len()).for_each(|lane| self.brake(lane));
         if matches!(self.phase, Phase::Following(_) | Phase::Settling(_)) {
             // What leads on from rest is a join, and that meets the film where it is.

@@ -17,6 +17,8 @@ use crate::belief::Reading;
 use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
 use crate::drive::{Manner, lanes};
+#[cfg(test)]
+use crate::engine::Engine;
 use crate::engine::{Headroom, Mix, Show};
 use crate::film::chase::ChaseRules;
 use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
@@ -155,6 +157,13 @@ impl Virtual {
         let level = Mix { motion: self.level, vibration: self.level, ..Mix::FULL };
         let mixes = vec![level; lanes.len()];
         StagedShow::of_lanes(lanes, &timeline, headroom, show, &mixes).expect("there is a join")
+    }
+
+    /// Its engine before the first tick.
+    #[cfg(test)]
+    pub(crate) fn engine(&self) -> Engine {
+        let rate = Rate::from_hz(self.rate_hz);
+        self.stage(Show { rate, timing: self.timing, start: self.start, plays: self.plays }).split().0
     }
 
     /// Plays it to its end.
