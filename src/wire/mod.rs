@@ -38,9 +38,9 @@ pub use imax::{ImaxMotion, ImaxRegisters};
 pub use motion::{Motion, MotionReply, MotionRequest, Timing};
 pub(crate) use motion::{motion_channel_and_slots, motion_len};
 pub use per_axis::PerAxis;
-#[cfg(test)]
-pub(crate) use position::AXES_PER_BLOCK;
-pub(crate) use position::{DP_INPUTS, DP_POSITIONS, position_reads, positions};
+pub(crate) use position::{
+    AXES_PER_BLOCK, DP_INPUTS, DP_POSITIONS, position_parts, position_reads, positions,
+};
 pub use position::{position, position_words};
 pub(crate) use register::Space;
 pub use register::{Access, ReadRequest, RegisterReply, WriteRequest};

@@ -24,6 +24,27 @@ pub(crate) fn position_reads(axes: usize, accept: Code, reply: Code) -> impl Ite
     })
 }
 
+/// Two reads that tell the same as one of [`position_reads`], that of a block from axis `first` on, from 0: the first axis alone, and the
+/// others. Answers name a first register and a count and nothing else, and these are no other read's: an answer to the one is never
+/// taken for an answer to the other. A block of one axis has one read, which goes on to the next axis.
+pub(crate) fn position_parts(
+    first: usize,
+    axes: usize,
+    accept: Code,
+    reply: Code,
+) -> [Option<ReadRequest>; 2] {
+    let axes = axes.min(DP_POSITIONS.len()).saturating_sub(first).min(AXES_PER_BLOCK);
+    let read = |axis: usize, axes: usize| {
+        let start = DP_POSITIONS.get(axis).copied().filter(|_| axes > 0)?;
+        Some(ReadRequest { channel: 0, accept, reply, start, num: super::bytes::count(2 * axes) })
+    };
+    match axes {
+        0 => [None, None],
+        1 => [read(first, 2), None],
+        _ => [read(first, 1), read(first + 1, axes - 1)],
+    }
+}
+
 /// The positions that position registers hold, first axis first; an odd word at the end is left out.
 #[must_use]
 pub(crate) fn positions(words: Words<'_>, dialect: Dialect) -> PerAxis<Pulses> {
@@ -68,6 +89,21 @@ mod tests {
             let there = Pulses(-1_234_567);
             assert_eq!(position(position_words(there, dialect), dialect), there);
         }
+    }
+
+    #[test]
+    fn the_parts_of_a_block_are_other_reads_than_the_block_whatever_its_axes() {
+        for axes in 1..=8 {
+            let whole: Vec<ReadRequest> = position_reads(axes, Code::ALL, Code::ALL).collect();
+            for (block, read) in whole.iter().enumerate() {
+                let first = block * AXES_PER_BLOCK;
+                let parts = position_parts(first, axes, Code::ALL, Code::ALL);
+                let told: u16 = parts.iter().flatten().map(|part| part.num).sum();
+                assert!(told >= read.num && parts[0].is_some_and(|part| part.start == read.start));
+                assert!(parts.iter().flatten().all(|part| part != read), "{axes} axes");
+            }
+        }
+        assert_eq!(position_parts(3, 3, Code::ALL, Code::ALL), [None, None]);
     }
 
     #[test]

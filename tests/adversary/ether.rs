@@ -44,6 +44,8 @@ pub(crate) enum Weather {
 
 /// When the seats' time begins.
 pub(crate) const BEGIN: u64 = 1_000 * MS;
+/// Answers and reports of a seat that are kept.
+const KEPT: usize = 2_000;
 /// So long after a frame, or after somebody asked for motion, nobody jogs a seat.
 const JUST: u64 = 300 * MS;
 
@@ -68,6 +70,8 @@ pub(crate) struct Line {
     newest: u64,
     lost_since: Option<u64>,
     master: Option<Master>,
+    /// Answers and reports of its seat, oldest first: the network may deliver them again.
+    pub(crate) said: VecDeque<Vec<u8>>,
 }
 
 impl Line {
@@ -140,6 +144,7 @@ impl Ether {
             newest: 0,
             lost_since: None,
             master: None,
+            said: VecDeque::new(),
         };
         let lines = seats.iter().enumerate().map(line).collect();
         let dice = Dice::new(!seed);
@@ -288,7 +293,16 @@ impl Line {
         self.master.take_if(|master| master.is_over());
     }
 
+    /// The network delivers that at an instant, whatever befalls all else.
+    pub(crate) fn deliver_again(&mut self, octets: Vec<u8>, at: u64) {
+        insert(&mut self.back, Packet { at, sent: at, lost_since: at, asked: false, octets });
+    }
+
     fn answer(&mut self, octets: Vec<u8>, at: u64, dice: &mut Dice) {
+        if !matches!(octets[4], 0x13 | 0x14 | 0x18 | 0x19) {
+            self.said.drain(..self.said.len().saturating_sub(KEPT));
+            self.said.push_back(octets.clone());
+        }
         let hoarse = self.until(at, |what| matches!(what, Weather::Hoarse(_)));
         let lost = matches!(hoarse, Some((_, Weather::Hoarse(times))) if dice.one_in(times));
         if lost || self.is(at, Weather::Mute).is_some() || self.is(at, Weather::Cut).is_some() {

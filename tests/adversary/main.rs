@@ -41,6 +41,7 @@ mod judge;
 mod master;
 mod named;
 mod odd;
+mod old;
 mod person;
 mod plays;
 mod processes;

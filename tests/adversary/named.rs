@@ -95,7 +95,7 @@ impl Hall<'_, '_> {
     }
 
     /// Asks for park until the seats are on their way, and waits until they are there; says whether they are.
-    fn parks(&mut self) -> bool {
+    pub(super) fn parks(&mut self) -> bool {
         for _ in 0..20 {
             self.ask(Transition::Park);
             if self.comes_to(|state| matches!(state, State::Parking | State::Parked), 300) {

@@ -135,3 +135,23 @@ pub(crate) fn report(id: u16, positions: &[i32], inputs: u16) -> Vec<u8> {
     }
     report
 }
+
+/// Where an answer to a read has axes, from 0, and their places, pulses; none where it is no answer about positions.
+pub(crate) fn told_places(octets: &[u8], high_first: bool) -> Option<Vec<(usize, i32)>> {
+    const POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
+    let is_answer = octets.len() >= 16 && octets[4] == 0x11 && u16_at(octets, 6) == 0;
+    let first = POSITIONS.iter().position(|start| *start == u16_at(octets, 12)).filter(|_| is_answer)?;
+    let place = |index: usize| {
+        let [one, other] = [0, 2].map(|at| u32::from(u16_at(octets, 16 + 4 * index + at)));
+        let bits = if high_first { one << 16 | other } else { other << 16 | one };
+        (first + index, bits.cast_signed())
+    };
+    Some((0..usize::from(u16_at(octets, 14)) / 2).map(place).collect())
+}
+
+/// The same of a status report.
+pub(crate) fn report_places(octets: &[u8]) -> Option<Vec<(usize, i32)>> {
+    let is_report = octets.len() > 10 && u16_at(octets, 0) == 0x33cc && octets[4] == 0x31;
+    let place = |axis: usize| (axis, u32_at(octets, 10 + 4 * axis).cast_signed());
+    is_report.then(|| (0..usize::from(u16_at(octets, 8))).map(place).collect())
+}

@@ -104,7 +104,11 @@ impl MboxPeer {
             Need::Identity => self.probe.asks(read),
             Need::Count => read == Packets && self.probe.asks(read),
             Need::Position => read.first_axis().is_some() || (read == Mode && self.drives.is_none()),
-            Need::KeepAlive { .. } | Need::Dark => next == Some(read),
+            // What frames lead is known by their acks; a seat at rest by two sources, which have to agree.
+            Need::KeepAlive { is_led } => {
+                next == Some(read) || (!is_led && next.is_some_and(|next| read.is_part_of(next)))
+            }
+            Need::Dark => false,
         });
         if need == Need::Identity {
             self.probe.begin();
@@ -178,14 +182,21 @@ impl MboxPeer {
             read.first_axis().is_some() || (read == Inputs && (self.has_belts || self.has_stop_inputs));
         out.extend((is_answer && is_sign).then_some(Evidence::Alive));
         let word = reply.data.get(0);
-        match (read, claim) {
-            (FirstPositions | MorePositions, Some(claim)) => {
-                let told = positions(reply.values(self.dialect), self.dialect);
-                let first = read.first_axis().unwrap_or_default();
-                let passing = self.position.answer(first, &told, claim, at);
-                out.push(Evidence::Position(self.whereabouts(Some(passing), at)));
+        if let Some((first, source)) = read.first_axis().zip(read.source()) {
+            let told = positions(reply.values(self.dialect), self.dialect);
+            match claim {
+                Some(claim) => {
+                    let passing = self.position.answer(first, &told, source, claim, at);
+                    out.push(Evidence::Position(self.whereabouts(Some(passing), at)));
+                }
+                // Of it and of what was taken for the answer one is old, and nobody knows which.
+                None if !others_ask && self.position.on_repeated(first, &told, at) => {
+                    out.push(Evidence::Position(self.whereabouts(None, at)));
+                }
+                None => {}
             }
-            (FirstPositions | MorePositions, None) if !others_ask => self.position.on_repeated(at),
+        }
+        match (read, claim) {
             (Mode, Some(_)) => {
                 self.drives = reply.values(self.dialect).get(2).or(self.drives);
                 out.extend(self.drives.filter(|drives| !self.leads_all(*drives)).map(Evidence::OtherAxes));

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::pending::{ANSWERED_WITHIN, Claim};
+use super::reads::PositionSource;
 use crate::belief::{Reading, Source};
 use crate::motion::{MAX_AXES, Pulses, SeatType, in_stroke};
 use crate::time::MonoTime;
@@ -14,7 +15,7 @@ use crate::wire::{DP_POSITIONS, PerAxis, in_other_order};
 const STILL: f64 = 0.001;
 /// For how long an axis has to be seen in one place to be at rest there. What comes in one burst proves nothing.
 const REST: Duration = Duration::from_millis(100);
-/// So many answers have to see it there. One may be an older one that the network repeats in place of another that it holds back.
+/// So many answers of each source have to see it there. One may be an older one that the network repeats in place of another that it holds back.
 const TIMES: u32 = 3;
 /// As [`REST`] while the network repeats answers: one of them may be from before a move, and so may the next.
 const REST_REPEATED: Duration = Duration::from_millis(500);
@@ -37,32 +38,53 @@ struct Told {
     /// Where it rests, if it does, and about where it vibrates.
     rest: Stay,
     sway: Stay,
-    /// Whether it was elsewhere before.
+    /// Whether it was elsewhere before, or something contradicted that.
     moved: bool,
 }
 
-/// A place in which an axis has been, since when, at the latest, and how many answers have found it there.
+/// A place in which an axis has been, since when, at the latest, and how often each source has found it there.
 #[derive(Debug, Clone, Copy)]
 struct Stay {
     place: f64,
     since: MonoTime,
+    seen: [Seen; PositionSource::ALL.len()],
+}
+
+/// How many answers of one source have found it there, and when the newest of them was made at the earliest.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
     times: u32,
+    at: MonoTime,
 }
 
 impl Stay {
-    const fn begin(place: f64, since: MonoTime) -> Self {
-        Self { place, since, times: 1 }
+    fn begin(place: f64, since: MonoTime) -> Self {
+        Self { place, since, seen: [Seen::default(); PositionSource::ALL.len()] }
     }
 
-    /// The same with one more answer, if that is no farther away than `within`.
-    fn go_on(self, fraction: f64, within: f64) -> Option<Self> {
-        let stays = (self.place - fraction).abs() <= within;
-        stays.then_some(Self { times: self.times.saturating_add(1), ..self })
+    /// True if that is no farther away than `within`.
+    fn has(&self, fraction: f64, within: f64) -> bool {
+        (self.place - fraction).abs() <= within
     }
 
-    /// True if it was seen often enough, and for as long, up to `at`.
-    fn has_lasted(&self, at: MonoTime, long: Duration) -> bool {
-        self.times >= TIMES && at.since(self.since) >= long
+    /// The same with one more answer of these sources, which was made then.
+    fn seen_by(mut self, sources: &[PositionSource], made: MonoTime) -> Self {
+        for source in sources {
+            let Seen { times, at } = &mut self.seen[*source as usize];
+            (*times, *at) = (times.saturating_add(1), made.max(*at));
+        }
+        self
+    }
+
+    /// When the source saw it there last that has not for longest; none before all have.
+    fn agreed(&self) -> Option<MonoTime> {
+        let is_seen = self.seen.iter().all(|seen| seen.times > 0);
+        self.seen.iter().map(|seen| seen.at).min().filter(|_| is_seen)
+    }
+
+    /// True if each source saw it there often enough, and for as long.
+    fn has_lasted(&self, long: Duration) -> bool {
+        self.seen.iter().all(|seen| seen.times >= TIMES && seen.at.since(self.since) >= long)
     }
 }
 
@@ -120,11 +142,12 @@ impl Positions {
         &mut self,
         first: usize,
         positions: &[Pulses],
+        source: PositionSource,
         claim: Claim,
         at: MonoTime,
     ) -> Reading {
         self.answered = self.answered.max(claim.oldest);
-        self.hear(first, positions, claim.oldest, at, Source::Registers);
+        self.hear(first, positions, &[source], claim.oldest, at, Source::Registers);
         // Whether a seat follows its frames is a question of now: it is looked at once more than needs be where this is an older answer.
         let made = if self.may_be_repeated(at) { claim.newest.before(REPEATED) } else { claim.newest };
         self.in_passing(first, positions, made)
@@ -151,24 +174,52 @@ impl Positions {
         at < self.repeats_until
     }
 
-    /// The network repeats answers: for a while each may be from before a move.
-    pub(super) fn on_repeated(&mut self, at: MonoTime) {
+    /// The network repeats answers: for a while each may be from before a move. Of this one and of what was taken for the answer one is
+    /// old, and where they differ nobody knows which: says whether they do.
+    pub(super) fn on_repeated(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> bool {
         self.repeats_until = at + ANSWERED_WITHIN;
+        self.is_contradicted(first, positions, at)
     }
 
-    /// Hears a report: it tells of those axes alone that have no register, since it comes unasked, past frames that are held back on
-    /// their way. What comes after an answer was made after it.
+    /// Hears a report. It comes unasked, past frames that are held back on their way: it makes a place of those axes alone that have no
+    /// register, and of none where it contradicts what registers tell. What comes after an answer was made after it.
     pub(super) fn report(&mut self, positions: &[Pulses], at: MonoTime) {
-        for (axis, pulses) in positions.iter().enumerate().take(self.seat.axes.min(REGISTERS)) {
+        let of_registers = &positions[..positions.len().min(REGISTERS)];
+        for (axis, pulses) in of_registers.iter().enumerate().take(self.seat.axes) {
             self.hold_against(axis, *pulses);
         }
-        if let Some(others) = positions.get(REGISTERS..) {
-            self.hear(REGISTERS, others, self.answered, at, Source::Report);
+        let is_contradicted = self.is_contradicted(0, of_registers, at);
+        if let Some(others) = positions.get(REGISTERS..).filter(|_| !is_contradicted) {
+            self.hear(REGISTERS, others, &PositionSource::ALL, self.answered, at, Source::Report);
         }
+    }
+
+    /// True if axes were told to be elsewhere. Then both places count, and none of all axes before the sources have agreed on it for
+    /// long enough.
+    fn is_contradicted(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> bool {
+        let within = self.sways();
+        let is_elsewhere = |(axis, pulses): (usize, &Pulses)| {
+            let fraction = self.seat.each[axis].fraction(*pulses).clamp(0.0, 1.0);
+            self.told[axis].is_some_and(|told| !told.rest.has(fraction, within))
+        };
+        let is_contradicted = (first..self.seat.axes.min(MAX_AXES)).zip(positions).any(is_elsewhere);
+        for told in self.told.iter_mut().flatten().filter(|_| is_contradicted) {
+            let begin = Stay::begin(told.fraction, at);
+            *told = Told { rest: begin, sway: begin, moved: true, ..*told };
+        }
+        is_contradicted
     }
 
     /// Hears where axes were between `made` and `at`.
-    fn hear(&mut self, first: usize, positions: &[Pulses], made: MonoTime, at: MonoTime, by: Source) {
+    fn hear(
+        &mut self,
+        first: usize,
+        positions: &[Pulses],
+        sources: &[PositionSource],
+        made: MonoTime,
+        at: MonoTime,
+        by: Source,
+    ) {
         for (axis, pulses) in (first..self.led).zip(positions) {
             let fraction = self.seat.each[axis].fraction(*pulses);
             let is_own = axis < self.seat.axes;
@@ -193,11 +244,11 @@ impl Positions {
             self.home &= (fraction - self.zero(axis)).abs() <= STILL;
             let before = self.told[axis];
             let recent = before.filter(|told| made.since(told.at) <= APART);
-            let rest = recent.and_then(|told| told.rest.go_on(fraction, STILL));
-            let sway = recent.and_then(|told| told.sway.go_on(fraction, self.sways()));
+            let rest = recent.map(|told| told.rest).filter(|rest| rest.has(fraction, STILL));
+            let sway = recent.map(|told| told.sway).filter(|sway| sway.has(fraction, self.sways()));
             let moved = before.is_some_and(|told| told.moved || rest.is_none());
-            let begin = Stay::begin(fraction, at);
-            let (rest, sway) = (rest.unwrap_or(begin), sway.unwrap_or(begin));
+            let [rest, sway] = [rest, sway]
+                .map(|stay| stay.unwrap_or_else(|| Stay::begin(fraction, at)).seen_by(sources, made));
             self.told[axis] = Some(Told { fraction, at: made, rest, sway, moved });
         }
     }
@@ -281,10 +332,12 @@ impl Positions {
             let slot = self.first_slot + axis;
             match self.told[axis] {
                 Some(told) => {
+                    // One source alone may be an old answer; that it is elsewhere than before is believed all the same.
+                    let at = told.rest.agreed().or(told.moved.then_some(told.at))?;
                     reading.pose[slot] = told.fraction;
-                    reading.at = reading.at.min(told.at);
-                    let rests = told.rest.has_lasted(told.at, rest);
-                    sways &= told.sway.has_lasted(told.at, rest.max(SWAY));
+                    reading.at = reading.at.min(at);
+                    let rests = told.rest.has_lasted(rest);
+                    sways &= told.sway.has_lasted(rest.max(SWAY));
                     reading.rests &= rests;
                     reading.moves |= told.moved && !rests;
                 }

@@ -99,7 +99,7 @@ impl Probe {
             read.first_axis().is_none_or(|first| first >= self.axes) || self.told(*read).is_some()
         };
         // Positions may have been asked for beside it: what comes before them is still to be heard then.
-        if !self.seen.open || !is_told || !MonitorRead::POSITIONS.iter().all(has_place) || !self.is_whole() {
+        if !self.seen.open || !is_told || !MonitorRead::BLOCKS.iter().all(has_place) || !self.is_whole() {
             return None;
         }
         self.seen.open = false;

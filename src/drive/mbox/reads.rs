@@ -2,7 +2,8 @@
 //! else.
 
 use crate::wire::{
-    Access, Code, DP_INPUTS, DP_POSITIONS, ReadRequest, RegisterReply, ReplyCode, position_reads,
+    AXES_PER_BLOCK, Access, Code, DP_INPUTS, ReadRequest, RegisterReply, ReplyCode, position_parts,
+    position_reads,
 };
 
 /// Object channels of reads: monitors, parameters (SMC manual 2.2.2.1).
@@ -28,22 +29,80 @@ pub(super) enum MonitorRead {
     FirstPositions,
     /// Where axes 4 to 6 are.
     MorePositions,
+    /// Where axis 1 is, and where axes 2 and 3 are: a second source beside [`FirstPositions`].
+    FirstAxis,
+    NextAxes,
+    /// The same of axes 4 to 6, beside [`MorePositions`].
+    FourthAxis,
+    LastAxes,
 }
 
-use MonitorRead::{FirstPositions, Inputs, Mode, MorePositions, Packets, StopMask, Versions, Zero};
+use MonitorRead::{
+    FirstAxis, FirstPositions, FourthAxis, Inputs, LastAxes, Mode, MorePositions, NextAxes, Packets,
+    StopMask, Versions, Zero,
+};
+
+/// A source of positions: answers to reads of one never pass for answers to reads of the other, so that no single datagram that the
+/// network repeats is both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PositionSource {
+    /// Reads of a whole block of axes.
+    Blocks,
+    /// Reads of a part of one.
+    Parts,
+}
+
+impl PositionSource {
+    /// Both of them.
+    pub(super) const ALL: [Self; 2] = [Self::Blocks, Self::Parts];
+}
 
 /// What DPF0 says of a controller that knows its zero.
 pub(super) const ZERO_KNOWN: u16 = 2;
 
 impl MonitorRead {
-    pub(super) const ALL: [Self; 8] =
-        [Mode, Zero, Versions, Packets, StopMask, Inputs, FirstPositions, MorePositions];
-    pub(super) const POSITIONS: [Self; 2] = [FirstPositions, MorePositions];
+    pub(super) const ALL: [Self; 12] = [
+        Mode,
+        Zero,
+        Versions,
+        Packets,
+        StopMask,
+        Inputs,
+        FirstPositions,
+        MorePositions,
+        FirstAxis,
+        NextAxes,
+        FourthAxis,
+        LastAxes,
+    ];
+    pub(super) const BLOCKS: [Self; 2] = [FirstPositions, MorePositions];
+    pub(super) const POSITIONS: [Self; 6] =
+        [FirstPositions, MorePositions, FirstAxis, NextAxes, FourthAxis, LastAxes];
 
     /// The first axis, from 0, that it tells the position of; none where it tells none.
-    pub(super) fn first_axis(self) -> Option<usize> {
-        let block = Self::POSITIONS.iter().position(|read| *read == self)?;
-        Some(block * DP_POSITIONS.len() / Self::POSITIONS.len())
+    pub(super) const fn first_axis(self) -> Option<usize> {
+        match self {
+            FirstPositions | FirstAxis => Some(0),
+            NextAxes => Some(1),
+            MorePositions | FourthAxis => Some(AXES_PER_BLOCK),
+            LastAxes => Some(AXES_PER_BLOCK + 1),
+            _ => None,
+        }
+    }
+
+    /// Which source of positions it is of; none where it tells none.
+    pub(super) const fn source(self) -> Option<PositionSource> {
+        match self {
+            FirstPositions | MorePositions => Some(PositionSource::Blocks),
+            FirstAxis | NextAxes | FourthAxis | LastAxes => Some(PositionSource::Parts),
+            _ => None,
+        }
+    }
+
+    /// True if it tells of a part of the axes that `block` tells of.
+    pub(super) fn is_part_of(self, block: Self) -> bool {
+        let blocks = [self, block].map(|read| read.first_axis().map(|axis| axis / AXES_PER_BLOCK));
+        self.source() == Some(PositionSource::Parts) && blocks[0] == blocks[1]
     }
 
     /// What asks a controller for it of which so many axes are read; none where it has no such axes.
@@ -57,6 +116,10 @@ impl MonitorRead {
             Inputs => (MONITORS, DP_INPUTS, 1),
             FirstPositions => return position_reads(axes, code, code).next(),
             MorePositions => return position_reads(axes, code, code).nth(1),
+            FirstAxis => return position_parts(0, axes, code, code)[0],
+            NextAxes => return position_parts(0, axes, code, code)[1],
+            FourthAxis => return position_parts(AXES_PER_BLOCK, axes, code, code)[0],
+            LastAxes => return position_parts(AXES_PER_BLOCK, axes, code, code)[1],
         };
         Some(ReadRequest { channel, accept: code, reply: code, start, num })
     }

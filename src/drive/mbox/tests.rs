@@ -58,11 +58,18 @@ fn position(start: u16) -> RegisterReply<'static> {
     answer(start, &[7, 0, 7, 0, 7, 0])
 }
 
+/// The two parts of that, of which each tells of other axes.
+fn parts(start: u16) -> [RegisterReply<'static>; 2] {
+    [answer(start, &[7, 0]), answer(start + 2, &[7, 0, 7, 0])]
+}
+
 #[test]
 fn a_look_asks_for_all_that_tells_who_it_is_and_an_mbox_for_less() {
     let smc = [(1, 0, 3), (0, 0xf0, 1), (0, 0xfe, 2), (0, 0x34, 1), (1, 0x92, 1), (0, 0x5e, 1)];
     // Its frames have places for six axes.
-    let places = [(0, DP_POSITIONS[0], 6), (0, DP_POSITIONS[3], 6)];
+    let blocks = [(0, DP_POSITIONS[0], 6), (0, DP_POSITIONS[3], 6)];
+    let [one, three] = [0, 3].map(|axis| [(0, DP_POSITIONS[axis], 2), (0, DP_POSITIONS[axis + 1], 4)]);
+    let places = [&blocks[..], &one, &three].concat();
     assert_eq!(asked(&mut peer(Dialect::Smc, 4), Need::Identity, 0), [&smc[..], &places].concat());
     let mbox = asked(&mut peer(Dialect::Mbox, 4), Need::Identity, 0);
     assert_eq!(mbox, [&smc[..3], &places].concat());
@@ -79,10 +86,9 @@ fn one_thing_at_a_time_is_asked_for_as_a_sign_of_life_and_its_zero_while_frames_
             .map(|(_, start, _)| start)
             .collect()
     };
-    let at_rest = [0x06, 0x21, 0x5e];
     let mut told = starts(false);
-    told[..3].sort_unstable();
-    assert_eq!(told[..3], at_rest);
+    told[..7].sort_unstable();
+    assert_eq!(told[..7], [0x06, 0x06, 0x08, 0x21, 0x21, 0x23, 0x5e], "of a place by both sources");
     let mut led = starts(true);
     led[..4].sort_unstable();
     assert_eq!(led[..4], [0x06, 0x21, 0x5e, 0xf0]);
@@ -98,6 +104,11 @@ fn an_answer_to_a_position_read_tells_of_three_axes_and_no_other_answer_is_one()
     assert_eq!(place.passing.unwrap().slots, 0b11_1000);
     assert_eq!((place.reading, &place.told), (None, &None), "the first three are to come");
     let told = hear(&mut peer, position(DP_POSITIONS[0]), 2);
+    assert!(matches!(&told[2], Evidence::Position(place) if place.reading.is_none()), "{told:?}");
+    let others =
+        [parts(DP_POSITIONS[0])[1], answer(DP_POSITIONS[3], &[4, 0]), answer(DP_POSITIONS[4], &[5, 0, 6, 0])];
+    others.into_iter().for_each(|part| drop(hear(&mut peer, part, 2)));
+    let told = hear(&mut peer, parts(DP_POSITIONS[0])[0], 2);
     assert!(matches!(&told[2], Evidence::Position(place) if place.reading.is_some()), "{told:?}");
     assert_eq!(hear(&mut peer, position(DP_POSITIONS[1]), 3), [], "nobody asks so");
     let many = [0; 40];
@@ -105,7 +116,7 @@ fn an_answer_to_a_position_read_tells_of_three_axes_and_no_other_answer_is_one()
 }
 
 #[test]
-fn an_answer_that_nobody_waits_for_tells_no_place_and_is_no_sign_of_life() {
+fn an_answer_that_nobody_waits_for_makes_no_place_and_is_no_sign_of_life_and_contradicts_another() {
     let mut peer = peer(Dialect::Smc, 3);
     asked(&mut peer, Need::KeepAlive { is_led: false }, 0);
     asked(&mut peer, Need::Position, 0);
@@ -114,6 +125,11 @@ fn an_answer_that_nobody_waits_for_tells_no_place_and_is_no_sign_of_life() {
     }
     let told = hear(&mut peer, answer(DP_POSITIONS[0], &[9, 0, 9, 0, 9, 0]), 90);
     assert_eq!(told, [Evidence::Code(ReplyCode::Running)], "it was repeated on its way");
+    let told = hear(&mut peer, answer(DP_POSITIONS[0], &[9_000, 0, 9, 0, 9, 0]), 90);
+    assert!(
+        matches!(&told[..], [Evidence::Code(_), Evidence::Position(_)]),
+        "one of the two is old: {told:?}"
+    );
     let place = peer.whereabouts(None, ms(91));
     assert_eq!(place.told.unwrap()[0], Pulses(7));
     // A conversation of another thread: what nobody here waits for may be for that.
@@ -175,20 +191,22 @@ fn where_a_seat_is_counts_only_once_its_controller_has_told_that_it_drives_its_a
         found.expect("it told its positions").reading
     };
     let mut peer = peer(Dialect::Smc, 3);
-    assert_eq!(asked(&mut peer, Need::Position, 0), [(1, 0, 3), (0, DP_POSITIONS[0], 6)]);
-    assert_eq!(place(&hear(&mut peer, position(DP_POSITIONS[0]), 1)), None);
+    let [start, second, _] = [0, 1, 2].map(|axis| DP_POSITIONS[axis]);
+    let places = [(0, start, 6), (0, start, 2), (0, second, 4)];
+    assert_eq!(asked(&mut peer, Need::Position, 0), [&[(1, 0, 3)], &places[..]].concat());
+    let answers = |peer: &mut MboxPeer, at| {
+        parts(start).into_iter().for_each(|part| drop(hear(peer, part, at)));
+        place(&hear(peer, position(start), at))
+    };
+    assert_eq!(answers(&mut peer, 1), None);
     for (drives, tells) in [(2, true), (3, false)] {
         let words = [0, 0, drives];
         let mode = RegisterReply { channel: 1, ..answer(0, &words) };
         asked(&mut peer, Need::Identity, 2);
         assert_eq!(hear(&mut peer, mode, 3).contains(&Evidence::OtherAxes(drives)), tells);
-        assert_eq!(place(&hear(&mut peer, position(DP_POSITIONS[0]), 4)).is_none(), tells);
+        assert_eq!(answers(&mut peer, 4).is_none(), tells);
     }
-    assert_eq!(
-        asked(&mut peer, Need::Position, 5),
-        [(0, DP_POSITIONS[0], 6)],
-        "that does not change by itself"
-    );
+    assert_eq!(asked(&mut peer, Need::Position, 5), places, "that does not change by itself");
 }
 
 #[test]

@@ -90,7 +90,11 @@ impl Watch {
         match self.try_ask(controller, Need::KeepAlive { is_led }, now) {
             (0, false) => {}
             (0, true) => self.judge(HealthInput::BeatKept(controller, now)),
-            _ => self.judge(HealthInput::BeatSent(controller, now)),
+            (sent, _) => {
+                self.judge(HealthInput::BeatSent(controller, now));
+                // Each datagram counts, and the beat is one of them.
+                self.judge(HealthInput::OtherSent(controller, sent - 1));
+            }
         }
     }
 

@@ -9,10 +9,14 @@ fn claim(at: u64) -> Claim {
     Claim { oldest: ms(at), newest: ms(at), is_count: false }
 }
 
-/// It is asked, and answers at once.
+/// It is asked, and answers at once, by both sources.
 fn look(positions: &mut Positions, first: usize, told: &[Pulses], at: u64) {
+    PositionSource::ALL.into_iter().for_each(|source| look_by(source, positions, first, told, at));
+}
+
+fn look_by(source: PositionSource, positions: &mut Positions, first: usize, told: &[Pulses], at: u64) {
     for (index, block) in told.chunks(AXES_PER_BLOCK).enumerate() {
-        positions.answer(first + index * AXES_PER_BLOCK, block, claim(at), ms(at));
+        positions.answer(first + index * AXES_PER_BLOCK, block, source, claim(at), ms(at));
     }
 }
 
@@ -142,18 +146,74 @@ fn an_answer_is_as_old_as_the_oldest_request_that_is_open_and_in_passing_as_the_
     let mut positions = seat(1);
     look(&mut positions, 0, &[Pulses(7)], 0);
     let claim = Claim { oldest: ms(250), newest: ms(500), is_count: false };
-    assert_eq!(positions.answer(0, &[Pulses(7)], claim, ms(501)).at, ms(500));
+    for source in PositionSource::ALL {
+        assert_eq!(positions.answer(0, &[Pulses(7)], source, claim, ms(501)).at, ms(500));
+    }
     assert_eq!(positions.reading(ms(501)).unwrap().at, ms(250));
-    positions.on_repeated(ms(502));
-    let passing = positions.answer(0, &[Pulses(7)], Claim { newest: ms(510), ..claim }, ms(511));
+    assert!(!positions.on_repeated(0, &[Pulses(7)], ms(502)));
+    let claim = Claim { newest: ms(510), ..claim };
+    let passing = positions.answer(0, &[Pulses(7)], PositionSource::Blocks, claim, ms(511));
     assert_eq!(passing.at, ms(210), "while answers are repeated it may be an older one");
+}
+
+#[test]
+fn a_place_that_one_source_alone_tells_is_none_and_one_of_two_is_as_old_as_the_older() {
+    let mut positions = seat(3);
+    let told = [Pulses(7); 3];
+    for at in [0, 200, 400, 600] {
+        look_by(PositionSource::Blocks, &mut positions, 0, &told, at);
+        assert_eq!(positions.reading(ms(at)), None, "an old answer may come again and again");
+    }
+    look_by(PositionSource::Parts, &mut positions, 0, &told[..1], 601);
+    assert_eq!(positions.reading(ms(601)), None, "it tells of the first axis alone");
+    look_by(PositionSource::Parts, &mut positions, 1, &told[1..], 602);
+    let reading = positions.reading(ms(602)).unwrap();
+    assert_eq!((reading.at, reading.rests, reading.moves), (ms(600), false, false));
+    look_by(PositionSource::Blocks, &mut positions, 0, &[Pulses(9_000); 3], 800);
+    assert!(positions.reading(ms(800)).unwrap().moves, "that it is elsewhere one tells");
+}
+
+#[test]
+fn a_place_is_none_while_a_second_answer_to_one_request_or_a_report_has_the_seat_elsewhere() {
+    let away = [Pulses(7), Pulses(9_000), Pulses(7)];
+    let by_answer = |positions: &mut Positions, at| assert!(positions.on_repeated(0, &away, ms(at)));
+    let by_report = |positions: &mut Positions, at| positions.report(&away, ms(at));
+    for contradicts in [&by_answer as &dyn Fn(&mut Positions, u64), &by_report] {
+        let mut positions = seat(3);
+        [0, 60, 120].into_iter().for_each(|at| look(&mut positions, 0, &[Pulses(7); 3], at));
+        assert!(positions.reading(ms(120)).unwrap().rests);
+        contradicts(&mut positions, 121);
+        let reading = positions.reading(ms(121)).unwrap();
+        assert!(reading.moves && !reading.rests, "it is at either place");
+        [180, 240, 300].into_iter().for_each(|at| look(&mut positions, 0, &[Pulses(7); 3], at));
+        contradicts(&mut positions, 301);
+        assert!(!positions.reading(ms(301)).unwrap().rests, "and as long as that goes on");
+        for at in (360..=1_400).step_by(60) {
+            look(&mut positions, 0, &[Pulses(7); 3], at);
+        }
+        let reading = positions.reading(ms(1_400)).unwrap();
+        assert!(reading.rests && !reading.moves, "fresh answers resolve it");
+    }
+}
+
+#[test]
+fn a_report_that_registers_contradict_tells_nothing_of_axes_that_have_none() {
+    let mut positions = seat(8);
+    look(&mut positions, 0, &[Pulses(7); 6], 0);
+    let mut told = [Pulses(7); 8];
+    told[2] = Pulses(9_000);
+    positions.report(&told, ms(1));
+    assert_eq!(positions.reading(ms(1)).unwrap().slots, 0b11_1111);
+    look(&mut positions, 0, &[Pulses(7); 6], 60);
+    positions.report(&[Pulses(7); 8], ms(61));
+    assert_eq!(positions.reading(ms(61)).unwrap().slots, 0xff);
 }
 
 #[test]
 fn a_seat_is_looked_at_for_longer_while_answers_are_repeated() {
     let mut positions = seat(1);
     look(&mut positions, 0, &[Pulses(7)], 0);
-    positions.on_repeated(ms(90));
+    assert!(!positions.on_repeated(0, &[Pulses(7)], ms(90)));
     for (at, rests) in [(200, false), (450, false), (501, true)] {
         look(&mut positions, 0, &[Pulses(7)], at);
         assert_eq!(positions.reading(ms(at)).unwrap().rests, rests, "at {at} ms");
