@@ -1,6 +1,7 @@
 //! How surfaces reach the hall: a bounded queue of asks, each with the way back for its answer; the newest status; and the
 //! stop, which waits for neither.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, SyncSender, TrySendError};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::thread::Thread;
@@ -8,6 +9,7 @@ use std::time::Duration;
 
 use tokio::sync::{oneshot, watch};
 
+use super::posted::{Posted, gone};
 use super::{Code, Command, Problem, SharedClock, Status, Who};
 use crate::rt::Desk;
 use crate::state::State;
@@ -16,8 +18,6 @@ use crate::time::{Clock as _, MonoTime};
 
 /// Asks that wait at the most; of a flood the rest is refused.
 const ASKS: usize = 64;
-/// How long an answer may take: a cue of two hours is proved meanwhile.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How old an ask that [goes stale](Command::goes_stale) may be when its turn comes.
 pub(crate) const FRESH: Duration = Duration::from_secs(2);
@@ -45,6 +45,8 @@ pub struct Asked {
     /// What, and who.
     pub desired: Desired,
     asked_at: MonoTime,
+    /// True once it is taken, or given up: whoever sets it first decides. A stop is never given up.
+    settled: Arc<AtomicBool>,
     reply: oneshot::Sender<Result<Arc<Status>, Problem>>,
 }
 
@@ -71,12 +73,15 @@ pub struct Inbox(mpsc::Receiver<Asked>);
 
 impl Inbox {
     /// The next ask, waited for so long; `None` if nobody asked, or all surfaces are gone. What has gone
-    /// stale while it waited is answered here and never comes out: nobody expects it any more.
+    /// stale while it waited is answered here and never comes out: nobody expects it any more. Neither does what was given up.
     #[must_use]
     pub fn next(&self, wait: Duration) -> Option<Asked> {
         let until = Monotonic.now() + wait;
         loop {
             let asked = self.0.recv_timeout(until.since(Monotonic.now())).ok()?;
+            if asked.settled.swap(true, Ordering::AcqRel) {
+                continue;
+            }
             if !asked.is_stale(Monotonic.now()) {
                 return Some(asked);
             }
@@ -156,7 +161,8 @@ impl Handle {
     /// Leaves word of a stop for the journal, without waiting: where there is no room, it is not noted.
     pub(crate) fn note_stop(&self, who: Who) {
         let (reply, _) = oneshot::channel();
-        let note = Asked { desired: Desired { ask: Command::Stop, who }, asked_at: Monotonic.now(), reply };
+        let desired = Desired { ask: Command::Stop, who };
+        let note = Asked { desired, asked_at: Monotonic.now(), settled: Arc::default(), reply };
         drop(self.asks.try_send(note));
         self.wake();
     }
@@ -208,45 +214,26 @@ impl Handle {
             self.stop();
         }
         let (reply, answer) = oneshot::channel();
-        let asked = Asked { desired: Desired { ask, who }, asked_at, reply };
+        let (word, settled) = (ask.word(), Arc::<AtomicBool>::default());
+        let posted = Posted::new(answer, word, (ask != Command::Stop).then(|| Arc::clone(&settled)));
+        let asked = Asked { desired: Desired { ask, who }, asked_at, settled, reply };
         if asked.is_stale(Monotonic.now()) {
-            return Err(late(asked.desired.ask.word()));
+            return Err(late(word));
         }
         let queued = self.asks.try_send(asked);
         self.wake();
         match queued {
-            Ok(()) => Ok(Posted(answer)),
+            Ok(()) => Ok(posted),
             // It is done with its flag; what would follow is its line in the journal.
             Err(TrySendError::Full(asked)) if asked.desired.ask == Command::Stop => {
                 asked.answer(Ok(self.status()));
-                Ok(Posted(answer))
+                Ok(posted)
             }
             Err(TrySendError::Full(_)) => {
                 let detail = format!("{ASKS} requests are already waiting");
                 Err(Problem::new(Code::Busy, detail, "try again in a second"))
             }
             Err(TrySendError::Disconnected(_)) => Err(gone()),
-        }
-    }
-}
-
-/// Something asked that waits for its answer. Dropped, it is done all the same.
-#[derive(Debug)]
-pub struct Posted(oneshot::Receiver<Result<Arc<Status>, Problem>>);
-
-impl Posted {
-    /// The state that it led to.
-    ///
-    /// # Errors
-    /// [`Problem`] where it was not done.
-    pub(crate) async fn answer(self) -> Result<Arc<Status>, Problem> {
-        match tokio::time::timeout(PATIENCE, self.0).await {
-            Ok(answer) => answer.unwrap_or_else(|_| Err(gone())),
-            Err(_) => Err(Problem::new(
-                Code::Timeout,
-                format!("no answer within {} s", PATIENCE.as_secs()),
-                "check the status before you repeat the command: it may still take effect",
-            )),
         }
     }
 }
@@ -261,10 +248,6 @@ pub(crate) fn overtaken(word: &str, state: State) -> Problem {
 fn late(word: &str) -> Problem {
     let detail = format!("{word} came more than {} s after it was sent", FRESH.as_secs());
     Problem::new(Code::Late, detail, "look at the seats, then ask again")
-}
-
-fn gone() -> Problem {
-    Problem::new(Code::Timeout, "the hall is shutting down", "wait until the service is back")
 }
 
 #[cfg(test)]

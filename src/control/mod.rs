@@ -9,6 +9,7 @@ mod handle;
 mod links;
 pub(crate) mod model;
 mod places;
+mod posted;
 mod problem;
 mod recordings;
 mod status;
@@ -20,15 +21,16 @@ pub use ask::StartOrder;
 pub use ask::{Command, LevelsChange};
 pub(crate) use broadcasts::BroadcastStatus;
 pub(crate) use clock::{ClockReading, SharedClock};
-pub(crate) use handle::{Asked, FRESH, Posted, asked_at, overtaken};
+pub(crate) use handle::{Asked, FRESH, asked_at, overtaken};
 pub use handle::{Desired, Handle, Inbox, StatusSource, handle};
 pub(crate) use links::{LinkAxisStatus, LinkStatus};
 pub use model::Health;
 pub(crate) use model::{Coded, Histogram, Percentiles, Severity, Then, Times};
 pub(crate) use places::{Place, Places, network};
-#[cfg(test)]
-pub(crate) use problem::NEEDS_ENGINEER;
+pub(crate) use posted::Posted;
 pub use problem::{Code, Problem};
+#[cfg(test)]
+pub(crate) use problem::{NEEDS_ENGINEER, NOT_TAKEN};
 pub(crate) use recordings::is_recording;
 pub(crate) use status::{
     ArmedForStatus, ButtonsStatus, ClockStatus, EntryStatus, FORMAT, FilmDisagreement, FilmSourceStatus,

@@ -53,6 +53,8 @@ words! {
 
 /// What stands against what an engineer has to ask.
 pub(crate) const NEEDS_ENGINEER: &str = "needs-engineer";
+/// What stands against what a busy hall does not take in time.
+pub(crate) const NOT_TAKEN: &str = "not-taken";
 
 /// Why something was not done (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]

@@ -103,3 +103,17 @@ fn what_comes_late_and_moves_nothing_is_done_all_the_same() {
         assert_eq!(request.send(&hall.socket()).problem(), problem(409, "late"), "{word}");
     }
 }
+
+#[test]
+fn a_pause_that_a_busy_hall_does_not_take_is_refused_within_a_second_and_not_done_later() {
+    let hall = Hall::open();
+    hall.sleep();
+    let reply = hall.socket().post("/api/v1/show/pause");
+    assert_eq!(reply.problem(), problem(503, "timeout"));
+    assert_eq!(reply.value()["why"], "not-taken");
+    assert_eq!(hall.socket().post("/api/v1/show/stop").status, 200);
+    assert!(hall.desk.take_stop());
+    hall.wake();
+    hall.socket().post("/api/v1/show/park");
+    assert_eq!(hall.asks(), [Command::Stop, Command::Park]);
+}

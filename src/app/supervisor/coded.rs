@@ -125,7 +125,7 @@ mod tests {
     use super::*;
     use crate::console;
     use crate::control::model::{Ending, Health};
-    use crate::control::{Code, MarginOf, NEEDS_ENGINEER, Role};
+    use crate::control::{Code, MarginOf, NEEDS_ENGINEER, NOT_TAKEN, Role};
     use crate::film::chase::{HoldCause, ParkCause};
     use crate::film::point::FilmState;
     use crate::film::words::FilmLed;
@@ -231,8 +231,10 @@ mod tests {
             add("refusal", why.code(), 0);
             add("refusal-remedy", why.code(), 0);
         }
-        add("refusal", NEEDS_ENGINEER, 0);
-        add("refusal-remedy", NEEDS_ENGINEER, 0);
+        for why in [NEEDS_ENGINEER, NOT_TAKEN] {
+            add("refusal", why, 0);
+            add("refusal-remedy", why, 0);
+        }
         for why in standings() {
             add("standing", why.code(), why.figures().len());
             why.next().iter().for_each(|_| add("remedy", why.code(), 0));
