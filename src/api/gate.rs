@@ -19,6 +19,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::access::{Access, one};
 use super::input::whole;
+use super::live::LIVE;
 use super::once::{KeptReply, KeyHolder, KeyedRequest};
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
@@ -133,10 +134,11 @@ pub(super) fn introduce(request: &mut Request, who: Who) -> bool {
     is_known
 }
 
-/// What is no secret and changes nothing: the page and what belongs to it, the description of the API, whether it is well.
+/// What is no secret and changes nothing: the page and what belongs to it, the description of the API, whether it is well. The channel of
+/// the page asks for the token itself, as a browser sends none with the handshake of a WebSocket.
 fn is_public(path: &str) -> bool {
     match path {
-        "/healthz" | "/readyz" | super::service::DOCUMENT => true,
+        "/healthz" | "/readyz" | super::service::DOCUMENT | LIVE => true,
         "/metrics" => false,
         _ => !path.starts_with("/api"),
     }
@@ -145,8 +147,13 @@ fn is_public(path: &str) -> bool {
 /// Says who was turned away at the door: nobody guesses tokens unseen. Who just comes without one is not worth a line.
 pub(super) fn note(log: &Log, request: &Request, problem: &Problem) {
     let guessed = request.headers().contains_key(AUTHORIZATION);
+    note_of(log, request.extensions().get::<Peer>(), guessed, problem);
+}
+
+/// Like [`note`], of a peer who showed a token or did not.
+pub(super) fn note_of(log: &Log, peer: Option<&Peer>, guessed: bool, problem: &Problem) {
     if guessed && matches!(problem.code, Code::Token | Code::Busy) || problem.code == Code::Origin {
-        let from = request.extensions().get::<Peer>().map_or_else(String::new, ToString::to_string);
+        let from = peer.map_or_else(String::new, ToString::to_string);
         let line =
             Line::new(Priority::Warning, "turned-away", format!("rejected {from}: {}", problem.detail));
         log.say(line.with("code", problem.code.word()).with("from", from));

@@ -41,6 +41,7 @@ mod gate;
 mod guarded;
 mod history;
 mod input;
+mod live;
 mod once;
 mod peer;
 mod pieces;
@@ -62,6 +63,7 @@ mod status;
 mod stop;
 mod streams;
 mod tries;
+mod websocket;
 
 pub(crate) use doors::serve_behind_doors;
 #[cfg(test)]

@@ -51,7 +51,29 @@ impl IntoResponse for Problem {
 /// Gives a problem its body; other replies pass as they are.
 pub(super) fn render(mut response: Response, hall: Option<&Status>) -> Response {
     let Some(problem) = response.extensions_mut().remove::<Problem>() else { return response };
-    let Problem { status, code, detail, why, remedy, faults } = &problem;
+    let (status, code) = (problem.status, problem.code);
+    let text = text(&problem, hall);
+    let mut rendered = (
+        StatusCode::from_u16(status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR),
+        [(CONTENT_TYPE, HeaderValue::from_static(PROBLEM_JSON))],
+        text,
+    )
+        .into_response();
+    if code == Code::Token {
+        rendered.headers_mut().insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+    }
+    // What axum says of its own accord (Allow, of a wrong method).
+    for (name, value) in response.headers() {
+        if name != CONTENT_TYPE && name != axum::http::header::CONTENT_LENGTH {
+            rendered.headers_mut().append(name, value.clone());
+        }
+    }
+    rendered
+}
+
+/// A problem as JSON.
+pub(super) fn text(problem: &Problem, hall: Option<&Status>) -> String {
+    let Problem { status, code, detail, why, remedy, faults } = problem;
     let body = ProblemBody {
         kind: format!("urn:kinocue:problem:{}", code.word()),
         title: title(*code),
@@ -63,23 +85,7 @@ pub(super) fn render(mut response: Response, hall: Option<&Status>) -> Response 
         faults,
         hall: hall.map(HallFacts::from),
     };
-    let text = serde_json::to_string(&body).expect("text and numbers are written without fail");
-    let mut rendered = (
-        StatusCode::from_u16(*status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR),
-        [(CONTENT_TYPE, HeaderValue::from_static(PROBLEM_JSON))],
-        text,
-    )
-        .into_response();
-    if *code == Code::Token {
-        rendered.headers_mut().insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
-    }
-    // What axum says of its own accord (Allow, of a wrong method).
-    for (name, value) in response.headers() {
-        if name != CONTENT_TYPE && name != axum::http::header::CONTENT_LENGTH {
-            rendered.headers_mut().append(name, value.clone());
-        }
-    }
-    rendered
+    serde_json::to_string(&body).expect("text and numbers are written without fail")
 }
 
 const fn title(code: Code) -> &'static str {

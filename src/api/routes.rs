@@ -16,7 +16,7 @@ use utoipa_axum::routes;
 use super::problem::{PROBLEM_JSON, ProblemBody};
 use super::shared::Shared;
 use super::{
-    controllers, cues, fleet, fleet_cues, fleet_wishes, gate, history, playlist, recordings, reports,
+    controllers, cues, fleet, fleet_cues, fleet_wishes, gate, history, live, playlist, recordings, reports,
     service, settings, show, status,
 };
 use crate::control::Code;
@@ -82,6 +82,8 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(recordings::mark))
         .routes(routes!(recordings::dump));
     let (router, document) = router.split_for_parts();
+    // OpenAPI has no words for a WebSocket; docs/http.md has.
+    let router = router.route(live::LIVE, get(live::live));
     (router.fallback(service::page).method_not_allowed_fallback(service::wrong_method), completed(document))
 }
 

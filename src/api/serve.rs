@@ -135,7 +135,7 @@ where
     });
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME).max_buf_size(BUFFER).max_headers(HEADERS);
-    let served = http.serve_connection(TokioIo::new(Guarded::new(stream)), service);
+    let served = http.serve_connection(TokioIo::new(Guarded::new(stream)), service).with_upgrades();
     tokio::pin!(served);
     tokio::select! {
         _ = served.as_mut() => return, // whatever ended it, the other end has gone

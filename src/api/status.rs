@@ -22,7 +22,7 @@ use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
 /// Between two events at the least.
-const PACE: Duration = Duration::from_millis(100);
+pub(super) const PACE: Duration = Duration::from_millis(100);
 /// After how long without an event a comment says that the server lives.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 

@@ -15,6 +15,7 @@ mod events;
 mod hall;
 mod late;
 mod limits;
+mod live;
 #[path = "../common/programs.rs"]
 mod programs;
 mod replies;
