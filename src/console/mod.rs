@@ -1,6 +1,6 @@
 //! The web console: one page and what belongs to it, built into the program. It needs no network but the server's own, no
 //! build step, and nothing that `Content-Security-Policy: default-src 'self'` forbids. What it shows comes from
-//! `/api/v1/events`, what is pressed goes to `/api/v1`; the modules in `page/js` say which does what. Control plane.
+//! `/api/v1/live`, what is pressed goes to `/api/v1`; the modules in `page/js` say which does what. Control plane.
 
 #[cfg(test)]
 mod tests;
@@ -44,11 +44,13 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "controls.css" CSS,
     "panels.css" CSS,
     "js/api.js" JS,
+    "js/channel.js" JS,
     "js/clock.js" JS,
     "js/controller.js" JS,
     "js/curves.js" JS,
     "js/dom.js" JS,
     "js/error.js" JS,
+    "js/events.js" JS,
     "js/film.js" JS,
     "js/follow.js" JS,
     "js/headline.js" JS,
@@ -72,6 +74,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/playlist.js" JS,
     "js/pose.js" JS,
     "js/press.js" JS,
+    "js/reach.js" JS,
     "js/recordings.js" JS,
     "js/reports.js" JS,
     "js/said.js" JS,

@@ -5,6 +5,7 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::rc::Rc;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -24,12 +25,17 @@ pub(crate) const ESCAPE: &str = "\u{e00c}";
 /// One browser at a time is work enough for a small machine.
 static ONE: Mutex<()> = Mutex::new(());
 
-/// A browser with one page; it ends with its test.
+/// A browser, and the page of it that is driven; it ends with its test.
 pub(crate) struct Browser {
-    driver: Child,
-    port: u16,
+    driver: Rc<Driver>,
     session: String,
     shots: PathBuf,
+}
+
+/// The program that drives browsers.
+struct Driver {
+    child: Child,
+    port: u16,
     _only: MutexGuard<'static, ()>,
 }
 
@@ -40,13 +46,13 @@ impl Browser {
             return None;
         }
         let only = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut driver = Command::new("chromedriver")
+        let mut child = Command::new("chromedriver")
             .arg("--port=0")
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
             .expect("it is installed");
-        let mut lines = BufReader::new(driver.stdout.take().expect("piped")).lines();
+        let mut lines = BufReader::new(child.stdout.take().expect("piped")).lines();
         let port = lines
             .by_ref()
             .map_while(Result::ok)
@@ -54,10 +60,19 @@ impl Browser {
             .expect("it says on which port it listens");
         // Whatever else it says is taken, so that it never waits for us.
         std::thread::spawn(move || lines.for_each(drop));
+        Some(Self::driven_by(Rc::new(Driver { child, port, _only: only })))
+    }
+
+    /// Another browser on the same machine, which shares nothing with this one.
+    pub(crate) fn another(&self) -> Self {
+        Self::driven_by(Rc::clone(&self.driver))
+    }
+
+    fn driven_by(driver: Rc<Driver>) -> Self {
         let shots =
             Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("it is in target").join("console-shots");
         std::fs::create_dir_all(&shots).expect("a folder for the pictures");
-        let mut browser = Self { driver, port, session: String::new(), shots, _only: only };
+        let mut browser = Self { driver, session: String::new(), shots };
         let arguments = [
             "--headless=new",
             "--no-sandbox", // root has none
@@ -75,7 +90,24 @@ impl Browser {
         browser.session = format!("/session/{}", session["sessionId"].as_str().expect("a session"));
         let patience = u64::try_from(PATIENCE.as_millis()).expect("short");
         browser.command("/timeouts", &json!({"script": patience, "pageLoad": patience}));
-        Some(browser)
+        browser
+    }
+
+    /// Opens a window, which leaves the others in view, or a tab, which hides the one before; that one is driven from now on.
+    pub(crate) fn begin(&self, kind: &str) {
+        let new = self.command("/window/new", &json!({"type": kind}));
+        self.turn_to(new["handle"].as_str().expect("a handle"));
+    }
+
+    /// The window or tab that is driven.
+    pub(crate) fn page(&self) -> String {
+        let page = self.ask("GET", &format!("{}/window", self.session), &Value::Null);
+        page.as_str().expect("a handle").to_owned()
+    }
+
+    /// Drives that window or tab from now on, which comes in view.
+    pub(crate) fn turn_to(&self, page: &str) {
+        self.command("/window", &json!({"handle": page}));
     }
 
     /// Opens a page.
@@ -85,8 +117,14 @@ impl Browser {
 
     /// Asks for these languages from the next page on, the best first.
     pub(crate) fn speak(&self, languages: &[&str]) {
-        let source =
-            format!("Object.defineProperty(navigator, 'languages', {{ value: {} }})", json!(languages));
+        self.begin_with(&format!(
+            "Object.defineProperty(navigator, 'languages', {{ value: {} }})",
+            json!(languages)
+        ));
+    }
+
+    /// Has a script run before each page that is opened from now on in this window.
+    pub(crate) fn begin_with(&self, source: &str) {
         let command = json!({"cmd": "Page.addScriptToEvaluateOnNewDocument", "params": {"source": source}});
         self.command("/goog/cdp/execute", &command);
     }
@@ -208,7 +246,7 @@ impl Browser {
     }
 
     fn exchange(&self, method: &str, path: &str, body: &Value) -> std::io::Result<(u16, Value)> {
-        let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port))?;
+        let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.driver.port))?;
         stream.set_read_timeout(Some(2 * PATIENCE))?;
         let body = if body.is_null() { String::new() } else { body.to_string() };
         let length = body.len();
@@ -239,7 +277,12 @@ impl Drop for Browser {
         if !self.session.is_empty() {
             let _ = self.exchange("DELETE", &self.session, &Value::Null); // it ends the browser
         }
-        let _ = self.driver.kill(); // it may have ended already
-        let _ = self.driver.wait();
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        let _ = self.child.kill(); // it may have ended already
+        let _ = self.child.wait();
     }
 }

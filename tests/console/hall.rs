@@ -110,6 +110,11 @@ impl Hall {
         self.serving = Some(serving);
     }
 
+    /// Stops the server's process, which goes on by `Signal::CONT`.
+    pub(crate) fn signal(&self, signal: Signal) {
+        self.serving.as_ref().expect("it serves").signal(signal);
+    }
+
     /// Kills the server, as a crash would.
     pub(crate) fn kill(&mut self) {
         self.serving = None;

@@ -15,6 +15,7 @@ mod hall;
 mod languages;
 mod page;
 mod show_mode;
+mod tabs;
 mod timeline;
 
 use std::path::Path;

@@ -28,9 +28,10 @@ pub(crate) fn pretend(browser: &Browser, script: &str) {
     browser.eval(&format!(
         "const parse = window.honest ??= JSON.parse;
          JSON.parse = (text) => {{
-           const status = parse(text);
+           const parsed = parse(text);
+           const status = parsed?.status ?? parsed;
            if (status?.controllers) {{ {script} }}
-           return status;
+           return parsed;
          }};"
     ));
 }

@@ -7,10 +7,7 @@ import { said, words } from './language.js';
 const PATIENCE_MS = 65_000; // the hall may take 60 s over a cue of two hours
 const UPLOAD_MS = 600_000; // it is written, checked and proved, beside a show with what time that leaves
 const ROOT = '/api/v1/';
-/**
- * Changes under way at once at the most. A browser has six connections to a server, the stream of statuses has one: of the
- * rest some must always be free for STOP.
- */
+/** Changes under way at once at the most: of the six connections that a browser has to a server, for all its pages, some must be free for STOP. */
 const CHANGES = 3;
 
 let changing = 0;
@@ -75,6 +72,19 @@ async function inTurn(request) {
 
 /** Sends a stop, which waits behind nothing and is done each time that it comes. */
 export const sendStop = (patience) => send('POST', 'show/stop', {}, key(), patience);
+
+/** Why a plain STOP would not be taken now; null where it would be. */
+export async function whyNoStop(patience) {
+  try {
+    await request('GET', 'who', undefined, {}, patience);
+    return null;
+  } catch (error) {
+    // With a token that is no more, whoever needs none may stop all the same.
+    return error.status > 0 && token() && await isKnownWithout(patience) ? null : error;
+  }
+}
+
+const isKnownWithout = (patience) => fetch(`${ROOT}who`, { cache: 'no-store', credentials: 'omit', redirect: 'error', signal: AbortSignal.timeout(patience) }).then(({ ok }) => ok, () => false);
 
 function send(method, path, body, repeatOf, patience) {
   const more = {

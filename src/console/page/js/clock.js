@@ -8,8 +8,10 @@ const HEADER = 'X-Kinocue-Time';
 let best = null;
 
 /** Takes the server's time from a reply that was asked for at `before`, by `performance.now()`. */
-export function hear(replyHeaders, before) {
-  const theirs = Number(replyHeaders.get(HEADER));
+export const hear = (replyHeaders, before) => hearTime(Number(replyHeaders.get(HEADER)), before);
+
+/** Takes the server's time, Unix milliseconds, from what was asked for then. */
+export function hearTime(theirs, before) {
   if (!theirs) return;
   const now = performance.now();
   const round = now - before;

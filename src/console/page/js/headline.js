@@ -2,6 +2,7 @@
 
 import { sentAt } from './clock.js';
 import { byId, setAttribute, setProperty, setText } from './dom.js';
+import { channelAnswers } from './channel.js';
 import { takesPart } from './marks.js';
 import { hasSpoken, needsToken, refusal, silence } from './stream.js';
 import { linkState } from './state.js';
@@ -37,6 +38,7 @@ function showLink(link) {
   const asked = !hasSpoken() && !byId('token').hidden;
   setProperty(byId('lost'), 'hidden', link !== 'lost' || asked);
   setProperty(byId('log-in'), 'hidden', !needsToken());
+  setText(byId('lost-title'), words(channelAnswers() ? 'lost.silent' : 'lost.title'));
   setText(byId('link'), words(asked ? 'link.log-in' : `link.${link}`));
   const why = refusal() ?? words('lost.trying');
   setText(byId('lost-since'), words(hasSpoken() ? 'lost.for' : 'lost.yet', { s: number(silence()), why }));
@@ -49,7 +51,7 @@ function showStatus(status, link) {
   const seats = seatsInPlay(status.controllers);
   const led = seats.playing > 0 || !LEADING.has(status.state);
   const state = led ? stateName(status.state) : words('in-play.none', { state: stateName(status.state) });
-  setText(byId('state'), link === 'lost' ? `${state}?` : state);
+  setText(byId('state'), link === 'live' ? state : `${state}?`);
   setText(byId('cause'), sentence(causeOf(status)));
   setText(byId('since'), times(status));
   setText(byId('next'), sentence(nextOf(status)));
@@ -59,7 +61,7 @@ function showStatus(status, link) {
   badge('realtime', status.realtime.refusals.length > 0 ? words('badge.not-real-time') : '', 'weak', status.realtime.refusals.join('; '));
   const { text, planned } = settings(status);
   badge('settings-badge', text, planned ? 'calm' : 'weak', words(planned ? 'badge.planned' : 'badge.not-planned'));
-  setProperty(document, 'title', `${state} – ${status.hall} – kinocue`);
+  setProperty(document, 'title', [...(link === 'live' ? [state] : []), status.hall, 'kinocue'].join(' – '));
   const now = `${state}. ${sentence(causeOf(status))}. ${words('next.label')}${nextOf(status)}.`;
   if (now !== spoken) {
     spoken = now;

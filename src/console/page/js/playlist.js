@@ -13,7 +13,7 @@ let cues = [];
 export function startPlaylist() {
   onPress(byId('playlist-load'), (button) => {
     const id = byId('playlists').value;
-    if (id) ask(button, words('playlist.load', { id }), () => change('PUT', 'playlist', { id }));
+    if (id) ask(button, words('playlist.load', { id }), () => change('PUT', 'playlist', { id }), { long: true });
   });
   onPress(byId('playlist-drop'), (button) => ask(button, words('playlist.unload'), () => change('PUT', 'playlist', { id: null })));
   onPress(byId('cue-load'), loadCue);
@@ -29,7 +29,7 @@ export const chosenCue = () => byId('cues').value;
 export function loadCue(button) {
   const cue = chosenCue();
   // Only reading a cue shows its title and length, or its faults.
-  if (cue) ask(button, words('load.cue', { cue }), () => change('POST', 'show/load', { cue })).then(() => readLists());
+  if (cue) ask(button, words('load.cue', { cue }), () => change('POST', 'show/load', { cue }), { long: true }).then(() => readLists());
 }
 
 /** Whether the library has a cue of that id, as far as is known. */
@@ -106,6 +106,6 @@ function entryLine(entry, index, isLoaded) {
     return make('li', { className: 'entry current', 'aria-current': 'true' }, told, make('span', { className: 'loaded' }, words('entry.loaded')));
   }
   const button = make('button', { type: 'button', 'aria-label': words('entry.select-as', { title }) }, words('entry.select'));
-  onPress(button, () => ask(button, words('entry.select-as', { title }), () => change('POST', 'playlist/select', { entry: index })));
+  onPress(button, () => ask(button, words('entry.select-as', { title }), () => change('POST', 'playlist/select', { entry: index }), { long: true }));
   return make('li', { className: 'entry' }, told, button);
 }

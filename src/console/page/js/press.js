@@ -9,6 +9,8 @@ import { stateName } from './said.js';
 
 const SURE_WITHIN_MS = 3000;
 const BOUNCE_MS = 250;
+/** After how long it is said that what was asked is not done yet. */
+const SLOW_MS = 1000;
 /** How long it stays said what came of a press, and why it was not done. */
 const DONE_MS = 8000;
 const FAILED_MS = 30_000;
@@ -24,6 +26,7 @@ export function say(near, text, failed = false) {
   clearTimeout(timers.get(reply));
   timers.set(reply, setTimeout(() => forget(reply), failed ? FAILED_MS : DONE_MS));
   if (failed) obstacles.set(reply, obstacle(hall()));
+  else obstacles.delete(reply);
 }
 
 function forget(reply) {
@@ -39,10 +42,17 @@ watch((status) => {
   for (const [reply, then] of obstacles) if (obstacle(status) !== then) forget(reply);
 });
 
-/** Asks, and says what came of it beside the element that was pressed. Gives whether it was done. */
-export async function ask(near, what, request) {
+/**
+ * Asks, and says what came of it beside the element that was pressed. Gives whether it was done. What takes its time, as a preflight does,
+ * is `long`; all else can be pressed again after a second without an answer.
+ */
+export async function ask(near, what, request, { long = false } = {}) {
   setAttribute(near, 'aria-busy', 'true');
   say(near, `${sentence(what)} …`);
+  const slow = setTimeout(() => {
+    if (!long) near.removeAttribute('aria-busy');
+    say(near, words('press.slow', { what: sentence(what) }), !long);
+  }, SLOW_MS);
   try {
     const status = await request();
     const done = words('press.done', { what: sentence(what) });
@@ -53,6 +63,7 @@ export async function ask(near, what, request) {
     say(near, words('press.failed', { what: sentence(what), why: sentence(problem) }), true);
     return false;
   } finally {
+    clearTimeout(slow);
     near.removeAttribute('aria-busy');
   }
 }

@@ -15,7 +15,7 @@ export function startReports() {
 }
 
 /** Has every seat asked whether it is fit for a show. */
-export const runPreflight = (button) => ask(button, words('preflight.title'), () => change('POST', 'preflight'));
+export const runPreflight = (button) => ask(button, words('preflight.title'), () => change('POST', 'preflight'), { long: true });
 
 /** Shows both tables. */
 export function showReports(status) {

@@ -8,7 +8,7 @@ let due = false;
 /** The newest status; null before the first. */
 export const hall = () => status;
 
-/** `connecting` before the first word, `live`, or `lost` where nothing came for too long. */
+/** `connecting` before the first word since the page is seen, `live`, or `lost` where nothing came for too long. */
 export const linkState = () => link;
 
 /** Calls back with the status and the link, at each change of either. */
@@ -18,6 +18,12 @@ export const watch = (listener) => listeners.push(listener);
 export function setStatus(newest) {
   status = newest;
   link = 'live';
+  changed();
+}
+
+/** Nobody sees the page, and nothing is heard: what was known is old until the next status. */
+export function setAway() {
+  link = 'connecting';
   changed();
 }
 

@@ -3,6 +3,8 @@
 
 import { byId, setProperty, setText } from './dom.js';
 import { sendStop } from './api.js';
+import { stopByChannel } from './channel.js';
+import { startReach } from './reach.js';
 import { hall, linkState, watch } from './state.js';
 import { words } from './language.js';
 import { stateName } from './said.js';
@@ -10,10 +12,15 @@ import { stateName } from './said.js';
 const TRIES = 4;
 const PATIENCE_MS = 1000;
 const BETWEEN_MS = 150;
+/** By when the hall that has received a stop says that it stops. */
+const STOPS_MS = 3000;
 
 let sending = false;
 /** Whether nothing was heard of the server at some time since the last word about a stop. */
 let wasGone = false;
+/** When that was said, and whether the hall has stopped since. */
+let told = 0;
+let hasStopped = false;
 
 function start() {
   const button = byId('stop');
@@ -22,6 +29,7 @@ function start() {
   button.addEventListener('click', (event) => event.detail === 0 && stop());
   document.addEventListener('keydown', onKey, { capture: true });
   watch(forget);
+  startReach();
 }
 
 function onKey(event) {
@@ -39,7 +47,7 @@ async function stop() {
   let problem = null;
   for (let attempt = 0; attempt < TRIES; attempt += 1) {
     try {
-      await sendStop(PATIENCE_MS);
+      await deliver();
       problem = null;
       tell(words('stop.received'), 'received');
       break;
@@ -55,8 +63,14 @@ async function stop() {
   sending = false;
 }
 
+/** By the channel and by a plain request, as either may be held up; of two stops the second does nothing. */
+async function deliver() {
+  const plain = sendStop(PATIENCE_MS);
+  await Promise.any([stopByChannel(PATIENCE_MS), plain]).catch(() => plain);
+}
+
 function tell(text, kind) {
-  wasGone = linkState() !== 'live';
+  [wasGone, told, hasStopped] = [linkState() !== 'live', performance.now(), false];
   const place = byId('stop-reply');
   setText(place, text);
   setProperty(place, 'className', `stop-reply ${kind}`);
@@ -64,7 +78,7 @@ function tell(text, kind) {
 }
 
 /**
- * That a stop was received is old once the hall is no longer stopped. That it was not stays until the hall is stopped; where the
+ * That a stop was received is old once the hall is no longer stopped; the word of it comes before the state. That it was not stays until the hall is stopped; where the
  * server was gone meanwhile and is back, it is over if nothing moves, and else said of what moves.
  */
 function forget() {
@@ -73,7 +87,9 @@ function forget() {
   if (sending || place.hidden || linkState() !== 'live') return;
   const { state, moving } = hall();
   const received = place.classList.contains('received');
-  const over = received ? state !== 'stopping' && state !== 'stopped' : state === 'stopped' || (wasGone && !moving);
+  const stops = state === 'stopping' || state === 'stopped';
+  hasStopped ||= stops;
+  const over = received ? !stops && (hasStopped || performance.now() - told > STOPS_MS) : state === 'stopped' || (wasGone && !moving);
   if (over) setProperty(place, 'hidden', true);
   else if (!received && wasGone) setText(place, words('stop.again', { state: stateName(state) }));
 }

@@ -1,10 +1,10 @@
-// The stream of statuses: read as it comes, begun anew when it ends, and noticed when it falls silent.
-// An EventSource cannot send a token, hence fetch and a reader.
+// The statuses of the hall: by the channel, begun anew when it ends, and noticed when they fall silent. A page that nobody sees has no
+// channel, and says nothing of the hall.
 
-import { headers } from './api.js';
-import { hear } from './clock.js';
-import { setLost, setStatus } from './state.js';
-import { askForToken, onToken, token } from './token.js';
+import { channelAnswers, endChannel, openChannel } from './channel.js';
+import { readEvents } from './events.js';
+import { setAway, setLost, setStatus } from './state.js';
+import { askForToken, onToken } from './token.js';
 import { words } from './language.js';
 
 const SILENCE_MS = 1500;
@@ -14,6 +14,8 @@ const LONGEST_WAIT_MS = 1000;
 
 let heard = performance.now();
 let everHeard = false;
+/** Since when somebody sees the page. */
+let seen = performance.now();
 let attempt = null;
 let wakeUp = () => {};
 let refused = null;
@@ -30,14 +32,15 @@ export const refusal = () => refused;
 /** Whether it says that it needs a token. */
 export const needsToken = () => refused === words('lost.token');
 
-/** Reads for as long as the page is open. */
+/** Listens for as long as the page is open. */
 export async function startStream() {
   setInterval(watchSilence, WATCH_MS);
-  document.addEventListener('visibilitychange', () => document.hidden || watchSilence());
+  document.addEventListener('visibilitychange', onSeen);
   onToken(() => wakeUp());
   for (let wait = FIRST_WAIT_MS; ; wait = Math.min(wait * 2, LONGEST_WAIT_MS)) {
+    if (document.hidden) await new Promise((resolve) => (wakeUp = resolve));
     const before = heard;
-    await read().catch(() => { refused = null; });
+    await listen();
     if (heard !== before) wait = FIRST_WAIT_MS;
     await new Promise((resolve) => {
       wakeUp = resolve;
@@ -46,57 +49,41 @@ export async function startStream() {
   }
 }
 
-/** A stream that is open but silent is as good as none: it is ended, and another one tried. */
+function onSeen() {
+  if (document.hidden) {
+    setAway();
+    attempt?.end();
+  } else {
+    seen = performance.now();
+    wakeUp();
+  }
+}
+
+/** One that is open but silent is as good as none: it is ended, and another one tried. It stays where it still takes a STOP. */
 function watchSilence() {
-  const silent = performance.now() - heard;
-  if (silent < SILENCE_MS) return;
+  const now = performance.now();
+  if (document.hidden || now - Math.max(heard, seen) < SILENCE_MS) return;
   setLost();
-  if (attempt && performance.now() - attempt.begun > SILENCE_MS && silent > SILENCE_MS) attempt.abort.abort();
+  if (attempt && now - attempt.begun > SILENCE_MS && !channelAnswers()) attempt.end();
 }
 
-async function read() {
-  attempt = { begun: performance.now(), abort: new AbortController(), shown: token() };
-  const response = await fetch('/api/v1/events', {
-    headers: headers({ Accept: 'text/event-stream' }),
-    cache: 'no-store',
-    credentials: 'omit',
-    redirect: 'error',
-    signal: attempt.abort.signal,
-  });
-  hear(response.headers, attempt.begun);
-  refused = response.ok ? null : await refusalOf(response);
-  if (!response.ok) return;
-  let text = '';
-  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
-  for (;;) {
-    const { done, value } = await reader.read();
-    if (done) return;
-    const events = (text + value.replaceAll('\r', '')).split('\n\n');
-    text = events.pop();
-    // Of several that came at once only the last is still true.
-    const newest = events.map(dataOf).filter((data) => data !== '').pop();
-    if (newest !== undefined) take(newest);
-  }
+async function listen() {
+  attempt = { begun: performance.now(), end: endChannel };
+  const spoke = await openChannel({ take, refuse }).catch(() => false);
+  if (spoke || document.hidden) return;
+  const abort = new AbortController();
+  attempt = { begun: performance.now(), end: () => abort.abort() };
+  await readEvents({ take, refuse, signal: abort.signal }).catch(() => { refused = null; });
 }
 
-async function refusalOf(response) {
-  if (response.status === 401) {
-    askForToken({ pressed: false, shown: attempt.shown });
-    return words('lost.token');
-  }
-  const problem = await response.json().catch(() => ({}));
-  return problem.detail ?? words('api.replied', { status: response.status });
+function refuse(problem, shown) {
+  refused = problem.status === 401 ? words('lost.token') : problem.detail ?? words('api.replied', { status: problem.status });
+  if (problem.status === 401) askForToken({ pressed: false, shown });
 }
 
-/** The data of an event: its data lines, joined. Comments have none. */
-function dataOf(event) {
-  const lines = event.split('\n').filter((line) => line.startsWith('data:'));
-  return lines.map((line) => line.slice(line.startsWith('data: ') ? 6 : 5)).join('\n');
-}
-
-function take(data) {
-  const status = JSON.parse(data);
+function take(status) {
   heard = performance.now();
   everHeard = true;
+  refused = null;
   setStatus(status);
 }

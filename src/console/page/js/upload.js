@@ -45,7 +45,7 @@ async function send(button) {
       showFaults(problem.faults ?? []);
       throw Object.assign(problem, { faults: [] });
     }
-  });
+  }, { long: true });
   if (!taken) return;
   byId('upload-file').value = '';
   await readLists(id);
