@@ -216,7 +216,7 @@ fn on_panel(numbers: &str, panel: &PanelName) -> Result<Selection, SelectError> 
         let digits = text.bytes().all(|byte| byte.is_ascii_digit());
         text.parse::<u8>().ok().filter(|_| digits && text.len() <= 3).ok_or_else(bad)
     };
-    let (first, last) = ends(numbers).ok_or_else(bad)?;
+    let (first, last) = ends(numbers, &panel.name.to_lowercase()).ok_or_else(bad)?;
     let (first, last) = (decimal(first)?, decimal(last)?);
     if last < first {
         return Err(SelectError::Backward(numbers.to_owned()));
@@ -229,7 +229,7 @@ fn on_panel(numbers: &str, panel: &PanelName) -> Result<Selection, SelectError> 
 fn control(words: &mut SelectionWords) -> Result<Selection, SelectError> {
     let word = words.next().unwrap_or_default().to_owned();
     let bad = || SelectError::Number { word: word.clone(), space: "DPF", wanted: "0 to f" };
-    let (first, last) = ends(&word).ok_or_else(bad)?;
+    let (first, last) = ends(&word, "dpf").ok_or_else(bad)?;
     let digit = |text: &str| u8::from_str_radix(text, 16).ok().filter(|digit| *digit < 16).ok_or_else(bad);
     let range = format!("{:x}..{:x}", CONTROL + digit(first)?, CONTROL + digit(last)?);
     documented(if first == last { &range[..2] } else { &range }, "DP", Address::Dp)
@@ -239,7 +239,7 @@ fn control(words: &mut SelectionWords) -> Result<Selection, SelectError> {
 fn servo(words: &mut SelectionWords) -> Result<Selection, SelectError> {
     let servo = words.next().and_then(number).filter(|servo| *servo > 0).ok_or(SelectError::Servo)?;
     let word = words.next().ok_or(SelectError::Servo)?.to_owned();
-    let (first, last) = ends(word.strip_prefix("pa").unwrap_or(&word)).ok_or(SelectError::Servo)?;
+    let (first, last) = ends(word.strip_prefix("pa").unwrap_or(&word), "pa").ok_or(SelectError::Servo)?;
     let (first, last) = (number(first).ok_or(SelectError::Servo)?, number(last).ok_or(SelectError::Servo)?);
     if last < first {
         return Err(SelectError::Backward(word));
@@ -288,7 +288,7 @@ fn documented(numbers: &str, space: &'static str, of: fn(u8) -> Address) -> Resu
         space,
         wanted: "00 to ff, or a range like 06..0b",
     };
-    let (first, last) = ends(numbers).ok_or_else(bad)?;
+    let (first, last) = ends(numbers, &space.to_lowercase()).ok_or_else(bad)?;
     let (low, high) = (hex(first).ok_or_else(bad)?, hex(last).ok_or_else(bad)?);
     if high < low {
         return Err(SelectError::Backward(numbers.to_owned()));
@@ -307,10 +307,11 @@ fn whole(of: fn(u8) -> Address) -> Selection {
     Selection { addresses: all.collect(), single: false }
 }
 
-/// First and last of `06..0b`, which may repeat its prefix (`PA80..PA85`); twice the same of a single one.
-fn ends(text: &str) -> Option<(&str, &str)> {
+/// First and last of `06..0b`, which may repeat the prefix of its own table (`PA80..PA85`); twice the same of a single one.
+/// That of another table is none: `cd` are the digits of PAcd.
+fn ends<'t>(text: &'t str, prefix: &str) -> Option<(&'t str, &'t str)> {
     let (first, last) = text.split_once("..").unwrap_or((text, text));
-    let last = ["pa", "dp", "cp", "cd"].iter().find_map(|space| last.strip_prefix(space)).unwrap_or(last);
+    let last = last.strip_prefix(prefix).unwrap_or(last);
     (!first.is_empty() && !last.is_empty()).then_some((first, last))
 }
 
@@ -378,6 +379,37 @@ mod tests {
         assert!(named("CP153").starts_with("PA99 is in neither manual"));
         let given = assignments(&words("CP082=5")).unwrap();
         assert_eq!(given, [Assignment { address: Address::Pa(0x52), value: 5 }]);
+    }
+
+    #[test]
+    fn every_register_of_the_table_is_found_by_its_own_name_alone_and_as_the_end_of_a_range() {
+        for register in table().iter().map(|register| register.address) {
+            let name = register.to_string();
+            let ways = match register {
+                Address::Pa(number) => {
+                    vec![
+                        format!("pa {number:x}"),
+                        format!("CP{number:03}"),
+                        format!("cp {number}..CP{number}"),
+                    ]
+                }
+                Address::Dp(number) => {
+                    vec![
+                        format!("dp 0x{number:x}"),
+                        format!("CD{number:03}"),
+                        format!("cd {number}..cd{number}"),
+                    ]
+                }
+                Address::Servo { .. } => Vec::new(),
+            };
+            let range = format!("{name}..{name}");
+            for way in [name.clone(), name.to_lowercase(), range].into_iter().chain(ways) {
+                assert_eq!(named(&way), name, "{way}");
+            }
+        }
+        assert!(named("PAc0..cd").ends_with(" PAcd"), "{}", named("PAc0..cd"));
+        assert_eq!((named("CP192..205"), named("pa c0..PAcd")), (named("PAc0..cd"), named("PAc0..cd")));
+        assert!(named("PA80..dp85").contains("is not a register number"), "a range is of one table");
     }
 
     #[test]
