@@ -43,10 +43,35 @@ pub(crate) fn escaped(text: &str, limit: usize) -> Cow<'_, str> {
     Cow::Owned(line)
 }
 
+/// A name of a few letters, such as a column or a key has, with all that nobody sees in it escaped: spaces of other kinds and characters
+/// without a width too, which in prose belong to some languages.
+#[must_use]
+pub(crate) fn seen(name: &str) -> Cow<'_, str> {
+    // Of one that a reader sees the escape is itself, or it behind a backslash.
+    let is_unseen = |c: char| c.escape_debug().len() > 2 || misleads(c);
+    if !name.contains(is_unseen) {
+        return Cow::Borrowed(name);
+    }
+    let shown = |c: char| if is_unseen(c) { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(name.chars().map(shown).collect())
+}
+
 /// The name of a file as one line.
 #[must_use]
 pub(crate) fn path(path: &Path) -> String {
     escaped(&path.to_string_lossy(), PATH_LEN).into_owned()
+}
+
+/// The name of a file as one word for a shell; a placeholder where a line cannot show it.
+#[must_use]
+pub(crate) fn shell(path: &Path) -> String {
+    let name = path.to_string_lossy();
+    if name.is_empty() || name.contains(misleads) || name.contains('\u{fffd}') {
+        return "FILE".to_owned();
+    }
+    let name = if name.starts_with('-') { format!("./{name}").into() } else { name };
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=,@%:".contains(c);
+    if name.chars().all(is_plain) { name.into_owned() } else { format!("'{}'", name.replace('\'', "'\\''")) }
 }
 
 /// The text with the same characters escaped, but for line breaks and tabs: for lines of our own that hold what came from
@@ -99,6 +124,31 @@ mod tests {
         assert_eq!(escaped("\x1b[2Jgone", 80), "\\u{1b}[2Jgone");
         assert_eq!(escaped("a\u{202e}csv.exe", 80), "a\\u{202e}csv.exe");
         assert_eq!(escaped("nul\0tab\tcr\r", 80), "nul\\u{0}tab\\tcr\\r");
+    }
+
+    #[test]
+    fn what_nobody_sees_in_a_name_is_escaped_and_what_is_seen_is_not() {
+        for name in ["a1", "fx_air", "Höhe (mm)", "\"座席\"", "it's a\\b"] {
+            assert!(matches!(seen(name), Cow::Borrowed(same) if same == name), "{name}");
+        }
+        assert_eq!(seen("\u{a0}a1"), "\\u{a0}a1");
+        assert_eq!(seen("a\u{200b}1\u{feff}\u{3000}"), "a\\u{200b}1\\u{feff}\\u{3000}");
+        assert_eq!(seen("a\t1"), "a\\t1");
+    }
+
+    #[test]
+    fn the_name_of_a_file_is_one_word_of_a_shell_whatever_is_in_it() {
+        for (name, word) in [
+            ("cues/storm-2.csv", "cues/storm-2.csv"),
+            ("my cue.csv", "'my cue.csv'"),
+            ("it's.csv", "'it'\\''s.csv'"),
+            ("-rf.csv", "./-rf.csv"),
+            ("$(reboot);.csv", "'$(reboot);.csv'"),
+            ("Übung.csv", "Übung.csv"),
+            ("a\nb.csv", "FILE"),
+        ] {
+            assert_eq!(shell(Path::new(name)), word, "{name:?}");
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ mod typed;
 
 pub use grid::{Rate, Tick, TickGrid};
 pub(crate) use typed::{
-    TRIM_FRAMES, TRIM_MS, TrimChange, parse_duration, parse_time, parse_trim, parse_trim_change,
+    TRIM_FRAMES, TRIM_MS, TrimChange, is_second_60, parse_duration, parse_time, parse_trim, parse_trim_change,
 };
 
 use std::fmt;

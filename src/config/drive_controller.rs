@@ -8,6 +8,7 @@ use toml::de::DeTable;
 
 use crate::channel::{self, SWITCHES};
 use crate::motion::{MAX_AXES, SeatType};
+use crate::plain;
 
 pub(super) use together::{find_twins, refuse_parted_groups, settle};
 
@@ -140,7 +141,7 @@ fn link_of(section: &mut Section<'_, '_, '_>, links: &[LinkEntry<'_>]) -> Option
         return Some(name.to_owned());
     }
     let hint = did_you_mean(name, links.iter().map(|link| link.name));
-    entry.fault(section.faults, &format!("there is no [link.{name}]{hint}"));
+    entry.fault(section.faults, &format!("there is no [link.{}]{hint}", plain::seen(name)));
     None
 }
 

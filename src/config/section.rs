@@ -9,6 +9,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::fault::Faults;
+use crate::plain;
+use crate::time::is_second_60;
 
 /// How alike two words must be, 0 to 1, for one to be taken as a slip for the other.
 const ALIKE: f64 = 0.75;
@@ -117,7 +119,7 @@ impl<'t> Entry<'t> {
         let text = self.text(faults)?;
         let digits = |part: &str| part.len() == 2 && part.bytes().all(|byte| byte.is_ascii_digit());
         let spelt = text.split(':').all(digits) && matches!(text.len(), 5 | 8);
-        let time = text.parse().ok().filter(|_| spelt);
+        let time = text.parse().ok().filter(|_| spelt && !is_second_60(text));
         if time.is_none() {
             self.fault(faults, &format!("{text:?} is not a time of day, such as \"19:00\" or \"19:00:30\""));
         }
@@ -253,7 +255,7 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
     pub(crate) fn finish(self) {
         for key in self.table.keys().filter(|key| !self.asked.contains(&key.get_ref().as_ref())) {
             let word: &str = key.get_ref();
-            let hint = did_you_mean(word, self.asked.iter().copied());
+            let (word, hint) = (plain::seen(word), did_you_mean(word, self.asked.iter().copied()));
             self.faults.note(key.span().start, format!("{word}: unknown key in {}{hint}", self.name));
         }
     }
@@ -270,7 +272,7 @@ pub(crate) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>)
 
 /// That there is no `what` of that name, with the one that it may be a slip for.
 pub(crate) fn there_is_no<'a>(what: &str, name: &str, known: impl Iterator<Item = &'a str>) -> String {
-    format!("there is no {what} {name}{}", did_you_mean(name, known))
+    format!("there is no {what} {}{}", plain::seen(name), did_you_mean(name, known))
 }
 
 fn whole_number(value: &DeValue<'_>) -> Option<i64> {

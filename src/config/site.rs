@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::Effect;
 use super::section::{Section, did_you_mean};
 use crate::motion::SeatType;
+use crate::plain;
 
 /// What controllers refer to.
 pub(super) struct Site<'a> {
@@ -27,7 +28,7 @@ pub(super) fn seat_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Opt
     let name = entry.text(section.faults)?;
     if !site.named.contains(&name) {
         let hint = did_you_mean(name, site.named.iter().copied());
-        entry.fault(section.faults, &format!("there is no [seat.{name}]{hint}"));
+        entry.fault(section.faults, &format!("there is no [seat.{}]{hint}", plain::seen(name)));
     }
     site.seats.iter().find(|seat| seat.name == name).cloned()
 }

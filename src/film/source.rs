@@ -12,7 +12,7 @@ use jiff::{Timestamp, Zoned};
 pub(crate) use super::lines::{LineKind, MtcInput, SoundLine};
 use super::timecode::{FrameRate, Label, Timecode, TimecodeError};
 use super::tracker::SourceKind;
-use crate::time::ShowTime;
+use crate::time::{ShowTime, is_second_60};
 
 /// A film that is found by its own sound.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -260,6 +260,9 @@ impl ClockStart {
 
 impl ClockTime {
     fn of(text: &str) -> Option<Self> {
+        if is_second_60(text) {
+            return None;
+        }
         // A date alone would be midnight, which nobody means who writes no time.
         let here = || text.parse().ok().filter(|_| text.contains(['T', ' '])).map(Self::Here);
         let today = || text.parse().ok().map(Self::Today);
@@ -347,6 +350,10 @@ mod tests {
             ("artnet:hall.local", "has no sender"),
             ("clock:soon", "19:00"),
             ("clock:2026-11-21", "2026-11-21T19:00"),
+            ("clock:19:00:60", "19:00"),
+            ("clock:190060", "19:00"),
+            ("clock:2026-11-21 19:00:60", "19:00"),
+            ("clock:2026-11-21T19:00:60.5+01:00", "19:00"),
             ("clock:19:00,max_error=1", "max_error=1ms"),
             ("clock:19:00,max_error=-1ms", "20000ms"),
         ];

@@ -6,6 +6,7 @@ use super::{Entry, Playlist};
 use crate::config::{Config, ConfigFault, did_you_mean};
 use crate::control::Problem;
 use crate::library::{CueId, CueInfo, Library, Proved};
+use crate::plain;
 
 impl Playlist {
     /// Every fault of a playlist for a library and a hall: a cue that is missing or does not pass, a preset or an effect
@@ -42,6 +43,7 @@ impl Playlist {
     fn check_names(&self, entry: &Entry, config: &Config, faults: &mut Vec<ConfigFault>) {
         if let Some(name) = entry.preset.as_deref().filter(|name| config.preset(name).is_none()) {
             let hint = did_you_mean(name, config.presets.iter().map(|preset| preset.name.as_str()));
+            let name = plain::seen(name);
             let message = format!("preset: there is no [preset.{name}] in the configuration{hint}");
             faults.push(self.fault(entry.places.preset, message));
         }
@@ -52,6 +54,7 @@ impl Playlist {
         for name in entry.effects.keys() {
             if !config.effects.iter().any(|effect| effect.name == *name) {
                 let hint = did_you_mean(name, config.effects.iter().map(|effect| effect.name.as_str()));
+                let name = plain::seen(name);
                 let message = format!("{name}: is not in [effects] of the configuration{hint}");
                 faults.push(self.fault(entry.places.effects, message));
             }

@@ -95,7 +95,9 @@ fn every_fault_is_named_with_its_line() {
 
 #[test]
 fn times_of_day_are_spelt_in_full() {
-    for bad in ["7:00", "19", "19:00:00.5", "24:00", "19:60", "T19:00", "19:00Z", "noon"] {
+    for bad in
+        ["7:00", "19", "19:00:00.5", "24:00", "19:60", "19:00:60", "23:59:60", "T19:00", "19:00Z", "noon"]
+    {
         let faults = faults_of(&format!("cue = \"c\"\nat = \"{bad}\""));
         assert!(faults[0].contains("is not a time of day"), "{bad}: {faults:?}");
     }
@@ -138,6 +140,8 @@ fn what_only_library_and_hall_can_tell_is_found_when_it_is_loaded() {
     let library = Library::open(dir.path(), hall).unwrap();
     let config = from_to_args(&["127.0.0.1:1".to_owned()], &[], 1).unwrap();
     let day = list(&["preset = \"kids\"", "effects = { watr = false }"]);
+    let unseen = list(&["preset = \"kids\u{a0}\""]).check(&library, &config);
+    assert!(unseen[0].to_string().contains("[preset.kids\\u{a0}]"), "{unseen:?}");
     let faults: Vec<_> = day.check(&library, &config).iter().map(ToString::to_string).collect();
     let [preset, cue, effect] = &faults[..] else { panic!("a cue is looked at once: {faults:#?}") };
     assert!(preset.starts_with("day.toml:4:10: preset: there is no [preset.kids]"), "{preset}");

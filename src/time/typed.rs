@@ -36,6 +36,13 @@ pub(crate) fn parse_time(text: &str) -> Result<ShowTime, String> {
     i64::try_from(nanos).map(ShowTime::from_nanos).map_err(|_| refuse("longer than any cue"))
 }
 
+/// True if a time of day, alone or behind a date, is at second 60. Readers of times take it for second 59; no clock of the day shows it.
+pub(crate) fn is_second_60(text: &str) -> bool {
+    let clock = text.rsplit(['T', 't', ' ']).next().unwrap_or(text);
+    let of_clock = clock.chars().take_while(|c| c.is_ascii_digit() || *c == ':');
+    of_clock.filter(char::is_ascii_digit).skip(4).take(2).eq(['6', '0'])
+}
+
 /// A length of time with its unit: `80ms`, `1.5s`, `100us`, `5min`, `2h`.
 ///
 /// # Errors

@@ -15,6 +15,7 @@ use crate::cli::{Exit, Failure, OrExit as _};
 use crate::fleet::{LONGEST_WISH, WishedPlaylist};
 use crate::playlist::Playlist;
 use crate::sys;
+use crate::time::is_second_60;
 
 /// Puts playlists into halls that allow it (playlists), and says what came of it in each.
 ///
@@ -93,6 +94,7 @@ fn when_from(text: &str, now: &Zoned) -> Result<u64, String> {
     };
     // A date by itself would be its midnight, and is more likely a slip.
     let at = match text.len() {
+        _ if is_second_60(text) => None,
         ..=8 => text.parse::<Time>().ok().and_then(next),
         9..=10 => None,
         _ => text.parse::<Timestamp>().ok().or_else(|| here(text.parse::<DateTime>().ok()?)),
@@ -118,9 +120,18 @@ mod tests {
         assert_eq!(told("2026-11-22T04:00"), "2026-11-22T03:00:00Z");
         assert_eq!(told("2026-11-22T04:00+02:00"), "2026-11-22T02:00:00Z");
         assert_eq!(told("2026-11-22 04:00:30Z"), "2026-11-22T04:00:30Z");
-        for wrong in
-            ["", "4", "25:00", "2026-11-22", "tomorrow", "2026-13-01T04:00", "1969-01-01T00:00Z", "-5"]
-        {
+        for wrong in [
+            "",
+            "4",
+            "25:00",
+            "04:00:60",
+            "2026-11-22T04:00:60Z",
+            "2026-11-22",
+            "tomorrow",
+            "2026-13-01T04:00",
+            "1969-01-01T00:00Z",
+            "-5",
+        ] {
             assert!(when_from(wrong, &now).is_err(), "{wrong}");
         }
     }
