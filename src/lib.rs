@@ -34,6 +34,7 @@
     )
 )]
 
+mod kind;
 mod motion;
 mod plain;
 mod published;

@@ -52,6 +52,10 @@ fn beginnings(door: &str) -> Vec<Vec<u8>> {
         "sixpack2" => vec![octets("00015000000000000000 00012601020304050607 c8011400000000000000 0003")],
         "cue-csv" => vec![head("cues/bench-ride.csv", 40), head("cues/voyage.csv", 20)],
         "cue-mcap" => vec![file("cues/storm.mcap")],
+        "cue-spreadsheet" => text(&[
+            "sep=;\n\"# units: mm, deg\";;\nTime_ms;A1;A2\n0;0,5;1\n10;0,75;2\n;;\n",
+            "# units: mm\ntime_s,a1\n0,0\n\"0,5\",\"1,25\"\n",
+        ]),
         "cue-rows" => text(&["1,20,0,0,0,0,0,0\n2,20,1,1,1,0,0,0\n3,20,0,0,0,0,0,0\n"]),
         "cue-u8" => vec![vec![0; 30], (0..90).collect()],
         "config" => [

@@ -111,12 +111,12 @@ fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
 
 fn broken(cue: &Path, violations: &[Violation], more: u64, chases: bool) -> String {
     let chase = if chases { " --chase" } else { "" };
-    let cue = plain::path(cue);
+    let (cue, shell) = (plain::path(cue), plain::shell(cue));
     let mut text: String = violations.iter().map(|violation| format!("{cue}:{violation}\n")).collect();
     if more > 0 {
         text += &format!("{cue}: and {more} more\n");
     }
     text + &format!(
-        "the limits proof failed, so nothing is played; `kinocue fit {cue} -o OUT{chase}` makes a cue that keeps the limits"
+        "the limits proof failed, so nothing is played; `kinocue fit {shell} -o OUT{chase}` makes a cue that keeps the limits"
     )
 }

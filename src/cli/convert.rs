@@ -25,6 +25,7 @@ const MAX_LINKS: usize = 40;
 Examples:
   kinocue convert cues/coaster.csv coaster.mcap
   kinocue convert examples/rows.csv swell.csv --from rows --units mm --title Swell
+  kinocue convert --from csv saved.csv storm.csv                      a spreadsheet of yours, with semicolons and 0,5
   kinocue convert ride.bin ride.csv --from u8 --axes 3 --rate 20      raw bytes of yours
   kinocue convert --recover cues/storm.mcap saved.mcap
   kinocue convert ride.mcap sent.csv --seat c1 --take sent            a recording of yours
@@ -35,7 +36,7 @@ pub(super) struct Args {
     input: PathBuf,
     /// The file to write; its name ends in .csv or .mcap.
     output: PathBuf,
-    /// Foreign format to read: rows is line,time_ms,x,y,z,u,v,w, where time_ms is the duration of the row; u8 is raw
+    /// Foreign format to read: csv is a cue as a spreadsheet of any language saves it; rows is line,time_ms,x,y,z,u,v,w, where time_ms is the duration of the row; u8 is raw
     /// bytes, one per axis, 0 to 255 over the stroke.
     #[arg(long, value_enum, value_name = "FORMAT")]
     from: Option<ConvertFormat>,
@@ -67,6 +68,7 @@ pub(super) struct Args {
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum ConvertFormat {
+    Csv,
     Rows,
     U8,
 }
@@ -87,6 +89,13 @@ pub(super) enum ConvertTarget {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let target = target(&args.output).or_exit(Exit::Usage)?;
+    let is_csv = matches!(args.from, Some(ConvertFormat::Csv));
+    if is_csv && (args.units.is_some() || args.axes.is_some() || args.rate.is_some()) {
+        let why = anyhow!(
+            "--from csv takes no --units, --axes or --rate: the file says what it is in \"# units: ...\""
+        );
+        return Err(why).or_exit(Exit::Usage);
+    }
     exit::refuse_to_replace(&args.output, args.force)?;
     if args.take.is_some() || args.recover {
         exit::refuse_same(&args.input, &args.output)?;
@@ -136,6 +145,7 @@ pub(super) fn target(output: &Path) -> anyhow::Result<ConvertTarget> {
 fn read(args: &Args) -> Result<(Cue, Option<Problem>), CueFaults> {
     let source = match args.from {
         None => Source::Native,
+        Some(ConvertFormat::Csv) => Source::Spreadsheet,
         Some(ConvertFormat::Rows) => Source::Rows { unit: args.units.unwrap_or_default() },
         Some(ConvertFormat::U8) => {
             Source::U8 { axes: args.axes.unwrap_or_default(), rate_hz: args.rate.unwrap_or_default() }

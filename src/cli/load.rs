@@ -114,8 +114,8 @@ impl SeatArgs {
 
     /// These arguments as they were typed, each behind a blank.
     pub(super) fn as_typed(&self) -> String {
-        let config = self.config.as_ref().map(|config| format!(" --config {}", plain::path(config)));
-        let seat = self.seat.as_ref().map(|seat| format!(" --seat {}", plain::escaped(seat, 200)));
+        let config = self.config.as_ref().map(|config| format!(" --config {}", plain::shell(config)));
+        let seat = self.seat.as_ref().map(|seat| format!(" --seat {}", plain::shell(Path::new(seat))));
         let rate = self.rate.map(|rate| format!(" --rate {rate}"));
         let chase = self.chase.then(|| " --chase".to_owned());
         [config, seat, rate, chase].into_iter().flatten().collect()

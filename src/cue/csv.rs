@@ -3,15 +3,16 @@
 use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::str::FromStr;
 
+use super::declared::{Declared, HeadLine, comment, is_remark};
 use super::fault::{Collector, CueFaults, Place};
 use super::header::{Column, Header};
 use super::limits::MAX_ROWS;
 use super::problem::Problem;
+use super::spreadsheet::SEPARATORS;
 use super::table::{Lines, Splitter, column_of};
 use super::unit::DeclaredUnits;
-use super::{Cue, Effects, Interpolation, Origin, Steps, title_of, value};
+use super::{Cue, Effects, Origin, Steps, value};
 use crate::channel::{Samples, TrackId};
 use crate::motion::MAX_AXES;
 use crate::plain;
@@ -27,10 +28,10 @@ pub(crate) fn comments(path: &Path) -> Vec<String> {
     let Ok(file) = super::open(path) else { return Vec::new() };
     let (mut lines, mut comments) = (Lines::new(file), Vec::new());
     while let Ok(Some((_, line))) = lines.next() {
-        let Some(comment) = line.trim_ascii_start().strip_prefix('#') else { break };
-        let key = comment.split_once(':').map(|(key, _)| key.trim().to_ascii_lowercase());
-        if key.is_none_or(|key| !DECLARED.contains(&key.as_str())) {
-            comments.push(line.to_owned());
+        match HeadLine::of(line) {
+            HeadLine::Comment(comment) if is_remark(&comment) => comments.push(format!("#{comment}")),
+            HeadLine::Comment(_) | HeadLine::Separator(_) => {}
+            HeadLine::Header => break,
         }
     }
     comments
@@ -59,20 +60,6 @@ fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cu
     }
 }
 
-/// What a comment line before the header can declare.
-const DECLARED: [&str; 4] = ["kinocue-csv", "title", "units", "interpolation"];
-
-/// What the comment lines before the header say.
-#[derive(Debug, Default)]
-struct Declared {
-    seen: Vec<String>,
-    title: Option<String>,
-    units: DeclaredUnits,
-    /// Where they stand, if anywhere.
-    units_at: Option<Place>,
-    interpolation: Interpolation,
-}
-
 /// Reads up to the header row; nothing where there is none, or rows cannot be understood after what was found.
 fn read_head<R: Read>(
     path: &Path,
@@ -82,69 +69,44 @@ fn read_head<R: Read>(
     let mut declared = Declared::default();
     let mut header = None;
     lines.each(faults, |number, line, faults| {
-        if let Some(comment) = line.trim_ascii_start().strip_prefix('#') {
-            declared.take(number, line, comment, faults);
-            return ControlFlow::Continue(());
-        }
-        if let Some((name, separator)) = other_separator(line) {
-            let problem = Problem::Separator(name, separator, plain::path(path).to_string());
+        let separator = match HeadLine::of(line) {
+            HeadLine::Comment(comment) => {
+                declared.take(number, line, &comment, faults);
+                return ControlFlow::Continue(());
+            }
+            HeadLine::Separator(',') => return ControlFlow::Continue(()),
+            HeadLine::Separator(other) => Some(other),
+            HeadLine::Header => other_separator(line),
+        };
+        if let Some(separator) = separator {
+            let problem = Problem::Separator(separator_name(separator), plain::shell(path));
             faults.add(Place::Text { line: number, column: 1 }, None, problem);
             return ControlFlow::Break(());
         }
         match Splitter::new().split(line) {
-            Ok(cells) => header = Some(Header::read(line, number, cells, faults)),
+            Ok(cells) => header = Some((cells.count(), Header::read(line, number, cells, faults))),
             Err((column, problem)) => faults.add(Place::Text { line: number, column }, None, problem),
         }
         ControlFlow::Break(())
     });
-    let header = header?;
-    if let Some((place, problem)) = declared.units_at.clone().zip(declared.units.misfit(header.axes)) {
-        faults.add(place, Some("units"), problem);
-    }
+    declared.refuse_near(faults);
+    let (cells, header) = header?;
+    declared.close(cells, header.axes, faults);
     faults.is_empty().then_some((declared, header))
 }
 
-/// What separates the columns of a header without a comma: in words, and for `sed`.
-fn other_separator(line: &str) -> Option<(&'static str, &'static str)> {
-    if line.contains(',') {
-        return None;
-    }
-    let known = [(';', "semicolons", ";"), ('\t', "tabs", "\\t")];
-    known.into_iter().find(|(separator, ..)| line.contains(*separator)).map(|(_, name, sed)| (name, sed))
+/// What separates the columns of a header without a comma.
+fn other_separator(line: &str) -> Option<char> {
+    if line.contains(',') { None } else { SEPARATORS.into_iter().find(|separator| line.contains(*separator)) }
 }
 
-impl Declared {
-    fn take(&mut self, number: u64, line: &str, comment: &str, faults: &mut Collector) {
-        let Some((key, text)) = comment.split_once(':') else { return };
-        let (key, text) = (key.trim().to_ascii_lowercase(), text.trim());
-        let taken = match key.as_str() {
-            "kinocue-csv" if text == "1" => Ok(()),
-            "kinocue-csv" => Err("this program reads version 1".to_owned()),
-            "title" => {
-                self.title = Some(title_of(text)).filter(|title| !title.is_empty());
-                Ok(())
-            }
-            "units" => parsed(text).map(|units| self.units = units),
-            "interpolation" => parsed(text).map(|interpolation| self.interpolation = interpolation),
-            _ => return,
-        };
-        // The value is the end of the line.
-        let column = (line.trim_end().chars().count() - text.chars().count()) as u64 + 1;
-        let place = Place::Text { line: number, column };
-        if key == "units" {
-            self.units_at = Some(place.clone());
-        }
-        if self.seen.contains(&key) {
-            faults.add(place, Some(&key), Problem::DeclaredTwice);
-        } else if let Err(allowed) = taken {
-            faults.add(place, Some(&key), Problem::Declaration { value: value::shortened(text), allowed });
-        }
-        self.seen.push(key);
+fn separator_name(separator: char) -> String {
+    match separator {
+        ';' => "semicolons".to_owned(),
+        '\t' => "tabs".to_owned(),
+        '|' => "bars".to_owned(),
+        other => format!("{other:?}"),
     }
-}
-
-fn parsed<T: FromStr<Err: ToString>>(text: &str) -> Result<T, String> {
-    text.parse().map_err(|error: T::Err| error.to_string())
 }
 
 /// The rows while they are read, and the cue so far.
@@ -191,7 +153,7 @@ impl CsvRows {
     /// Takes one line as a row; what is wrong with it goes to `faults`, and the next may follow.
     fn take(&mut self, number: u64, line: &str, faults: &mut Collector) {
         let place = |column| Place::Text { line: number, column };
-        if line.trim_ascii_start().starts_with('#') {
+        if comment(line).is_some() {
             return faults.add(place(1), None, Problem::CommentAmongRows);
         }
         let cells = match self.splitter.split_row(line, self.header.columns.len()) {

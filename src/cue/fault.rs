@@ -157,7 +157,9 @@ impl Collector {
         if self.is_full() {
             self.count();
         } else {
-            let column = column.map(|name| plain::escaped(name, NAME_TOLD).into_owned());
+            let column = column
+                .filter(|name| !name.is_empty())
+                .map(|name| plain::escaped(&plain::seen(name), NAME_TOLD).into_owned());
             self.told.push(Fault { place, column, problem });
         }
     }

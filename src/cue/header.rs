@@ -57,9 +57,13 @@ impl Header {
     pub(super) fn read(line: &str, number: u64, cells: Cells<'_>, faults: &mut Collector) -> Self {
         let mut header = Self::default();
         let place = |index| Place::Text { line: number, column: column_of(line, index) };
-        for index in 0..cells.count() {
+        if !is_time(cells.get(0)) && is_time(cells.get(1)) {
+            faults.add(place(0), Some(cells.get(0)), Problem::BeforeTheTime);
+            return header;
+        }
+        for index in 0..filled(cells) {
             let name = cells.get(index);
-            match header.column(index, name) {
+            match header.column(index, &name.to_ascii_lowercase()) {
                 Ok(column) if header.columns.contains(&column) => {
                     faults.add(place(index), Some(name), Problem::ColumnTwice);
                 }
@@ -73,12 +77,14 @@ impl Header {
         header
     }
 
+    /// What a column carries whose name is that, in small letters.
     fn column(&mut self, index: usize, name: &str) -> Result<Column, Problem> {
         match (index, name) {
             (0, "time_ms") => self.time_unit_ns = 1e6,
             (0, "time_s") => self.time_unit_ns = 1e9,
             (0, _) => return Err(Problem::UnknownColumn("the first column is time_ms or time_s")),
             (_, "io") => return Ok(Column::Word),
+            (_, "") => return Err(Problem::NoName),
             _ => return self.track(name).unwrap_or(Err(Problem::UnknownColumn(KNOWN.as_str()))),
         }
         Ok(Column::Time)
@@ -139,6 +145,18 @@ impl Header {
     }
 }
 
+/// The cells of a header up to the last with a name: behind it a spreadsheet leaves empty ones.
+fn filled(cells: Cells<'_>) -> usize {
+    let named: Vec<bool> = cells.iter().map(|name| !name.is_empty()).collect();
+    let last = named.iter().rposition(|is_named| *is_named);
+    // Of more cells than there is room for, nobody knows.
+    if named.len() < cells.count() { cells.count() } else { last.map_or(0, |last| last + 1) }
+}
+
+fn is_time(name: &str) -> bool {
+    ["time_ms", "time_s"].iter().any(|time| name.eq_ignore_ascii_case(time))
+}
+
 /// `1` to `12` as an index from 0.
 fn axis_number(digits: &str) -> Option<usize> {
     let plain = digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
@@ -173,7 +191,7 @@ mod tests {
 
     #[test]
     fn every_fault_is_told_at_its_column() {
-        let told = faults("time,a1,a3,v1_hz,v2_amp,v2_hz,wind,a13,fx_Air,a1");
+        let told = faults("time,a1,a3,v1_hz,v2_amp,v2_hz,wind,a13,fx_a-r,a1");
         let starts: Vec<_> = told.iter().map(|f| f.split(';').next().unwrap_or("")).collect();
         assert_eq!(
             starts,
@@ -181,12 +199,45 @@ mod tests {
                 "f:1:1: time: unknown column",
                 "f:1:31: wind: unknown column",
                 "f:1:36: a13: unknown column",
-                "f:1:40: fx_Air: an effect's name may only have a to z, 0 to 9 and _",
+                "f:1:40: fx_a-r: an effect's name may only have a to z, 0 to 9 and _",
                 "f:1:47: a1: the column occurs twice",
                 "f:1:1: v1_amp: the column is missing",
                 "f:1:1: a2: the column is missing",
             ]
         );
+    }
+
+    #[test]
+    fn columns_may_be_named_in_capitals_and_empty_ones_may_stand_behind_them() {
+        for header in
+            ["Time_ms,A1,V1_Hz,V1_Amp,FX_Air", "TIME_S,a1,IO", "time_ms,a1,,", "time_ms,a1,\"\",\" \""]
+        {
+            assert_eq!(faults(header), [""; 0], "{header}");
+        }
+        assert_eq!(faults("time_ms,a1,A1"), ["f:1:12: A1: the column occurs twice"]);
+        let unnamed = faults("time_ms,a1,,a2");
+        assert!(
+            unnamed.len() == 1 && unnamed[0].starts_with("f:1:12: a column without a name"),
+            "{unnamed:?}"
+        );
+    }
+
+    #[test]
+    fn an_index_before_the_time_is_one_fault_that_names_the_ways_to_leave_it_out() {
+        for header in [",time_ms,a1,fx_air", "\"\",time_ms,a1", "Unnamed: 0,time_ms,a1", "index,Time_s,a1"] {
+            let told = faults(header);
+            assert!(told.len() == 1 && told[0].contains("index=False"), "{header}: {told:?}");
+        }
+    }
+
+    #[test]
+    fn what_nobody_sees_in_the_name_of_a_column_is_shown() {
+        for (name, shown) in
+            [("\u{a0}a2", "\\u{a0}a2"), ("a\u{200b}2", "a\\u{200b}2"), ("\u{feff}a2", "\\u{feff}a2")]
+        {
+            let told = faults(&format!("time_ms,a1,{name}"));
+            assert!(told[0].starts_with(&format!("f:1:12: {shown}: unknown column")), "{told:?}");
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod builder;
 mod bytes;
 mod csv;
 mod csv_write;
+mod declared;
 mod fault;
 mod header;
 pub(crate) mod limits;
@@ -20,6 +21,7 @@ mod place;
 mod problem;
 mod rows;
 mod splice;
+mod spreadsheet;
 mod steps;
 mod table;
 mod tracks;
@@ -46,6 +48,7 @@ pub(crate) use unit::{DeclaredUnit, Interpolation, Unit, Units, UnknownInterpola
 
 use crate::channel::{ChannelId, Sample};
 use crate::container::MAGIC;
+use crate::kind;
 use crate::plain;
 use crate::sys;
 use crate::time::ShowTime;
@@ -56,6 +59,8 @@ pub enum Source {
     /// A cue of our own: MCAP where it begins as one or its name ends in `.mcap`, else CSV.
     #[default]
     Native,
+    /// A CSV cue as a spreadsheet of any language saves it.
+    Spreadsheet,
     /// Rows `line,time_ms,x,y,z,u,v,w` of a motion editor, with durations instead of times.
     Rows {
         /// The unit of the positions, which such a file does not say.
@@ -364,6 +369,7 @@ pub(crate) fn open(path: &Path) -> Result<File, CueFaults> {
 pub fn read(path: &Path, input: impl Read, source: &Source) -> Result<Cue, CueFaults> {
     let mut cue = match *source {
         Source::Native => read_native(path, input)?,
+        Source::Spreadsheet => spreadsheet::read(path, input)?,
         Source::Rows { unit } => rows::read(path, input, unit)?,
         Source::U8 { axes, rate_hz } => bytes::read(path, input, axes, rate_hz)?,
     };
@@ -385,17 +391,27 @@ pub(crate) fn is_mcap(front: &[u8]) -> bool {
 /// Reads a cue of our own: the content says whether it is MCAP, and a name in `.mcap` that it should be.
 fn read_native(path: &Path, mut input: impl Read) -> Result<Cue, CueFaults> {
     let mut front = Vec::new();
-    if let Err(error) = input.by_ref().take(MAGIC.len() as u64).read_to_end(&mut front) {
+    if let Err(error) = input.by_ref().take(kind::FRONT as u64).read_to_end(&mut front) {
         return Err(CueFaults::one(path, Problem::Unread(error.to_string())));
     }
-    let ends_in = |ending| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending));
-    let (named_so, begins_so) = (ends_in("mcap"), front == MAGIC);
-    let other = if ends_in("toml") { Some("a configuration: --config takes it") } else { other_kind(&front) };
-    if let Some(kind) = other.filter(|_| !named_so && !begins_so) {
-        return Err(CueFaults::one(path, Problem::OtherKind(kind)));
+    let (named_so, begins_so) = (ends_in(path, "mcap"), is_mcap(&front));
+    if !named_so && !begins_so {
+        refuse_other_kind(path, &front)?;
     }
     let input = front.as_slice().chain(input);
     if named_so || begins_so { mcap::read(path, input) } else { csv::read(path, input) }
+}
+
+/// Refuses a file that begins so, or has such a name, and is something else than text; what it is follows in words.
+fn refuse_other_kind(path: &Path, front: &[u8]) -> Result<(), CueFaults> {
+    let named =
+        ends_in(path, "toml").then_some("TOML: --config takes a configuration, kinocue playlist a playlist");
+    let kind = named.or_else(|| other_kind(front));
+    kind.map_or(Ok(()), |kind| Err(CueFaults::one(path, Problem::OtherKind(kind))))
+}
+
+fn ends_in(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
 }
 
 #[cfg(test)]

@@ -1,13 +1,15 @@
 //! Files that are no cues, by how they begin.
 
-/// What a file is that begins so and is no text, with what to do; `None` where it may be text.
+use crate::kind;
+
+/// Octets that are none of a text where one of them controls something.
+const TEXT: usize = 8;
+
+/// What a file is that begins so and is no cue, with what to do; `None` where it may be one.
 pub(super) fn other_kind(front: &[u8]) -> Option<&'static str> {
     let is_text = |byte: &u8| !byte.is_ascii_control() || byte.is_ascii_whitespace();
-    match front {
-        [b'P', b'K', 3, 4, ..] => Some("a spreadsheet or an archive: save it as CSV"),
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("text in UTF-16: save it as UTF-8"),
-        _ => (!front.iter().all(is_text)).then_some("no text, as a film or a picture is not"),
-    }
+    let unknown = || !front.iter().take(TEXT).all(is_text);
+    kind::of(front).or_else(|| unknown().then_some("no text, as a film or a picture is not"))
 }
 
 #[cfg(test)]
@@ -26,8 +28,13 @@ mod tests {
             "x.csv: is a spreadsheet or an archive: save it as CSV; a cue is a CSV or MCAP file"
         );
         assert!(told("x.csv", b"\xff\xfet\0i\0").contains("UTF-16: save it as UTF-8"));
-        assert!(told("film.mkv", b"\x1a\x45\xdf\xa3\x01").contains("no text"));
-        assert!(told("hall.toml", b"[show]\n").contains("--config takes it"));
+        assert!(told("film.mkv", b"\x1a\x45\xdf\xa3\x01").contains("is a Matroska or WebM file; a cue is"));
+        assert!(told("x.csv", b"\x01\x02\x03").contains("no text"));
+        assert!(told("ride.bag", b"#ROSBAG V2.0\n\x45\0\0\0").contains("is a bag of ROS 1; a cue is"));
+        assert!(told("ride.db3", b"SQLite format 3\0\x10").contains("(.db3)"));
+        assert!(told("reel.wav", b"RF64\xff\xff\xff\xffWAVEds64").contains("RF64"));
+        assert!(told("x.csv", b"# title: \x1b]0;x\x07\ntime_ms,a1\n0,2\n").contains("3:3: a1: 2 is outside"), "it has always been text");
+        assert!(told("hall.toml", b"[show]\n").contains("--config takes a configuration"));
         assert!(told("x.csv", b"\xef\xbb\xbftime_ms,a1\n0,2\n").contains("2:3: a1: 2 is outside"));
     }
 }

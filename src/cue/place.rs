@@ -6,6 +6,7 @@ use std::os::unix::fs::FileExt as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::declared::HeadLine;
 use super::fault::Place;
 use super::table::{Lines, Splitter, column_of};
 use crate::motion::MAX_AXES;
@@ -126,12 +127,15 @@ fn column_in_header(file: &CueFile, column: &str) -> Option<(u64, usize)> {
     let mut lines = file.lines()?;
     loop {
         let (number, text) = lines.next().ok()??;
-        if text.trim_start().starts_with('#') {
+        if HeadLine::of(text) != HeadLine::Header {
             continue;
         }
         let mut splitter = Splitter::new();
         let cells = splitter.split(text).ok()?;
-        return Some((number, (0..cells.count()).find(|&index| cells.get(index) == column)?));
+        return Some((
+            number,
+            (0..cells.count()).find(|&index| cells.get(index).eq_ignore_ascii_case(column))?,
+        ));
     }
 }
 

@@ -45,7 +45,7 @@ pub enum Problem {
     #[error("number of rows: {0}; a cue needs at least two")]
     TooFewRows(usize),
     /// Bytes that are no text.
-    #[error("not UTF-8 text")]
+    #[error("not UTF-8 text; save it as UTF-8")]
     NotUtf8,
     /// A carriage return that ends no line.
     #[error("a carriage return within a line; lines end in LF or CRLF")]
@@ -64,18 +64,57 @@ pub enum Problem {
         /// What it could say.
         allowed: String,
     },
+    /// A comment that looks like a declaration and is none.
+    #[error("{comment:?} declares nothing; write {write}")]
+    NearlyDeclared {
+        /// The comment.
+        comment: String,
+        /// What it could be.
+        write: String,
+    },
+    /// A key of the metadata that is nearly one that is known.
+    #[error("unknown key; write {0}")]
+    NearKey(&'static str),
     /// A declaration that was made before.
     #[error("declared twice")]
     DeclaredTwice,
     /// A column or field that means nothing to us.
     #[error("unknown column; {0}")]
     UnknownColumn(&'static str),
+    /// A column before that of the time.
+    #[error(
+        "the first column is time_ms or time_s; leave the one before it out, as with index=False in pandas or row.names = FALSE in R"
+    )]
+    BeforeTheTime,
+    /// A column that has no name, and others behind it.
+    #[error("a column without a name; give it one, or leave it out")]
+    NoName,
     /// Columns that something else than commas separates.
     #[error(
-        "the columns are separated by {0}, not by commas; `sed 's/,/./g; s/{1}/,/g' {2} > OUT.csv` makes a cue of it, with points in \
-         numbers"
+        "the columns are separated by {0}, not by commas; `kinocue convert --from csv {1} OUT.csv` makes a cue of it"
     )]
-    Separator(&'static str, &'static str, String),
+    Separator(String, String),
+    /// A number whose only mark may part thousands.
+    #[error(
+        "{0:?} may be a whole number or a broken one, and no other number of the file shows which; save it without marks between thousands, or \
+         with another number of decimals"
+    )]
+    MaybeThousands(String),
+    /// A number with a comma and a point.
+    #[error("{0:?} has a mark between thousands; save it without")]
+    Thousands(String),
+    /// Numbers with commas beside such with points.
+    #[error(
+        "{here:?} beside {there:?} on line {line}: one has a comma and one a point; save it with one of the two, and without marks between thousands"
+    )]
+    TwoMarks {
+        /// The number met.
+        here: String,
+        /// One before it.
+        there: String,
+        /// The line of that.
+        line: u64,
+    },
     /// A column that was there before.
     #[error("the column occurs twice")]
     ColumnTwice,
@@ -181,7 +220,7 @@ pub enum Problem {
     /// The curve between two points leaves the stroke by more than may be held back.
     #[error(
         "the curve reaches {value:.4} at {at}, outside the stroke, {low} to {high}{unit}, by more than 0.001 of it; \
-         add points there, or use interpolation monotone"
+         add points there, or write \"# interpolation: monotone\" above the header"
     )]
     CurveOutsideStroke {
         /// The worst value of the curve there.
@@ -283,8 +322,26 @@ pub enum Problem {
 
 /// What to write instead of a number with a comma.
 fn with_point(text: &str) -> String {
-    let point = text.replace(',', ".");
-    if point != text && point.parse::<f64>().is_ok() { format!("; write {point}") } else { String::new() }
+    let (point, whole) = (text.replace(',', "."), text.replace(',', ""));
+    match (point.parse::<f64>(), whole.parse::<f64>()) {
+        _ if point == text => String::new(),
+        (Ok(_), Ok(_)) if may_part_thousands(text, ',') => {
+            format!("; write {point}, or {whole} if the comma parts thousands")
+        }
+        (Ok(_), _) => format!("; write {point}"),
+        (Err(_), Ok(_)) if may_part_thousands(text, ',') => format!("; write {whole}"),
+        _ => String::new(),
+    }
+}
+
+/// True if that mark may part the thousands of a number: up to three digits, the first above 0, then three behind each mark.
+pub(super) fn may_part_thousands(text: &str, mark: char) -> bool {
+    let mut groups = text.trim_start_matches(['-', '+']).split(mark);
+    let are_digits = |group: &str| group.bytes().all(|byte| byte.is_ascii_digit());
+    let is_first =
+        |group: &str| (1..=3).contains(&group.len()) && !group.starts_with('0') && are_digits(group);
+    let first = groups.next().is_some_and(is_first);
+    first && text.contains(mark) && groups.all(|group| group.len() == 3 && are_digits(group))
 }
 
 /// What a file has to say whose numbers can be no fractions.

@@ -34,10 +34,10 @@ impl<R: Read> Lines<R> {
         Self { input: BufReader::with_capacity(BUFFER, input), line: Vec::new(), number: 0, bytes: 0 }
     }
 
-    /// The next line that is not blank, and its number from 1; nothing at the end of the file.
+    /// The next line that is not blank, as a row of empty cells is too, and its number from 1; nothing at the end of the file.
     pub(super) fn next(&mut self) -> Result<Option<(u64, &str)>, LineFault> {
         while self.read()? {
-            if !self.line.trim_ascii().is_empty() {
+            if !is_blank(&self.line) {
                 let number = self.number;
                 return self.checked().map(|text| Some((number, text)));
             }
@@ -116,6 +116,11 @@ impl<R: Read> Lines<R> {
     }
 }
 
+/// True if a line has nothing in it, in any cell of it.
+fn is_blank(line: &[u8]) -> bool {
+    line.split(|byte| *byte == b',').all(|cell| matches!(cell.trim_ascii(), b"" | b"\"\""))
+}
+
 fn memchr_cr(line: &[u8]) -> Option<usize> {
     // `contains` is vectorised where `position` is not, and hardly any line has one.
     if line.contains(&b'\r') { line.iter().position(|byte| *byte == b'\r') } else { None }
@@ -172,7 +177,7 @@ impl Splitter {
         Ok(Cells { text, gap: 0, ends: &self.ends[..count.min(MAX_CELLS)], count })
     }
 
-    /// The cells of a line that must have as many as the header has columns.
+    /// The cells of a line that must have as many as the header has columns. Behind them a spreadsheet leaves empty ones.
     pub(super) fn split_row<'a>(
         &'a mut self,
         line: &'a str,
@@ -182,6 +187,9 @@ impl Splitter {
         let count = cells.count;
         let problem = match count.cmp(&columns) {
             Ordering::Equal => return Ok(cells),
+            Ordering::Greater if count <= MAX_CELLS && cells.iter().skip(columns).all(str::is_empty) => {
+                return Ok(Cells { ends: &cells.ends[..columns], count: columns, ..cells });
+            }
             Ordering::Less => Problem::RowTooShort { cells: count, columns },
             Ordering::Greater => Problem::RowTooLong { cells: count, columns },
         };
@@ -286,9 +294,10 @@ mod tests {
 
     #[test]
     fn lines_end_in_lf_or_crlf_and_blank_ones_are_passed_over() {
-        let mut lines = Lines::new("\u{feff}a\r\n\r\n  \nb".as_bytes());
+        let mut lines = Lines::new("\u{feff}a\r\n\r\n  \n,, ,\r\n\"\",\"\"\nb\n\",\"\n,,".as_bytes());
         assert_eq!(lines.next().unwrap(), Some((1, "a")));
-        assert_eq!(lines.next().unwrap(), Some((4, "b")));
+        assert_eq!(lines.next().unwrap(), Some((6, "b")));
+        assert_eq!(lines.next().unwrap(), Some((7, "\",\"")), "a cell with a comma is not empty");
         assert_eq!(lines.next().unwrap(), None);
     }
 

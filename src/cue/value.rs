@@ -64,20 +64,27 @@ pub(super) fn part(value: f64, track: TrackId, part: usize, unit: DeclaredUnit) 
     }
 }
 
-/// True if an effect is on: `1` or `0`.
+/// True if an effect is on: `1` or `0`, which tables of numbers write as `1.0` and spreadsheets as `TRUE`.
 pub(super) fn switch(text: &str) -> Result<bool, Problem> {
-    match text {
-        "0" => Ok(false),
-        "1" => Ok(true),
+    match text.parse::<f64>() {
+        Ok(0.0) => Ok(false),
+        Ok(1.0) => Ok(true),
+        _ if text.eq_ignore_ascii_case("true") => Ok(true),
+        _ if text.eq_ignore_ascii_case("false") => Ok(false),
         _ => Err(Problem::Switch(shortened(text))),
     }
 }
 
-/// A raw output word: decimal, or hexadecimal behind `0x`.
+/// A raw output word: decimal, with `.0` where a table of numbers writes that, or hexadecimal behind `0x`.
 pub(super) fn word(text: &str) -> Result<u16, Problem> {
     let (digits, radix) = match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(digits) => (digits, 16),
-        None => (text, 10),
+        None => (
+            text.split_once('.')
+                .filter(|(_, part)| part.bytes().all(|b| b == b'0'))
+                .map_or(text, |(whole, _)| whole),
+            10,
+        ),
     };
     let word = u16::from_str_radix(digits, radix).ok().filter(|_| !digits.starts_with('+'));
     word.filter(|word| outputs(*word).is_ok()).ok_or_else(|| Problem::Word(shortened(text)))
@@ -115,8 +122,30 @@ mod tests {
     #[test]
     fn words_are_decimal_or_hexadecimal() {
         assert_eq!((word("4095"), word("0x0fFF")), (Ok(0x0fff), Ok(0x0fff)));
-        for text in ["4096", "0x1000", "65535", "65536", "-1", "+1", "0x", "fff", "0x+1"] {
+        assert_eq!((word("5.0"), word("4095.000")), (Ok(5), Ok(0x0fff)));
+        for text in [
+            "4096", "0x1000", "65535", "65536", "-1", "+1", "0x", "fff", "0x+1", "5.5", "0x5.0", ".0",
+            "4096.0",
+        ] {
             assert!(word(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_effect_is_on_or_off_however_a_table_writes_it() {
+        for (text, on) in [
+            ("1", true),
+            ("1.0", true),
+            ("TRUE", true),
+            ("true", true),
+            ("0", false),
+            ("0.00", false),
+            ("False", false),
+        ] {
+            assert_eq!(switch(text), Ok(on), "{text}");
+        }
+        for text in ["2", "0.5", "on", "yes", "-1", "nan", "", "1,0"] {
+            assert_eq!(switch(text), Err(Problem::Switch(text.to_owned())), "{text}");
         }
     }
 

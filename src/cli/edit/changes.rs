@@ -340,7 +340,7 @@ fn remedy(after: &Timeline, judge: &Judge, written: &WrittenArgs) -> String {
     let found = mends.into_iter().find(|(_, smooth)| fit::mends(after.cue(), judge, *smooth));
     match found {
         Some((smooth, _)) => {
-            let (cue, seat) = (plain::path(&written.output), written.seat.as_typed());
+            let (cue, seat) = (plain::shell(&written.output), written.seat.as_typed());
             format!("kinocue fit {cue} -o OUT{smooth}{seat} makes one that keeps them")
         }
         None => "kinocue fit cannot mend that; change the edit, or the cue that was edited".to_owned(),

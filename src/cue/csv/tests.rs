@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::cue::{FaultClass, Unit, Vibration};
+use crate::cue::{FaultClass, Interpolation, Unit, Vibration};
 
 fn cue(text: &str) -> Cue {
     read(Path::new("t.csv"), text.as_bytes()).unwrap_or_else(|faults| panic!("{faults}"))
@@ -38,9 +38,18 @@ fn a_whole_cue_is_understood() {
 fn columns_between_semicolons_or_tabs_are_one_fault_with_a_command_that_makes_a_cue_of_them() {
     let told = faults("time_ms;a1;a2\n0;0,5;0\n100;0,6;0\n");
     assert!(told.starts_with("1:1: the columns are separated by semicolons, not by commas; "), "{told}");
-    assert!(told.contains("`sed 's/,/./g; s/;/,/g' t.csv > OUT.csv`"), "{told}");
+    assert!(told.contains("`kinocue convert --from csv t.csv OUT.csv`"), "{told}");
     assert_eq!(told.lines().count(), 1, "{told}");
-    assert!(faults("time_ms\ta1\n0\t0\n").contains("by tabs, not by commas; `sed 's/,/./g; s/\\t/,/g'"));
+    assert!(faults("time_ms\ta1\n0\t0\n").contains("by tabs, not by commas; `kinocue convert"));
+    assert!(
+        faults("# units: mm\nsep=;\ntime_ms;a1\n0;0\n")
+            .starts_with("2:1: the columns are separated by semicolons")
+    );
+    let named = read(Path::new("it's a cue.csv"), "time_ms|a1\n0|0\n".as_bytes()).unwrap_err().to_string();
+    assert!(
+        named.contains("by bars, not by commas; `kinocue convert --from csv 'it'\\''s a cue.csv' OUT.csv`"),
+        "{named}"
+    );
 }
 
 #[test]
@@ -166,6 +175,76 @@ fn declarations_that_are_not_known_are_refused_with_their_line() {
     );
 }
 
+const NOD: &str = "# kinocue-csv: 1\n# title: A nod\n# units: mm, deg\n# interpolation: monotone\n";
+const ROWS: &str =
+    "time_ms,a1,a2,v1_hz,v1_amp,fx_air\n0,0,0,0,0,0\n1000,0.5,0.5,,,\n2000,0.7,0.3,20,0.001,1\n";
+
+#[test]
+fn a_cue_that_a_spreadsheet_saved_again_is_the_cue_that_it_was() {
+    let nod = cue(&format!("{NOD}{ROWS}"));
+    let padded = NOD.replace('\n', ",,,,,\r\n").replace("mm, deg,", "mm, deg");
+    let quoted: String = NOD.lines().map(|line| format!("\"{line}\"\n")).collect();
+    let all_quoted: String =
+        ROWS.lines().map(|line| format!("\"{}\",\"\"\n", line.replace(',', "\",\""))).collect();
+    let tall = "time_ms,a1,a2,v1_hz,v1_amp,fx_air";
+    for text in [
+        format!("{padded}{ROWS}"),
+        format!("{quoted}{ROWS}"),
+        format!("{quoted}{all_quoted}"),
+        format!("{NOD}{ROWS},,,,,\n,,,,,\n"),
+        format!("sep=,\n{NOD},,,,,\n{ROWS}"),
+        format!("{NOD}{}", ROWS.replace('\n', ",,\n")),
+        format!(
+            "{NOD}{}",
+            ROWS.replace(",1\n", ",1.0\n")
+                .replace(",0\n", ",FALSE\n")
+                .replace(tall, "Time_ms,A1,A2,V1_Hz,V1_Amp,FX_air")
+        ),
+    ] {
+        let again = cue(&text);
+        assert_eq!(
+            (again.title(), again.units(), again.interpolation()),
+            (nod.title(), nod.units(), nod.interpolation()),
+            "{text}"
+        );
+        assert_eq!((again.times(), again.positions()), (nod.times(), nod.positions()), "{text}");
+        assert_eq!((again.tracks(), again.effects()), (nod.tracks(), nod.effects()), "{text}");
+    }
+}
+
+#[test]
+fn what_a_spreadsheet_adds_is_told_from_what_a_person_wrote() {
+    assert_eq!(cue("# title: up, down,\ntime_ms,a1\n0,0\n1,0").title(), Some("up, down,"));
+    assert_eq!(
+        cue("# title: up, down,\ntime_ms,a1,a2\n0,0,0\n1,0,0").title(),
+        Some("up, down"),
+        "three cells"
+    );
+    assert_eq!(cue("\"# title: up, down,\"\ntime_ms,a1\n0,0\n1,0").title(), Some("up, down,"));
+    assert!(faults("time_ms,a1\n0,0\n1,0,,7\n2,0").starts_with("3:5: the row has 4 cells, the header 2"));
+    assert!(faults("time_ms,a1\n0,0\n\"# late\"\n1,0").starts_with("3:1: a comment among the rows"));
+    assert!(
+        faults("time_ms,a1\n0,0\n\"1,000\",1\n")
+            .contains("write 1.000, or 1000 if the comma parts thousands")
+    );
+}
+
+#[test]
+fn a_comment_that_is_nearly_a_declaration_is_a_fault_with_the_line_to_write() {
+    assert_eq!(
+        faults("# kinocue-csv: 1\n# unit: mm\n# interpolation = monotone,,,\ntime_ms,a1\n0,0\n1,0.9"),
+        "2:1: \"# unit: mm\" declares nothing; write \"# units: mm\"\n\
+         3:1: \"# interpolation = monotone\" declares nothing; write \"# interpolation: monotone\""
+    );
+    assert!(
+        faults("# unit: inch\ntime_ms,a1\n0,0\n1,0.9")
+            .contains("write \"# units: \" and which; units are fraction")
+    );
+    // A sentence about what is declared is one; a second value for it is not.
+    assert_eq!(cue("# units are mm\n# units: mm\ntime_ms,a1\n0,0\n1,0").units().of(0), Unit::Millimetre);
+    assert!(faults("# units: mm\n# unit = deg\ntime_ms,a1\n0,0\n1,0").starts_with("2:1: \"# unit = deg\""));
+}
+
 #[test]
 fn comments_stand_before_the_header_only() {
     assert!(faults("time_ms,a1\n0,0\n# units: mm\n1,0").starts_with("3:1: a comment among the rows"));
@@ -175,7 +254,7 @@ fn comments_stand_before_the_header_only() {
 fn text_that_is_none_is_refused() {
     assert_eq!(
         faults(b"time_ms,a1\n0,0\n1,\xff\n2,5"),
-        "3:3: not UTF-8 text\n4:3: a1: 5 is outside the stroke, 0 to 1"
+        "3:3: not UTF-8 text; save it as UTF-8\n4:3: a1: 5 is outside the stroke, 0 to 1"
     );
     assert_eq!(
         faults("time_ms,a1\r0,0\r1,0\r"),

@@ -9,6 +9,7 @@ use mcap::records::op;
 use serde::Deserialize;
 use serde::de::DeserializeSeed;
 
+use super::super::declared::is_alike;
 use super::super::fault::{Collector, CueFaults, Place};
 use super::super::header::is_effect_name;
 use super::super::limits::{
@@ -186,11 +187,17 @@ impl McapReading {
     }
 
     fn declare(&mut self, entries: &std::collections::BTreeMap<&str, &str>) {
+        let entry = |key| entries.get(key).copied().unwrap_or("");
+        let known = ["version", "title", "units", "interpolation"];
+        for key in entries.keys().filter(|key| !known.contains(key)) {
+            if let Some(near) = known.into_iter().find(|near| is_alike(key, near)) {
+                self.faults.add(Place::File, Some(key), Problem::NearKey(near));
+            }
+        }
         let mut refuse = |key: &str, value: &str, allowed: String| {
             let problem = Problem::Declaration { value: value::shortened(value), allowed };
             self.faults.add(Place::File, Some(key), problem);
         };
-        let entry = |key| entries.get(key).copied().unwrap_or("");
         if entry("version") != VERSION {
             refuse("version", entry("version"), format!("this program reads version {VERSION}"));
         }

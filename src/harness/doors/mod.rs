@@ -30,6 +30,7 @@ pub const DOORS: &[Door] = &[
     ("sixpack2", wires::sixpack2),
     ("cue-csv", |octets| cues::read("c.csv", octets, &Source::Native)),
     ("cue-mcap", |octets| cues::read("c.mcap", octets, &Source::Native)),
+    ("cue-spreadsheet", |octets| cues::read("c.csv", octets, &Source::Spreadsheet)),
     ("cue-rows", |octets| cues::read("c", octets, &Source::Rows { unit: DeclaredUnit::Millimetre })),
     ("cue-u8", |octets| cues::read("c", octets, &Source::U8 { axes: 3, rate_hz: 50.0 })),
     ("config", |octets| with_text(octets, texts::config)),
