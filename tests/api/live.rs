@@ -6,7 +6,7 @@ use kinocue::harness::control::{Command, Role};
 use serde_json::{Value, json};
 
 use crate::client::{Connection, Request, To, problem};
-use crate::hall::{Hall, with_controller};
+use crate::hall::{Hall, long_status, with_controller};
 
 /// The handshake of a page.
 fn handshake() -> Request {
@@ -17,6 +17,14 @@ fn handshake() -> Request {
         .header("Sec-WebSocket-Key", "dGhlIHNhbXBsZSBub25jZQ==")
 }
 
+/// The same, with the origin that a browser says.
+fn handshake_to(to: &To) -> Request {
+    match to {
+        To::Tcp(address) => handshake().header("Origin", format!("http://{address}")),
+        To::Unix(_) => handshake(),
+    }
+}
+
 /// A page, as far as it has come.
 struct Page(Box<dyn Connection>);
 
@@ -24,7 +32,7 @@ impl Page {
     /// Opens the channel, and says nothing yet.
     fn open(to: &To) -> Self {
         let mut page = Self(to.connect());
-        page.0.write_all(&handshake().header("Origin", origin(to)).bytes(to)).unwrap();
+        page.0.write_all(&handshake_to(to).bytes(to)).unwrap();
         let mut head = Vec::new();
         while !head.ends_with(b"\r\n\r\n") {
             head.push(page.byte());
@@ -62,6 +70,7 @@ impl Page {
         assert_eq!(head[0], 0x81, "text, whole");
         let len = match head[1] {
             126 => usize::from(u16::from_be_bytes([self.byte(), self.byte()])),
+            127 => (0..8).fold(0, |len, _| len << 8 | usize::from(self.byte())),
             len => usize::from(len),
         };
         let mut text = vec![0; len];
@@ -77,13 +86,6 @@ impl Page {
                 return value.clone();
             }
         }
-    }
-}
-
-fn origin(to: &To) -> String {
-    match to {
-        To::Tcp(address) => format!("http://{address}"),
-        To::Unix(_) => "http://localhost".to_owned(),
     }
 }
 
@@ -165,4 +167,30 @@ fn channels_share_the_room_of_event_streams_and_leave_it() {
     pages.pop();
     let again = (0..10_000).map(|_| Page::with(&hall.port(), "booth-token").told().unwrap());
     assert!(again.into_iter().any(|told| told.get("status").is_some()));
+}
+
+#[test]
+fn a_stop_passes_though_the_page_takes_nothing_of_what_it_is_sent() {
+    let hall = Hall::with(long_status(), |api| api);
+    let mut slow = Page::with(&hall.socket(), "");
+    let mut quick = Page::with(&hall.socket(), "");
+    // More than the buffers of a socket hold, and shorter than a stall may last.
+    for _ in 0..20 {
+        quick.next("status");
+    }
+    slow.say("stop");
+    assert!((0..30).any(|_| quick.next("status").is_object() && hall.desk.take_stop()), "it is read and set");
+}
+
+#[test]
+fn a_page_that_sleeps_makes_room() {
+    let hall = Hall::open();
+    let mut asleep = Page::with(&hall.socket(), "");
+    let mut awake = Page::with(&hall.socket(), "");
+    while asleep.told().is_some() {
+        awake.say("echo");
+        awake.next("time");
+    }
+    awake.say("stop");
+    awake.next("stop");
 }
