@@ -80,7 +80,7 @@ pub use stop::{StopSocket, stop_socket};
 
 use access::{Access, AccessTokens};
 use fleet_access::FleetAccess;
-use peer::Peer;
+use peer::{Peer, Users};
 use shared::{Pulse, Shared};
 use socket::SocketFile;
 use streams::Streams;
@@ -288,6 +288,10 @@ fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, [router, of_f
     let mut closing = shared.closing.clone();
     let (alive, mut all_gone) = mpsc::channel(1);
     let hall = serve::ServedHall { router, closing: closing.clone(), alive, log };
+    let users = Users::read();
+    let of_desk = users.clone();
+    let of_link = move |uid| Peer::Fleet(users.name(uid).into());
+    let of_user = move |uid| Peer::Socket(of_desk.name(uid).into());
     runtime.block_on(async move {
         tokio::spawn(Pulse::follow(Arc::clone(&shared)));
         serve::tcp(tcp, &hall).expect("the runtime has just been made, and takes sockets");
@@ -296,9 +300,9 @@ fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, [router, of_f
         if let Some(fleet) = fleet {
             let hall = serve::ServedHall { router: of_fleet, ..hall.clone() };
             tokio::spawn(fleet_wishes::keep_settled(shared));
-            tokio::spawn(serve::local(taken(fleet), Peer::of_link, "the fleet socket", hall));
+            tokio::spawn(serve::local(taken(fleet), of_link, "the fleet socket", hall));
         }
-        tokio::spawn(serve::local(taken(local), Peer::of_user, "the control socket", hall));
+        tokio::spawn(serve::local(taken(local), of_user, "the control socket", hall));
         let _ = closing.wait_for(|&closing| closing).await; // whoever would say so has gone: an end as well
         let _ = tokio::time::timeout(LAST_WORDS, all_gone.recv()).await;
     });

@@ -1,12 +1,13 @@
 //! Who is at the other end of a connection.
 
 use std::fmt;
-use std::fs::File;
 use std::io::Read as _;
 use std::net::IpAddr;
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::control::{Role, Surface, Who};
+use crate::sys::file;
 
 /// Of the table of users no more is read.
 const MAX_USERS_LEN: u64 = 1 << 20;
@@ -20,18 +21,6 @@ pub(super) enum Peer {
     Fleet(Arc<str>),
     /// Another machine, or this one by its loopback address.
     Tcp(IpAddr),
-}
-
-impl Peer {
-    /// The process that the kernel names (`SO_PEERCRED`).
-    pub(super) fn of_user(uid: u32) -> Self {
-        Self::Socket(user(uid).into())
-    }
-
-    /// The same at the fleet socket.
-    pub(super) fn of_link(uid: u32) -> Self {
-        Self::Fleet(user(uid).into())
-    }
 }
 
 impl fmt::Display for Peer {
@@ -53,11 +42,23 @@ pub(super) fn link(name: &str) -> Who {
     Who { role: Role::View, surface: Surface::Fleet, name: name.to_owned() }
 }
 
-/// The name of a user of this machine; `uid N` where the table of users has none.
-pub(super) fn user(uid: u32) -> String {
-    let mut table = String::new();
-    let read = File::open("/etc/passwd").and_then(|file| file.take(MAX_USERS_LEN).read_to_string(&mut table));
-    read.ok().and_then(|_| name_in(&table, uid)).unwrap_or_else(|| format!("uid {uid}"))
+/// The users of this machine, as they were when the sockets opened: whoever serves one reads no file, as a stop may come next.
+#[derive(Debug, Clone)]
+pub(super) struct Users(Arc<str>);
+
+impl Users {
+    /// Reads the table of users.
+    pub(super) fn read() -> Self {
+        let mut table = String::new();
+        let read = file::open(Path::new("/etc/passwd"));
+        let read = read.and_then(|file| file.take(MAX_USERS_LEN).read_to_string(&mut table));
+        Self(read.map_or_else(|_| "".into(), |_| table.into()))
+    }
+
+    /// The name of a user, as the kernel says who it is (`SO_PEERCRED`); `uid N` where the table has none.
+    pub(super) fn name(&self, uid: u32) -> String {
+        name_in(&self.0, uid).unwrap_or_else(|| format!("uid {uid}"))
+    }
 }
 
 /// `name:password:uid:…`, a line each.
@@ -80,7 +81,8 @@ mod tests {
         assert_eq!(name_in(table, 1000).as_deref(), Some("anna"));
         assert_eq!(name_in(table, 1001), None);
         assert_eq!(name_in("an na:x:1:1", 1), None, "what could be taken for more than a name");
-        assert_eq!(user(0), "root");
-        assert_eq!(user(4_000_000_000), "uid 4000000000");
+        let users = Users::read();
+        assert_eq!(users.name(0), "root");
+        assert_eq!(users.name(4_000_000_000), "uid 4000000000");
     }
 }

@@ -67,7 +67,7 @@ impl ServedHall {
 /// Serves a socket of this machine until the server ends; `peer` names who comes by it.
 pub(super) async fn local(
     listener: UnixListener,
-    peer: fn(u32) -> Peer,
+    peer: impl Fn(u32) -> Peer,
     what: &'static str,
     hall: ServedHall,
 ) {

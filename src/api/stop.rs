@@ -12,8 +12,9 @@ use std::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::sockopt::socket_peercred;
 
+use super::ApiError;
+use super::peer::{self, Users};
 use super::socket::{self, SocketFile};
-use super::{ApiError, peer};
 use crate::control::{Handle, Who};
 use crate::sys::clock::Monotonic;
 use crate::sys::file::want_of_files;
@@ -78,6 +79,7 @@ struct StopDesk {
     handle: Handle,
     /// Who somebody is that comes by it, by the name of their user.
     who: fn(&str) -> Who,
+    users: Users,
     peers: VecDeque<Caller>,
     pause_until: Option<MonoTime>,
 }
@@ -95,7 +97,17 @@ impl StopDesk {
         let (listener, file) = socket::unix(path)?;
         let (wake, sleeper) = UnixStream::pair().map_err(ApiError::System)?;
         let (spare, peers) = (sleeper.try_clone().ok(), VecDeque::new());
-        let desk = Self { listener, _file: file, sleeper, spare, handle, who, peers, pause_until: None };
+        let desk = Self {
+            listener,
+            _file: file,
+            sleeper,
+            spare,
+            handle,
+            who,
+            users: Users::read(),
+            peers,
+            pause_until: None,
+        };
         Ok((desk, wake))
     }
 
@@ -135,8 +147,8 @@ impl StopDesk {
 
     /// Reads what the connections said, without waiting for any; before one goes that said nothing for long: this thread may have stood still.
     fn hear(&mut self, now: MonoTime) {
-        let (handle, who) = (&self.handle, self.who);
-        self.peers.retain_mut(|caller| caller.listen(handle, who) && caller.until > now);
+        let Self { handle, who, users, peers, .. } = self;
+        peers.retain_mut(|caller| caller.listen(handle, |uid| who(&users.name(uid))) && caller.until > now);
     }
 
     fn accept(&mut self, now: MonoTime) {
@@ -144,7 +156,7 @@ impl StopDesk {
             match self.listener.accept() {
                 Ok((stream, _)) if stream.set_nonblocking(true).is_ok() => {
                     let mut caller = Caller { stream, line: Vec::new(), until: now + SILENCE };
-                    if caller.listen(&self.handle, self.who) {
+                    if caller.listen(&self.handle, |uid| (self.who)(&self.users.name(uid))) {
                         self.peers.push_back(caller);
                         if self.peers.len() > PEERS {
                             self.parts_with_oldest();
@@ -176,14 +188,14 @@ impl StopDesk {
     /// Has the oldest caller go, once what they said meanwhile was read; whether there was one.
     fn parts_with_oldest(&mut self) -> bool {
         let Some(mut oldest) = self.peers.pop_front() else { return false };
-        oldest.listen(&self.handle, self.who);
+        oldest.listen(&self.handle, |uid| (self.who)(&self.users.name(uid)));
         true
     }
 }
 
 impl Caller {
     /// Takes in what is there; whether more is to come.
-    fn listen(&mut self, handle: &Handle, who: fn(&str) -> Who) -> bool {
+    fn listen(&mut self, handle: &Handle, who: impl Fn(u32) -> Who) -> bool {
         let mut bytes = [0; LINE];
         loop {
             match self.stream.read(&mut bytes) {
@@ -199,8 +211,8 @@ impl Caller {
             }
         }
         let reply = if self.is_stop() {
-            handle.stop(); // before anything that reads a file
-            handle.note_stop(who(&self.user()));
+            handle.stop(); // before all else
+            handle.note_stop(who(self.uid()));
             "stopping\n"
         } else {
             "send the line: stop\n"
@@ -214,9 +226,9 @@ impl Caller {
         line.trim_ascii().eq_ignore_ascii_case(b"stop")
     }
 
-    fn user(&self) -> String {
-        socket_peercred(&self.stream)
-            .map_or_else(|_| "unknown".to_owned(), |peer| peer::user(peer.uid.as_raw()))
+    /// Whoever calls; one whom the kernel does not name is nobody's number.
+    fn uid(&self) -> u32 {
+        socket_peercred(&self.stream).map_or(u32::MAX, |peer| peer.uid.as_raw())
     }
 }
 
@@ -266,7 +278,7 @@ mod tests {
         assert!(hall.desk.take_stop());
         let noted = hall.inbox.next(Duration::ZERO).unwrap().desired;
         assert_eq!((noted.ask, noted.who.role), (Command::Stop, Role::Engineer));
-        assert_eq!(noted.who.name, peer::user(rustix::process::getuid().as_raw()));
+        assert_eq!(noted.who.name, Users::read().name(rustix::process::getuid().as_raw()));
         assert_eq!(say(&hall.path, " STOP\r\n"), "stopping\n");
         assert_eq!(say(&hall.path, "stop"), "stopping\n", "a line without its end");
     }

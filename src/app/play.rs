@@ -101,7 +101,7 @@ impl Play {
             staged.headroom = chasing(staged.headroom, &rules);
         }
         let purpose = Purpose::Play { silent: manner.silent, film };
-        let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default(), None)?;
+        let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Default::default(), None)?;
         let desk = runtime.control().desk;
         staged.mixes.iter().enumerate().for_each(|(lane, mix)| desk.set(lane, *mix));
         Ok(Self { runtime, staged, holds: false, recording: None, roll: Arc::default(), links: Vec::new() })

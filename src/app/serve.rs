@@ -7,7 +7,6 @@ use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::channel;
 use std::thread::Builder;
 use std::time::Duration;
@@ -33,6 +32,7 @@ use crate::health::Why;
 use crate::journal::{Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::{Line, Log, Priority};
+use crate::rt::Calls;
 use crate::sd::{self, WatchdogThread};
 use crate::settings::SettingsFile;
 use crate::state::LedBefore;
@@ -211,7 +211,8 @@ fn serve_halls(
     let library = open_library(&config, &places.config)?;
     let (mut numbers, took_over) = before(pair.as_ref(), &config);
     let mut film = HallFilm::default();
-    let opening = Opening { config: &places.config, leave: &signals.leave, pair: pair.as_ref() };
+    let calls = Calls::ended_by(&signals.leave);
+    let opening = Opening { config: &places.config, calls: &calls, pair: pair.as_ref() };
     let mut runtime = opening.first(&config, led_before(crashed, took_over.as_ref()), &numbers, &mut film)?;
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let (settings_file, kept) = SettingsFile::open(&places.state);
@@ -256,7 +257,7 @@ fn serve_halls(
         };
         // Also of controllers that come back with a later configuration.
         numbers.extend(left.closed.numbers.clone());
-        let opening = Opening { config: &ports.config, leave: &ports.signals.leave, pair: pair.as_ref() };
+        let opening = Opening { config: &ports.config, calls: &calls, pair: pair.as_ref() };
         (runtime, config) = opening.reopen(next, config, &numbers, &mut ports.carryover, &mut film)?;
         surfaces.take_tokens(&config);
     };
@@ -302,7 +303,7 @@ fn before(pair: Option<&Pair>, config: &Config) -> (Numbers, Option<TookOver>) {
 struct Opening<'a> {
     /// The file of the configuration.
     config: &'a Path,
-    leave: &'a Arc<AtomicBool>,
+    calls: &'a Calls,
     pair: Option<&'a Pair>,
 }
 
@@ -331,7 +332,7 @@ impl Opening<'_> {
     ) -> Result<Runtime, RuntimeError> {
         let purpose = Purpose::Hall { before: ended };
         let lead = self.pair.map(Pair::lead);
-        let runtime = Runtime::open(Arc::clone(config), purpose, numbers, self.leave, lead)?;
+        let runtime = Runtime::open(Arc::clone(config), purpose, numbers, self.calls, lead)?;
         if let Some(pair) = self.pair {
             pair.shows(&runtime.control().live, numbers);
         }
@@ -440,8 +441,8 @@ mod tests {
         let (next, before) = (hall("192.0.2.1:0"), hall("127.0.0.1:0"));
         let mut carryover = Carryover::default();
         let mut film = HallFilm::default();
-        let leave = Arc::default();
-        let opening = Opening { config: Path::new("hall.toml"), leave: &leave, pair: None };
+        let calls = Calls::default();
+        let opening = Opening { config: Path::new("hall.toml"), calls: &calls, pair: None };
         let (_house, config) =
             opening.reopen(next, Arc::clone(&before), &Numbers::new(), &mut carryover, &mut film).unwrap();
         assert!(Arc::ptr_eq(&config, &before));

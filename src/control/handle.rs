@@ -11,7 +11,7 @@ use tokio::sync::{oneshot, watch};
 
 use super::posted::{Posted, gone};
 use super::{Code, Command, Problem, SharedClock, Status, Who};
-use crate::rt::Desk;
+use crate::rt::{Calls, Desk};
 use crate::state::State;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -91,42 +91,31 @@ impl Inbox {
     }
 }
 
+/// The supervisor of the hall as it was opened last; `None` before it runs.
+type Keeper = Arc<RwLock<Option<Thread>>>;
+
 /// Where the supervisor puts the newest status.
 #[derive(Debug)]
-pub struct StatusSource(watch::Sender<Arc<Status>>, Arc<RwLock<Led>>);
-
-/// The hall of now, which is another with every configuration.
-#[derive(Debug)]
-struct Led {
-    desk: Arc<Desk>,
-    /// Who is woken by each ask; `None` before it runs.
-    supervisor: Option<Thread>,
+pub struct StatusSource {
+    status: watch::Sender<Arc<Status>>,
+    keeper: Keeper,
     clock: SharedClock,
 }
 
 impl StatusSource {
-    /// From now on a stop goes to that desk: the hall was opened anew. So does one that was asked while the hall before closed: nobody takes it
-    /// there any more, and whoever asked was told that it is done.
-    pub(crate) fn lead(&self, desk: Arc<Desk>) {
-        let mut led = self.1.write().unwrap_or_else(PoisonError::into_inner);
-        if std::mem::replace(&mut led.desk, desk).take_stop() {
-            led.desk.stop();
-        }
-    }
-
-    /// From now on that thread is woken by each ask. What was asked before is there to be taken.
+    /// From now on that thread, the supervisor's own, is woken by each ask. What was asked before is there to be taken.
     pub(crate) fn wakes(&self, supervisor: Thread) {
-        self.1.write().unwrap_or_else(PoisonError::into_inner).supervisor = Some(supervisor);
+        *self.keeper.write().unwrap_or_else(PoisonError::into_inner) = Some(supervisor);
     }
 
     /// How far the wall clock may be off, as surfaces are told.
     pub(crate) fn clock(&self) -> SharedClock {
-        self.1.read().unwrap_or_else(PoisonError::into_inner).clock.clone()
+        self.clock.clone()
     }
 
     /// Makes a status known to all who watch.
     pub fn put(&self, status: Arc<Status>) {
-        self.0.send_replace(status);
+        self.status.send_replace(status);
     }
 }
 
@@ -135,27 +124,32 @@ impl StatusSource {
 pub struct Handle {
     asks: SyncSender<Asked>,
     status: watch::Receiver<Arc<Status>>,
-    led: Arc<RwLock<Led>>,
+    calls: Calls,
+    keeper: Keeper,
+    clock: SharedClock,
 }
 
-/// The ends of a hall: for its surfaces, and for its supervisor. `desk` is the tick thread's.
+/// The ends of a hall: for its surfaces, and for its supervisor. `desk` is the tick thread's; the hall's next one is asked by the same
+/// flags.
 #[must_use]
 pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
     let (asks, inbox) = mpsc::sync_channel(ASKS);
     let (source, status) = watch::channel(Arc::new(first));
-    let led = Arc::new(RwLock::new(Led { desk, supervisor: None, clock: SharedClock::default() }));
-    (Handle { asks, status, led: Arc::clone(&led) }, Inbox(inbox), StatusSource(source, led))
+    let (calls, keeper, clock) = (desk.calls().clone(), Keeper::default(), SharedClock::default());
+    let source = StatusSource { status: source, keeper: Arc::clone(&keeper), clock: clock.clone() };
+    (Handle { asks, status, calls, keeper, clock }, Inbox(inbox), source)
 }
 
 impl Handle {
     /// Where it is put how far the wall clock may be off.
     pub(crate) fn clock(&self) -> SharedClock {
-        self.led.read().unwrap_or_else(PoisonError::into_inner).clock.clone()
+        self.clock.clone()
     }
 
-    /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
+    /// Has the seats come to rest: a flag that the tick thread reads every tick, be it that of the hall which is opened next. Waits for
+    /// nothing and cannot fail.
     pub(crate) fn stop(&self) {
-        self.led.read().unwrap_or_else(PoisonError::into_inner).desk.stop();
+        self.calls.stop();
     }
 
     /// Leaves word of a stop for the journal, without waiting: where there is no room, it is not noted.
@@ -167,9 +161,11 @@ impl Handle {
         self.wake();
     }
 
-    /// Has the supervisor look into the queue.
+    /// Has the supervisor check the queue. One that is just being named checks it by itself, and nobody waits for that.
     fn wake(&self) {
-        if let Some(supervisor) = &self.led.read().unwrap_or_else(PoisonError::into_inner).supervisor {
+        if let Ok(keeper) = self.keeper.try_read()
+            && let Some(supervisor) = &*keeper
+        {
             supervisor.unpark();
         }
     }
@@ -302,17 +298,23 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_that_the_hall_before_did_not_take_any_more_is_one_of_the_hall_that_was_opened_anew() {
-        let [before, next] = [(); 2].map(|()| Arc::new(Desk::new(std::iter::empty())));
-        let (handle, _inbox, source) = handle(Arc::clone(&before), Status::starting("Hall 1"));
-        source.lead(Arc::clone(&before));
-        assert!(!before.take_stop(), "nobody asked for one");
-        handle.stop();
-        source.lead(Arc::clone(&next));
-        assert!(next.take_stop());
-        source.lead(before);
-        handle.stop();
-        assert!(!next.take_stop());
+    fn a_stop_and_its_note_wait_for_nobody_who_opens_the_hall_anew() {
+        let (handle, inbox, source) = {
+            let desk = Arc::new(Desk::new(std::iter::empty()));
+            handle(desk, Status::starting("Hall 1"))
+        };
+        let next = Desk::new(std::iter::empty()).called_by(handle.calls.clone());
+        let held = source.keeper.write().unwrap(); // as by a reload that stands still
+        let (tell, told) = mpsc::channel();
+        std::thread::spawn(move || {
+            handle.stop();
+            handle.note_stop(who(Role::View));
+            tell.send(handle.post(who(Role::View), Command::Stop).is_ok()).unwrap();
+        });
+        assert_eq!(told.recv_timeout(Duration::from_secs(20)), Ok(true));
+        assert!(next.take_stop(), "nobody took it, so it is one of the hall that is opened");
+        drop(held);
+        assert_eq!([(); 2].map(|()| inbox.next(NOW).unwrap().desired.ask), [const { Command::Stop }; 2]);
     }
 
     #[test]

@@ -10,11 +10,31 @@ use crate::published::atomics::{AtomicBool, AtomicI32, AtomicU32, Ordering};
 /// What operators set. Anyone may write; the tick thread reads all of it every tick.
 #[derive(Debug)]
 pub struct Desk {
-    stop: AtomicBool,
+    calls: Calls,
     trim_ms: AtomicI32,
     strips: Box<[Strip]>,
+}
+
+/// What is asked of a hall whichever configuration it was opened with: flags that outlive each of its desks.
+#[derive(Debug, Clone, Default)]
+pub struct Calls {
+    /// The lanes are to come to rest.
+    stop: Arc<AtomicBool>,
     /// Set by a signal: the program is to end.
     ended: Arc<Signal>,
+}
+
+impl Calls {
+    /// Those of a program that a signal ends by that flag.
+    #[must_use]
+    pub(crate) fn ended_by(signal: &Arc<Signal>) -> Self {
+        Self { ended: Arc::clone(signal), ..Self::default() }
+    }
+
+    /// Asks for the lanes to come to rest at once: one store, which waits for nothing and cannot fail.
+    pub(crate) fn stop(&self) {
+        self.stop.store(true, Ordering::Release);
+    }
 }
 
 /// What is set for one seat.
@@ -40,25 +60,30 @@ impl Desk {
         };
         let mixes: Vec<Mix> = mixes.collect();
         let desk = Self {
-            stop: AtomicBool::new(false),
+            calls: Calls::default(),
             trim_ms: AtomicI32::new(0),
             strips: mixes.iter().map(strip).collect(),
-            ended: Arc::default(),
         };
         mixes.into_iter().enumerate().for_each(|(lane, mix)| desk.set(lane, mix));
         desk
     }
 
-    /// The same for a program that a signal ends by that flag.
+    /// The same desk, asked by those flags.
     #[must_use]
-    pub(crate) fn ended_by(self, signal: Arc<Signal>) -> Self {
-        Self { ended: signal, ..self }
+    pub(crate) fn called_by(self, calls: Calls) -> Self {
+        Self { calls, ..self }
+    }
+
+    /// The flags that it is asked by.
+    #[must_use]
+    pub(crate) const fn calls(&self) -> &Calls {
+        &self.calls
     }
 
     /// Whether a signal wants the program to end.
     #[must_use]
     pub(crate) fn is_ended(&self) -> bool {
-        self.ended.load(Ordering::Relaxed)
+        self.calls.ended.load(Ordering::Relaxed)
     }
 
     /// How many lanes it has.
@@ -132,13 +157,14 @@ impl Desk {
 
     /// Asks for the lanes to come to rest at once.
     pub fn stop(&self) {
-        self.stop.store(true, Ordering::Release);
+        self.calls.stop();
     }
 
     /// Takes the request for a stop, if there is one.
     #[must_use]
     pub fn take_stop(&self) -> bool {
         // A plain load in all the ticks in which there is none.
-        self.stop.load(Ordering::Acquire) && self.stop.swap(false, Ordering::AcqRel)
+        let stop = &self.calls.stop;
+        stop.load(Ordering::Acquire) && stop.swap(false, Ordering::AcqRel)
     }
 }

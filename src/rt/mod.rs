@@ -27,6 +27,7 @@ mod withdrawn;
 pub use acks::{Accounts, AckLoop};
 pub use broadcast::Broadcast;
 pub use conductor::Conductor;
+pub(crate) use desk::Calls;
 pub use desk::Desk;
 pub use film::FilmLead;
 pub(crate) use film::FilmStart;

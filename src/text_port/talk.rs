@@ -118,6 +118,9 @@ impl TextTalk {
             Err(TextFault::Refused(problem)) => return (Read::Answered(Err(problem)), Then::Listen),
             Err(TextFault::NoOrder(problem)) => return (Read::Answered(Err(problem)), Then::End),
         };
+        if order == TextOrder::Command(Command::Stop) {
+            self.hall.stop(); // before all else
+        }
         self.place.show(&self.who.name);
         let read = match order {
             TextOrder::Status => Read::Answered(Ok(self.hall.status())),

@@ -96,9 +96,14 @@ pub(crate) fn open<T>(
     }
     ether.world().outside = kind.outside;
     let halves = over(Arc::new(ether.clone()));
-    let mut runtime =
-        Runtime::over(Arc::clone(&book.config), Purpose::Hall { before }, numbers, &Arc::default(), halves)
-            .expect("the hall opens");
+    let mut runtime = Runtime::over(
+        Arc::clone(&book.config),
+        Purpose::Hall { before },
+        numbers,
+        &Default::default(),
+        halves,
+    )
+    .expect("the hall opens");
     let recording = ether.world().recordings.is_some().then(|| HallRecording::tap(&mut runtime));
     let origin = MonoTime::from_nanos(ether.ns() + 20 * MS);
     let period = Rate::from_hz(kind.hz).period();

@@ -30,9 +30,9 @@ use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::record::{Judging, Taps};
 use crate::rt::{
-    AckLoop, Broadcast, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail, MailEnds,
-    NewsIn, Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch, line,
-    mailboxes,
+    AckLoop, Broadcast, Calls, Command, Conductor, Desk, FilmLead, Line, LinkEnd, LinkLoop, Live, Mail,
+    MailEnds, NewsIn, Order, Outlets, Places, PlanLoop, Planning, Port, Spinning, Standby, TickLoop, Watch,
+    line, mailboxes,
 };
 use crate::state::LedBefore;
 use crate::sys::clock::Monotonic;
@@ -163,7 +163,7 @@ pub(crate) struct RuntimeEnd {
 }
 
 impl Runtime {
-    /// Opens the frame port for a configuration. Where `signals` ask for the end, the seats park and the hall closes, even if
+    /// Opens the frame port for a configuration. Where `calls` ask for the end, the seats park and the hall closes, even if
     /// whoever leads it does not hear them. Where there is a `lead`, nothing leaves once that is over.
     ///
     /// # Errors
@@ -172,7 +172,7 @@ impl Runtime {
         config: Arc<Config>,
         purpose: Purpose,
         numbers: &Numbers,
-        signals: &Arc<AtomicBool>,
+        calls: &Calls,
         lead: Option<Arc<Lead>>,
     ) -> Result<Self, RuntimeError> {
         // Refused, the ports may still open; if not, their error says what to do.
@@ -181,7 +181,7 @@ impl Runtime {
         let (sender, receiver) = boot::bind(&config)?;
         let halves = (sender.led_by(lead), receiver);
         let crowding = boot::crowding(&config);
-        let mut runtime = Self::over_all(config, purpose, numbers, signals, halves, ports)?;
+        let mut runtime = Self::over_all(config, purpose, numbers, calls, halves, ports)?;
         runtime.handle.crowding = crowding;
         Ok(runtime)
     }
@@ -194,10 +194,10 @@ impl Runtime {
         config: Arc<Config>,
         purpose: Purpose,
         numbers: &Numbers,
-        signals: &Arc<AtomicBool>,
+        calls: &Calls,
         halves: (Sender, Receiver),
     ) -> Result<Self, RuntimeError> {
-        Self::over_all(config, purpose, numbers, signals, halves, Vec::new())
+        Self::over_all(config, purpose, numbers, calls, halves, Vec::new())
     }
 
     /// The same with its links, by ports that are open.
@@ -208,13 +208,13 @@ impl Runtime {
         config: Arc<Config>,
         purpose: Purpose,
         numbers: &Numbers,
-        signals: &Arc<AtomicBool>,
+        calls: &Calls,
         (sender, receiver): (Sender, Receiver),
         ports: Vec<Port>,
     ) -> Result<Self, RuntimeError> {
         let manner = Manner { level: 0.0, silent: purpose.is_silent() };
         let (engine, lanes, planner, timeline) = boot::open(&config, numbers, manner)?.split();
-        let desk = Arc::new(Desk::new(lanes.iter().map(|_| Mix::FULL)).ended_by(Arc::clone(signals)));
+        let desk = Arc::new(Desk::new(lanes.iter().map(|_| Mix::FULL)).called_by(calls.clone()));
         let broadcast = Broadcast::of(&config, purpose.is_silent());
         let live = Arc::new(Live::new(lanes.len()).with_broadcast(broadcast));
         let rate = Rate::from_hz(config.show.rate_hz);

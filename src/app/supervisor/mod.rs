@@ -177,7 +177,6 @@ impl Supervisor {
         let now = Monotonic.now();
         let carryover = std::mem::take(&mut ports.carryover);
         let settings = carryover.settings(&runtime.config);
-        ports.source.lead(Arc::clone(&runtime.desk));
         job::examine(library.clone());
         let mut hall = HallContext::new(&runtime, settings, now);
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());

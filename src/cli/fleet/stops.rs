@@ -54,8 +54,9 @@ impl Link {
             let (message, asked) = (Message { payload: Bytes::new(), ..message }, Instant::now());
             tokio::spawn(async move {
                 let who = message.subject.rsplit('.').next().unwrap_or_default();
+                let stopped = link.stop().await; // before a terminal, which may stand still
                 print::tell(&format!("{who} asks for a stop"));
-                match link.stop().await {
+                match stopped {
                     Ok(()) => link.answer(&message, stopping()).await,
                     Err(_) if link.is_of_two() => drop(wait.try_send((asked, message))),
                     Err(why) => link.answer(&message, away(&why)).await,

@@ -358,8 +358,9 @@ fn homed<B: Bus>(
     let staged = StagedShow::new(&config, Timeline::new(cue.clone()), show, manner).expect("there is a way");
     let purpose = Purpose::Play { silent: false, film: None };
     let network = crate::net::over(Arc::new(Nobody));
-    let runtime = Runtime::over_all(config, purpose, &Numbers::new(), &Arc::default(), network, vec![port])
-        .expect("it opens");
+    let runtime =
+        Runtime::over_all(config, purpose, &Numbers::new(), &Default::default(), network, vec![port])
+            .expect("it opens");
     let origin = NOW.get() + Duration::from_millis(20);
     runtime.stepped(&Jumps, origin, |runtime, _, loops| {
         let desk = Arc::clone(&runtime.desk);
