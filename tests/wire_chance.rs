@@ -4,7 +4,7 @@ use kinocue::harness::motion::Pulses;
 use kinocue::wire::{
     Access, Code, FrameNo, FromController, ImaxMotion, ImaxRegisters, MAX_LEN, Message, MotionReply,
     MotionRequest, PerAxis, ReadRequest, RegisterReply, RegisterReport, ReplyCode, ServoRead, ServoReply,
-    ServoWrite, Status, Timing, Vibration, VibrationPort, Words, WriteRequest,
+    ServoWrite, Status, Timing, Vibration, VibrationPort, Words, WriteRequest, is_printed_imax,
 };
 use proptest::prelude::*;
 
@@ -174,13 +174,12 @@ fn assert_told_apart(bytes: &[u8]) {
     let told = FromController::parse(VibrationPort::Two, bytes);
     let (reply, registers) = (MotionReply::parse(bytes).ok(), RegisterReply::parse(bytes).ok());
     let (status, report) = (Status::parse(bytes).ok(), RegisterReport::parse(bytes).ok());
-    let is_wide = ImaxRegisters::parse(bytes).is_ok_and(|reply| reply.is_wide());
     let alone = match (reply, registers, status, report) {
         (Some(reply), None, None, None) => FromController::Reply(reply),
         (None, Some(registers), None, None) => FromController::Registers(registers),
         (None, None, Some(status), None) => FromController::Status(status),
         (None, None, None, Some(report)) => FromController::Report(report),
-        (None, None, None, None) if is_wide => FromController::WideRegisters,
+        (None, None, None, None) if is_printed_imax(bytes) => FromController::PrintedImax,
         (None, None, None, None) => FromController::Other,
         more => panic!("two readers take it: {more:?}"),
     };

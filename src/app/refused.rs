@@ -64,6 +64,13 @@ pub enum PlayError {
     /// Controllers that drive other axes than their seats have: name, what they drive, what the seat has.
     #[error("{}; nothing was sent", axes(.0))]
     Axes(Vec<(String, u16, usize)>),
+    /// Controllers that answer in another layout than that of our frames.
+    #[error(
+        "{}: answers as the IMAX manual prints (registers of 32 bits), and would take each frame for another position and time; nothing \
+         was sent. Leave it out, and send a capture (`kinocue decode --dialect imax`) to the maintainers of this program",
+        .0.join(", ")
+    )]
+    Foreign(Vec<String>),
     /// Seats that do not tell where all of their axes are, and cannot be known to have come to park.
     #[error(
         "{}: does not report the positions of all its axes, and cannot be brought to park for certain: it does not ack, or its longest \

@@ -122,6 +122,7 @@ impl PlayScript {
         let _ = realtime::normal_priority();
         if reads {
             self.read_positions();
+            self.look_at_layouts()?;
             self.look_at_axes()?;
         }
         if holds {
@@ -198,6 +199,13 @@ impl PlayScript {
             self.handle.live.want(now);
             self.wait_until(now + READ_WAIT, all_rest);
         }
+    }
+
+    /// Refuses controllers to which a frame would mean something else than it says.
+    fn look_at_layouts(&self) -> Result<(), PlayError> {
+        let is_foreign = |lane: usize| self.handle.live.evidence(lane).is_some_and(|it| it.is_foreign());
+        let foreign = self.names(is_foreign);
+        if foreign.is_empty() { Ok(()) } else { Err(PlayError::Foreign(foreign)) }
     }
 
     /// Refuses controllers that said that they drive other axes than their seats have.

@@ -8,10 +8,13 @@ use crate::time::MonoTime;
 
 impl Belief {
     /// True if a frame to `pose`, to be reached in so many milliseconds, keeps the greatest speed of every axis from wherever
-    /// it may be. Losses shorter than [`super::GAP`] are left out: while acks come, an axis is where its last frame leads.
+    /// it may be, and its controller is not known to read frames otherwise. Losses shorter than [`super::GAP`] are left out: while acks come, an axis is where its last frame leads.
     #[must_use]
     pub(crate) fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
         let time = f64::from(lasts_ms);
+        if self.foreign {
+            return false;
+        }
         if self.is_quiet(now) && !self.is_fresh(now) && self.within != 0 {
             return false;
         }

@@ -62,7 +62,7 @@ type ReadingWords = SharedWords<{ MAX_AXES + 3 }>;
 /// them, and of 64 lanes they take 8 lines of its cache.
 #[derive(Debug, Default)]
 pub struct EvidenceTable {
-    /// The number of the newest frame that was acked, and [`SOME`]; 0 where there is none.
+    /// The number of the newest frame that was acked, and [`SOME`]; 0 where there is none. [`FOREIGN`] beside it.
     acked: Box<[SharedWord]>,
     readings: Box<[ReadingWords]>,
 }
@@ -92,6 +92,7 @@ pub struct LaneEvidence<'t> {
 }
 
 const SOME: u64 = 1 << 32;
+const FOREIGN: u64 = 1 << 33;
 const RESTS: u64 = 1 << 16;
 const MOVES: u64 = 1 << 17;
 const BY: u32 = 18;
@@ -108,8 +109,19 @@ impl LaneEvidence<'_> {
     /// Notes an ack; an older one than the newest says nothing new.
     pub fn on_ack(&self, frame: FrameNo) {
         if self.acked().is_none_or(|newest| frame.since(newest) > 0) {
-            self.acked.put(SOME | u64::from(frame.0));
+            self.acked.put(SOME | u64::from(frame.0) | (self.acked.get() & FOREIGN));
         }
+    }
+
+    /// True if its controller answers in another layout than that of our frames, to which these mean other positions and times.
+    #[must_use]
+    pub(crate) fn is_foreign(&self) -> bool {
+        self.acked.get() & FOREIGN != 0
+    }
+
+    /// Notes whether it does. One thread alone may.
+    pub(crate) fn on_layout(&self, is_foreign: bool) {
+        self.acked.put((self.acked.get() & !FOREIGN) | if is_foreign { FOREIGN } else { 0 });
     }
 
     /// Which reading is the newest; 0 before the first.

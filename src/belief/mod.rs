@@ -90,6 +90,8 @@ pub(crate) struct Belief {
     own: u16,
     /// Those of them that are known to be within the spans.
     within: u16,
+    /// Its controller answers in another layout than that of our frames: none may go there.
+    foreign: bool,
     known: Known,
     spans: Spans,
     history: History,
@@ -131,6 +133,7 @@ impl Belief {
             near,
             own: window.own(),
             within: 0,
+            foreign: false,
             known: Known::Nothing,
             spans: Spans::over(GAP + window.acked_after()),
             history: History::at([0.0; MAX_AXES]),
@@ -171,6 +174,7 @@ impl Belief {
 
     /// Takes up what the ack thread has seen so far; all that arrived before `told` is in it.
     pub(crate) fn look(&mut self, evidence: LaneEvidence<'_>, told: MonoTime, now: MonoTime) -> Found {
+        self.foreign = evidence.is_foreign();
         if let Some(acked) = evidence.acked()
             && self.acked.is_none_or(|before| acked.since(before) > 0)
         {

@@ -213,7 +213,7 @@ impl<'a> HomingReport<'a> {
 
 fn tell(error: &HomeError, name: &str, troubles: &mut Troubles) {
     let silent = match error {
-        HomeError::Order(fault) => !fault.refused(),
+        HomeError::Order(fault) => !fault.refused() && !fault.is_foreign(),
         HomeError::Timeout { dpf0, .. } => dpf0.is_none(),
         _ => false,
     };

@@ -237,6 +237,7 @@ pub(super) fn exit_of(error: &PlayError) -> Exit {
         PlayError::Runtime(RuntimeError::PortTaken(_)) => Exit::TryAgain,
         PlayError::Runtime(RuntimeError::Link(_)) | PlayError::Silent(_) => Exit::Unavailable,
         PlayError::Limits { .. } => Exit::CheckFailed,
+        PlayError::Foreign(_) => Exit::Refused,
         PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
         PlayError::Unsure(_) | PlayError::Unplaced(_) | PlayError::NotHome(_) | PlayError::UnknownTurn(_) => {
             Exit::TryAgain

@@ -238,8 +238,9 @@ impl Troubles {
         match result {
             Ok(answer) => Ok((request, answer)),
             Err(fault) => {
-                self.refused |= fault.refused();
-                self.silent |= !fault.refused();
+                let answered = fault.refused() || fault.is_foreign();
+                self.refused |= answered;
+                self.silent |= !answered;
                 // The silence before it has been told.
                 if !matches!(fault, Fault::Unasked { .. }) {
                     print::tell(&format!("kinocue: {}: {fault}", targets.name(lane)));

@@ -14,7 +14,7 @@ use crate::net::SendFault;
 use crate::time::MonoTime;
 use crate::wire::{
     Access, Code, DeviceError, Dialect, MAX_LEN, Message, RegisterReply, ReplyCode, ServoReply, WireError,
-    Words,
+    Words, is_printed_imax,
 };
 
 /// How late an answer may be. The protocol says nothing; the books of a show call an ack lost after the same time.
@@ -218,10 +218,23 @@ impl Exchange {
         one.owed.push(Owed { id, answers: tries, until: sent + LATEST });
         let result = Err(Fault::Silent { request: request.clone(), tries, timeout, odd });
         self.outcomes[index] = Some(RequestOutcome { lane, request, result });
-        for (index, request) in one.queue.drain(..) {
+        self.drop_queue(lane);
+    }
+
+    fn drop_queue(&mut self, lane: usize) {
+        for (index, request) in self.lanes[lane].queue.drain(..) {
             let result = Err(Fault::Unasked { request: request.clone() });
             self.outcomes[index] = Some(RequestOutcome { lane, request, result });
         }
+    }
+
+    /// Ends all that is asked of a controller whose answers nobody can read: it would answer nothing else.
+    fn on_foreign(&mut self, lane: usize) {
+        self.lanes[lane].odds.malformed += 1;
+        let Some(Flight { index, request, .. }) = self.lanes[lane].flight.take() else { return };
+        let result = Err(Fault::Foreign { request: request.clone() });
+        self.outcomes[index] = Some(RequestOutcome { lane, request, result });
+        self.drop_queue(lane);
     }
 
     /// Notes that the kernel did not take what was due.
@@ -246,6 +259,7 @@ impl Exchange {
         match Reply::parse(bytes) {
             Ok(Some(reply)) => self.on_reply(lane, &reply, at),
             Ok(None) => return false,
+            Err(_) if is_printed_imax(bytes) => self.on_foreign(lane),
             Err(error) => {
                 self.lanes[lane].odds.malformed += 1;
                 self.note(lane, Odd::Malformed(error));

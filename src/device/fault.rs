@@ -35,21 +35,38 @@ pub enum Fault {
         /// By which the code is to be read.
         dialect: Dialect,
     },
+    /// What it answered is in the layout that the IMAX manual prints, which says nothing of the controller's state to a reader of
+    /// another.
+    #[error("cannot {request}: {PRINTED}")]
+    Foreign {
+        /// What was asked.
+        request: Request,
+    },
     /// No message of the controller's dialect says this.
     #[error("cannot {request}: mbox controllers have no message for it")]
     NoWay {
         /// What should have been asked.
         request: Request,
     },
-    /// It was not asked, because the controller had not answered an earlier request.
-    #[error("cannot {request}: not sent, as the controller had stopped answering")]
+    /// It was not asked, because an earlier request had no answer, or one that cannot be read.
+    #[error("cannot {request}: not sent, as an earlier request had no answer that can be read")]
     Unasked {
         /// What should have been asked.
         request: Request,
     },
 }
 
+/// What a controller does that speaks as the IMAX manual prints.
+pub(crate) const PRINTED: &str = "the controller answers as the IMAX manual prints (registers of 32 bits, motion without frame numbers), which \
+                                  is neither smc nor mbox; do not play to it";
+
 impl Fault {
+    /// True if the controller answered in a layout that nothing here writes.
+    #[must_use]
+    pub(crate) const fn is_foreign(&self) -> bool {
+        matches!(self, Self::Foreign { .. })
+    }
+
     /// True if the controller answered, but would not.
     #[must_use]
     pub(crate) const fn refused(&self) -> bool {

@@ -250,7 +250,9 @@ impl SeatHoming {
                 self.complete = if self.dpf0 == Some(COMPLETE) { self.complete + 1 } else { 0 };
                 self.check(&answer);
             }
-            Err(fault) if fault.refused() => self.result = Some(Err(HomeError::Unreadable(fault))),
+            Err(fault) if fault.refused() || fault.is_foreign() => {
+                self.result = Some(Err(HomeError::Unreadable(fault)))
+            }
             Err(_) => (self.dpf0, self.complete) = (None, 0),
         }
         if self.result.is_none() && self.complete >= LOOKS {

@@ -33,6 +33,7 @@ mod testing;
 pub use address::Address;
 pub use exchange::Patience;
 pub(crate) use exchange::{Endpoint, Exchange, Odds, RegisterAnswer, RequestOutcome};
+pub(crate) use fault::PRINTED;
 pub(crate) use fault::{Fault, Odd, refusal};
 pub(crate) use request::Request;
 pub use request::reads;

@@ -108,7 +108,7 @@ impl StandError {
     #[must_use]
     pub(crate) const fn answered(&self) -> bool {
         match self {
-            Self::Unread(fault) => fault.refused(),
+            Self::Unread(fault) => fault.refused() || fault.is_foreign(),
             _ => true,
         }
     }

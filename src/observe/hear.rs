@@ -20,7 +20,7 @@ impl Observer {
                 self.on_register(controller, reply, at);
                 false
             }
-            FromController::Reply(_) | FromController::WideRegisters | FromController::Other => false,
+            FromController::Reply(_) | FromController::PrintedImax | FromController::Other => false,
         }
     }
 

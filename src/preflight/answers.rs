@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{Check, Notes, Subject, wanted};
 use crate::device::change::dialect_name;
 use crate::device::survey::{ROUND_TIMEOUT, Survey};
-use crate::device::{Address, Fault, table};
+use crate::device::{Address, Fault, PRINTED, table};
 use crate::wire::Dialect;
 
 /// Answers slower than this are noted.
@@ -25,6 +25,12 @@ pub(crate) fn round_trip(took: &[Duration]) -> Option<(Duration, Duration)> {
 
 pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     let Some(survey) = subject.survey else { return };
+    let faults = || survey.silent.iter().chain(&survey.unread);
+    if faults().any(Fault::is_foreign) {
+        let remedy = "leave it out, and send a capture (`kinocue decode --dialect imax`) to the maintainers of this program";
+        notes.add(Check::Dialect, PRINTED, remedy);
+        return;
+    }
     if let Some(fault) = &survey.silent {
         notes.add(
             Check::NoAnswer,

@@ -1,6 +1,6 @@
 //! What a controller may send, told apart once for each datagram.
 
-use super::{ImaxRegisters, Message, MotionReply, RegisterReply, RegisterReport, Status, VibrationPort};
+use super::{Message, MotionReply, RegisterReply, RegisterReport, Status, VibrationPort, is_printed_imax};
 
 /// A datagram of a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,8 +9,8 @@ pub enum FromController<'a> {
     Reply(MotionReply),
     /// The answer to a request for registers.
     Registers(RegisterReply<'a>),
-    /// An answer with registers of 32 bits, as the IMAX manual has them (2.3) and no program that is known.
-    WideRegisters,
+    /// An answer in the layout that the IMAX manual prints: registers of 32 bits (2.3), motion without a frame number (2.2.2.7).
+    PrintedImax,
     /// Its state, sent unasked by an SMC controller.
     Status(Status),
     /// Registers, sent unasked by an IMAX or MBOX controller.
@@ -28,7 +28,7 @@ impl<'a> FromController<'a> {
             Ok(Message::RegisterReply(reply)) => Self::Registers(reply),
             Ok(Message::Status(status)) => Self::Status(status),
             Ok(Message::Report(report)) => Self::Report(report),
-            Err(_) if ImaxRegisters::parse(bytes).is_ok_and(|reply| reply.is_wide()) => Self::WideRegisters,
+            Err(_) if is_printed_imax(bytes) => Self::PrintedImax,
             Ok(_) | Err(_) => Self::Other,
         }
     }

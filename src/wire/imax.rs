@@ -1,6 +1,6 @@
 //! Messages as the IMAX manual prints them: motion without a frame number and with four bytes of outputs (2.2.2.6,
-//! 2.2.2.7), registers of 32 bits (2.3). No program is known to send them, so they are only read, to put a capture in
-//! words.
+//! 2.2.2.7), registers of 32 bits (2.3). They are only read: to put a capture in words, and to know a controller that speaks so,
+//! to which our frames would mean other positions and times.
 
 use super::bytes::{i32_at, u32_at};
 use super::header::{self, Header};
@@ -76,6 +76,13 @@ impl ImaxMotion {
     }
 }
 
+/// True if a controller that speaks as the IMAX manual prints sent that: no message of another layout has such a length.
+#[must_use]
+pub fn is_printed_imax(bytes: &[u8]) -> bool {
+    ImaxRegisters::parse(bytes).is_ok_and(|reply| reply.is_wide() || reply.has_wide_error())
+        || ImaxMotion::parse(bytes).is_ok_and(|motion| motion.code.is_some())
+}
+
 fn axes(channel: u16, bytes: usize) -> Result<usize, WireError> {
     match channel {
         0 => Ok(3),
@@ -127,6 +134,11 @@ impl<'a> ImaxRegisters<'a> {
     #[must_use]
     pub fn is_wide(&self) -> bool {
         self.code == ReplyCode::Running && self.num > 0
+    }
+
+    /// True for a refusal with an error number of 32 bits, where one of 16 would have no room for it.
+    fn has_wide_error(&self) -> bool {
+        self.code.refused() && self.num <= 1 && self.data.len() == 4
     }
 
     /// The registers in order; with x = 3 the error number.

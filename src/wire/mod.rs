@@ -34,7 +34,7 @@ pub use frame_no::FrameNo;
 pub use from_controller::FromController;
 pub(crate) use header::Header;
 pub use header::{Code, Dialect, ReplyCode};
-pub use imax::{ImaxMotion, ImaxRegisters};
+pub use imax::{ImaxMotion, ImaxRegisters, is_printed_imax};
 pub use motion::{Motion, MotionReply, MotionRequest, Timing};
 pub(crate) use motion::{motion_channel_and_slots, motion_len};
 pub use per_axis::PerAxis;

@@ -10,6 +10,8 @@
 #[path = "../common/http.rs"]
 #[expect(dead_code, reason = "each test uses its own part")]
 mod http;
+#[path = "../common/printed.rs"]
+mod printed;
 #[path = "../common/process.rs"]
 #[expect(dead_code, reason = "each test uses its own part")]
 mod process;

@@ -1,12 +1,9 @@
 //! A hall of IMAX and MBOX controllers, which tell no count of their datagrams (DP34), no error number and no emergency stop.
 
-use std::net::UdpSocket;
-
-use kinocue::wire::ReadRequest;
 use serde_json::Value;
 
 use crate::hall::Hall;
-use crate::process::PATIENCE;
+use crate::printed::PrintedImax;
 
 /// Serving and parked; the controllers say by an input that an emergency stop is pressed.
 fn open() -> Hall {
@@ -158,34 +155,16 @@ fn no_register_of_a_seat_that_another_machine_plays_is_written() {
     assert!(all_stand(&hall.status(), "ok"));
 }
 
-/// A controller that answers each read with registers of 32 bits, as the IMAX manual has them.
-fn wide_controller() -> String {
-    let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
-    socket.set_read_timeout(Some(PATIENCE)).expect("it is longer than nothing");
-    let address = socket.local_addr().expect("it is bound").to_string();
-    std::thread::spawn(move || {
-        let mut bytes = [0; 2048];
-        while let Ok((len, from)) = socket.recv_from(&mut bytes) {
-            let Ok(read) = ReadRequest::parse(&bytes[..len]) else { continue };
-            let mut answer = bytes[..16].to_vec();
-            answer[5] = 2;
-            answer[8..12].fill(0);
-            answer.resize(16 + 4 * usize::from(read.num), 0);
-            let _ = socket.send_to(&answer, from); // who is gone is gone
-        }
-    });
-    address
-}
-
 #[test]
 fn a_controller_with_registers_of_32_bits_is_out_in_words_and_nothing_moves() {
     let mut hall = closed();
-    let (before, wide) = (hall.relay(1).to(), wide_controller());
-    hall.rewrite(|config| config.replace(&before, &wide));
+    let (before, wide) = (hall.relay(1).to(), PrintedImax::start());
+    hall.rewrite(|config| config.replace(&before, &wide.address));
     hall.launch();
     hall.serving().heard(|line| line.contains("registers of 32 bits").then_some(()));
     let out = hall.wait(|status| health(status, 1) == "error");
     assert!(told(&out, "A2").contains("answers with registers of 32 bits"), "{out}");
     assert_eq!(hall.run(&["arm"]).code, Some(75));
-    assert_eq!(hall.relay(0).count(), 0, "no motion frame");
+    assert_eq!((hall.relay(0).count(), wide.frames()), (0, 0), "no motion frame");
+    assert!(wide.reads() > 0);
 }

@@ -2,6 +2,8 @@
 
 #[path = "../common/jog.rs"]
 mod jog;
+#[path = "../common/printed.rs"]
+mod printed;
 #[expect(dead_code, reason = "shared with tests that need more of it")]
 #[path = "../common/process.rs"]
 mod process;
@@ -19,6 +21,7 @@ mod frames;
 mod keyboard;
 mod loss;
 mod motion;
+mod printed_imax;
 mod recording;
 mod report;
 mod stopping;

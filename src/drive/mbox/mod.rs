@@ -158,7 +158,11 @@ impl MboxPeer {
         let Incoming { message, at, others_ask } = arrival;
         match message {
             FromController::Registers(reply) => self.on_registers(&reply, arrival, out),
-            FromController::WideRegisters => out.push(Evidence::Unreadable),
+            FromController::PrintedImax => {
+                // Only a whole look from now on says that somebody else is there.
+                self.probe.abandon();
+                out.push(Evidence::Unreadable);
+            }
             _ => {}
         }
         out.extend(others_ask.then_some(Evidence::Answered));

@@ -41,6 +41,11 @@ impl Probe {
         self.stop.begin();
     }
 
+    /// What was told so far counts for nothing.
+    pub(super) fn abandon(&mut self) {
+        self.seen = Seen::default();
+    }
+
     /// True if a look asks for that, positions apart.
     pub(super) fn asks(&self, read: MonitorRead) -> bool {
         match read {

@@ -6,7 +6,7 @@ use super::seen;
 use crate::wire::silvermax::{AnyRequest, Collected, LineCollector, MAX_LINE, Reply};
 use crate::wire::sixpack2::{CanFrame, FrameCollector, SixpackCommand, SixpackFrame};
 use crate::wire::{FromController, ImaxMotion, ImaxRegisters, MAX_LEN, Message, MotionReply, VibrationPort};
-use crate::wire::{RegisterReply, RegisterReport, Status};
+use crate::wire::{RegisterReply, RegisterReport, Status, is_printed_imax};
 
 /// What a controller may send is told apart at once as each reader of one message alone would tell.
 pub(super) fn controller(octets: &[u8]) {
@@ -17,7 +17,7 @@ pub(super) fn controller(octets: &[u8]) {
         FromController::Registers(reply) => RegisterReply::parse(octets).as_ref() == Ok(reply),
         FromController::Status(status) => Status::parse(octets).as_ref() == Ok(status),
         FromController::Report(report) => RegisterReport::parse(octets).as_ref() == Ok(report),
-        FromController::WideRegisters => ImaxRegisters::parse(octets).is_ok_and(|reply| reply.is_wide()),
+        FromController::PrintedImax => is_printed_imax(octets),
         FromController::Other => {
             let all = [
                 MotionReply::parse(octets).is_ok(),

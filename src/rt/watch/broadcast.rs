@@ -150,9 +150,8 @@ impl Watch {
     pub(in super::super) fn hear_stranger(&self, from: SocketAddrV4, octets: &[u8]) {
         let Some(one) = self.live.broadcast() else { return };
         let message = FromController::parse(VibrationPort::Two, octets);
-        // Registers of 32 bits are nobody's whom this hall plays.
-        if matches!(message, FromController::Reply(_) | FromController::WideRegisters) || is_answer(&message)
-        {
+        // What the IMAX manual prints is sent by nobody whom this hall plays.
+        if matches!(message, FromController::Reply(_) | FromController::PrintedImax) || is_answer(&message) {
             one.set(Permit::Stranger(from));
         }
     }

@@ -66,9 +66,15 @@ impl Watch {
             Evidence::Homed(_) => {}
             Evidence::Count(packets) => self.judge(HealthInput::Count(controller, packets)),
             Evidence::Counted => self.judge(HealthInput::Counted(controller)),
-            Evidence::Unreadable => self.judge(HealthInput::Wide(controller)),
+            Evidence::Unreadable => {
+                self.note_layout(controller, true);
+                self.judge(HealthInput::Wide(controller));
+            }
             Evidence::OtherAxes(drives) => self.judge(HealthInput::OtherAxes(controller, drives)),
-            Evidence::Seen(seen) => self.on_seen(controller, seen, at),
+            Evidence::Seen(seen) => {
+                self.note_layout(controller, false);
+                self.on_seen(controller, seen, at);
+            }
             Evidence::Code(code) => {
                 observer.on_code(controller, code, at);
                 if let Some(records) = &mut self.records {
@@ -88,6 +94,13 @@ impl Watch {
                 self.judge(HealthInput::FellOut(controller, why));
             }
             Evidence::Fell(_) => {}
+        }
+    }
+
+    /// The tick thread sends no frame to one that would read it otherwise.
+    fn note_layout(&self, controller: usize, is_foreign: bool) {
+        if let Some(evidence) = self.live.evidence(controller).filter(|it| it.is_foreign() != is_foreign) {
+            evidence.on_layout(is_foreign);
         }
     }
 
