@@ -234,6 +234,9 @@ checks! {
     Stroke "stroke" Motion Fail
         "PA42 is the stroke set in the controller; that of the seat type is longer, so positions near its end are cut off \
          or run into the end stop.";
+    Rise "rise" Motion Fail
+        "Position 0 lies the rise after homing (PA40, or PA43 to PA48 where it is 0) above the mechanical zero. Rise and stroke \
+         together are longer than the cylinder (PA42), so the upper end of the stroke is its end stop.";
     WordOrder "word-order" Motion Fail
         "In the word order of its dialect the controller's position registers read outside the stroke, or differ from its \
          reports; in the other order they do not. With the wrong order a motion would start from a position at which the \

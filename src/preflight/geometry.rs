@@ -10,6 +10,10 @@ use crate::wire::Dialect;
 const LINES: [f64; 2] = [5_000.0, 2_500.0];
 /// Half of the unit of PA41 and PA42, mm.
 const HALF_A_UNIT_MM: f64 = 0.05;
+/// The rise of all axes after homing, and where it is 0 those of the first six (both manuals, 5.5).
+const ALL_RISE: u8 = 0x40;
+const OWN_RISES: u8 = 0x43;
+const RISES: usize = 6;
 
 pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     judge_encoder(subject, notes);
@@ -65,18 +69,55 @@ fn judge_lead(subject: &Subject<'_>, notes: &mut Notes) {
 }
 
 /// 0 says nothing. In the SMC manual's table it is the rise of axis 1 where PA40 = 0, in its section 5.7 the stroke, as with
-/// IMAX.
+/// IMAX. A value that no rise has is a stroke.
 fn judge_stroke(subject: &Subject<'_>, notes: &mut Notes) {
-    let is_rise = subject.controller.connection.dialect == Dialect::Smc && subject.pa(0x40) == Some(0);
-    let Some(tenths) = subject.pa(0x42).filter(|tenths| *tenths > 0 && !is_rise) else { return };
+    let Some(tenths) = subject.pa(0x42).filter(|tenths| *tenths > 0) else { return };
     let seat = &subject.controller.seat;
     let stroke = f64::from(tenths) / 10.0;
     let longest = cylinders(subject).map(AxisGeometry::stroke).fold(0.0, f64::max);
+    let may_be_rise = subject.controller.connection.dialect == Dialect::Smc && subject.pa(ALL_RISE) == Some(0);
+    if may_be_rise && stroke < longest {
+        return;
+    }
     if stroke < longest - HALF_A_UNIT_MM {
         let found =
             format!("PA42 = {tenths}: a stroke of {stroke} mm, but seat {} has {longest} mm", seat.name);
         let remedy = "correct stroke_mm of the seat type, or set PA42 at the controller itself";
         notes.add(Check::Stroke, found, remedy);
+    } else {
+        judge_rise(subject, stroke, notes);
+    }
+}
+
+/// Position 0 lies a rise above the mechanical zero (IMAX manual 5.7, SMC manual 5.5 and 5.7): both have to fit the cylinder.
+fn judge_rise(subject: &Subject<'_>, cylinder: f64, notes: &mut Notes) {
+    let seat = &subject.controller.seat;
+    let all = seat.own().iter().enumerate().filter(|(_, axis)| axis.unit == AxisUnit::Millimetre);
+    let past = all.filter_map(|(index, axis)| {
+        let (register, tenths) = rise(subject, index)?;
+        let rise = f64::from(tenths) / 10.0;
+        let past = rise + axis.stroke() - cylinder;
+        (past > HALF_A_UNIT_MM).then_some((index, axis, register, tenths, past))
+    });
+    let Some((index, axis, register, tenths, past)) = past.max_by(|a, b| a.4.total_cmp(&b.4)) else { return };
+    let (rise, stroke) = (f64::from(tenths) / 10.0, axis.stroke());
+    let found = format!(
+        "PA{register:02x} = {tenths}: axis {} begins {rise} mm above its zero and moves {stroke} mm from there, {past:.1} mm past the \
+         {cylinder} mm of its cylinder (PA42)",
+        index + 1
+    );
+    let room = ((cylinder - stroke) * 10.0).floor();
+    notes.add(Check::Rise, found, format!("set PA{register:02x} = {room} or less, or correct stroke_mm of the seat type"));
+}
+
+/// Where the rise of an axis stands, and what it holds: PA40 is that of all axes, and where it is 0 each has its own.
+fn rise(subject: &Subject<'_>, axis: usize) -> Option<(u8, u16)> {
+    match subject.pa(ALL_RISE)? {
+        0 => {
+            let own = OWN_RISES + u8::try_from(axis).ok().filter(|axis| usize::from(*axis) < RISES)?;
+            Some((own, subject.pa(own)?))
+        }
+        tenths => Some((ALL_RISE, tenths)),
     }
 }
 

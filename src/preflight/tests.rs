@@ -47,6 +47,8 @@ refused! {
     another_lead_is_refused: [0x41 = 100] => Lead, "PA41 = 100: a lead of 10 mm, but seat bench3 has 5 mm";
     no_lead_is_refused: [0x41 = 0] => Lead, "a lead of 0 mm";
     a_shorter_stroke_is_refused: [0x42 = 1400] => Stroke, "PA42 = 1400: a stroke of 140 mm, but seat bench3 has 150 mm";
+    a_rise_that_leaves_no_room_for_the_stroke_is_refused: [0x40 = 800, 0x42 = 2000] => Rise, "PA40 = 800: axis 1 begins 80 mm above its zero and moves 150 mm from there, 30.0 mm past the 200 mm";
+    a_rise_of_one_axis_that_leaves_no_room_is_refused: [0x40 = 0, 0x42 = 2000, 0x44 = 501] => Rise, "PA44 = 501: axis 2 begins 50.1 mm above its zero";
     a_bus_slower_than_the_show_is_refused: [0x59 = 11] => BusPeriod, "every 11 ms at most, but frames come every 10.0 ms";
     positions_of_analogue_inputs_are_refused: [0x60 = 1, 0x61 = 2, 0x62 = 3] => AnaloguePosition, "analogue inputs, times 2/3";
     a_cut_of_long_times_is_refused: [0x0b = 2999] => IntervalLimit, "PA0b = 2999: the frame that brings the seat to its park pose, of 3000 ms, is cut to 2999 ms";
@@ -104,7 +106,7 @@ fn what_a_manual_allows_passes() {
         [(0x0a, 1)],
         [(0x0b, 0)],
         [(0x0b, 3_000)],
-        [(0x42, 1_500)],
+        [(0x42, 1_600)],
         [(0x59, 10)],
         [(0x61, 2)],
         [(0x93, 50)],
@@ -228,6 +230,17 @@ fn a_silent_controller_is_named_and_judged_no_further() {
     assert_eq!(finding.check, Check::NoAnswer);
     assert_eq!(finding.found, "does not answer: 3 tries of 300 ms");
     assert!(finding.remedy.contains("PA15"));
+}
+
+#[test]
+fn a_controller_that_answers_as_the_imax_manual_prints_is_named_as_such_and_not_as_silent() {
+    for dialect in [Dialect::Smc, Dialect::Mbox] {
+        let mut case = Case::new(dialect);
+        case.survey.silent = Some(Fault::Foreign { request: Request::read(Address::Pa(0x10)) });
+        let finding = only(&case).unwrap();
+        assert_eq!(finding.check, Check::Dialect);
+        assert!(finding.found.contains("registers of 32 bits"), "{}", finding.found);
+    }
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn no_other_command_sends_it_a_frame_or_a_write_and_each_names_the_cause() {
             assert_only_asked(&printed, &run);
         };
         of(&["latency", "--seconds", "1"], 76);
-        of(&["home"], 76);
+        of(&["home", "--seats-empty"], 76);
         of(&["preflight"], 1);
         of(&["register", "read", "PA02"], 76);
         of(&["register", "write", "PA02=3", "--yes"], 76);

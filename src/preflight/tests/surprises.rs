@@ -31,6 +31,20 @@ fn the_stroke_register_is_a_rise_where_the_smc_manual_says_so() {
 }
 
 #[test]
+fn a_rise_is_judged_by_what_is_in_force_and_to_the_unit_of_its_register() {
+    for dialect in [Dialect::Smc, Dialect::Mbox] {
+        let found = |parameters: &[(u8, u16)]| check(&Case::new(dialect).with(parameters));
+        assert_eq!(found(&[(0x40, 500), (0x42, 2_000)]), None);
+        assert_eq!(found(&[(0x40, 501), (0x42, 2_000)]), Some(Check::Rise));
+        // Those of the axes count only where the one of all is 0; of axes that the seat has.
+        assert_eq!(found(&[(0x40, 100), (0x42, 2_000), (0x43, 900)]), None);
+        assert_eq!(found(&[(0x40, 0), (0x42, 2_000), (0x45, 900)]), Some(Check::Rise));
+        assert_eq!(found(&[(0x40, 0), (0x42, 2_000), (0x46, 900), (0x48, 900)]), None);
+        assert_eq!(found(&[(0x40, 900), (0x42, 0)]), None, "how long the cylinder is nobody knows");
+    }
+}
+
+#[test]
 fn pulses_that_no_count_of_the_encoder_makes_are_refused() {
     let mut case = Case::smc();
     let odd = crate::motion::SeatType::bench3(3).with_each(|axis| axis.pulses_per_rev = 7_500.0);
