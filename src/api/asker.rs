@@ -13,7 +13,7 @@ use hyper::body::Bytes;
 use super::access::one;
 use super::problem::{bad_value, panicked};
 use super::shared::Shared;
-use crate::control::{self, Code, Command, FRESH, Problem, Status, Surface, Who};
+use crate::control::{self, Code, Command, Problem, Status, Surface, Who};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock as _, MonoTime};
 
@@ -74,10 +74,11 @@ impl Asker {
             }
             return Ok(now);
         };
-        control::asked_at(age_ms, now).ok_or_else(|| {
-            let (word, most) = (ask.word(), FRESH.as_millis());
+        control::asked_at(age_ms, now).map_err(|most| {
+            let (word, most) = (ask.word(), most.as_millis());
             let (detail, remedy) = if age_ms < 0 {
-                let detail = format!("{word} was sent {} ms from now: the clocks differ", -age_ms);
+                let detail =
+                    format!("{word} was sent {} ms from now, more than {most}: the clocks differ", -age_ms);
                 (detail, "set the clock of the sender, or correct for it with X-Kinocue-Time of the replies")
             } else {
                 let detail = format!("{word} came {age_ms} ms after it was sent, more than {most}");

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::problem::bad_value;
 use crate::config::{self, FleetKey, FleetWord, Role};
-use crate::control::{self, Code, FRESH, Problem, Surface, Who};
+use crate::control::{self, Code, Problem, Surface, Who};
 use crate::fleet::{AHEAD, Letter, Order, Wish};
 use crate::time::MonoTime;
 
@@ -157,8 +157,8 @@ pub(super) fn is_of_now(rev: u64, wall_ns: u64) -> bool {
 /// When an order was given, by our own clock.
 fn asked_at(order: &Order, wall_ns: u64, now: MonoTime) -> Result<MonoTime, Problem> {
     let age_ms = i128::from(wall_ns / 1_000_000) - i128::from(order.sent_ms);
-    control::asked_at(age_ms, now).ok_or_else(|| {
-        let (when, most) = (if age_ms < 0 { "from now" } else { "ago" }, FRESH.as_millis());
+    control::asked_at(age_ms, now).map_err(|most| {
+        let (when, most) = (if age_ms < 0 { "from now" } else { "ago" }, most.as_millis());
         let detail = format!("{} was asked {} ms {when}, more than {most}", order.word, age_ms.abs());
         Problem::new(Code::Late, detail, "if this happens every time, the clocks of desk and hall differ")
     })
@@ -210,7 +210,7 @@ mod tests {
         assert_eq!(open(&access, &pause("1", "berlin.h3", NOW_MS)).err(), Some(Code::Late), "again");
         assert!(open(&access, &pause("2", "berlin.h3", NOW_MS)).is_ok());
         assert_eq!(open(&access, &pause("3", "berlin.h4", NOW_MS)).err(), Some(Code::Origin));
-        for age in [2001, 60_000, -2001] {
+        for age in [2001, 60_000, -251, -1_900, -2001] {
             assert_eq!(
                 open(&access, &pause("4", "berlin.h3", NOW_MS - age)).err(),
                 Some(Code::Late),

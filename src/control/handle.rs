@@ -20,14 +20,22 @@ use crate::time::{Clock as _, MonoTime};
 const ASKS: usize = 64;
 
 /// How old an ask that [goes stale](Command::goes_stale) may be when its turn comes.
-pub(crate) const FRESH: Duration = Duration::from_secs(2);
+const FRESH: Duration = Duration::from_secs(2);
 
-/// When something was asked, by our own clock, that is so many milliseconds old by the clock of whoever asked; `None` where that is more
-/// than [`FRESH`] from now, to either side.
-pub(crate) fn asked_at(age_ms: i128, now: MonoTime) -> Option<MonoTime> {
+/// How far the clock of whoever asks may be ahead of ours. What is dated later would be fresh for longer than [`FRESH`]: it could be held
+/// up, and come when nobody expects it any more.
+const AHEAD: Duration = Duration::from_millis(250);
+
+/// When something was asked, by our own clock, that is so many milliseconds old by the clock of whoever asked, negative where that is
+/// ahead; the most that it may be where it is more.
+pub(crate) fn asked_at(age_ms: i128, now: MonoTime) -> Result<MonoTime, Duration> {
     let age = Duration::from_millis(u64::try_from(age_ms.unsigned_abs()).unwrap_or(u64::MAX));
-    // One that is asked from now on, by a clock that is ahead, is asked now.
-    (age <= FRESH).then(|| if age_ms > 0 { now.before(age) } else { now })
+    match age_ms {
+        ..=0 if age <= AHEAD => Ok(now), // its clock is ahead
+        ..=0 => Err(AHEAD),
+        _ if age <= FRESH => Ok(now.before(age)),
+        _ => Err(FRESH),
+    }
 }
 
 /// What a surface wants, and on whose behalf.

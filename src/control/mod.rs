@@ -21,7 +21,7 @@ pub use ask::StartOrder;
 pub use ask::{Command, LevelsChange};
 pub(crate) use broadcasts::BroadcastStatus;
 pub(crate) use clock::{ClockReading, SharedClock};
-pub(crate) use handle::{Asked, FRESH, asked_at, overtaken};
+pub(crate) use handle::{Asked, asked_at, overtaken};
 pub use handle::{Desired, Handle, Inbox, StatusSource, handle};
 pub(crate) use links::{LinkAxisStatus, LinkStatus};
 pub use model::Health;
