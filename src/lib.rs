@@ -34,6 +34,7 @@
     )
 )]
 
+mod json;
 mod kind;
 mod motion;
 mod plain;

@@ -1,6 +1,6 @@
 //! Access over TCP: the accepted host names, the accepted origins of pages, and the tokens.
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use axum::http::header::{AUTHORIZATION, HOST, ORIGIN};
@@ -16,13 +16,26 @@ use crate::time::MonoTime;
 /// The longest token that is hashed.
 const MAX_TOKEN_LEN: usize = 256;
 
-/// What the configuration says of who may come in.
+/// From which site the page is that asks, as browsers say it, and what for.
+const SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
+const MODE: HeaderName = HeaderName::from_static("sec-fetch-mode");
+
+/// Who may come in to a server.
 #[derive(Debug)]
-pub(super) struct Access {
-    hosts: Vec<String>,
+pub(crate) struct Access {
+    hosts: OwnHosts,
     origins: Vec<String>,
     open_role: Option<Role>,
     tokens: AccessTokens,
+}
+
+/// The names by which a server is asked.
+#[derive(Debug)]
+enum OwnHosts {
+    /// These.
+    Named(Vec<String>),
+    /// Any address: a page that is let in by its own name has a name.
+    Addresses,
 }
 
 /// Who has a token; others from one request to the next where the configuration is read anew.
@@ -61,7 +74,17 @@ impl Access {
         let origins = if config.origins.is_empty() { derived() } else { config.origins.clone() };
         let tokens = AccessTokens::default();
         tokens.set(&config.tokens);
-        Self { hosts, origins, open_role: config.open_role, tokens }
+        Self { hosts: OwnHosts::Named(hosts), origins, open_role: config.open_role, tokens }
+    }
+
+    /// Of a server that has no pages, and is asked by its address.
+    pub(crate) fn without_pages() -> Self {
+        Self {
+            hosts: OwnHosts::Addresses,
+            origins: Vec::new(),
+            open_role: None,
+            tokens: AccessTokens::default(),
+        }
     }
 
     /// Who has a token.
@@ -71,20 +94,22 @@ impl Access {
 
     /// True if a request was meant for this server: a page of another one that resolves its own name to our address is not
     /// let in (DNS rebinding).
-    pub(super) fn check_host(&self, headers: &HeaderMap, uri: &Uri) -> Result<(), Problem> {
+    pub(crate) fn check_host(&self, headers: &HeaderMap, uri: &Uri) -> Result<(), Problem> {
         let host = one(headers, &HOST)?.unwrap_or_default();
         let target = uri.authority().map_or(host, |authority| authority.as_str());
-        let known = |host: &str| self.hosts.iter().any(|known| known.eq_ignore_ascii_case(host));
-        if known(host) && known(target) {
+        if self.hosts.has(host) && self.hosts.has(target) {
             return Ok(());
         }
-        let detail = format!("{host:?} is not a name of this server");
-        Err(Problem::new(Code::Origin, detail, "use a name in hosts of [api], or add this one there"))
+        let remedy = match self.hosts {
+            OwnHosts::Named(_) => "use a name in hosts of [api], or add this one there",
+            OwnHosts::Addresses => "use the address of this machine, such as 192.168.1.10",
+        };
+        Err(Problem::new(Code::Origin, format!("{host:?} is not a name of this server"), remedy))
     }
 
     /// True if the page that asks, if a page asks, is one of this server's.
-    pub(super) fn check_origin(&self, headers: &HeaderMap) -> Result<(), Problem> {
-        let Some(origin) = one(headers, &ORIGIN)? else { return Ok(()) };
+    pub(crate) fn check_origin(&self, headers: &HeaderMap) -> Result<(), Problem> {
+        let Some(origin) = one(headers, &ORIGIN)? else { return check_site(headers) };
         if self.origins.iter().any(|known| known.eq_ignore_ascii_case(origin)) {
             return Ok(());
         }
@@ -128,6 +153,35 @@ impl Access {
     }
 }
 
+impl OwnHosts {
+    fn has(&self, host: &str) -> bool {
+        match self {
+            Self::Named(known) => known.iter().any(|known| known.eq_ignore_ascii_case(host)),
+            Self::Addresses => is_address(host),
+        }
+    }
+}
+
+/// True of an address, with or without a port, as a Host header has it.
+fn is_address(host: &str) -> bool {
+    let (name, port) = host.rsplit_once(':').unwrap_or((host, ""));
+    let name = if port.parse::<u16>().is_ok() { name } else { host };
+    let in_brackets = || name.strip_prefix('[').and_then(|name| name.strip_suffix(']'));
+    name.eq_ignore_ascii_case("localhost")
+        || name.parse::<Ipv4Addr>().is_ok()
+        || in_brackets().is_some_and(|name| name.parse::<Ipv6Addr>().is_ok())
+}
+
+/// True if no page of another site asks without saying its origin, as for a picture. A person who follows a link from there may come.
+fn check_site(headers: &HeaderMap) -> Result<(), Problem> {
+    let (site, mode) = (one(headers, &SITE)?, one(headers, &MODE)?);
+    if matches!(site, None | Some("same-origin" | "none")) || mode == Some("navigate") {
+        return Ok(());
+    }
+    let detail = "pages of other sites may not use this server";
+    Err(Problem::new(Code::Origin, detail, "open the page from this server"))
+}
+
 /// The one value of a header; two of them, or one that is no text, are refused.
 pub(super) fn one<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Result<Option<&'h str>, Problem> {
     let mut values = headers.get_all(name).iter();
@@ -156,8 +210,6 @@ fn own_names(bound: &[SocketAddr]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use std::net::Ipv4Addr;
-
     use axum::http::HeaderValue;
 
     use super::*;
@@ -214,6 +266,40 @@ mod tests {
         for other in ["null", "http://evil.example", "http://127.0.0.1", "file://"] {
             assert_eq!(origin(other), Err(Code::Origin), "{other}");
         }
+    }
+
+    #[test]
+    fn a_page_of_another_site_asks_for_nothing_either_where_it_does_not_say_its_origin() {
+        let of = |pairs: &[(&'static str, &str)]| {
+            access().check_origin(&headers(pairs)).map_err(|problem| problem.code)
+        };
+        for site in ["same-origin", "none"] {
+            assert_eq!(of(&[("sec-fetch-site", site), ("sec-fetch-mode", "cors")]), Ok(()));
+        }
+        for site in ["cross-site", "same-site", "anything"] {
+            assert_eq!(of(&[("sec-fetch-site", site), ("sec-fetch-mode", "no-cors")]), Err(Code::Origin));
+            assert_eq!(of(&[("sec-fetch-site", site)]), Err(Code::Origin));
+            assert_eq!(of(&[("sec-fetch-site", site), ("sec-fetch-mode", "navigate")]), Ok(()), "a link");
+        }
+        let own = ("origin", "http://127.0.0.1:8480");
+        assert_eq!(of(&[own, ("sec-fetch-site", "cross-site")]), Ok(()), "the origin says more");
+    }
+
+    #[test]
+    fn a_server_without_pages_is_asked_by_its_address_and_by_no_page() {
+        let access = Access::without_pages();
+        let host = |host: &str, uri| access.check_host(&headers(&[("host", host)]), &Uri::from_static(uri));
+        for known in ["10.0.0.2:8431", "10.0.0.2", "[fd00::2]:8431", "localhost:8431", "LOCALHOST"] {
+            assert!(host(known, "/").is_ok(), "{known}");
+        }
+        for other in
+            ["evil.example", "evil.example:8431", "10.0.0.2.evil.example", "me@10.0.0.2", "", "[10.0.0.2]x"]
+        {
+            assert_eq!(host(other, "/").map_err(|problem| problem.code), Err(Code::Origin), "{other}");
+        }
+        assert!(host("10.0.0.2:8431", "http://evil.example/").is_err());
+        let page = headers(&[("origin", "http://10.0.0.2:8431")]);
+        assert!(access.check_origin(&page).is_err(), "it has none");
     }
 
     fn who(authorization: &str, tries: &Tries) -> Result<Who, Code> {

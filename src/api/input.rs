@@ -13,7 +13,7 @@ use serde::de::DeserializeOwned;
 
 use super::problem::bad_value;
 use crate::control::{Code, Problem};
-use crate::library;
+use crate::{json, library};
 
 /// The longest body outside of uploads, bytes.
 pub(super) const MAX_BODY: usize = 64 << 10;
@@ -157,7 +157,7 @@ fn json_only(headers: &HeaderMap) -> Result<(), Problem> {
 }
 
 pub(super) fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
-    serde_json::from_slice(body).map_err(|error| {
+    json::from_slice(body).map_err(|error| {
         bad_value(format!("the body is not valid here: {error}"), "see /api/v1/openapi.json")
     })
 }

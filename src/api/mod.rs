@@ -65,6 +65,7 @@ mod streams;
 mod tries;
 mod websocket;
 
+pub(crate) use access::Access;
 pub(crate) use doors::serve_behind_doors;
 #[cfg(test)]
 pub(crate) use fleet::Letterbox;
@@ -73,12 +74,13 @@ pub(crate) use fleet::{try_letter, try_order};
 #[cfg(feature = "harness")]
 pub(crate) use fleet_wishes::try_wish;
 pub(crate) use gate::FLEET_STOP;
+pub(crate) use service::figures_as;
 pub(crate) use serving::ServingThread;
 pub(crate) use socket::unix as unix_socket;
 pub(crate) use stop::fleet_stop_socket;
 pub use stop::{StopSocket, stop_socket};
 
-use access::{Access, AccessTokens};
+use access::AccessTokens;
 use fleet_access::FleetAccess;
 use peer::{Peer, Users};
 use shared::{Pulse, Shared};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use axum::Json as JsonReply;
 use axum::extract::State;
-use axum::http::header::CONTENT_TYPE;
-use axum::http::{HeaderValue, Method, Uri};
+use axum::http::header::{ACCEPT, CONTENT_TYPE};
+use axum::http::{HeaderMap, HeaderValue, Method, Uri};
 use axum::response::{IntoResponse as _, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -55,14 +55,21 @@ fn well(shared: &Shared) -> JsonReply<Well> {
     JsonReply(Well { state: shared.handle.status().state.clone() })
 }
 
-/// Figures for Prometheus, `OpenMetrics` text.
+/// Figures for Prometheus: `OpenMetrics` where `Accept` prefers that, else its older text format.
 #[utoipa::path(
     get, path = "/metrics", tag = "service",
-    responses((status = 200, body = String, content_type = "application/openmetrics-text"))
+    responses((status = 200, body = String, content_type = "text/plain"))
 )]
-pub(super) async fn figures(State(shared): State<Arc<Shared>>) -> Response {
-    let text = metrics::render(&shared.handle.status());
-    ([(CONTENT_TYPE, HeaderValue::from_static(metrics::CONTENT_TYPE))], text).into_response()
+pub(super) async fn figures(State(shared): State<Arc<Shared>>, headers: HeaderMap) -> Response {
+    figures_as(&headers, metrics::render(&shared.handle.status()))
+}
+
+/// Figures in the format that whoever asks prefers.
+pub(crate) fn figures_as(headers: &HeaderMap, page: String) -> Response {
+    let accept =
+        headers.get_all(ACCEPT).iter().filter_map(|value| value.to_str().ok()).collect::<Vec<_>>().join(",");
+    let (kind, page) = metrics::negotiated(Some(&accept), page);
+    ([(CONTENT_TYPE, HeaderValue::from_static(kind))], page).into_response()
 }
 
 /// The description of this API (OpenAPI 3.1).

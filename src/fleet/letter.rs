@@ -6,6 +6,8 @@ use nkeys::{KeyPair, KeyPairType};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::json;
+
 /// The beginning of all that is signed, before the text: a signature that was made for another protocol is none of a letter.
 const DOMAIN: &[u8] = b"kinocue letter 1\n";
 /// The longest id of an order.
@@ -85,7 +87,7 @@ impl Order {
 
     /// The order of a letter; why it is none.
     pub(crate) fn of(letter: &Letter) -> Result<Self, String> {
-        let order: Self = serde_json::from_str(&letter.body).map_err(|error| error.to_string())?;
+        let order: Self = json::from_slice(letter.body.as_bytes()).map_err(|error| error.to_string())?;
         let id = &order.id;
         if id.is_empty() || id.len() > LONGEST_ID || !id.bytes().all(|byte| byte.is_ascii_graphic()) {
             return Err(format!("{id:?} is not an id of 1 to {LONGEST_ID} characters of ASCII"));

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::Letter;
+use crate::json;
 
 /// The longest wish as it is sent, signature and all, bytes.
 pub(crate) const LONGEST_WISH: usize = 256 << 10;
@@ -97,7 +98,7 @@ pub(crate) struct CuePiece {
 impl Wish {
     /// The wish of a letter, whoever has signed that; why it is none.
     pub(crate) fn of(letter: &Letter) -> Result<Self, String> {
-        let wish: Self = serde_json::from_str(&letter.body).map_err(|error| error.to_string())?;
+        let wish: Self = json::from_slice(letter.body.as_bytes()).map_err(|error| error.to_string())?;
         wish.check_count()?;
         for (id, cue) in &wish.cues {
             if !cue.is_named() {

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-pub(crate) use super::CONTENT_TYPE;
 use super::{Labels, MetricFamily, MetricValues, encoded, flag};
+use crate::control::model::Word;
 use crate::fleet::BriefStatus;
+use crate::state::State;
 
 /// What a desk knows.
 #[derive(Debug)]
@@ -41,7 +42,12 @@ impl FleetFigures {
     fn families(&self) -> Vec<MetricFamily> {
         let stops = self.stops.iter().map(|(result, count)| (vec![("result", (*result).to_owned())], *count));
         let heard = || self.halls.iter().filter_map(|hall| Some((hall, hall.status.as_ref()?)));
-        let states = heard().map(|(hall, status)| (hall.labels("state", &status.state.to_string()), 1.0));
+        // A word that nobody knows is no label: each would be a series more.
+        let word = |state: &Word<State>| match state {
+            Word::Known(state) => state.to_string(),
+            Word::Other(_) => "other".to_owned(),
+        };
+        let states = heard().map(|(hall, status)| (hall.labels("state", &word(&status.state)), 1.0));
         let seats = heard().flat_map(|(hall, status)| {
             let seats = status.seats;
             [("total", seats.total), ("taking_part", seats.taking_part), ("lost", seats.lost)]
@@ -101,7 +107,7 @@ fn figure(count: usize) -> f64 {
 /// Those of a desk that hears a hall, and knows of another.
 #[cfg(test)]
 pub(super) fn of_two_halls() -> super::tests::strict::Page {
-    let status = BriefStatus { state: crate::state::State::Parked.into(), ..BriefStatus::default() };
+    let status = BriefStatus { state: State::Parked.into(), ..BriefStatus::default() };
     let one = HallFigures { name: "a.h1".to_owned(), age_s: Some(0.25), silent: false, status: Some(status) };
     let two = HallFigures { name: "a.h2".to_owned(), age_s: None, silent: true, status: None };
     let figures = FleetFigures { engine: true, halls: vec![one, two], stops: BTreeMap::from([("done", 1)]) };
@@ -111,7 +117,6 @@ pub(super) fn of_two_halls() -> super::tests::strict::Page {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::State;
 
     #[test]
     fn each_hall_has_its_age_and_only_one_that_is_heard_has_a_state() {

@@ -13,6 +13,7 @@ use crate::control::{self, Status};
 
 mod controllers;
 mod film;
+mod format;
 pub(crate) mod halls;
 mod links;
 mod record;
@@ -20,8 +21,7 @@ mod shows;
 #[cfg(test)]
 mod tests;
 
-/// The type of what [`render`] gives.
-pub(crate) const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+pub(crate) use format::negotiated;
 
 /// All figures of a status as `OpenMetrics` text.
 ///

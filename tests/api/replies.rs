@@ -179,7 +179,7 @@ fn the_service_says_whether_it_is_well_and_ready_and_gives_its_figures() {
     hall.is_well();
     assert_eq!(hall.socket().get("/healthz").state(), "parked");
     let figures = hall.socket().get("/metrics");
-    assert!(figures.header("content-type").unwrap().starts_with("application/openmetrics-text"));
+    assert!(figures.header("content-type").unwrap().starts_with("text/plain; version=0.0.4"));
     assert!(figures.text().contains("kinocue_state{"), "{}", figures.text());
 }
 

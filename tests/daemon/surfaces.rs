@@ -2,6 +2,7 @@
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::process::{Command, Stdio};
 
 use rosc::{OscMessage, OscPacket, OscType, encoder};
 use serde_json::Value;
@@ -10,6 +11,7 @@ use sha2::{Digest as _, Sha256};
 use crate::hall::Hall;
 use crate::http::{Reply, Request, To, problem};
 use crate::process::PATIENCE;
+use crate::programs::is_installed;
 
 /// What of a status says how the hall is led.
 fn led(status: &Value) -> Value {
@@ -37,8 +39,20 @@ fn no_get_changes_anything_and_figures_and_health_are_told() {
         assert_eq!(hall.socket().get(path).value()["state"], "parked");
     }
     let figures = hall.socket().get("/metrics").text();
-    for figure in ["kinocue_frames_sent_total", "kinocue_tick_lateness_seconds_bucket", "# EOF"] {
+    for figure in ["kinocue_frames_sent_total", "kinocue_tick_lateness_seconds_bucket"] {
         assert!(figures.contains(figure), "{figure}:\n{figures}");
+    }
+    assert!(!figures.contains("# EOF"), "nobody asked for OpenMetrics");
+    let open =
+        Request::new("GET", "/metrics").header("Accept", "application/openmetrics-text; version=1.0.0");
+    assert!(open.send(&hall.socket()).text().ends_with("# EOF\n"));
+    if is_installed("promtool") {
+        let mut check = Command::new("promtool");
+        let mut check =
+            check.args(["check", "metrics"]).stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        check.stdin.take().unwrap().write_all(figures.as_bytes()).unwrap();
+        let checked = check.wait_with_output().unwrap();
+        assert!(checked.status.success(), "{}", String::from_utf8_lossy(&checked.stderr));
     }
 }
 

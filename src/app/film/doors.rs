@@ -5,6 +5,7 @@ use super::relayed::RelayedRead;
 use super::riff::{Channels, SampleStream};
 use crate::film::message::{FilmPosition, PositionReader};
 use crate::film::source::LineKind;
+use crate::json;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
 
@@ -23,7 +24,7 @@ pub(crate) fn relayed(octets: &[u8]) {
 
 /// A position by OSC, or by HTTP.
 pub(crate) fn position(octets: &[u8]) {
-    let by_http = serde_json::from_slice::<FilmPosition>(octets).ok();
+    let by_http = json::from_slice::<FilmPosition>(octets).ok();
     for told in osc_position(octets).into_iter().chain(by_http) {
         PositionReader::new(ShowTime::ZERO).hear(&told, Monotonic.now(), &mut drop);
     }

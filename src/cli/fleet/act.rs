@@ -399,8 +399,8 @@ impl Answer {
 
     pub(super) fn line(&self) -> String {
         match self {
-            Self::Done(line) | Self::Left(line) | Self::Silent(line) => line.clone(),
-            Self::Refused(why) => format!("refused: {why}"),
+            Self::Done(line) | Self::Left(line) | Self::Silent(line) => said(line),
+            Self::Refused(why) => said(&format!("refused: {why}")),
         }
     }
 

@@ -17,9 +17,9 @@ use super::{DeskArgs, engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print, table};
 use crate::control::model::Severity;
 use crate::fleet::{self, BriefStatus};
-use crate::plain;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
+use crate::{json, plain};
 
 /// How long halls are listened to: each tells its status twice a second.
 const LISTEN: Duration = Duration::from_millis(1_200);
@@ -31,6 +31,8 @@ const LOOKED_UP: Duration = Duration::from_secs(8);
 const DRAW: Duration = Duration::from_millis(500);
 /// The longest text in a cell or a line, bytes: a hall may say whatever it likes, and the others are to be seen beside it.
 const TEXT: usize = 480;
+/// The longest list in a status.
+const ITEMS: usize = 64;
 
 /// Shows all halls of a desk, worst first, with the age of what is known of each.
 ///
@@ -165,7 +167,7 @@ impl Halls {
     /// could have it speak for another: such an answer has headers, or is no status.
     pub(super) fn hear(&mut self, message: &Message) -> Option<String> {
         let name = message.subject.strip_prefix("kc.status.")?;
-        let status: BriefStatus = serde_json::from_slice(&message.payload).ok()?;
+        let status = told(&message.payload)?;
         if message.headers.is_some() || status.format == 0 {
             return None;
         }
@@ -257,7 +259,7 @@ async fn kept_of_one(kept: &Context, name: &str) -> anyhow::Result<Option<Kept>>
     let entry = engine::last_value(kept, fleet::SEEN, name).await?;
     let entry = entry.filter(|entry| !engine::is_answered(entry));
     Ok(entry.and_then(|entry| {
-        let status = serde_json::from_slice(&entry.payload).ok()?;
+        let status = told(&entry.payload)?;
         Some((status, engine::age_of(&entry), Monotonic.now()))
     }))
 }
@@ -316,6 +318,12 @@ fn row(hall: &HallSeen) -> [String; 7] {
     };
     let level = format!("{:.0} %", status.level * 100.0);
     [&hall.name, &state, &show, &level, &seats, &know, &age].map(|text| said(text))
+}
+
+/// The status that a hall tells, which may be whoever has its key: what enters here is short and plain wherever it goes on to.
+fn told(payload: &[u8]) -> Option<BriefStatus> {
+    let status = json::clipped(serde_json::from_slice(payload).ok()?, TEXT, ITEMS);
+    serde_json::from_value(status).ok()
 }
 
 /// What a hall says, in one line of bearable length, whatever it says.
@@ -395,6 +403,28 @@ mod tests {
         assert_eq!(hall.line().lines().count(), 1);
         let text = drawn(std::slice::from_ref(&hall));
         assert!(text.lines().count() == 3 && text.len() < 10 * TEXT && !text.contains('\x1b'), "{text}");
+    }
+
+    #[test]
+    fn whatever_the_key_of_a_hall_tells_as_its_status_is_short_and_plain_in_json_and_figures_as_well() {
+        let long = "x".repeat(500_000);
+        let warning = serde_json::json!({ "text": long, "id": "a\nb", "remedy": "\x1b[2J" });
+        let status = serde_json::json!({ "format": 1, "state": long, "cause": "ok\nb: parked", "hall": "\u{202e}h", "version": long,
+            "show": { "cue": long }, "warnings": vec![warning; 1_000], "seats": { "lost": 1 } });
+        let status = told(status.to_string().as_bytes()).expect("it is a status");
+        let json = serde_json::to_string(&status).unwrap();
+        assert!(json.len() < 200_000 && !json.contains('\u{202e}'), "{} bytes", json.len());
+        assert_eq!((status.seats.lost, status.cause.as_str()), (1, "ok\\nb: parked"));
+        let hall = crate::metrics::halls::HallFigures {
+            name: "a.h1".to_owned(),
+            age_s: Some(0.1),
+            silent: false,
+            status: Some(status),
+        };
+        let figures =
+            crate::metrics::halls::FleetFigures { engine: true, halls: vec![hall], stops: BTreeMap::new() };
+        let page = figures.render();
+        assert!(page.contains("state=\"other\"") && page.len() < 4_000, "{} bytes", page.len());
     }
 
     #[test]

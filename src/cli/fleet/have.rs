@@ -11,9 +11,14 @@ use super::desk::{age, said};
 use super::{engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print, table};
 use crate::fleet::{self, HadState, HaveReport, Letter, Wish};
+use crate::json;
 
 /// A hall tells what it has each minute; after so long without a word it is not heard.
 const UNHEARD: Duration = Duration::from_secs(150);
+
+/// The longest text that a hall tells of a file, bytes, and the most files.
+const TEXT: usize = 2_048;
+const NAMED: usize = 1_000;
 
 /// Shows which hall has what was wished for it, which lags, and why.
 ///
@@ -171,7 +176,7 @@ impl HallHas {
         Ok(Self {
             name: hall.to_owned(),
             age_s: have.as_ref().map(|message| engine::age_of(message).as_secs_f64()),
-            report: have.and_then(|message| serde_json::from_slice(&message.payload).ok()),
+            report: have.and_then(|message| told(&message.payload)),
             is_foreign: is_wished && wished.is_none(),
             wished,
         })
@@ -326,6 +331,12 @@ impl FileStands {
         }
         text
     }
+}
+
+/// What a hall tells that it has, short and plain.
+fn told(payload: &[u8]) -> Option<HaveReport> {
+    let report = json::clipped(serde_json::from_slice(payload).ok()?, TEXT, NAMED);
+    serde_json::from_value(report).ok()
 }
 
 /// The table as people read it, and below it what is not there.

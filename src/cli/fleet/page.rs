@@ -10,7 +10,7 @@ use async_nats::connection::State as EngineState;
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, State};
-use axum::http::{StatusCode, Uri, header};
+use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 use futures_util::StreamExt as _;
@@ -27,8 +27,9 @@ use super::{DeskArgs, act, engine, settings};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::control::{Code, Problem};
 use crate::fleet;
+use crate::json as strict;
 use crate::log::Log;
-use crate::metrics::halls::{CONTENT_TYPE, FleetFigures, HallFigures};
+use crate::metrics::halls::{FleetFigures, HallFigures};
 use crate::sys::clock::Monotonic;
 use crate::sys::lock::lock;
 use crate::time::Clock as _;
@@ -183,7 +184,7 @@ async fn stop(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
         let remedy = "send {\"halls\": [\"all\"]}, or names of halls of this desk";
         Problem::new(Code::Value, detail, remedy).into_response()
     };
-    let asked: StopRequest = match serde_json::from_slice(&body) {
+    let asked: StopRequest = match strict::from_slice(&body) {
         Ok(asked) => asked,
         Err(error) => return wrong(format!("no list of halls: {error}")),
     };
@@ -204,7 +205,7 @@ async fn stop(State(desk): State<Arc<Desk>>, body: Bytes) -> Response {
     json(&answers)
 }
 
-async fn figures(State(desk): State<Arc<Desk>>) -> Response {
+async fn figures(State(desk): State<Arc<Desk>>, headers: HeaderMap) -> Response {
     let halls = desk.table();
     let of_hall = |hall: &HallSeen| HallFigures {
         name: hall.name.clone(),
@@ -217,7 +218,7 @@ async fn figures(State(desk): State<Arc<Desk>>) -> Response {
         halls: halls.iter().map(of_hall).collect(),
         stops: lock(&desk.stops).clone(),
     };
-    ([(header::CONTENT_TYPE, CONTENT_TYPE)], figures.render()).into_response()
+    api::figures_as(&headers, figures.render())
 }
 
 async fn page(uri: Uri) -> Response {

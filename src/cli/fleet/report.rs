@@ -15,12 +15,17 @@ use crate::cli::report::{Day, parse_day, shows_table};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::fleet::{self, LogRecord};
 use crate::journal::{JournalReport, report_of};
+use crate::json;
 use crate::sys::clock::local_now;
 
 /// Records that are asked for at a time.
 const BATCH: usize = 200;
 /// How long the engine may take for these.
 const PATIENCE: Duration = Duration::from_secs(10);
+
+/// The longest text of a record that is shown, bytes, and the longest list.
+const TEXT: usize = 480;
+const ITEMS: usize = 256;
 
 /// Reports what all halls of a desk played on a day.
 ///
@@ -155,7 +160,9 @@ impl ToldByHall {
         // As the hall itself reads them: what was told again, of days before, is not behind what was told first.
         let file_of = |record: &LogRecord| record.part.file.clone();
         self.records.values_mut().for_each(|records| records.sort_by_cached_key(file_of));
-        let lines = |records: Vec<LogRecord>| records.into_iter().map(|record| record.part.record).collect();
+        let lines = |records: Vec<LogRecord>| {
+            records.into_iter().map(|record| json::clipped(record.part.record, TEXT, ITEMS)).collect()
+        };
         let mut report = report_of(self.records.into_values().map(lines), day, day);
         report.notes.extend(self.missing);
         report
