@@ -35,6 +35,7 @@ mod lasting;
 mod library;
 mod mbox;
 mod notify;
+mod pages;
 mod player;
 mod playlist;
 mod recordings;

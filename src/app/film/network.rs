@@ -1,7 +1,7 @@
 //! Art-Net timecode, and positions by OSC and HTTP: what comes over the network from one sender who is named.
 
 use std::convert::Infallible;
-use std::net::Ipv4Addr;
+use std::net::{IpAddr, Ipv4Addr};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -13,12 +13,14 @@ use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use rosc::{OscPacket, decoder};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::Semaphore;
 
 use super::{FilmError, WordSink, datagrams, start};
+use crate::api::Access;
+use crate::control::{Place, Places};
 use crate::film::artnet::{ArtNetReader, ArtTimecode};
 use crate::film::message::{FilmPosition, PositionReader};
 use crate::film::source::{FilmArgs, NamedSender};
+use crate::json;
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
 
@@ -28,8 +30,11 @@ const ADDRESS: &str = "/kinocue/sync";
 /// The longest body of a request, bytes, and how long its head may take.
 const BODY: usize = 1_024;
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// Connections of the one sender.
-const CONNECTIONS: usize = 8;
+/// Connections of the one sender. There is always room for one more: of those that have told no position yet, the one that was silent
+/// longest goes.
+const CONNECTIONS: usize = 64;
+/// Whose a connection is that has told a position.
+const PLAYER: &str = "player";
 /// How often it is looked whether anybody still listens.
 const LOOK: Duration = Duration::from_millis(250);
 
@@ -90,7 +95,8 @@ pub(super) fn osc_position(bytes: &[u8]) -> Option<FilmPosition> {
 pub(super) fn hear_http(sender: &NamedSender, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let listener = runtime.block_on(TcpListener::bind(sender.bind)).map_err(at_bind(sender))?;
-    let door = Door { reader: Mutex::new(PositionReader::new(args.begin())), told };
+    let access = Access::without_pages();
+    let door = Door { reader: Mutex::new(PositionReader::new(args.begin())), told, access };
     let named = sender.from;
     start("http", move || runtime.block_on(serve(listener, named, Arc::new(door))))?;
     Ok(())
@@ -100,10 +106,11 @@ pub(super) fn hear_http(sender: &NamedSender, args: &FilmArgs, told: WordSink) -
 struct Door {
     reader: Mutex<PositionReader>,
     told: WordSink,
+    access: Access,
 }
 
 async fn serve(listener: TcpListener, named: Ipv4Addr, door: Arc<Door>) {
-    let places = Arc::new(Semaphore::new(CONNECTIONS));
+    let places = Places::new(CONNECTIONS);
     while !door.told.is_over() {
         let Ok(accepted) = tokio::time::timeout(LOOK, listener.accept()).await else { continue };
         let Ok((stream, peer)) = accepted else {
@@ -113,28 +120,32 @@ async fn serve(listener: TcpListener, named: Ipv4Addr, door: Arc<Door>) {
         if !door.told.hears(named, peer.ip()) {
             continue;
         }
-        // One connection too many is closed: the sender has others.
-        let Ok(place) = Arc::clone(&places).try_acquire_owned() else { continue };
+        let (place, _) = places.take(Some(IpAddr::V4(named)));
         let door = Arc::clone(&door);
         tokio::spawn(async move {
-            connection(stream, &door).await;
-            drop(place);
+            tokio::select! {
+                () = connection(stream, &door, &place) => {}
+                () = place.leave() => {}
+            }
         });
     }
 }
 
-async fn connection(stream: TcpStream, door: &Door) {
+async fn connection(stream: TcpStream, door: &Door, place: &Place) {
     let _ = stream.set_nodelay(true); // a position that waits is a wrong one
-    let service = service_fn(|request| async { Ok::<_, Infallible>(answer(request, door).await) });
+    let service = service_fn(|request| async { Ok::<_, Infallible>(answer(request, door, place).await) });
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME).max_headers(32).max_buf_size(8_192);
     // What ended it, the sender knows best.
     let _ = http.serve_connection(TokioIo::new(stream), service).await;
 }
 
-async fn answer(request: Request<Incoming>, door: &Door) -> Response<Full<Bytes>> {
+async fn answer(request: Request<Incoming>, door: &Door, place: &Place) -> Response<Full<Bytes>> {
     let (status, text) = match take(request, door).await {
-        Ok(()) => (StatusCode::NO_CONTENT, String::new()),
+        Ok(()) => {
+            place.show(PLAYER);
+            (StatusCode::NO_CONTENT, String::new())
+        }
         Err((status, text)) => {
             door.told.note(|notes| notes.garbage += 1);
             (status, text + "\n")
@@ -146,6 +157,12 @@ async fn answer(request: Request<Incoming>, door: &Door) -> Response<Full<Bytes>
 }
 
 async fn take(request: Request<Incoming>, door: &Door) -> Result<(), (StatusCode, String)> {
+    // A page in a browser of the player's machine is no player, whatever name has led it here.
+    let of_page = door.access.check_origin(request.headers());
+    of_page.and_then(|()| door.access.check_host(request.headers(), request.uri())).map_err(|problem| {
+        let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::FORBIDDEN);
+        (status, format!("{}; {}", problem.detail, problem.remedy))
+    })?;
     if request.uri().path() != PATH {
         return Err((StatusCode::NOT_FOUND, format!("put positions to {PATH}")));
     }
@@ -157,7 +174,7 @@ async fn take(request: Request<Incoming>, door: &Door) -> Result<(), (StatusCode
         (StatusCode::PAYLOAD_TOO_LARGE, format!("the body is longer than {BODY} bytes, or late"))
     })?;
     let at = Monotonic.now();
-    let position: FilmPosition = serde_json::from_slice(&body.to_bytes()).map_err(|error| {
+    let position: FilmPosition = json::from_slice(&body.to_bytes()).map_err(|error| {
         (
             StatusCode::BAD_REQUEST,
             format!("{error}; send {{\"media_ms\": 61500.0, \"rate\": 1.0, \"playing\": true}}"),

@@ -314,14 +314,22 @@ fn positions_by_osc_prove_fine_and_a_told_stop_is_one() {
     until(&reader, "counted", |table| table.sources[0].notes.garbage == 1);
 }
 
-/// What is answered to a request with that head and body.
-fn asked(from: Ipv4Addr, to: SocketAddrV4, head: &str, body: &str) -> String {
+fn connected(from: Ipv4Addr, to: SocketAddrV4) -> TcpStream {
     let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None).expect("a socket");
     socket.bind(&SocketAddrV4::new(from, 0).into()).expect("it is of this machine");
     socket.connect(&to.into()).expect("somebody listens");
-    let mut stream = TcpStream::from(socket);
+    socket.into()
+}
+
+/// What is answered to a request with that head and body.
+fn asked(from: Ipv4Addr, to: SocketAddrV4, head: &str, body: &str) -> String {
+    let mut stream = connected(from, to);
+    // Unless it is asked by another name.
+    let host = if head.contains("\r\nhost: ") { String::new() } else { format!("\r\nhost: {to}") };
+    let (line, more) = head.split_once("\r\n").unwrap_or((head, ""));
     let text = format!(
-        "{head} HTTP/1.1\r\nhost: h\r\nconnection: close\r\ncontent-length: {}\r\n\r\n{body}",
+        "{line} HTTP/1.1{host}\r\n{more}{}connection: close\r\ncontent-length: {}\r\n\r\n{body}",
+        if more.is_empty() { "" } else { "\r\n" },
         body.len()
     );
     let _ = stream.write_all(text.as_bytes()); // who is not heard may find that out here
@@ -348,6 +356,10 @@ fn positions_by_http_lead_from_the_named_player_alone_and_what_is_none_is_refuse
         ("GET /api/v1/sync/position", "", "405"),
         (put, "{}", "400"),
         (put, "{\"media_ms\": 1, \"speed\": 2}", "400"),
+        (put, "{\"media_ms\": 1, \"media_ms\": 2}", "400"),
+        ("PUT /api/v1/sync/position\r\nhost: evil.example:8431", "{\"media_ms\": 1}", "403"),
+        ("PUT /api/v1/sync/position\r\norigin: http://evil.example", "{\"media_ms\": 1}", "403"),
+        ("PUT /api/v1/sync/position\r\nsec-fetch-site: cross-site", "{\"media_ms\": 1}", "403"),
         (put, &long, "413"),
     ];
     for (head, body, status) in refused {
@@ -355,11 +367,34 @@ fn positions_by_http_lead_from_the_named_player_alone_and_what_is_none_is_refuse
         assert!(answer.starts_with(&format!("HTTP/1.1 {status}")), "{head} {body:.40}: {answer}");
     }
     assert_eq!(asked(foreign, here, put, "{\"media_ms\": 1}"), "", "nobody else is answered");
-    let table = until(&reader, "counted", |table| table.sources[0].notes.garbage == 5);
+    let table = until(&reader, "counted", |table| table.sources[0].notes.garbage == 9);
     assert_eq!(table.sources[0].notes.foreign_from, Some(foreign));
     drop(film);
     assert!(asked(named, here, put, "{\"media_ms\": 90000, \"playing\": false}").starts_with("HTTP/1.1 204"));
     in_state(&reader, FilmState::Stopped);
+}
+
+#[test]
+fn half_open_connections_of_the_players_own_machine_keep_the_player_out_at_no_time() {
+    let (named, here) = (address(), SocketAddrV4::new(address(), 8431));
+    let reader = listen(&[format!("http:{named},bind={here}")]);
+    let put = |at: f64| asked(named, here, "PUT /api/v1/sync/position", &format!("{{\"media_ms\": {at}}}"));
+    let half = |octets: &[u8]| {
+        let mut stream = connected(named, here);
+        let _ = stream.write_all(octets);
+        stream
+    };
+    let mut held = Vec::new();
+    for n in 0..300 {
+        held.push(half(
+            [&b""[..], b"PUT /api/v1/sync/posi", b"PUT /api/v1/sync/position HTTP/1.1\r\nhost:"][n % 3],
+        ));
+        if n % 50 == 49 {
+            let answer = put(60_000.0 + n as f64);
+            assert!(answer.starts_with("HTTP/1.1 204"), "beside {n}: {answer}");
+        }
+    }
+    drop((held, reader));
 }
 
 #[test]
