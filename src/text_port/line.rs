@@ -36,13 +36,19 @@ impl From<Problem> for TextFault {
 
 /// What a line asks; it has no end of line any more.
 pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<TextOrder, TextFault> {
+    if is_stop(line) {
+        return Ok(TextOrder::Command(Command::Stop));
+    }
     let text = str::from_utf8(line).ok().filter(|text| text.is_ascii());
     let no_ascii = || TextFault::NoOrder(value("the line is not ASCII".to_owned(), "send plain ASCII"));
-    let words: Vec<&str> = text.ok_or_else(no_ascii)?.split_ascii_whitespace().collect();
+    let text = text.ok_or_else(no_ascii)?;
+    let small = text.to_ascii_lowercase();
+    let words: Vec<&str> = small.split_ascii_whitespace().collect();
+    // Names are what they are, in capitals or not.
+    let name = || text.split_ascii_whitespace().nth(1).unwrap_or_default();
     let order = TextOrder::Command(match words[..] {
         ["status"] => return Ok(TextOrder::Status),
         ["film"] => return Ok(TextOrder::Film),
-        [stop] if stop.eq_ignore_ascii_case("stop") => Command::Stop,
         ["go"] => Command::Go,
         ["pause"] => Command::Pause,
         ["resume"] => Command::Resume,
@@ -55,20 +61,28 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<TextOrder, TextFa
         ["level", all] => level(all, |all| (Some(all), Some(all)))?,
         ["level", "motion", motion] => level(motion, |motion| (Some(motion), None))?,
         ["level", "vibration", vibration] => level(vibration, |vibration| (None, Some(vibration)))?,
-        ["effect", name, "on"] => effect(name, true),
-        ["effect", name, "off"] => effect(name, false),
-        ["enable", name] => Command::Enable(name.to_owned()),
-        ["disable", name] => Command::Disable { name: name.to_owned(), why: None },
+        ["effect", _, "on"] => effect(name(), true),
+        ["effect", _, "off"] => effect(name(), false),
+        ["enable", _] => Command::Enable(name().to_owned()),
+        ["disable", _] => Command::Disable { name: name().to_owned(), why: None },
         [word, ..] if Command::OF_PEOPLE.contains(&word) => {
             let detail = format!("lines of text may never {word}");
             return Err(Problem::new(Code::Role, detail, "a person does that on the console").into());
         }
         _ => {
-            let detail = format!("{:?} is not a line that kinocue knows", text.unwrap_or_default());
+            let detail = format!("{text:?} is not a line that kinocue knows");
             return Err(TextFault::NoOrder(value(detail, &format!("the lines are {LINES}"))));
         }
     });
     allowed(order, allow)
+}
+
+/// True of what can be read as a stop: its first word is that, whatever stands before and behind it.
+pub(super) fn is_stop(line: &[u8]) -> bool {
+    let from = line.iter().position(u8::is_ascii_alphanumeric).unwrap_or(line.len());
+    let Some((word, rest)) = line[from..].split_first_chunk::<4>() else { return false };
+    let is_over = rest.first().is_none_or(|next| !next.is_ascii_alphanumeric() && !b"-_".contains(next));
+    word.eq_ignore_ascii_case(b"stop") && is_over
 }
 
 /// An order, where the configuration allows it.
@@ -128,6 +142,16 @@ mod tests {
             ("resume", Command::Resume),
             ("stop", Command::Stop),
             (" STOP ", Command::Stop),
+            ("Stop!", Command::Stop),
+            ("\u{feff}stop;", Command::Stop),
+            ("\0stop\r", Command::Stop),
+            ("stop the show", Command::Stop),
+            ("GO", Command::Go),
+            ("Seek 12:30", Command::Seek(ShowTime::from_millis(750_000))),
+            ("LEVEL 60%", levels(Some(0.6), Some(0.6))),
+            ("TRIM +80MS", Command::Trim(80)),
+            ("ENABLE F4", Command::Enable("F4".to_owned())),
+            ("Effect Water OFF", effect("Water", false)),
             ("park", Command::Park),
             ("seek 12:30", Command::Seek(ShowTime::from_millis(750_000))),
             ("trim +80ms", Command::Trim(80)),
@@ -171,7 +195,10 @@ mod tests {
     fn what_is_no_line_is_refused_with_what_to_write() {
         for (line, says) in [
             ("", "the lines are go, pause"),
-            ("GO", "\"GO\" is not a line"),
+            ("GOO", "\"GOO\" is not a line"),
+            ("stopwatch", "not a line"),
+            ("stop-film", "not a line"),
+            ("no stop", "not a line"),
             ("go now", "not a line"),
             ("seek", "not a line"),
             ("effect water maybe", "not a line"),

@@ -5,19 +5,19 @@ use std::time::Duration;
 
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
-use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
+use tokio::io::{AsyncBufRead, AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
 use tokio::net::TcpStream;
 use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-use super::line::{TextFault, TextOrder, order};
+use super::line::{TextFault, TextOrder, is_stop, order};
 use crate::config::GearWord;
 use crate::control::{Code, Command, FilmStatus, Handle, Place, Posted, Problem, Status, Who};
 use crate::time::ShowTime;
 
 /// Bytes of a line at the most, its end included.
-const LONGEST: u64 = 256;
+const LONGEST: usize = 256;
 /// Lines that may wait for their answers; of who sends more ahead nothing but a stop is heard any more.
 const AHEAD: usize = 16;
 /// Of what came behind the last line so much is read, bytes, and waited for so long.
@@ -46,6 +46,17 @@ pub(super) struct TextTalk {
     pub(super) idle: Duration,
     /// Its place among the connections.
     pub(super) place: Place,
+}
+
+/// How a line ended.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum LineEnd {
+    /// As it should: with LF, CR or both.
+    Whole,
+    /// It did not, in [`LONGEST`] bytes.
+    TooLong,
+    /// The peer left.
+    Cut,
 }
 
 /// What comes after a line.
@@ -85,28 +96,50 @@ impl TextTalk {
         let mut line = Vec::new();
         loop {
             line.clear();
-            let mut bounded = (&mut incoming).take(LONGEST);
-            match timeout(self.idle, bounded.read_until(b'\n', &mut line)).await {
-                Ok(Ok(1..)) => {}
-                _ => return, // it left, or fell silent
-            }
-            let Some(text) = line.strip_suffix(b"\n") else {
-                if let Some(lines) = lines.filter(|_| line.len() as u64 == LONGEST) {
+            let end = timeout(self.idle, self.next_line(&mut incoming, &mut line)).await;
+            let end = end.unwrap_or(LineEnd::Cut); // it fell silent
+            // What is left of a line is none, unless it is a stop.
+            if end != LineEnd::Whole && !is_stop(&line) {
+                if let Some(lines) = lines.filter(|_| end == LineEnd::TooLong) {
                     let _ = lines.try_send(Read::Answered(Err(too_long())));
                 }
-                return; // what is left of a line is none
-            };
-            let text = text.strip_suffix(b"\r").unwrap_or(text);
-            let Some(to) = &lines else {
-                self.hear_a_stop(text);
-                continue;
-            };
-            let (read, then) = if wanted.is_some() { self.first(text, &mut wanted) } else { self.take(text) };
-            let full = to.try_send(read).is_err();
-            match then {
-                Then::End => return,
-                Then::Listen if full => lines = None,
-                Then::Listen => {}
+                return;
+            }
+            let text = line.trim_ascii();
+            match &lines {
+                _ if text.is_empty() => {} // CR and LF end one line, and some gear sends one before
+                None => self.hear_a_stop(text),
+                Some(to) => {
+                    let first = wanted.is_some();
+                    let (read, then) = if first { self.first(text, &mut wanted) } else { self.take(text) };
+                    let full = to.try_send(read).is_err();
+                    match then {
+                        Then::End => return,
+                        Then::Listen if full => lines = None,
+                        Then::Listen => {}
+                    }
+                }
+            }
+            if end != LineEnd::Whole {
+                return;
+            }
+        }
+    }
+
+    /// Reads a line, without its end. A stop is done as soon as it can be read, whether or not its line has ended.
+    async fn next_line(&self, incoming: &mut (impl AsyncBufRead + Unpin), line: &mut Vec<u8>) -> LineEnd {
+        loop {
+            let Ok(octets @ [_, ..]) = incoming.fill_buf().await else { return LineEnd::Cut };
+            let octets = &octets[..octets.len().min(LONGEST - line.len())];
+            let end = octets.iter().position(|octet| b"\r\n".contains(octet));
+            line.extend(&octets[..end.unwrap_or(octets.len())]);
+            let read = end.map_or(octets.len(), |end| end + 1);
+            incoming.consume(read);
+            match end {
+                Some(_) => return LineEnd::Whole,
+                None if line.len() == LONGEST => return LineEnd::TooLong,
+                None if is_stop(line) => self.hall.stop(),
+                None => {}
             }
         }
     }

@@ -14,6 +14,8 @@ use crate::control::{
     Code, Command, FilmStatus, Inbox, Problem, Role, ShowStatus, Status, StatusSource, Surface, handle,
 };
 use crate::rt::Desk;
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
 
 /// Nothing is waited for longer; where all is well it takes milliseconds.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -239,6 +241,48 @@ fn where_a_token_is_wanted_nothing_but_a_stop_is_taken_without_it() {
     let mut peer = stage.connect();
     peer.send(b"token hush\r\ngo\r\n");
     assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
+    assert_eq!(stage.asked().desired.ask, Command::Go);
+}
+
+#[test]
+fn whatever_can_be_read_as_a_stop_is_one_however_its_line_ends_and_whatever_stands_before() {
+    let stage = Stage::new();
+    for octets in [
+        &b"stop\r"[..],
+        b"\r\nstop\r\n",
+        b"\n \n\nSTOP\n",
+        b"\xef\xbb\xbfstop\n",
+        b"stop!",
+        b"status\rstop",
+        &[&b"stop"[..], &[b' '; 300]].concat(),
+    ] {
+        let mut peer = stage.connect();
+        peer.send(octets);
+        let end = Monotonic.now() + PATIENCE;
+        while !stage.desk.take_stop() {
+            assert!(Monotonic.now() < end, "{:?}", String::from_utf8_lossy(octets));
+            std::thread::yield_now();
+        }
+        peer.0.get_ref().shutdown(std::net::Shutdown::Write).unwrap();
+        assert_eq!(stage.asked().desired.ask, Command::Stop, "{:?}", String::from_utf8_lossy(octets));
+        let _ = stage.desk.take_stop();
+    }
+    let mut peer = stage.connect();
+    peer.send(b"stopwatch");
+    peer.0.get_ref().shutdown(std::net::Shutdown::Write).unwrap();
+    assert_eq!(peer.line(), "");
+    assert!(!stage.desk.take_stop(), "another word");
+}
+
+#[test]
+fn lines_end_with_cr_or_lf_or_both_and_empty_ones_are_none() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(b"\r\nstatus\rstatus\n\r\nstatus\r\n");
+    for _ in 0..3 {
+        assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
+    }
+    peer.send(b"GO\r");
     assert_eq!(stage.asked().desired.ask, Command::Go);
 }
 
