@@ -377,6 +377,12 @@ impl Belief {
         self.busy_until + self.lead
     }
 
+    /// Whether its seat may still be on its way to where the last frame leads: what is read until then says nothing of where it rests.
+    #[must_use]
+    pub(crate) fn is_under_way(&self, now: MonoTime) -> bool {
+        now < self.executed_until() + SETTLE
+    }
+
     /// Whether no frame has been under way for so long that the next is the first of a motion.
     #[must_use]
     pub(crate) fn is_quiet(&self, now: MonoTime) -> bool {

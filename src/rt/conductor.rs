@@ -340,7 +340,8 @@ impl Conductor {
     }
 
     /// Tells the machine what the engine does; to be called every tick, after the engine's. What happened comes before how far it is.
-    pub(crate) fn watch(&mut self, engine: &mut Engine, now: MonoTime) {
+    /// `is_read` says whether all seats that are led were read since the engine was over.
+    pub(crate) fn watch(&mut self, engine: &mut Engine, is_read: bool, now: MonoTime) {
         let mut trouble = None;
         engine.events().take(|event| {
             match event {
@@ -356,6 +357,7 @@ impl Conductor {
             true
         });
         let means = self.what_it_means(engine.progress(), engine.playhead().frames() > 0);
+        let means = means.filter(|event| is_read || *event != Event::Parked);
         if let Some(event) = trouble.map(Event::Trouble).or(means) {
             self.machine.event(event, now);
             self.steer(engine);
@@ -544,7 +546,7 @@ mod tests {
                 let mut conductor = Conductor::of_a_play(now, true).chasing(film);
                 engine.obey(Directive::Play); // as a show is that waits for its seats to be read
                 conductor.request(asked, &mut engine, now).unwrap();
-                conductor.watch(&mut engine, now);
+                conductor.watch(&mut engine, true, now);
                 let ended = if asked == Transition::Stop { State::Stopped } else { State::Parked };
                 assert_eq!(conductor.machine().state(), ended);
                 assert!(engine.sends_nothing());

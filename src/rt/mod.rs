@@ -57,7 +57,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::belief::Taken;
 use crate::drive::{Lane, Stamped};
-use crate::engine::{Ending, Engine, EngineEvent, Step};
+use crate::engine::{Ending, Engine, EngineEvent, PlayProgress, Step};
 use crate::motion::Pose;
 use crate::net::{Delivery, SendFault, Sender};
 use crate::record::{Asked, TickHead};
@@ -166,6 +166,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         // In a pause nothing is sent: what follows begins as any motion does.
         let moving = self.conductor.machine().may_send_motion() && !self.engine.waits();
         self.places.look(&mut self.engine, &self.mail, now, moving);
+        let was_over = matches!(self.engine.progress(), PlayProgress::Over(_));
         let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving, soon);
         let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
         self.mind_broadcast(now);
@@ -178,7 +179,10 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             }
             Step::Send | Step::Quiet | Step::Over => nanos(tick.late),
         };
-        self.conductor.watch(&mut self.engine, now);
+        // Seats are at park once they were read after their last frame, where somebody reads them; whose program ends does not wait.
+        let is_awaited = self.conductor.stays() && !self.conductor.is_left() && self.mail.live().has_reader();
+        let is_read = (was_over && goes_on) || !is_awaited;
+        self.conductor.watch(&mut self.engine, is_read, now);
         let Tick { index, deadline, missed, .. } = tick;
         let (film, state) = (self.engine.playhead().at(), self.conductor.machine().state());
         self.sink.tick_over(&TickHead { index, deadline, late_ns, missed, film, state });

@@ -146,6 +146,9 @@ impl Places {
             self.wait(mail, now, true);
         }
         let Some(mut wait) = self.waits.take().filter(|_| moving || soon) else { return true };
+        if engine.sends_nothing() && self.is_any_under_way(engine, now) {
+            wait.met = now;
+        }
         let is_over = moving && (soon || now.since(wait.met) >= WAITS_FOR);
         let mut goes_on = true;
         for lane in 0..self.lanes.len() {
@@ -165,6 +168,15 @@ impl Places {
         // One that begins is over with the first frame.
         self.waits = Some(wait).filter(|wait| wait.begins || !goes_on);
         goes_on || !wait.begins || !moving
+    }
+
+    /// Whether a seat that is led may still be on its way to where its last frame leads.
+    fn is_any_under_way(&self, engine: &Engine, now: MonoTime) -> bool {
+        let is_led = |lane: usize| engine.lane(lane).takes_part() && !engine.lane(lane).is_blind();
+        self.lanes
+            .iter()
+            .enumerate()
+            .any(|(lane, Place { belief, .. })| is_led(lane) && belief.is_under_way(now))
     }
 
     /// Whether a lane's seat is still to be read.
