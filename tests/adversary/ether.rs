@@ -71,7 +71,7 @@ pub(crate) struct Line {
     lost_since: Option<u64>,
     master: Option<Master>,
     /// Answers and reports of its seat, oldest first: the network may deliver them again.
-    pub(crate) said: VecDeque<Vec<u8>>,
+    pub(crate) said: VecDeque<(u64, Vec<u8>)>,
 }
 
 impl Line {
@@ -301,7 +301,7 @@ impl Line {
     fn answer(&mut self, octets: Vec<u8>, at: u64, dice: &mut Dice) {
         if !matches!(octets[4], 0x13 | 0x14 | 0x18 | 0x19) {
             self.said.drain(..self.said.len().saturating_sub(KEPT));
-            self.said.push_back(octets.clone());
+            self.said.push_back((at, octets.clone()));
         }
         let hoarse = self.until(at, |what| matches!(what, Weather::Hoarse(_)));
         let lost = matches!(hoarse, Some((_, Weather::Hoarse(times))) if dice.one_in(times));

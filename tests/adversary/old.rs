@@ -4,6 +4,7 @@
 use kinocue::harness::state::{LedBefore, State, Transition};
 
 use super::cues::{KINDS, Kind, MBOXES};
+use super::dice::Dice;
 use super::ether::{Ether, Line, Weather};
 use super::hall::Hall;
 use super::judge::PULSES_PER_MM;
@@ -43,7 +44,7 @@ impl Old {
     fn farthest(self, line: &Line, now: u64) -> Vec<Vec<u8>> {
         let place = line.seat.told_place(now);
         let mut found: Vec<(f64, &Vec<u8>)> = Vec::new();
-        for octets in &line.said {
+        for (_, octets) in &line.said {
             let Some(off) = self.is_off(octets, &line.seat, &place) else { continue };
             let is_alike = |other: &&Vec<u8>| self != Self::Answers || other[4..16] == octets[4..16];
             match found.iter_mut().find(|(_, other)| is_alike(other)) {
@@ -68,6 +69,38 @@ impl Ether {
             }
         }
     }
+}
+
+impl Ether {
+    /// The network delivers a stretch of what a seat said again, or all of it in any order: `from` is how many of its datagrams are older, and
+    /// the stretch is as long as it was.
+    pub(crate) fn delivers_again(&self, seat: usize, from: u64, ms: u64, dice: Option<&mut Dice>) {
+        let now = self.ns();
+        let line = &mut self.world().lines[seat];
+        let from = from as usize % line.said.len().max(1);
+        let begun = line.said.get(from).map_or(0, |(at, _)| *at);
+        let stretch = line.said.iter().skip(from).take_while(|(at, _)| *at < begun + ms * MS);
+        let stretch: Vec<(u64, Vec<u8>)> = stretch.cloned().collect();
+        let mut shift = dice;
+        for (at, octets) in stretch {
+            let later = shift.as_mut().map_or(at - begun, |dice| dice.range(0, ms * MS));
+            line.deliver_again(octets, now + later);
+        }
+    }
+}
+
+/// What old datagrams come by chance.
+pub(crate) fn by_chance(hall: &mut Hall<'_, '_>, seat: usize, dice: &mut Dice) {
+    let ms = dice.pick(&[20, 150, 300, 800, 1_500]);
+    if dice.one_in(3) {
+        let (from, ms, in_order) = (dice.next(), ms.min(300), dice.one_in(2));
+        hall.note(|| format!("seat {}: {ms} ms of answers from before, in order: {in_order}", seat + 1));
+        return hall.ether.delivers_again(seat, from, ms, (!in_order).then_some(dice));
+    }
+    let old = dice.pick(&[Old::Answer, Old::Answer, Old::Answers, Old::Report]);
+    let every_us = dice.pick(&[300, 3_000, 20_000, 90_000]);
+    hall.note(|| format!("seat {}: {old:?} from before each {every_us} us for {ms} ms", seat + 1));
+    hall.ether.repeats(seat, old, every_us, ms);
 }
 
 /// What is asked of a hall while old datagrams come again.
@@ -239,5 +272,35 @@ fn nor_from_an_old_report_that_the_registers_contradict() {
         for asked in [Asked::Rejoin, Asked::Go, Asked::Resume, Asked::Park] {
             comes_again(kind, 100, asked, Trouble { old: Old::Report, every_us: 20_000, ..ONE });
         }
+    }
+}
+
+#[test]
+fn a_hall_is_parked_once_a_reading_that_was_made_after_the_last_frame_finds_its_seats_there() {
+    for kind in [THREE, SIX, FAST, KINDS[6], MBOX] {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, LedBefore::Ended, |hall| {
+            hall.ride(0);
+            hall.pass(700);
+            hall.ask(Transition::Park);
+            let (mut frames, mut last) = (0, 0);
+            for _ in 0..20_000 {
+                hall.pass(1);
+                if hall.state == State::Parked {
+                    break;
+                }
+                let count = hall.ether.world().lines[0].frames;
+                (frames, last) = if count == frames { (frames, last) } else { (count, hall.ether.ns()) };
+            }
+            assert_eq!(hall.state, State::Parked, "{kind:?}");
+            let line = &hall.ether.world().lines[0];
+            let is_there = |octets: &[u8]| {
+                let told = told_places(octets, line.seat.settings.high_first);
+                told.is_some_and(|told| told.iter().all(|(_, at)| f64::from(*at) < 0.2 * PULSES_PER_MM))
+            };
+            let read = line.said.iter().any(|(at, octets)| *at > last + 50 * MS && is_there(octets));
+            assert!(read, "{kind:?}: nobody has read it since its last frame");
+        });
+        assert_no_breach(&ether);
     }
 }

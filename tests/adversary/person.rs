@@ -7,6 +7,7 @@ use super::bent::Bent;
 use super::dice::Dice;
 use super::ether::{Ether, Weather};
 use super::hall::{Hall, Thread};
+use super::old;
 use super::seat::MS;
 
 /// How a hall ends.
@@ -121,6 +122,9 @@ impl Person {
 
     fn weather(&mut self, hall: &mut Hall<'_, '_>) {
         let seat = self.seat(hall);
+        if self.dice.one_in(7) {
+            return old::by_chance(hall, seat, &mut self.dice);
+        }
         let ms = self.dice.pick(&[20, 45, 80, 150, 300, 700]);
         let weather = match self.dice.range(0, 11) {
             0 => Weather::Lost,
