@@ -351,6 +351,8 @@ pub struct ControllerStatus {
     pub belts_open: Option<Vec<u8>>,
     /// Outputs, bit 0 = Y01; null if it never told.
     pub outputs: Option<u16>,
+    /// True if something may be on that nobody asks for: outputs, or vibration. Unknown counts as on.
+    pub left_on: bool,
     /// Where its axes are, mm, and degrees of its rotary axis: as measured, unless it acked a frame more than a second later, then as
     /// that commanded; null if nobody knows.
     pub positions_mm: Option<Vec<f64>>,

@@ -7,6 +7,9 @@ use crate::engine::{Beat, Mix};
 use crate::motion::{Pose, Window};
 use crate::wire::{Code, FrameNo, MAX_LEN, Timing};
 
+/// Axes at the most for which a frame has places of vibration (SMC manual 2.2.2.9).
+const SHAKEN: usize = 6;
+
 /// Our state for one controller, as far as sending goes.
 #[derive(Debug, Clone)]
 pub struct Lane {
@@ -39,6 +42,8 @@ pub struct Stamped {
     pub frame: FrameNo,
     /// True if it asks for a reply.
     pub(crate) asked: bool,
+    /// True if it switches outputs on.
+    pub(crate) lights: bool,
     /// The greatest amplitude of vibration that it asks of any slot, strokes.
     pub shakes: f64,
 }
@@ -75,7 +80,7 @@ impl Lane {
         buf: &'b mut [u8; MAX_LEN],
     ) -> Option<(Stamped, &'b [u8])> {
         let Codec::Mbox(codec) = &self.codec else { return None };
-        let mut stamped = Stamped { frame, asked: frame.asks(self.ack_every), shakes: 0.0 };
+        let mut stamped = Stamped { frame, asked: frame.asks(self.ack_every), lights: false, shakes: 0.0 };
         let octets = codec.write(&self.window, (beat, pose), mix, code, &mut stamped, buf);
         Some((stamped, octets))
     }
@@ -98,15 +103,37 @@ impl Lane {
         time_ms: u32,
         buf: &'b mut [u8; MAX_LEN],
     ) -> (Stamped, &'b [u8]) {
+        self.encode_slow(&self.window.park(), false, time_ms, buf)
+    }
+
+    /// Writes the one slow frame that holds a seat which vibrates about that pose: it says that each axis is not to, outputs off.
+    pub(crate) fn encode_still<'b>(
+        &mut self,
+        pose: &Pose,
+        time_ms: u32,
+        buf: &'b mut [u8; MAX_LEN],
+    ) -> (Stamped, &'b [u8]) {
+        let has_room = self.window.slots().len() <= SHAKEN;
+        self.encode_slow(pose, has_room, time_ms, buf)
+    }
+
+    fn encode_slow<'b>(
+        &mut self,
+        pose: &Pose,
+        vibrates: bool,
+        time_ms: u32,
+        buf: &'b mut [u8; MAX_LEN],
+    ) -> (Stamped, &'b [u8]) {
         let set_vibrates = |lane: &mut Self, vibrates| match &mut lane.codec {
             Codec::Mbox(codec) => std::mem::replace(&mut codec.vibrates, vibrates),
             Codec::Link { .. } => vibrates,
         };
-        let vibrates = set_vibrates(self, false);
-        let park = self.window.park();
-        let slow = self.encode(&Beat::still(Timing::Relative, time_ms), &park, Mix::STILL, buf);
-        set_vibrates(self, vibrates);
-        slow
+        let before = set_vibrates(self, vibrates);
+        let (stamped, octets) =
+            self.encode(&Beat::still(Timing::Relative, time_ms), pose, Mix::STILL, &mut *buf);
+        let len = octets.len();
+        set_vibrates(self, before);
+        (stamped, &buf[..len])
     }
 
     /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration, effects and outputs off.
@@ -139,7 +166,7 @@ impl Lane {
         let frame = self.next_frame;
         self.next_frame = frame.next();
         let asked = frame.asks(self.ack_every);
-        Stamped { frame, asked, shakes: 0.0 }
+        Stamped { frame, asked, lights: false, shakes: 0.0 }
     }
 }
 

@@ -30,12 +30,12 @@ pub(crate) use stream::{LinkStream, motors_of, units_of};
 use std::sync::Arc;
 
 use crate::belief::{Fall, Reading};
-use crate::config::Controller;
+use crate::config::{ALL_OUTPUTS, Controller};
 use crate::health::{Pushed, Sighting};
 use crate::motion::Pulses;
 use crate::observe::Look;
 use crate::time::MonoTime;
-use crate::wire::{FromController, PerAxis, ReplyCode};
+use crate::wire::{FrameNo, FromController, PerAxis, ReplyCode};
 
 /// The other end of a lane: one controller. A variant for each family, matched and never boxed.
 #[derive(Debug)]
@@ -61,8 +61,58 @@ pub(crate) enum Need {
         /// Frames go there.
         is_led: bool,
     },
-    /// That its effects are off: no frame can switch them off that does not move it. Nobody answers.
+    /// That it is dark and still, and to be read so: outputs by a register, since no frame can switch them off that does not move it.
     Dark,
+}
+
+/// A frame on its way, as far as it leaves something on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SentFrame {
+    /// Its number.
+    pub(crate) frame: FrameNo,
+    /// It switches outputs on.
+    pub(crate) lights: bool,
+    /// The greatest amplitude of vibration that it asks for, strokes.
+    pub(crate) shakes: f64,
+    /// The instant before it was sent.
+    pub(crate) at: MonoTime,
+}
+
+/// What may be on at a controller, asked for or not. Unknown counts as on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LeftOn {
+    /// Its outputs may be on.
+    pub outputs: bool,
+    /// Its outputs when it told them last, bit 0 = Y01; none where it never did.
+    pub told: Option<u16>,
+    /// The amplitude with which its seat may vibrate, strokes.
+    pub(crate) shakes: f64,
+    /// Something was sent, or told, that says so; else nobody knows.
+    pub(crate) is_known: bool,
+}
+
+impl LeftOn {
+    /// True if anything may be.
+    #[must_use]
+    pub(crate) fn is_any(&self) -> bool {
+        self.outputs || self.vibrates()
+    }
+
+    /// The outputs that may be on, all where it did not say which; none where they are off.
+    #[must_use]
+    pub(crate) fn outputs_in_words(&self) -> Option<String> {
+        let told = self.told.filter(|told| *told != 0).unwrap_or(ALL_OUTPUTS);
+        let on = (0..12).filter(|bit| told >> bit & 1 == 1).map(|bit| format!("Y{:02}", bit + 1));
+        let names =
+            || if told == ALL_OUTPUTS { "Y01 to Y12".to_owned() } else { on.collect::<Vec<_>>().join(" ") };
+        self.outputs.then(names)
+    }
+
+    /// True if its seat may vibrate.
+    #[must_use]
+    pub(crate) fn vibrates(&self) -> bool {
+        self.shakes > 0.0
+    }
 }
 
 /// A message of a controller that is no reply to a frame.
@@ -92,6 +142,8 @@ pub(crate) enum Evidence {
     Count(u16),
     /// The same, as part of a look: what was sent and acked until now is what that count is held against, whenever the rest has come.
     Counted,
+    /// Its outputs, bit 0 = Y01.
+    Outputs(u16),
     /// It speaks in a way that nobody here can read.
     Unreadable,
     /// It drives so many axes (PA02), which are not those that its frames lead.
@@ -203,25 +255,45 @@ impl Peer {
     }
 
     /// Takes what a controller reported unasked of where its axes are; none where its family has no such reports.
-    pub(crate) fn on_report(&mut self, positions: &[Pulses], at: MonoTime) -> Option<Whereabouts> {
+    pub(crate) fn on_report(
+        &mut self,
+        positions: &[Pulses],
+        outputs: Option<u16>,
+        at: MonoTime,
+    ) -> Option<Whereabouts> {
         match self {
-            Self::Mbox(peer) => Some(peer.on_report(positions, at)),
+            Self::Mbox(peer) => Some(peer.on_report(positions, outputs, at)),
             Self::Link(_) => None,
         }
     }
 
     /// A frame went to it.
-    pub(crate) fn on_sent(&mut self, at: MonoTime) {
+    pub(crate) fn on_sent(&mut self, sent: &SentFrame) {
         match self {
-            Self::Mbox(peer) => peer.position.on_sent(at),
-            Self::Link(peer) => peer.on_sent(at),
+            Self::Mbox(peer) => peer.on_sent(sent),
+            Self::Link(peer) => peer.on_sent(sent.at),
+        }
+    }
+
+    /// It has acked a frame.
+    pub(crate) fn on_ack(&mut self, acked: FrameNo) {
+        if let Self::Mbox(peer) = self {
+            peer.on_ack(acked);
+        }
+    }
+
+    /// What may be on there. Drives on a link have no outputs, and vibrate by the poses alone that their thread is given.
+    pub(crate) fn left_on(&self) -> LeftOn {
+        match self {
+            Self::Mbox(peer) => peer.on.left_on(),
+            Self::Link(_) => LeftOn::default(),
         }
     }
 
     /// No frame goes to it any more, and its seat may vibrate on by so much, strokes.
     pub(crate) fn on_cut_off(&mut self, shakes: f64) {
         match self {
-            Self::Mbox(peer) => peer.position.on_cut_off(shakes),
+            Self::Mbox(peer) => peer.on_cut_off(shakes),
             Self::Link(_) => {}
         }
     }
@@ -238,14 +310,6 @@ impl Peer {
     pub(crate) fn is_behind(&mut self, now: MonoTime) -> bool {
         match self {
             Self::Mbox(peer) => peer.pending.is_full(now),
-            Self::Link(_) => false,
-        }
-    }
-
-    /// True if it has answered something of what it was when last asked for its identity.
-    pub(crate) fn has_answered(&mut self) -> bool {
-        match self {
-            Self::Mbox(peer) => peer.probe.has_answered(),
             Self::Link(_) => false,
         }
     }

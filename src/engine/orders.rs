@@ -75,10 +75,12 @@ impl Engine {
     /// The seat of that lane, which was cut off, vibrates on about that pose: slow frames lead it there, without vibration. It is looked at
     /// then.
     pub(crate) fn still(&mut self, lane: usize, pose: &Pose) {
-        if self.sends_nothing() {
-            return self.lanes.fall_out(lane, Fall::Gap);
-        }
         self.lanes.all[lane].still(pose);
+        self.stamps.break_off();
+    }
+
+    /// A frame left that is none of its own: the sum of Times at that controller is broken off.
+    pub(crate) fn break_off(&mut self) {
         self.stamps.break_off();
     }
 

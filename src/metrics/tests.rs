@@ -46,6 +46,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         belts_open: None,
         inputs: Some(0),
         outputs: None,
+        left_on: false,
         positions_mm: None,
         commanded: None,
         measured: None,

@@ -261,6 +261,11 @@ impl Observer {
         found.next().is_none().then_some(controller)
     }
 
+    /// Hears which outputs are on, as they were read.
+    pub(crate) fn on_outputs(&mut self, controller: usize, value: u16, at: MonoTime) {
+        self.states[controller].outputs = Some(Heard { value, at });
+    }
+
     fn note_inputs(&mut self, controller: usize, inputs: u16, at: MonoTime) {
         let state = &mut self.states[controller];
         state.heard_at = Some(at);

@@ -446,7 +446,7 @@ fn copy_of(sent: Sent) -> AckRecord<'static> {
 
 fn record(sent: Sent, tracker: &mut Tracker, last_sent: &mut MonoTime) {
     match sent {
-        Sent::Posted { lane, frame, asked, at } => {
+        Sent::Posted { lane, frame, asked, at, .. } => {
             tracker.on_sent(usize::from(lane), frame, asked, at);
             *last_sent = at.max(*last_sent);
         }

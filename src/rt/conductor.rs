@@ -44,6 +44,8 @@ pub struct Conductor {
     lead: Option<Arc<Lead>>,
     /// What starts by itself at its instant.
     start: TimedStart,
+    /// Since when an end waits for the seats to be dark, and when it did last.
+    ends: Option<(MonoTime, MonoTime)>,
 }
 
 /// A signal goes to whoever leads the hall as well, who knows more: this long it is left to them.
@@ -55,6 +57,16 @@ const EXCUSED_FOR: Duration = Duration::from_millis(100);
 /// Where no more of the lead is left than this, the seats are braked: nobody has promised more for the rest of its second. Whatever the
 /// limits of a seat are, what is not at rest by then halts with the last frame.
 const BRAKES_IN: Duration = Duration::from_millis(400);
+
+/// What ends waits so long for the seats to be dark and still.
+const DARKENED_WITHIN: Duration = Duration::from_secs(5);
+/// Ticks that are farther apart are of two ends.
+const APART: Duration = Duration::from_millis(1_500);
+
+/// Whether that is the end of a stop, or of the way to park.
+const fn ends(event: Event) -> bool {
+    matches!(event, Event::AtRest | Event::Parked)
+}
 
 impl Conductor {
     /// One of a hall in that state.
@@ -74,6 +86,7 @@ impl Conductor {
             film_error_ns: None,
             lead: None,
             start: TimedStart::NONE,
+            ends: None,
         }
     }
 
@@ -340,8 +353,8 @@ impl Conductor {
     }
 
     /// Tells the machine what the engine does; to be called every tick, after the engine's. What happened comes before how far it is.
-    /// `is_read` says whether all seats that are led were read since the engine was over.
-    pub(crate) fn watch(&mut self, engine: &mut Engine, is_read: bool, now: MonoTime) {
+    /// `is_read`: all seats that are led were read since the engine was over. `is_left_on`: one that answers is not dark and still.
+    pub(crate) fn watch(&mut self, engine: &mut Engine, is_read: bool, is_left_on: bool, now: MonoTime) {
         let mut trouble = None;
         engine.events().take(|event| {
             match event {
@@ -358,6 +371,8 @@ impl Conductor {
         });
         let means = self.what_it_means(engine.progress(), engine.playhead().frames() > 0);
         let means = means.filter(|event| is_read || *event != Event::Parked);
+        let waits = means.is_some_and(|event| self.waits_for_dark(ends(event), is_left_on, now));
+        let means = means.filter(|_| !waits);
         if let Some(event) = trouble.map(Event::Trouble).or(means) {
             self.machine.event(event, now);
             self.steer(engine);
@@ -396,6 +411,19 @@ impl Conductor {
             (State::Boot | State::Recovering | State::Parked | State::Homing | State::Armed, _) => None,
             (State::Paused | State::Stopped | State::Fault, _) => None,
         }
+    }
+
+    /// Whether what `ends` is to wait until all that answer are dark and still, for a while at the most: then somebody is warned.
+    pub(super) fn waits_for_dark(&mut self, ends: bool, is_left_on: bool, now: MonoTime) -> bool {
+        if !(ends && is_left_on) {
+            return false;
+        }
+        if self.ends.is_none_or(|(_, looked)| now.since(looked) > APART) {
+            self.ends = Some((now, now));
+        }
+        let (since, looked) = self.ends.as_mut().expect("it was set above");
+        *looked = now;
+        now.since(*since) < DARKENED_WITHIN
     }
 
     /// What is new since it was asked last.
@@ -546,7 +574,7 @@ mod tests {
                 let mut conductor = Conductor::of_a_play(now, true).chasing(film);
                 engine.obey(Directive::Play); // as a show is that waits for its seats to be read
                 conductor.request(asked, &mut engine, now).unwrap();
-                conductor.watch(&mut engine, true, now);
+                conductor.watch(&mut engine, true, false, now);
                 let ended = if asked == Transition::Stop { State::Stopped } else { State::Parked };
                 assert_eq!(conductor.machine().state(), ended);
                 assert!(engine.sends_nothing());

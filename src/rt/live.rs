@@ -91,6 +91,8 @@ pub struct Live {
     evidence: EvidenceTable,
     /// Which controllers have said anything at all.
     heard: Box<[AtomicBool]>,
+    /// At how many controllers that answer something may be on.
+    left_on: SharedWord,
     /// Up to when it has told all that arrived.
     told_ns: SharedWord,
     /// Since when a reading of all seats is waited for, and whether anybody reads them.
@@ -156,6 +158,16 @@ impl Live {
     #[must_use]
     pub(crate) fn wanted(&self) -> MonoTime {
         MonoTime::from_nanos(self.wanted_ns.get())
+    }
+
+    /// True if something may be on at a controller that answers: outputs, or vibration.
+    pub(crate) fn is_left_on(&self) -> bool {
+        self.left_on.get() > 0
+    }
+
+    /// Notes at how many.
+    pub(crate) fn on_left_on(&self, controllers: u32) {
+        self.left_on.put(controllers.into());
     }
 
     /// Asks for a reading of all seats, later than `since`. Tick thread, and whoever leads before anything moves.

@@ -40,6 +40,10 @@ pub enum Sent {
         asked: bool,
         /// The instant before it is sent.
         at: MonoTime,
+        /// It switches outputs on.
+        lights: bool,
+        /// The greatest amplitude of vibration that it asks for, strokes.
+        shakes: f64,
     },
     /// The next frame of a lane has another number than the one after its last: none has those between.
     Skipped {

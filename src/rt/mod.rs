@@ -19,6 +19,7 @@ mod planning;
 mod sending;
 mod spin;
 mod standby;
+mod still;
 mod table;
 mod timed;
 mod watch;
@@ -182,14 +183,17 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         // Seats are at park once they were read after their last frame, where somebody reads them; whose program ends does not wait.
         let is_awaited = self.conductor.stays() && !self.conductor.is_left() && self.mail.live().has_reader();
         let is_read = (was_over && goes_on) || !is_awaited;
-        self.conductor.watch(&mut self.engine, is_read, now);
+        let is_left_on = self.mail.live().is_left_on();
+        self.conductor.watch(&mut self.engine, is_read, is_left_on, now);
         let Tick { index, deadline, missed, .. } = tick;
         let (film, state) = (self.engine.playhead().at(), self.conductor.machine().state());
         self.sink.tick_over(&TickHead { index, deadline, late_ns, missed, film, state });
         self.hand_on();
         self.mail.beat();
         // A hall goes on when its show is over; one that is told to leave has ended its engine once nothing moves.
-        step != Step::Over || (self.conductor.stays() && !self.conductor.is_left())
+        let goes_on = step != Step::Over || (self.conductor.stays() && !self.conductor.is_left());
+        // The end is over when every seat that answers is dark and still.
+        self.conductor.waits_for_dark(!goes_on, is_left_on, now) || goes_on
     }
 
     /// Begins what is to begin at this tick; true where it does, or will soon.
@@ -208,7 +212,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     /// Bounded: so many commands and alarms a tick, and the planner answers one request at a time. The stop waits for none of
     /// them.
     fn take_mail(&mut self, now: MonoTime) {
-        let Self { conductor, engine, places, mail, desk, .. } = self;
+        let Self { conductor, engine, mail, desk, .. } = self;
         if desk.take_stop() {
             conductor.stop(engine, now);
         }
@@ -220,11 +224,11 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
         engine.trim(desk.trim_ms());
         for _ in 0..ALARMS_PER_TICK {
-            let Some(alarm) = mail.alarm() else { break };
+            let Some(alarm) = self.mail.alarm() else { break };
             if let Alarm::Found(lane) = alarm {
-                places.find(usize::from(lane), engine, mail, now);
+                self.find(usize::from(lane), now);
             }
-            conductor.alarm(alarm, engine, now);
+            self.conductor.alarm(alarm, &mut self.engine, now);
         }
         for _ in 0..COMMANDS_PER_TICK {
             let Some((ticket, command)) = self.mail.command() else { break };
@@ -359,10 +363,12 @@ impl Outgoing<'_> {
     /// Hands it to the kernel, and notes what became of it.
     #[inline]
     fn hand_over(&self, datagram: &[u8], places: &mut Places, mail: &mut Mail, sink: &mut impl FrameSink) {
-        let Self { index, stamped: Stamped { frame, asked, shakes }, pose, lasts_ms, at_most_ms, at } = *self;
+        let Self { index, stamped, pose, lasts_ms, at_most_ms, at } = *self;
+        let Stamped { frame, asked, lights, shakes } = stamped;
         // Posted before it is sent: a reply can overtake what is posted after.
         // To the microsecond, as it is recorded: whoever judges a recording again judges by the same instants.
-        mail.post(Sent::Posted { lane: places::number(index), frame, asked, at: at.whole_micros() });
+        let lane = places::number(index);
+        mail.post(Sent::Posted { lane, frame, asked, at: at.whole_micros(), lights, shakes });
         let delivery = sink.send(index, datagram, at);
         places.sent(index, &Taken { frame, asked, pose, lasts_ms, at_most_ms, shakes, at }, delivery);
         if let Delivery::Failed(_) = delivery {

@@ -8,6 +8,7 @@ use super::mail::{Mail, Sent};
 use crate::belief::{Belief, Fall, Found, Known, KnownPose, Taken, Tally};
 use crate::drive::Lane;
 use crate::engine::{Beat, Engine, LaneOrder};
+use crate::motion::Pose;
 use crate::net::Delivery;
 use crate::time::{MonoTime, Rate};
 use crate::wire::Timing;
@@ -192,17 +193,29 @@ impl Places {
     }
 
     /// A controller takes part again. Where its seat stands is known by what was read since the last frame went to it; else it
-    /// is looked at once more.
-    pub(super) fn find(&mut self, lane: usize, engine: &mut Engine, mail: &mut Mail, now: MonoTime) {
+    /// is looked at once more. Gives the pose about which it vibrates where no frame of the engine's ends that: none `flows`.
+    pub(super) fn find(
+        &mut self,
+        lane: usize,
+        engine: &mut Engine,
+        mail: &mut Mail,
+        now: MonoTime,
+        flows: bool,
+    ) -> Option<Pose> {
         self.take_evidence(lane, mail, mail.told(), now);
         if engine.is_led(lane) {
-            return; // it is looked at again as soon as it is away
+            return None; // it is looked at again as soon as it is away
         }
         let belief = &self.lanes[lane].belief;
         // What begins meanwhile has it read once more.
         match known(belief, self.moved, mail, now) {
             Some(known) => engine.found(lane, &known, belief.near()),
-            None if let Some(pose) = belief.vibrates_about(now) => engine.still(lane, pose),
+            None if let Some(pose) = belief.vibrates_about(now) => {
+                if !flows {
+                    return Some(*pose);
+                }
+                engine.still(lane, pose);
+            }
             None if belief.is_measured_in_part() => {
                 engine.order(lane, LaneOrder::Cut);
                 mail.post(Sent::Unread { lane: number(lane) });
@@ -212,6 +225,7 @@ impl Places {
             }
             None => engine.order(lane, LaneOrder::FallOut(Fall::Gap)),
         }
+        None
     }
 
     /// All that arrived before `told`, which was asked before, is in what is taken.

@@ -144,13 +144,13 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
     /// Sends it, and notes for each lane what became of its frame.
     fn send_to_all(&mut self, one: &Broadcast, same: Same, at: MonoTime, datagram: &[u8]) {
         let Self { lanes, places, engine, mail, sink, first, tick, .. } = self;
-        let Stamped { frame, asked, shakes } = same.stamped;
+        let Stamped { frame, asked, lights, shakes } = same.stamped;
         for lane in &one.lanes {
             let number = places::number(*lane);
             if lanes[*lane].take(frame) {
                 mail.post(Sent::Skipped { lane: number, next: frame });
             }
-            mail.post(Sent::Posted { lane: number, frame, asked, at: at.whole_micros() });
+            mail.post(Sent::Posted { lane: number, frame, asked, at: at.whole_micros(), lights, shakes });
         }
         first.get_or_insert(at);
         let delivery = sink.send_to_all(datagram);

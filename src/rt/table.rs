@@ -1,5 +1,8 @@
 //! How each controller stands, as the ack thread tells it ten times a second.
 
+use std::time::Duration;
+
+use crate::drive::LeftOn;
 use crate::health::{HealthState, Why};
 use crate::observe::ControllerState;
 use crate::time::MonoTime;
@@ -23,8 +26,20 @@ pub struct Row {
     pub(crate) state: ControllerState,
     /// Whether it knows its position; none where it never told.
     pub(crate) homed: Option<bool>,
+    /// What may be on there, by its own word where it told.
+    pub left_on: LeftOn,
+    /// Since when something may be that nobody asks for; none where frames say what is on, or nothing is.
+    pub(crate) left_since: Option<MonoTime>,
     /// When this was told.
     pub at: MonoTime,
+}
+
+impl Row {
+    /// True if something may have been on for that long that nobody asks for.
+    #[must_use]
+    pub fn is_left_on_for(&self, long: Duration) -> bool {
+        self.left_since.is_some_and(|since| self.at.since(since) >= long)
+    }
 }
 
 /// Percentiles of ack latency, ns.

@@ -3,6 +3,7 @@
 
 mod asking;
 mod broadcast;
+mod dark;
 mod hearing;
 mod notes;
 
@@ -19,7 +20,7 @@ use super::table::{Row, Turns};
 use crate::belief::Reading;
 use crate::config::Controller;
 use crate::drive::link::LaneWants;
-use crate::drive::{EvidenceList, Lane, MOST_EVIDENCE, Need, Peer, Rounds, Whereabouts};
+use crate::drive::{EvidenceList, Lane, MOST_EVIDENCE, Need, Peer, Rounds, SentFrame, Whereabouts};
 use crate::health::{Change, HealthInput, HealthState, HealthTable, Notice};
 use crate::net::Sender;
 use crate::observe::Observer;
@@ -29,13 +30,12 @@ use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
 use crate::wire::ReplyCode;
 use broadcast::BroadcastLook;
+use dark::Tended;
 use notes::Notes;
 
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
 
-/// So often effects are switched off at a controller that gets no more frames: a datagram may be lost, and nobody answers.
-const DARKENED: u8 = 3;
 /// A seat at rest that is so far from where it was, strokes, was moved.
 const MOVED: f64 = 0.002;
 /// A controller that was not seen for so long after the hall was cleared holds up nobody.
@@ -65,8 +65,8 @@ pub(crate) struct Watch {
     heard: u64,
     notices: Vec<Notice>,
     changes: Vec<Change>,
-    /// How often the effects of each controller are still to be switched off, should it get no more frames.
-    lit: Vec<u8>,
+    /// How far each is with being made dark and still.
+    tended: Vec<Tended>,
     /// Since when positions are read anew, because the hall was cleared.
     anew: Option<MonoTime>,
     /// How often it was cleared so far.
@@ -114,7 +114,7 @@ impl Watch {
             paused_at: vec![None; controllers.len()],
             reported: vec![MonoTime::default(); controllers.len()],
             heard: 0,
-            lit: vec![0; controllers.len()],
+            tended: (0..controllers.len()).map(Tended::of).collect(),
             anew: None,
             clears: 0,
             lost_zero: false,
@@ -185,10 +185,10 @@ impl Watch {
 
     pub(super) fn on_sent(&mut self, sent: Sent) {
         match sent {
-            Sent::Posted { lane, frame, asked, at } => {
+            Sent::Posted { lane, frame, asked, at, lights, shakes } => {
                 self.health.on_sent(usize::from(lane), frame, asked, at);
-                self.peers[usize::from(lane)].on_sent(at);
-                self.lit[usize::from(lane)] = DARKENED;
+                self.peers[usize::from(lane)].on_sent(&SentFrame { frame, lights, shakes, at });
+                self.tended[usize::from(lane)].posted = at;
             }
             Sent::Failed { .. } | Sent::Skipped { .. } => {}
             Sent::Joined { lane } => {
@@ -227,7 +227,11 @@ impl Watch {
     pub(super) fn on_fate(&mut self, reply: &Reply, fate: Fate) {
         let is_refusal = self.peers[reply.controller].on_reply_code(reply.code);
         match fate {
-            Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
+            Fate::Answered(ReplyCode::Running) => {
+                self.tended[reply.controller].answered = reply.at;
+                self.peers[reply.controller].on_ack(reply.frame);
+                self.health.on_ack(reply.controller, reply.frame, reply.at);
+            }
             Fate::Answered(_) if is_refusal => self.judge(HealthInput::Refused(reply.controller)),
             Fate::Duplicate | Fate::Stray => self.mind_foreign(reply.controller, fate),
             _ => {}
@@ -270,11 +274,15 @@ impl Watch {
 
     /// Tells whoever looks how the controllers stand.
     pub(super) fn tell_table(&mut self, tracker: &Tracker, observer: &Observer) {
-        let Self { health, standby, turns, looked, live, .. } = self;
+        let mut turns = std::mem::take(&mut self.turns);
+        let Self { health, standby, looked, live, .. } = &*self;
         let is_told = live.on_table(|rows| {
             let row = |controller: usize, before: Option<&Row>| {
                 let group = health.groups().group_of(controller);
+                let (left_on, left_since) = self.left_on(controller);
                 Row {
+                    left_on,
+                    left_since,
                     counts: tracker.counts(controller),
                     ack_ns: before.and_then(|row| row.ack_ns),
                     standing: health.standing(group),
@@ -292,7 +300,7 @@ impl Watch {
             }
             turns.look_up(rows, tracker);
         });
-        self.untold = !is_told;
+        (self.turns, self.untold) = (turns, !is_told);
     }
 
     /// Judges all at `now`, an instant up to which all was told.
@@ -309,7 +317,9 @@ impl Watch {
             if let Some(told) = state.measured.filter(|told| told.at == at && at > self.reported[controller])
             {
                 self.reported[controller] = at;
-                if let Some(place) = self.peers[controller].on_report(&told.value, at) {
+                let outputs = state.outputs.filter(|outputs| outputs.at == at).map(|outputs| outputs.value);
+                self.tended[controller].answered = at;
+                if let Some(place) = self.peers[controller].on_report(&told.value, outputs, at) {
                     self.publish(controller, &place);
                 }
             }
@@ -318,6 +328,7 @@ impl Watch {
         self.stand_by();
         self.beat(now);
         self.read_all();
+        self.tend(now);
         let notices = &mut self.notices;
         self.health.tick(now, &mut |notice| notices.push(notice));
         if let Some(records) = &mut self.records {
@@ -347,7 +358,6 @@ impl Watch {
             Notice::Read(controller) if self.is_asked_otherwise() && self.stands(controller).may_move() => {}
             Notice::Count(controller) => drop(self.ask(controller, Need::Count, self.looked)),
             Notice::Read(controller) => {
-                self.darken(controller);
                 let datagrams = self.ask(controller, Need::Identity, self.looked);
                 self.judge(HealthInput::ReadSent(controller, datagrams));
             }
@@ -390,18 +400,6 @@ impl Watch {
             to if !to.may_move() => self.alarm(Alarm::Leave(lane)),
             _ => {}
         }
-    }
-
-    /// Switches off the effects that the last frame may have left on at a controller that gets no more, with each of the next looks;
-    /// those that find it silent do not count.
-    fn darken(&mut self, controller: usize) {
-        if self.lit[controller] == 0 || self.stands(controller).may_move() {
-            return;
-        }
-        self.lit[controller] -= u8::from(self.peers[controller].has_answered());
-        // It is sent three times: what the kernel does not take is like what is lost.
-        self.ask(controller, Need::Dark, self.looked);
-        self.judge(HealthInput::OtherSent(controller, 1));
     }
 
     /// What finds no room waits for the next look: the tick thread hears all of it, in this order.

@@ -39,7 +39,7 @@ pub use motion::{Motion, MotionReply, MotionRequest, Timing};
 pub(crate) use motion::{motion_channel_and_slots, motion_len};
 pub use per_axis::PerAxis;
 pub(crate) use position::{
-    AXES_PER_BLOCK, DP_INPUTS, DP_POSITIONS, position_parts, position_reads, positions,
+    AXES_PER_BLOCK, DP_INPUTS, DP_OUTPUTS, DP_POSITIONS, position_parts, position_reads, positions,
 };
 pub use position::{position, position_words};
 pub(crate) use register::Space;

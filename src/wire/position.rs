@@ -9,6 +9,8 @@ pub(crate) const DP_POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
 
 /// The monitor register of the active inputs, bit 0 = X01.
 pub(crate) const DP_INPUTS: u16 = 0x5e;
+/// Active outputs, bit 0 = Y01 (2.3.3 of both manuals).
+pub(crate) const DP_OUTPUTS: u16 = 0x66;
 
 /// Axes of one block of position registers.
 pub(crate) const AXES_PER_BLOCK: usize = 3;

@@ -123,6 +123,7 @@ mod tests {
     use super::super::testing::Rig;
     use super::*;
     use crate::control::Command;
+    use crate::drive::LeftOn;
     use crate::health::{HealthState, Why};
     use crate::observe::Heard;
     use crate::sys::clock::Monotonic;
@@ -157,6 +158,8 @@ mod tests {
             ack_ns: None,
             standing: HealthState::Ok,
             why: Why::Acked,
+            left_on: LeftOn::default(),
+            left_since: None,
             state,
             homed: Some(true),
             at,

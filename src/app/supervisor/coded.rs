@@ -35,6 +35,10 @@ words! {
     pub(super) WarningCode {
         /// How many acks in a minute another master got.
         AnotherMaster = "another-master",
+        /// Which outputs are left on.
+        LeftOn = "left-on",
+        /// Its seat may vibrate.
+        LeftShaking = "left-shaking",
         /// None takes part.
         NoSeat = "no-seat",
         /// Preflight was not run.
@@ -97,6 +101,8 @@ words! {
     pub(super) RemedyCode {
         /// Find the other machine.
         AnotherMaster = "another-master",
+        /// Switch off what is on there.
+        LeftOn = "left-on",
         /// Enable seats.
         NoSeat = "no-seat",
         /// Run preflight.
@@ -247,7 +253,7 @@ mod tests {
         RemedyCode::ALL.iter().for_each(|code| add("remedy", code.word(), 0));
         for code in WarningCode::ALL {
             let values = match code {
-                WarningCode::AnotherMaster | WarningCode::BeltOpen => 1,
+                WarningCode::AnotherMaster | WarningCode::BeltOpen | WarningCode::LeftOn => 1,
                 WarningCode::SeatOut => 2,
                 WarningCode::SeatOutWhy => 3,
                 _ => 0,

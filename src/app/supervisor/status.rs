@@ -225,6 +225,7 @@ impl StatusParts<'_> {
             inputs: state.inputs.map(|heard| heard.value),
             belts_open: belts::open(controller, &state, now).map(belts::numbers),
             outputs: state.outputs.map(|heard| heard.value),
+            left_on: row.is_some_and(|row| row.left_since.is_some()),
             positions_mm,
             commanded,
             measured,

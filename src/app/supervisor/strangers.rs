@@ -60,6 +60,8 @@ mod tests {
             ack_ns: None,
             standing: HealthState::Ok,
             why: Why::Acked,
+            left_on: crate::drive::LeftOn::default(),
+            left_since: None,
             state: crate::observe::ControllerState::default(),
             homed: None,
             at: MonoTime::default(),

@@ -25,6 +25,7 @@ use crate::control::{
     Command, Desired, Handle, Inbox, Problem, Role, Status, StatusSource, Surface, Who, handle,
 };
 use crate::cue::{self, Source};
+use crate::drive::LeftOn;
 use crate::engine::Mix;
 use crate::health::{HealthState, Why};
 use crate::journal::{Journal, Limits};
@@ -189,6 +190,8 @@ pub(super) fn row(at: MonoTime) -> Row {
         ack_ns: None,
         standing: HealthState::Ok,
         why: Why::Acked,
+        left_on: LeftOn::default(),
+        left_since: None,
         state: ControllerState::default(),
         homed: Some(true),
         at,

@@ -11,6 +11,7 @@ use super::{belts, player, recorded};
 use crate::app::notify::NotifyTable;
 use crate::app::pair::PairWatch;
 use crate::app::{broadcasts, links};
+use crate::config::Controller;
 use crate::control::{Coded, Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -18,6 +19,9 @@ use crate::state::{Next, State};
 
 /// In a new state all controllers have this long to be looked at before one that was not is worth a word.
 const FIRST_LOOK: Duration = Duration::from_secs(1);
+
+/// What nobody asks for is ended by itself within less.
+const LEFT_ON: Duration = Duration::from_secs(3);
 
 impl From<HealthState> for Health {
     fn from(standing: HealthState) -> Self {
@@ -45,6 +49,7 @@ impl StatusParts<'_> {
         let Self { hall, features, .. } = *self;
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
         warnings.extend(self.of_nobody(table));
+        warnings.extend(self.of_left_on(table));
         warnings.extend(self.of_strangers());
         warnings.extend(belts::warnings(hall, table));
         warnings.extend(self.of_the_machine());
@@ -132,7 +137,7 @@ impl StatusParts<'_> {
         let hall = self.hall;
         let controllers = hall.config.controllers.iter().zip(table).enumerate();
         let (has_begun, homes) = (self.has_begun(), hall.mirror.state == State::Homing);
-        let of = |(lane, (controller, row)): (usize, (&crate::config::Controller, &Row))| {
+        let of = |(lane, (controller, row)): (usize, (&Controller, &Row))| {
             let severity = match row.standing {
                 HealthState::Rejoining if matches!(row.why, Why::Moved(_)) => Severity::Error,
                 HealthState::Rejoining if hall.mirror.next == Next::ParkOrStart => Severity::Warning,
@@ -160,6 +165,38 @@ impl StatusParts<'_> {
             })
         };
         controllers.filter_map(of).collect::<Vec<_>>().into_iter()
+    }
+
+    /// What is still on at a controller though nobody asks for it, and could not be ended by itself.
+    fn of_left_on(&self, table: &[Row]) -> Vec<Warning> {
+        let controllers = self.hall.config.controllers.iter().zip(table);
+        let left = controllers.filter(|(_, row)| row.is_left_on_for(LEFT_ON));
+        let warning = |(controller, row): (&Controller, &Row)| {
+            let outputs = row.left_on.outputs_in_words();
+            let (code, values, text) = match outputs {
+                Some(outputs) => (
+                    WarningCode::LeftOn.word(),
+                    vec![outputs.clone()],
+                    format!("outputs may be on that nobody asks for: {outputs}"),
+                ),
+                None => (
+                    WarningCode::LeftShaking.word(),
+                    Vec::new(),
+                    "its seat may vibrate though nobody asks for it".to_owned(),
+                ),
+            };
+            Warning {
+                id: WarningCode::LeftOn.to_string(),
+                severity: Severity::Error,
+                controller: Some(controller.name.clone()),
+                text,
+                coded: Some(Coded::new(code, values)),
+                remedy: "clear what holds its seat, then park or resume; where that does not end it, cut its power"
+                    .to_owned(),
+                remedy_code: Some(RemedyCode::LeftOn.to_string()),
+            }
+        };
+        left.map(warning).collect()
     }
 
     fn of_strangers(&self) -> impl Iterator<Item = Warning> {

@@ -61,7 +61,17 @@ mod tests {
     fn row(standing: HealthState, why: Why) -> Row {
         let state = ControllerState::default();
         let counts = Counts::default();
-        Row { counts, ack_ns: None, standing, why, state, homed: None, at: MonoTime::default() }
+        Row {
+            counts,
+            ack_ns: None,
+            standing,
+            why,
+            state,
+            homed: None,
+            left_on: crate::drive::LeftOn::default(),
+            left_since: None,
+            at: MonoTime::default(),
+        }
     }
 
     fn names() -> [String; 2] {

@@ -110,7 +110,7 @@ fn a_cue_with_vibration_is_sent_in_frames_that_carry_it() {
     let mut buf = [0xa5; MAX_LEN];
     let (stamped, bytes) = lane.encode(&beat, &lane.window.park(), Mix::FULL, &mut buf);
     let frame = MotionRequest::parse(bytes).unwrap();
-    assert_eq!(stamped, Stamped { frame: FrameNo::FIRST, asked: true, shakes: 0.01 });
+    assert_eq!(stamped, Stamped { frame: FrameNo::FIRST, asked: true, lights: false, shakes: 0.01 });
     assert_eq!(frame.vibration.unwrap()[0], Vibration { period: 400, amplitude: 3_000 });
     assert_eq!(bytes[4..6], [0x18, 0x01]);
 }

@@ -79,6 +79,8 @@ impl MotionCodec {
             }
         }
         let levels = mix.sample(ChannelId::Analogue, beat.samples.of(ChannelId::Analogue.of_hall()));
+        let outputs = self.wiring.outputs(mix.effects(beat.effects));
+        stamped.lights = outputs != 0;
         let motion = Motion {
             timing: beat.timing,
             channel: self.channel,
@@ -87,7 +89,7 @@ impl MotionCodec {
             frame: stamped.frame,
             time_ms: beat.time_ms,
             positions: &positions[..slots.len()],
-            outputs: self.wiring.outputs(mix.effects(beat.effects)),
+            outputs,
             analogue: Analogue::from_levels(self.wiring.within(ChannelId::Analogue, levels).0),
             vibration: self.vibrates.then_some(&vibration[..slots.len()]),
         };

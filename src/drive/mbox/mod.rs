@@ -1,6 +1,7 @@
 //! SMC, IMAX and MBOX controllers: their frames, and how a running hall asks them for registers and hears of them.
 
 mod frame;
+mod on;
 mod pending;
 mod position;
 mod probe;
@@ -9,21 +10,22 @@ mod stop_signs;
 
 use std::sync::Arc;
 
-use super::{Evidence, EvidenceList, Incoming, Lane, Need, Seen, Whereabouts};
+use super::{Evidence, EvidenceList, Incoming, Lane, Need, Seen, SentFrame, Whereabouts};
 use crate::belief::Reading;
 use crate::config::{Controller, Station};
 use crate::motion::{AxisGeometry, MAX_AXES, Pose, Pulses, SeatType};
 use crate::time::MonoTime;
 use crate::wire::{
-    Code, DP_POSITIONS, Dialect, FromController, MAX_LEN, RegisterReply, ReplyCode, Words, WriteRequest,
-    positions,
+    Code, DP_POSITIONS, Dialect, FrameNo, FromController, MAX_LEN, RegisterReply, ReplyCode, Words,
+    WriteRequest, positions,
 };
 pub(super) use frame::{MotionCodec, Wiring};
+use on::OnBelief;
 use pending::Pending;
 use position::Positions;
 use probe::Probe;
 use reads::{
-    MonitorRead::{self, FirstPositions, Inputs, Mode, MorePositions, Packets, Zero},
+    MonitorRead::{self, FirstPositions, Inputs, Mode, MorePositions, Outputs, Packets, Polarity, Zero},
     ZERO_KNOWN,
 };
 
@@ -58,6 +60,8 @@ pub(crate) struct MboxPeer {
     pub(super) pending: Pending,
     pub(super) position: Positions,
     pub(super) probe: Probe,
+    /// What may be on there.
+    pub(super) on: OnBelief,
     /// How often it was asked for a sign of life: of what it tells, one is asked for at a time.
     turn: usize,
 }
@@ -74,6 +78,7 @@ impl MboxPeer {
         let mut beyond = slots.iter().skip(first_slot + seat.axes);
         let led = if beyond.all(|slot| slot.axis.is_none()) { places } else { seat.axes };
         let axes = led.min(DP_POSITIONS.len());
+        let on = OnBelief::unknown(dialect == Dialect::Smc);
         Self {
             code,
             dialect,
@@ -86,17 +91,23 @@ impl MboxPeer {
             has_belts: controller.belt_inputs != 0,
             has_stop_inputs: dialect == Dialect::Mbox && controller.estop_inputs != 0,
             pending: Pending::new(),
-            position: Positions::new(Arc::clone(seat), first_slot, led),
+            position: Positions::new(Arc::clone(seat), first_slot, led, on.shakes()),
+            on,
             probe: Probe::new(dialect, axes, controller.estop_inputs),
             turn: 0,
         }
     }
 
     pub(super) fn poll(&mut self, need: Need, now: MonoTime, send: &mut dyn FnMut(&[u8]) -> bool) -> u32 {
+        let mut written = 0;
         let next = match need {
-            Need::Dark => return u32::from(self.darken(send)),
+            // What is off is only read.
+            Need::Dark if self.on.left_on().outputs => {
+                written = u32::from(self.darken(send));
+                None
+            }
             Need::KeepAlive { is_led } => self.next_sign(is_led),
-            Need::Identity | Need::Count | Need::Position => None,
+            Need::Identity | Need::Count | Need::Position | Need::Dark => None,
         };
         let is_behind = self.pending.is_behind(now);
         let wanted = MonitorRead::ALL.map(|read| match need {
@@ -108,13 +119,15 @@ impl MboxPeer {
             Need::KeepAlive { is_led } => {
                 next == Some(read) || (!is_led && next.is_some_and(|next| read.is_part_of(next)))
             }
-            Need::Dark => false,
+            Need::Dark if read == Polarity => self.on.wants_polarity(),
+            Need::Dark if read.first_axis().is_some() => self.on.left_on().vibrates() && !is_behind,
+            Need::Dark => read == Outputs,
         });
         if need == Need::Identity {
             self.probe.begin();
         }
         let reads = MonitorRead::ALL.into_iter().zip(wanted).filter(|(_, wanted)| *wanted);
-        reads.map(|(read, _)| self.ask(read, need, now, send)).sum()
+        written + reads.map(|(read, _)| self.ask(read, need, now, send)).sum::<u32>()
     }
 
     /// Asks for that, if the controller has it; what the kernel does not take is not waited for.
@@ -192,6 +205,7 @@ impl MboxPeer {
                 Some(claim) => {
                     let passing = self.position.answer(first, &told, source, claim, at);
                     out.push(Evidence::Position(self.whereabouts(Some(passing), at)));
+                    self.mind_shaking(at);
                 }
                 // Of it and of what was taken for the answer one is old, and nobody knows which.
                 None if !others_ask && self.position.on_repeated(first, &told, at) => {
@@ -200,7 +214,13 @@ impl MboxPeer {
                 None => {}
             }
         }
+        let told = reply.values(self.dialect).get(0);
         match (read, claim) {
+            (Outputs, Some(claim)) => {
+                let on = told.and_then(|word| self.on.on_outputs(word, claim.oldest));
+                out.extend(on.map(Evidence::Outputs));
+            }
+            (Polarity, Some(_)) => told.into_iter().for_each(|word| self.on.on_polarity(word)),
             (Mode, Some(_)) => {
                 self.drives = reply.values(self.dialect).get(2).or(self.drives);
                 out.extend(self.drives.filter(|drives| !self.leads_all(*drives)).map(Evidence::OtherAxes));
@@ -222,7 +242,7 @@ impl MboxPeer {
             sighting,
             rests: reading.rests,
             sways: reading.sways > 0.0,
-            at_park: self.is_parked(&reading.pose),
+            at_park: reading.rests && self.is_parked(&reading.pose),
         })
     }
 
@@ -240,6 +260,30 @@ impl MboxPeer {
         }
     }
 
+    pub(super) fn on_sent(&mut self, sent: &SentFrame) {
+        self.on.on_sent(sent);
+        self.position.on_sent(sent.at);
+        self.position.may_shake(self.on.shakes());
+    }
+
+    pub(super) fn on_ack(&mut self, acked: FrameNo) {
+        self.on.on_ack(acked);
+        self.position.may_shake(self.on.shakes());
+    }
+
+    pub(super) fn on_cut_off(&mut self, shakes: f64) {
+        self.on.on_cut_off(shakes);
+        self.position.may_shake(self.on.shakes());
+    }
+
+    /// A seat that was read in one place for long enough does not vibrate.
+    fn mind_shaking(&mut self, at: MonoTime) {
+        if self.on.shakes() > 0.0 && self.position.reading(at).is_some_and(|reading| reading.rests) {
+            self.on.on_still();
+            self.position.may_shake(0.0);
+        }
+    }
+
     pub(super) fn on_reply_code(&mut self, code: ReplyCode) -> bool {
         self.probe.mind_stop(code);
         // With x = 4 an SMC controller tells of an emergency stop, which the observer hears.
@@ -249,8 +293,14 @@ impl MboxPeer {
         }
     }
 
-    pub(super) fn on_report(&mut self, positions: &[Pulses], at: MonoTime) -> Whereabouts {
+    pub(super) fn on_report(
+        &mut self,
+        positions: &[Pulses],
+        outputs: Option<u16>,
+        at: MonoTime,
+    ) -> Whereabouts {
         self.position.report(positions, at);
+        outputs.into_iter().for_each(|word| self.on.on_reported(word));
         self.whereabouts(None, at)
     }
 

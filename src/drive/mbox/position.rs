@@ -26,8 +26,14 @@ const APART: Duration = Duration::from_millis(1_200);
 /// How far outside its stroke an axis may be told and be at the end of it: rounding, and what a drive at rest swings by.
 const OUTSIDE: f64 = 0.002;
 
-/// For how long an axis has to be seen about one place to vibrate there and do nothing else.
+/// For how long an axis has to be seen about one place to vibrate there and do nothing else, and how often it has to have turned round
+/// meanwhile: whoever jogs an axis, or one that sinks, goes one way. As long, and by so many answers, it has to be seen in one place that
+/// may vibrate: some of them may find it at the same place of each swing.
 const SWAY: Duration = Duration::from_millis(500);
+const TURNS: u32 = 3;
+/// And in each second, at the least: keys are not pressed as often.
+const TURNS_S: f64 = 3.0;
+const STILL_TIMES: u32 = 6;
 
 /// What one axis told.
 #[derive(Debug, Clone, Copy)]
@@ -37,9 +43,61 @@ struct Told {
     at: MonoTime,
     /// Where it rests, if it does, and about where it vibrates.
     rest: Stay,
-    sway: Stay,
+    sway: Sway,
     /// Whether it was elsewhere before, or something contradicted that.
     moved: bool,
+}
+
+/// Between which places an axis has swung, since when, at the latest, how often it has turned round, and how many answers of each source
+/// are of that.
+#[derive(Debug, Clone, Copy)]
+struct Sway {
+    low: f64,
+    high: f64,
+    since: MonoTime,
+    turns: u32,
+    /// Where it was seen to go last, and whether that was up.
+    last: f64,
+    rises: Option<bool>,
+    seen: [u32; PositionSource::ALL.len()],
+}
+
+impl Sway {
+    const fn begin(place: f64, since: MonoTime) -> Self {
+        let seen = [0; PositionSource::ALL.len()];
+        Self { low: place, high: place, since, turns: 0, last: place, rises: None, seen }
+    }
+
+    /// True if it was no farther from all that was seen of it than `within`.
+    fn has(&self, fraction: f64, within: f64) -> bool {
+        self.high.max(fraction) - self.low.min(fraction) <= within
+    }
+
+    /// The same with one more answer of these sources.
+    fn go_on(mut self, fraction: f64, sources: &[PositionSource]) -> Self {
+        (self.low, self.high) = (self.low.min(fraction), self.high.max(fraction));
+        sources.iter().for_each(|source| self.seen[*source as usize] += 1);
+        if (fraction - self.last).abs() > STILL / 2.0 {
+            let rises = fraction > self.last;
+            self.turns += u32::from(self.rises.is_some_and(|before| before != rises));
+            (self.last, self.rises) = (fraction, Some(rises));
+        }
+        self
+    }
+
+    fn has_lasted(&self, at: MonoTime, long: Duration) -> bool {
+        let lasts = at.since(self.since);
+        let turns = self.turns >= TURNS && f64::from(self.turns) >= TURNS_S * lasts.as_secs_f64();
+        turns && lasts >= long && self.seen.iter().all(|times| *times >= TIMES)
+    }
+
+    const fn middle(&self) -> f64 {
+        f64::midpoint(self.low, self.high)
+    }
+
+    fn width(&self) -> f64 {
+        self.high - self.low
+    }
 }
 
 /// A place in which an axis has been, since when, at the latest, and how often each source has found it there.
@@ -82,9 +140,9 @@ impl Stay {
         self.seen.iter().map(|seen| seen.at).min().filter(|_| is_seen)
     }
 
-    /// True if each source saw it there often enough, and for as long.
-    fn has_lasted(&self, long: Duration) -> bool {
-        self.seen.iter().all(|seen| seen.times >= TIMES && seen.at.since(self.since) >= long)
+    /// True if each source saw it there so often, and for as long.
+    fn has_lasted(&self, (long, times): (Duration, u32)) -> bool {
+        self.seen.iter().all(|seen| seen.times >= times && seen.at.since(self.since) >= long)
     }
 }
 
@@ -118,7 +176,8 @@ pub(in crate::drive) struct Positions {
 }
 
 impl Positions {
-    pub(super) fn new(seat: Arc<SeatType>, first_slot: usize, led: usize) -> Self {
+    /// Those of a seat that may vibrate by so much, strokes.
+    pub(super) fn new(seat: Arc<SeatType>, first_slot: usize, led: usize, shakes: f64) -> Self {
         let told = [None; MAX_AXES];
         Self {
             seat,
@@ -128,7 +187,7 @@ impl Positions {
             answered: MonoTime::default(),
             sent: MonoTime::default(),
             repeats_until: MonoTime::default(),
-            shakes: 0.0,
+            shakes,
             outside: None,
             ordered: false,
             ambiguous: 0,
@@ -197,15 +256,19 @@ impl Positions {
     /// True if axes were told to be elsewhere. Then both places count, and none of all axes before the sources have agreed on it for
     /// long enough.
     fn is_contradicted(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> bool {
+        // What swings is told elsewhere each time, and not farther than it swings.
         let within = self.sways();
-        let is_elsewhere = |(axis, pulses): (usize, &Pulses)| {
+        let (mut is_contradicted, mut is_beyond) = (false, false);
+        for (axis, pulses) in (first..self.seat.axes.min(MAX_AXES)).zip(positions) {
             let fraction = self.seat.each[axis].fraction(*pulses).clamp(0.0, 1.0);
-            self.told[axis].is_some_and(|told| !told.rest.has(fraction, within))
-        };
-        let is_contradicted = (first..self.seat.axes.min(MAX_AXES)).zip(positions).any(is_elsewhere);
+            if let Some(told) = &self.told[axis] {
+                is_contradicted |= !told.rest.has(fraction, STILL);
+                is_beyond |= !told.sway.has(fraction, within);
+            }
+        }
         for told in self.told.iter_mut().flatten().filter(|_| is_contradicted) {
-            let begin = Stay::begin(told.fraction, at);
-            *told = Told { rest: begin, sway: begin, moved: true, ..*told };
+            let sway = if is_beyond { Sway::begin(told.fraction, at) } else { told.sway };
+            *told = Told { rest: Stay::begin(told.fraction, at), sway, moved: true, ..*told };
         }
         is_contradicted
     }
@@ -247,8 +310,8 @@ impl Positions {
             let rest = recent.map(|told| told.rest).filter(|rest| rest.has(fraction, STILL));
             let sway = recent.map(|told| told.sway).filter(|sway| sway.has(fraction, self.sways()));
             let moved = before.is_some_and(|told| told.moved || rest.is_none());
-            let [rest, sway] = [rest, sway]
-                .map(|stay| stay.unwrap_or_else(|| Stay::begin(fraction, at)).seen_by(sources, made));
+            let rest = rest.unwrap_or_else(|| Stay::begin(fraction, at)).seen_by(sources, made);
+            let sway = sway.unwrap_or(Sway::begin(fraction, at)).go_on(fraction, sources);
             self.told[axis] = Some(Told { fraction, at: made, rest, sway, moved });
         }
     }
@@ -258,13 +321,13 @@ impl Positions {
         self.seat.each[axis].fraction(Pulses(0))
     }
 
-    /// How far apart two answers of an axis may be that vibrates on, strokes.
+    /// How far apart answers of an axis may be that vibrates, strokes.
     fn sways(&self) -> f64 {
         2.0 * self.shakes + STILL
     }
 
-    /// No frame goes to it any more, and it may vibrate on by so much.
-    pub(in crate::drive) const fn on_cut_off(&mut self, shakes: f64) {
+    /// It may vibrate by so much.
+    pub(super) const fn may_shake(&mut self, shakes: f64) {
         self.shakes = shakes;
     }
 
@@ -322,12 +385,13 @@ impl Positions {
     pub(super) fn reading(&self, now: MonoTime) -> Option<Reading> {
         let (pose, by) = ([0.0; MAX_AXES], self.by);
         let mut reading = Reading { pose, slots: 0, at: now, rests: true, moves: false, sways: 0.0, by };
-        let mut sways = self.shakes > 0.0;
+        let (mut sways, mut widest) = (self.shakes > 0.0, 0.0_f64);
         let is_beyond = self.outside.is_some_and(|(axis, _)| axis >= self.seat.axes);
         if self.is_ambiguous() || is_beyond {
             return None;
         }
-        let rest = if self.may_be_repeated(now) { REST_REPEATED } else { REST };
+        let long = if self.may_be_repeated(now) { REST_REPEATED } else { REST };
+        let rest = if sways { (long.max(SWAY), STILL_TIMES) } else { (long, TIMES) };
         for axis in 0..self.seat.axes.min(MAX_AXES - self.first_slot) {
             let slot = self.first_slot + axis;
             match self.told[axis] {
@@ -337,7 +401,10 @@ impl Positions {
                     reading.pose[slot] = told.fraction;
                     reading.at = reading.at.min(at);
                     let rests = told.rest.has_lasted(rest);
-                    sways &= told.sway.has_lasted(rest.max(SWAY));
+                    if !rests {
+                        sways &= told.sway.has_lasted(told.at, long.max(SWAY));
+                        widest = widest.max(told.sway.width());
+                    }
                     reading.rests &= rests;
                     reading.moves |= told.moved && !rests;
                 }
@@ -348,8 +415,20 @@ impl Positions {
             }
             reading.slots |= 1 << slot;
         }
-        reading.sways = if sways && !reading.rests { self.sways() } else { 0.0 };
+        if sways && !reading.rests {
+            self.settle_on_middles(&mut reading, widest);
+        }
         Some(reading)
+    }
+
+    /// One that vibrates is read where it does so about, and is elsewhere by no more than it swings.
+    fn settle_on_middles(&self, reading: &mut Reading, widest: f64) {
+        for axis in 0..self.seat.axes.min(MAX_AXES - self.first_slot) {
+            if let Some(told) = self.told[axis] {
+                reading.pose[self.first_slot + axis] = told.sway.middle();
+            }
+        }
+        reading.sways = 2.0 * self.shakes.min(widest) + STILL;
     }
 }
 

@@ -1,6 +1,6 @@
 //! One look at a controller: all that it has told since it was asked who it is, put together into a sighting.
 
-use super::reads::MonitorRead::{self, Inputs, Mode, Packets, StopMask, Versions, Zero};
+use super::reads::MonitorRead::{self, Inputs, Mode, Outputs, Packets, Polarity, StopMask, Versions, Zero};
 use super::reads::ZERO_KNOWN;
 use super::stop_signs::StopSigns;
 use crate::health::{Continuity, Identity, Sighting};
@@ -50,15 +50,11 @@ impl Probe {
     pub(super) fn asks(&self, read: MonitorRead) -> bool {
         match read {
             Packets | StopMask => self.dialect == Dialect::Smc,
+            Outputs | Polarity => false,
             // Elsewhere they tell nothing of an emergency stop.
             Inputs => self.dialect == Dialect::Smc || self.estop_inputs != 0,
             _ => true,
         }
-    }
-
-    /// True if it has answered something of what it was asked last.
-    pub(in crate::drive) fn has_answered(&self) -> bool {
-        self.seen.answered.contains(&true)
     }
 
     /// Hears an answer to a read.

@@ -2,8 +2,8 @@
 //! else.
 
 use crate::wire::{
-    AXES_PER_BLOCK, Access, Code, DP_INPUTS, ReadRequest, RegisterReply, ReplyCode, position_parts,
-    position_reads,
+    AXES_PER_BLOCK, Access, Code, DP_INPUTS, DP_OUTPUTS, ReadRequest, RegisterReply, ReplyCode,
+    position_parts, position_reads,
 };
 
 /// Object channels of reads: monitors, parameters (SMC manual 2.2.2.1).
@@ -25,6 +25,10 @@ pub(super) enum MonitorRead {
     StopMask,
     /// DP5E: active inputs, bit 0 = X01.
     Inputs,
+    /// PA05: 1 where outputs are inverted.
+    Polarity,
+    /// DP66: active outputs, bit 0 = Y01.
+    Outputs,
     /// Where axes 1 to 3 are.
     FirstPositions,
     /// Where axes 4 to 6 are.
@@ -38,8 +42,8 @@ pub(super) enum MonitorRead {
 }
 
 use MonitorRead::{
-    FirstAxis, FirstPositions, FourthAxis, Inputs, LastAxes, Mode, MorePositions, NextAxes, Packets,
-    StopMask, Versions, Zero,
+    FirstAxis, FirstPositions, FourthAxis, Inputs, LastAxes, Mode, MorePositions, NextAxes, Outputs, Packets,
+    Polarity, StopMask, Versions, Zero,
 };
 
 /// A source of positions: answers to reads of one never pass for answers to reads of the other, so that no single datagram that the
@@ -61,13 +65,15 @@ impl PositionSource {
 pub(super) const ZERO_KNOWN: u16 = 2;
 
 impl MonitorRead {
-    pub(super) const ALL: [Self; 12] = [
+    pub(super) const ALL: [Self; 14] = [
         Mode,
         Zero,
         Versions,
         Packets,
         StopMask,
         Inputs,
+        Polarity,
+        Outputs,
         FirstPositions,
         MorePositions,
         FirstAxis,
@@ -114,6 +120,8 @@ impl MonitorRead {
             Packets => (MONITORS, 0x34, 1),
             StopMask => (PARAMETERS, 0x92, 1),
             Inputs => (MONITORS, DP_INPUTS, 1),
+            Outputs => (MONITORS, DP_OUTPUTS, 1),
+            Polarity => (PARAMETERS, 0x05, 1),
             FirstPositions => return position_reads(axes, code, code).next(),
             MorePositions => return position_reads(axes, code, code).nth(1),
             FirstAxis => return position_parts(0, axes, code, code)[0],

@@ -210,15 +210,39 @@ fn where_a_seat_is_counts_only_once_its_controller_has_told_that_it_drives_its_a
 }
 
 #[test]
-fn effects_are_switched_off_by_a_register_that_moves_nothing_and_nobody_answers() {
-    let mut heard = Vec::new();
-    let sent = peer(Dialect::Mbox, 3).poll(Need::Dark, ms(0), &mut |datagram| {
-        heard = datagram.to_vec();
-        true
-    });
-    let write = WriteRequest::parse(&heard).unwrap();
-    assert_eq!((write.channel, write.start, write.data.get(0)), (2, 1, Some(0)), "DPF1");
-    assert_eq!((write.accept, write.reply, sent), (CODE, Code::NONE, 1));
+fn effects_are_switched_off_by_a_register_that_moves_nothing_and_read_to_be_so() {
+    let darken = |peer: &mut MboxPeer, at| {
+        let mut sent = Vec::new();
+        peer.poll(Need::Dark, ms(at), &mut |datagram| {
+            sent.push(datagram.to_vec());
+            true
+        });
+        sent
+    };
+    for (dialect, positions) in [(Dialect::Mbox, 0), (Dialect::Smc, 3)] {
+        let mut peer = peer(dialect, 3);
+        let sent = darken(&mut peer, 1);
+        let write = WriteRequest::parse(&sent[0]).unwrap();
+        assert_eq!((write.channel, write.start, write.data.get(0)), (2, 1, Some(0)), "DPF1");
+        assert_eq!((write.accept, write.reply), (CODE, Code::NONE));
+        let asked = sent[1..].iter().map(|octets| {
+            let ReadRequest { channel, start, num, .. } = ReadRequest::parse(octets).unwrap();
+            (channel, start, num)
+        });
+        let [first, second, _] = [0, 1, 2].map(|axis| DP_POSITIONS[axis]);
+        let all = [(1, 0x05, 1), (0, 0x66, 1), (0, first, 6), (0, first, 2), (0, second, 4)];
+        assert_eq!(asked.collect::<Vec<_>>(), all[..2 + positions], "{dialect:?}: an MBOX has no vibration");
+        hear(&mut peer, RegisterReply { channel: 1, ..answer(0x05, &[0]) }, 2);
+        for at in [3, 10] {
+            darken(&mut peer, at);
+            assert!(peer.on.left_on().outputs);
+            hear(&mut peer, answer(0x66, &[0]), at + 1);
+        }
+        assert!(!peer.on.left_on().outputs);
+        let sent = darken(&mut peer, 20);
+        let read = ReadRequest::parse(&sent[0]).unwrap();
+        assert_eq!((read.channel, read.start, sent.len()), (0, 0x66, 1 + positions), "it is only read");
+    }
 }
 
 #[test]

@@ -24,6 +24,9 @@ impl Watch {
         let mut evidence = std::mem::take(&mut self.evidence);
         self.peers[controller].receive(arrival, &mut evidence);
         let is_answer = !evidence.is_empty();
+        if is_answer {
+            self.tended[controller].answered = at;
+        }
         for one in evidence.drain(..) {
             self.take(observer, controller, one, at);
         }
@@ -66,6 +69,7 @@ impl Watch {
             Evidence::Homed(_) => {}
             Evidence::Count(packets) => self.judge(HealthInput::Count(controller, packets)),
             Evidence::Counted => self.judge(HealthInput::Counted(controller)),
+            Evidence::Outputs(on) => observer.on_outputs(controller, on, at),
             Evidence::Unreadable => {
                 self.note_layout(controller, true);
                 self.judge(HealthInput::Wide(controller));
@@ -120,8 +124,8 @@ impl Watch {
 
     fn on_seen(&mut self, controller: usize, seen: Seen, at: MonoTime) {
         let Seen { sighting, rests, sways, .. } = seen;
-        // A vibration ends with the next frame, and none goes to a seat while the hall sends none.
-        if rests || (sways && self.live.is_moving()) || !self.stands(controller).is_looked_at() {
+        // A vibration ends with the next frame.
+        if rests || sways || !self.stands(controller).is_looked_at() {
             self.judge(HealthInput::Seen(controller, sighting, at));
             if let Some(standby) = &mut self.standby {
                 standby.on_seen(controller, seen);

@@ -105,7 +105,8 @@ fn what_was_acked_before_an_answer_came_is_in_the_books_when_that_is_heard() {
     let mut acks = AckLoop::new(ports.split().1, vec![watched], 1, sent, ticks);
     acks.tell(Arc::clone(&live));
     let frame = FrameNo(1);
-    mail.post(Sent::Posted { lane: 0, frame, asked: true, at: Monotonic.now() });
+    let (at, lights, shakes) = (Monotonic.now(), false, 0.0);
+    mail.post(Sent::Posted { lane: 0, frame, asked: true, at, lights, shakes });
     let (timing, code, positions) = (Timing::Relative, ReplyCode::Running, PerAxis::new(&[Pulses(0); 3]));
     let (channel, error, time_ms, inputs, extend, vibration) = (0, 0, 1, 0, 0, None);
     let ack =

@@ -29,6 +29,7 @@ const FIGURES = {
   'figure.belts': ({ belts_open: belts }) => belted(belts),
   'figure.inputs': ({ inputs }) => bits(inputs, 'X'),
   'figure.outputs': ({ outputs }) => bits(outputs, 'Y'),
+  'figure.left-on': ({ left_on: on }) => words(on ? 'figure.maybe' : 'figure.no'),
   'figure.positions': ({ positions_mm: places, rotary_axis: rotary }) => positions(places, rotary),
 };
 

@@ -21,7 +21,7 @@ fn look_by(source: PositionSource, positions: &mut Positions, first: usize, told
 }
 
 fn seat(axes: usize) -> Positions {
-    Positions::new(Arc::new(SeatType::bench3(axes)), 0, motion_channel_and_slots(axes).1)
+    Positions::new(Arc::new(SeatType::bench3(axes)), 0, motion_channel_and_slots(axes).1, 0.0)
 }
 
 #[test]
@@ -48,21 +48,39 @@ fn a_seat_rests_where_three_answers_over_a_tenth_of_a_second_see_it() {
 #[test]
 fn a_seat_that_was_cut_off_sways_if_it_swings_about_one_place_for_half_a_second_by_no_more_than_it_was_told_to()
  {
-    let swings = |shakes: f64, places: [i32; 5]| {
+    let swings = |shakes: f64, places: [i32; 7]| {
         let mut positions = seat(1);
-        positions.on_cut_off(shakes);
-        for (at, pulses) in (0..).step_by(150).zip(places) {
+        positions.may_shake(shakes);
+        for (at, pulses) in (0..).step_by(100).zip(places) {
             look(&mut positions, 0, &[Pulses(pulses)], at);
         }
         let reading = positions.reading(ms(600)).unwrap();
-        (reading.rests, reading.sways)
+        (reading.rests, reading.sways, reading.pose[0])
     };
-    let (swinging, standing) = ([30_000, 35_500, 24_500, 31_000, 27_000], [30_000; 5]);
-    assert_eq!(swings(0.01, swinging), (false, 2.0 * 0.01 + STILL));
-    assert_eq!(swings(0.008, swinging), (false, 0.0), "it swings farther than that");
-    assert_eq!(swings(0.0, swinging), (false, 0.0), "no frame told it to");
-    assert_eq!(swings(0.01, [30_000, 32_000, 34_000, 36_500, 39_000]), (false, 0.0), "somebody jogs it");
-    assert_eq!(swings(0.01, standing), (true, 0.0), "it rests");
+    let (swinging, standing) = ([30_000, 32_500, 27_500, 31_000, 29_000, 32_000, 28_000], [30_000; 7]);
+    assert_eq!(swings(0.01, swinging), (false, 2.0 * 0.01 + STILL, 0.1), "about the middle of it");
+    let (_, sways, _) = swings(0.1, swinging);
+    assert!(
+        (sways - 2.0 * 5_000.0 / 300_000.0 - STILL).abs() < 1e-9,
+        "by no more than it was seen to: {sways}"
+    );
+    assert_eq!(swings(0.007, swinging).1, 0.0, "it swings farther than that");
+    assert_eq!(swings(0.0, swinging).1, 0.0, "no frame told it to");
+    let rising = [30_000, 31_000, 32_000, 33_000, 34_000, 35_000, 36_000];
+    assert_eq!(swings(0.1, rising).1, 0.0, "somebody jogs it");
+    let turning = [30_000, 31_000, 32_000, 33_000, 32_000, 31_000, 30_000];
+    assert_eq!(swings(0.1, turning).1, 0.0, "or jogs it back");
+    assert_eq!((swings(0.01, standing).0, swings(0.01, standing).1), (true, 0.0), "it rests");
+}
+
+#[test]
+fn one_that_may_vibrate_rests_only_where_more_answers_see_it_in_one_place_for_half_a_second() {
+    let mut positions = seat(1);
+    positions.may_shake(0.01);
+    for (at, rests) in [(0, false), (120, false), (240, false), (360, false), (480, false), (510, true)] {
+        look(&mut positions, 0, &[Pulses(30_000)], at);
+        assert_eq!(positions.reading(ms(at)).unwrap().rests, rests, "at {at} ms");
+    }
 }
 
 #[test]
@@ -97,7 +115,7 @@ fn axes_without_a_register_are_known_from_a_report_or_right_after_homing_alone()
 fn turntable(axes: usize) -> Positions {
     let mut seat = SeatType::bench3(axes);
     (seat.each[axes - 1].low, seat.each[axes - 1].high) = (-75.0, 75.0);
-    Positions::new(Arc::new(seat), 0, motion_channel_and_slots(axes).1)
+    Positions::new(Arc::new(seat), 0, motion_channel_and_slots(axes).1, 0.0)
 }
 
 #[test]
@@ -133,7 +151,7 @@ fn a_turntable_that_tells_its_zero_is_home_and_one_at_the_end_of_its_range_is_no
     let slots = |pulses: i32| {
         let mut seat = SeatType::bench3(8);
         (seat.each[0].low, seat.each[0].high) = (-75.0, 75.0);
-        let mut positions = Positions::new(Arc::new(seat), 0, motion_channel_and_slots(8).1);
+        let mut positions = Positions::new(Arc::new(seat), 0, motion_channel_and_slots(8).1, 0.0);
         positions.on_homed();
         look(&mut positions, 0, &[pulses, 0, 0, 0, 0, 0].map(Pulses), 0);
         positions.reading(ms(0)).expect("its registers told").slots
