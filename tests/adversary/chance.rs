@@ -19,6 +19,9 @@ use super::seat::MS;
 /// Where the histories begin that are always the same.
 const FIXED: u64 = 12_000_000;
 
+/// One history in so many ends with a calm in which what is on has to go off.
+const CALM: u64 = 8;
+
 /// What is kept of a history beside what seats did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Keeps {
@@ -70,6 +73,9 @@ pub(crate) fn live_through(seed: u64, bent: Option<Bent>, deeds: u64, keeps: Kee
         let (close, next) = open(&ether, kind, before, &numbers, |hall| {
             hall.diary = told.then(|| std::mem::take(&mut diary));
             let close = person.lead(hall);
+            if close == Close::Over && seed.is_multiple_of(CALM) {
+                hall.comes_to_a_calm();
+            }
             diary = hall.diary.take().unwrap_or_default();
             close
         });

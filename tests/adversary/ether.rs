@@ -67,7 +67,7 @@ pub(crate) struct Line {
     /// Frames of motion that the kernel took.
     pub(crate) frames: u64,
     /// When the newest was to be sent; and the first of those since the last that will arrive.
-    newest: u64,
+    pub(crate) newest: u64,
     lost_since: Option<u64>,
     master: Option<Master>,
     /// Answers and reports of its seat, oldest first: the network may deliver them again.
@@ -81,6 +81,11 @@ impl Line {
         let quiet = now > self.newest + JUST && now > asked_at + JUST;
         let is_told = axis < REGISTERS || self.seat.settings.report_ms > 0 || !self.seat.homed;
         quiet && is_told && self.there.is_empty() && self.seat.jog(axis, mm, now)
+    }
+
+    /// Whether anything befalls its datagrams, or did so long ago.
+    pub(crate) fn is_troubled(&self, now: u64, ago: u64) -> bool {
+        self.master.is_some() || self.weather.iter().any(|(until, _)| *until + ago > now)
     }
 
     fn is(&self, now: u64, weather: Weather) -> Option<u64> {
@@ -232,6 +237,14 @@ impl Ether {
         for line in [one, other] {
             line.there.clear();
             line.back.clear();
+        }
+    }
+
+    /// Whatever befell seats is over.
+    pub(crate) fn calm(&self) {
+        let now = self.ns();
+        for line in &mut self.world().lines {
+            line.weather.iter_mut().for_each(|(until, _)| *until = now.min(*until));
         }
     }
 

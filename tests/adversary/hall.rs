@@ -236,6 +236,7 @@ impl Hall<'_, '_> {
             (self.state, self.since) = (state, now);
             self.see_who_asks();
         }
+        self.judge_what_is_on(now);
         if matches!(state, State::Paused | State::Stopping) && now > self.since + COMES_TO_REST {
             self.ether.world().asked = false;
         }
@@ -444,6 +445,11 @@ impl Hall<'_, '_> {
         if thread == Thread::All && ms > ASLEEP_MS && matches!(self.state, State::Playing(_)) {
             self.ether.world().asked = false;
         }
+    }
+
+    /// Whether a loop stands still, or did a moment ago.
+    pub(super) fn stands_still(&self, now: u64) -> bool {
+        self.still.iter().any(|until| now < until + 1_000 * MS)
     }
 
     /// Somebody wants the hall to close.

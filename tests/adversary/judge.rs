@@ -17,6 +17,8 @@ const ROUNDING: f64 = 2.0;
 pub(crate) const PULSES_PER_MM: f64 = 2_000.0;
 /// So far outside of its stroke a seat may be found, and led back from, mm.
 pub(crate) const OUTSIDE_MM: f64 = 11.0;
+/// How closely the middle of a vibration is read, parts of its amplitude.
+const READ_TO: f64 = 0.2;
 /// What a seat may move by though nobody asked, mm.
 const STILL_MM: f64 = 0.2;
 
@@ -38,6 +40,8 @@ pub(crate) enum How {
     Unasked,
     /// Led to a place that its stroke has not.
     Beyond,
+    /// Outputs or vibration are on that nobody asks for; its number is the outputs.
+    LeftOn,
 }
 
 impl Breach {
@@ -88,6 +92,8 @@ pub(crate) struct Executed {
     pub(crate) by_hand: [f64; 12],
     /// Whether somebody had asked for motion when it was sent.
     pub(crate) asked: bool,
+    /// The greatest amplitude with which the seat vibrated until then, pulses: where it does so about is read as exactly as that.
+    pub(crate) shook: f64,
 }
 
 impl Executed {
@@ -103,6 +109,10 @@ impl Executed {
         if over(axis) > far {
             return Some((axis, mm, How::Fast));
         }
-        (!self.asked && over(axis) > STILL_MM * PULSES_PER_MM).then_some((axis, mm, How::Unasked))
+        (!self.asked && over(axis) > STILL_MM * PULSES_PER_MM + READ_TO * self.shook).then_some((
+            axis,
+            mm,
+            How::Unasked,
+        ))
     }
 }

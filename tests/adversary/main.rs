@@ -1,6 +1,6 @@
 //! An adversary: whole halls in virtual time, with the real loops, virtual seats that execute what they are sent as the
 //! manuals say, a network that loses, holds back, repeats and reorders, and a person who does whatever comes to mind. The
-//! judge looks at nothing but where the axes of the seats went, and how fast.
+//! judge looks at nothing but where the axes of the seats went, how fast, and what is on there though nobody asks for it.
 //!
 //! `KINOCUE_HISTORIES=N` plays so many histories instead of the default; `KINOCUE_SEED=S` begins at that seed, and with
 //! `KINOCUE_DEEDS=K` the person does no more than K things: `KINOCUE_HISTORIES=1 KINOCUE_SEED=S KINOCUE_DEEDS=K` is how a
@@ -33,6 +33,7 @@ mod anew;
 mod bent;
 mod chance;
 mod cues;
+mod dark;
 mod dice;
 mod ether;
 mod fresh;
@@ -42,6 +43,7 @@ mod master;
 mod named;
 mod odd;
 mod old;
+mod on;
 mod person;
 mod plays;
 mod processes;

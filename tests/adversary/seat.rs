@@ -175,6 +175,10 @@ pub(crate) struct Seat {
     pub(crate) outputs: u16,
     pub(crate) shakes: bool,
     shake: [(u16, u16); 6],
+    /// By how much it vibrated before the frame that came last, pulses.
+    shook: f64,
+    /// Since when something is on that nobody asks for.
+    pub(crate) on_since: Option<u64>,
     pub(crate) breaches: Vec<Breach>,
 }
 
@@ -214,6 +218,8 @@ impl Seat {
             outputs: 0,
             shakes: false,
             shake: [(0, 0); 6],
+            shook: 0.0,
+            on_since: None,
             breaches: Vec::new(),
         }
     }
@@ -223,6 +229,11 @@ impl Seat {
         let Some(Move { from, to, begin, end, .. }) = self.moving else { return self.rest };
         let part = now.saturating_sub(begin) as f64 / (end - begin).max(1) as f64;
         std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * part.min(1.0))
+    }
+
+    /// Whether it has no power.
+    pub(crate) fn is_away(&self, now: u64) -> bool {
+        self.rebooting || now < self.dead_until
     }
 
     pub(crate) fn is_moving(&self) -> bool {
@@ -397,6 +408,7 @@ impl Seat {
             bunched: bunched || self.settings.jitter_ms > 0.0,
             by_hand: self.moved_by_hand(&command, now),
             asked: command.asked,
+            shook: self.shook,
         };
         if !self.crowded {
             self.judge(&executed, command.number, now);
@@ -489,6 +501,8 @@ impl Seat {
         let inputs = u16::from(self.button.0);
         let reply = match words::hear(octets) {
             Heard::Motion(frame) => {
+                self.shook =
+                    self.shake.iter().map(|(_, amplitude)| f64::from(*amplitude)).fold(0.0, f64::max);
                 (self.outputs, self.shakes, self.shake) = (frame.outputs, frame.shakes, frame.shake);
                 self.on_motion(&frame, arrival);
                 if mbox && self.stopped {
@@ -653,6 +667,7 @@ impl Seat {
         match at {
             0x34 if self.settings.mbox => 0,
             0x34 => self.packets,
+            0x66 => self.outputs,
             0xf0 if self.homed || (self.settings.lies && !homes) => 2,
             0xf0 => u16::from(homes),
             0xfe => u16::from(!self.settings.mbox),
