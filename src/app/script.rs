@@ -27,9 +27,9 @@ use crate::sys::realtime;
 use crate::time::{Clock as _, MonoTime};
 use crate::wire::FrameNo;
 
-/// Rounds of position reads, and how long each waits for the answers. A seat is at rest where three rounds find it.
-const READ_TRIES: usize = 5;
-const READ_WAIT: Duration = Duration::from_millis(150);
+/// Rounds of position reads, by how long each waits for the answers, ms. A seat is at rest where six rounds over half a second find it, or
+/// three where it cannot vibrate: what another program left on is not to be read at the same place of each swing.
+const READ_WAITS_MS: [u64; 10] = [67, 97, 71, 83, 59, 101, 73, 89, 61, 79];
 /// How often the slow frame is sent, where its ack does not come.
 const PARK_TRIES: usize = 3;
 /// How long that ack is waited for.
@@ -194,10 +194,10 @@ impl PlayScript {
     fn read_positions(&self) {
         let rests = |lane| self.reading(lane).is_some_and(|reading| reading.rests);
         let all_rest = || (0..self.lanes.len()).all(rests);
-        for _ in (0..READ_TRIES).take_while(|_| !all_rest()) {
+        for wait_ms in READ_WAITS_MS.into_iter().take_while(|_| !all_rest()) {
             let now = Monotonic.now();
             self.handle.live.want(now);
-            self.wait_until(now + READ_WAIT, all_rest);
+            self.wait_until(now + Duration::from_millis(wait_ms), all_rest);
         }
     }
 
