@@ -73,7 +73,7 @@ fn answered(request: &Request, to: SocketAddr) -> String {
 fn a_page_of_anybody_leads_a_hall_by_none_of_its_doors() {
     let mut hall = Hall::open_with(|config| {
         config
-            + "[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"operate\"\n\
+            + "[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"view\"\n\
                [text]\nlisten = \"127.0.0.1:0\"\nsources = [\"127.0.0.1\"]\n\
                [sync]\nsources = [\"http\"]\nfilm_fps = \"25\"\nstart = \"00:01:00:00\"\n\
                [sync.http]\nfrom = \"127.0.0.1\"\nbind = \"127.0.0.1:0\"\n"

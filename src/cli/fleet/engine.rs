@@ -14,9 +14,11 @@ use async_nats::{Client, ConnectOptions, header};
 
 use super::settings::Access;
 use crate::cli::{Exit, Failure, OrExit as _, print};
-use crate::fleet;
 use crate::sys::clock::wall_now_ns;
+use crate::{fleet, plain};
 
+/// The longest text of an engine that is shown, bytes.
+const TEXT: usize = 480;
 /// How long a desk waits for the engine.
 const ENTRY: Duration = Duration::from_secs(3);
 /// How long an answer of the engine may take.
@@ -68,7 +70,7 @@ pub(super) async fn connect_link(access: &Access, name: &str) -> Result<Client, 
         let kind = Some(mem::discriminant(&event));
         let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
         if mem::replace(&mut *told, kind) != kind {
-            print::tell(&format!("engine: {event}"));
+            print::tell(&plain::escaped(&format!("engine: {event}"), TEXT));
         }
         async {}
     });
