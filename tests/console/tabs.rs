@@ -6,6 +6,7 @@ use serde_json::json;
 
 use crate::browser::{Browser, ESCAPE};
 use crate::hall::{Hall, TOKEN};
+use crate::page::out_of_reach;
 use crate::{arm, enter, go};
 
 /// A browser that takes no WebSocket, as an old one, or one behind an old proxy.
@@ -84,14 +85,20 @@ fn a_page_that_could_not_send_a_stop_says_so_before_it_is_asked() {
     enter(&browser, &hall);
     hall.signal(Signal::STOP);
     browser.reads("stop-reach", "a stop from here would not arrive: no reply");
-    browser.wait("document.getElementById('stop').classList.contains('unsure')");
+    browser.wait("document.documentElement.hasAttribute('data-no-stop')");
     browser.shot("96-no-stop-from-here");
+    for size in [(390, 844), (844, 390), (768, 1024)] {
+        assert_eq!(out_of_reach(&browser, size, "#stop, #stop-reach"), json!([]), "{size:?}");
+        browser.shot(&format!("96-no-stop-from-here-{}", size.0));
+    }
     hall.signal(Signal::CONT);
     browser.wait("document.getElementById('stop-reach').hidden");
     browser.reads("link", "connected");
 
     // Requests that wait for ever, as behind those of other pages, leave the channel.
-    browser.eval("window.fetch = () => new Promise(() => {})");
+    browser.eval(
+        "window.fetch = (_, { signal }) => new Promise((_, end) => signal.addEventListener('abort', () => end(signal.reason)))",
+    );
     browser.wait("(window.heldAt ??= performance.now()) + 3500 < performance.now()");
     assert_eq!(browser.eval("return document.getElementById('stop-reach').hidden"), json!(true));
     browser.press("#preflight-run");

@@ -20,6 +20,6 @@ export async function startReach() {
 
 function show(problem) {
   setProperty(byId('stop-reach'), 'hidden', problem === null);
-  byId('stop').classList.toggle('unsure', problem !== null);
+  document.documentElement.toggleAttribute('data-no-stop', problem !== null);
   setText(byId('stop-reach'), problem === null ? '' : words('stop.cannot', { why: problem.message }));
 }

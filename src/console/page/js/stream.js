@@ -11,6 +11,8 @@ const SILENCE_MS = 1500;
 const WATCH_MS = 100;
 const FIRST_WAIT_MS = 100;
 const LONGEST_WAIT_MS = 1000;
+/** How long events are read before the channel is tried again. */
+const EVENTS_MS = 30_000;
 
 let heard = performance.now();
 let everHeard = false;
@@ -19,6 +21,8 @@ let seen = performance.now();
 let attempt = null;
 let wakeUp = () => {};
 let refused = null;
+/** Whether the channel ever was one: where it is, no events are read, which would hold a connection that a STOP may need. */
+let hasChannel = false;
 
 /** Seconds since the last status. */
 export const silence = () => (performance.now() - heard) / 1000;
@@ -70,8 +74,11 @@ function watchSilence() {
 async function listen() {
   attempt = { begun: performance.now(), end: endChannel };
   const spoke = await openChannel({ take, refuse }).catch(() => false);
-  if (spoke || document.hidden) return;
+  if (!spoke) refused = null;
+  hasChannel ||= spoke;
+  if (hasChannel || document.hidden) return;
   const abort = new AbortController();
+  setTimeout(() => abort.abort(), EVENTS_MS);
   attempt = { begun: performance.now(), end: () => abort.abort() };
   await readEvents({ take, refuse, signal: abort.signal }).catch(() => { refused = null; });
 }
