@@ -78,6 +78,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/recordings.js" JS,
     "js/reports.js" JS,
     "js/said.js" JS,
+    "js/seats.js" JS,
     "js/sources.js" JS,
     "js/state.js" JS,
     "js/stop.js" JS,

@@ -264,3 +264,50 @@ fn seats_that_do_not_take_part_each_have_a_mark_a_word_and_a_colour_of_their_own
     browser.reads("in-play", "0 of 5 seats");
     browser.reads("state", "playing, no seat");
 }
+
+#[test]
+fn the_headline_is_the_worst_that_is_true_of_the_seats_and_what_is_next_deals_with_it() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    let worst = "document.documentElement.dataset.worst";
+    let colour =
+        |browser: &Browser| browser.eval("return getComputedStyle(document.getElementById('state')).color");
+    browser.wait(&format!("{worst} === ''"));
+    browser.reads("next", "load");
+    let calm = colour(&browser);
+
+    // One seat of four is out while the others are parked: arming is not what comes first.
+    pretend(
+        &browser,
+        "Object.assign(status, { state: 'parked', may_clear: false, next: 'arm', next_coded: { code: 'arm' } });
+         status.controllers[2].health = 'lost';",
+    );
+    browser.wait(&format!("{worst} === 'weak'"));
+    browser.reads("next", "see to B1: disable or mend. Then:");
+    browser.reads("next-actions", "disable B1");
+    assert_eq!(browser.eval("return document.querySelectorAll('[data-next=true]').length"), json!(0));
+    assert_ne!(colour(&browser), calm);
+    browser.shot("84-parked-but-for-one");
+
+    pretend(
+        &browser,
+        "status.controllers.forEach((one) => { one.health = 'lost'; }); status.state = 'parked';",
+    );
+    browser.wait(&format!("{worst} === 'bad'"));
+    browser.reads("next", "see to A1, A2, B1, B2");
+
+    pretend(
+        &browser,
+        "status.controllers.forEach((one) => { one.health = 'lost'; }); status.state = 'playing';",
+    );
+    browser.reads("state", "playing, no seat");
+    browser.reads("next", "stop or park: the film leads no seat");
+    browser.wait(&format!("{worst} === 'bad'"));
+    browser.shot("85-playing-without-a-seat");
+
+    // A seat that a person has taken out, or that has to be homed, is no news.
+    pretend(&browser, "status.controllers[0].enabled = false; status.controllers[1].health = 'excluded';");
+    browser.wait(&format!("{worst} === ''"));
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}

@@ -3,7 +3,7 @@
 import { sentAt } from './clock.js';
 import { byId, setAttribute, setProperty, setText } from './dom.js';
 import { channelAnswers } from './channel.js';
-import { takesPart } from './marks.js';
+import { seatsInPlay, worstOf } from './seats.js';
 import { hasSpoken, needsToken, refusal, silence } from './stream.js';
 import { linkState } from './state.js';
 import { askForToken } from './token.js';
@@ -12,8 +12,8 @@ import { causeOf, nextOf, stateName } from './said.js';
 import { lasting, number, percent, sentence, signed, timeOfDay } from './words.js';
 
 const BLINK_MS = 250;
-/** States in which the film leads seats: with none that takes part the large word would say what nobody sees in the hall. */
-const LEADING = new Set(['joining', 'playing']);
+/** Seats that are named. */
+const NAMED = 4;
 let spoken = '';
 
 /** Keeps the time of day and the seconds of silence true while nothing comes. */
@@ -49,12 +49,14 @@ function showStatus(status, link) {
   setText(byId('hall'), status.hall);
   setText(byId('version'), words('page.version', { version: status.version, time: lasting(status.uptime_s) }));
   const seats = seatsInPlay(status.controllers);
-  const led = seats.playing > 0 || !LEADING.has(status.state);
-  const state = led ? stateName(status.state) : words('in-play.none', { state: stateName(status.state) });
+  const worst = worstOf(status);
+  const state = worst?.none ? words('in-play.none', { state: stateName(status.state) }) : stateName(status.state);
+  const next = nextAfter(worst, status);
+  setAttribute(document.documentElement, 'data-worst', worst?.look ?? '');
   setText(byId('state'), link === 'live' ? state : `${state}?`);
   setText(byId('cause'), sentence(causeOf(status)));
   setText(byId('since'), times(status));
-  setText(byId('next'), sentence(nextOf(status)));
+  setText(byId('next'), sentence(next));
   showInPlay(seats);
   const start = status.state === 'armed' ? status.playlist?.next_start : null;
   badge('starts', start ? words('badge.starts', { at: timeOfDay(start) }) : '', 'weak', words('badge.starts.why'));
@@ -62,28 +64,24 @@ function showStatus(status, link) {
   const { text, planned } = settings(status);
   badge('settings-badge', text, planned ? 'calm' : 'weak', words(planned ? 'badge.planned' : 'badge.not-planned'));
   setProperty(document, 'title', [...(link === 'live' ? [state] : []), status.hall, 'kinocue'].join(' – '));
-  const now = `${state}. ${sentence(causeOf(status))}. ${words('next.label')}${nextOf(status)}.`;
+  const now = `${state}. ${sentence(causeOf(status))}. ${words('next.label')}${next}.`;
   if (now !== spoken) {
     spoken = now;
     setText(byId('spoken'), now);
   }
 }
 
+/** What a person does next: first about seats that are out, where nothing moves or the film leads none. */
+function nextAfter(worst, status) {
+  if (worst?.none) return words('next.no-seat');
+  if (worst === null || !['parked', 'armed'].includes(status.state)) return nextOf(status);
+  const more = worst.names.length > NAMED ? ` ${words('and-more', { n: worst.names.length - NAMED })}` : '';
+  return words('next.seats-out', { seats: worst.names.slice(0, NAMED).join(', ') + more, next: nextOf(status) });
+}
+
 function times(status) {
   const lapses = status.lapses_s === null ? '' : `; ${words('since.lapses', { time: lasting(status.lapses_s) })}`;
   return `${words('since.for', { time: lasting(status.since_s) })}${lapses}`;
-}
-
-/** How many seats take part, and how many the configuration has; a seat of several controllers needs them all. */
-function seatsInPlay(controllers) {
-  const seats = new Map();
-  for (const controller of controllers) {
-    if (controller.health === 'out') continue;
-    seats.set(controller.group, (seats.get(controller.group) ?? true) && takesPart(controller));
-  }
-  const playing = [...seats.values()].filter(Boolean).length;
-  const failed = controllers.some((controller) => controller.enabled && !takesPart(controller) && controller.health !== 'out');
-  return { playing, all: seats.size, failed };
 }
 
 function showInPlay({ playing, all, failed }) {

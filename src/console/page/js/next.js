@@ -5,6 +5,7 @@ import { disable } from './controller.js';
 import { isShut } from './lock.js';
 import { healthWord } from './marks.js';
 import { chosenCue, loadCue } from './playlist.js';
+import { worstOf } from './seats.js';
 import { onPress } from './press.js';
 import { runPreflight } from './reports.js';
 import { words } from './language.js';
@@ -28,7 +29,8 @@ export function armNeeds({ show, preflight }) {
 export function showNext(status, link) {
   const live = link === 'live';
   showActions(live ? actionsOf(status) : []);
-  const next = (live && PRESSED[status.next_coded?.code]) || null;
+  // Where seats are out they come first.
+  const next = (live && worstOf(status) === null && PRESSED[status.next_coded?.code]) || null;
   const shut = next !== null && isShut(byId(next));
   setProperty(byId('next-locked'), 'hidden', !shut);
   for (const button of document.querySelectorAll('.transport button, #lock')) setAttribute(button, 'data-next', String(button.id === (shut ? 'lock' : next)));
@@ -36,7 +38,7 @@ export function showNext(status, link) {
 
 function actionsOf(status) {
   const { state, show, preflight, may_clear: mayClear } = status;
-  if (state === 'boot') return inTheWay(status);
+  if (state === 'boot' || (state === 'parked' && worstOf(status) !== null)) return inTheWay(status);
   if (state !== 'parked' || mayClear) return [];
   if (!show) return [{ what: 'load', of: chosenCue() }];
   return preflight?.passed ? [] : [{ what: 'preflight' }, ...(preflight ? inTheWay(status) : [])];

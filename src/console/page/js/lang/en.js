@@ -233,6 +233,8 @@ export default {
   "means.unwatched": "not monitored: acks are off",
   "next.actions": "What to do next",
   "next.label": "Next: ",
+  "next.no-seat": "STOP or PARK: the film leads no seat. Then see to the warnings",
+  "next.seats-out": "See to {seats}: disable or mend. Then: {next}",
   "notes.one": "{n} note",
   "notes.other": "{n} notes",
   "now.title": "State of the hall",
