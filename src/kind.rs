@@ -37,15 +37,42 @@ const KINDS: &[(usize, &[u8], &str)] = &[
     (0, b"[", "TOML or JSON"),
 ];
 
+/// Octets that no samples are by chance.
+const SURE: usize = 4;
+
 /// What a file is that begins so, if that is known; of `front` the first [`FRONT`] octets count.
 pub(crate) fn of(front: &[u8]) -> Option<&'static str> {
     let begins = |at: usize, magic: &[u8]| front.get(at..).is_some_and(|rest| rest.starts_with(magic));
     KINDS.iter().find(|(at, magic, _)| begins(*at, magic)).map(|(.., kind)| *kind)
 }
 
+/// The same of a stream that may be raw samples, as of which few octets tell nothing: a whole number of samples may be any.
+pub(crate) fn of_stream(front: &[u8]) -> Option<&'static str> {
+    let sure = KINDS.iter().filter(|(_, magic, _)| magic.len() >= SURE);
+    sure.filter(|(at, magic, _)| front.get(*at..).is_some_and(|rest| rest.starts_with(magic)))
+        .map(|(.., kind)| *kind)
+        .next()
+}
+
+/// True if that is not known yet of a stream of which no more than `front` has come.
+pub(crate) fn is_open(front: &[u8]) -> bool {
+    let agrees = |at: usize, magic: &[u8]| {
+        front.len() < at + magic.len()
+            && front.get(at..).unwrap_or_default().iter().zip(magic).all(|(a, b)| a == b)
+    };
+    KINDS.iter().any(|(at, magic, _)| magic.len() >= SURE && agrees(*at, magic))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stream_of_samples_is_of_no_kind_as_soon_as_it_can_be_none() {
+        assert_eq!(of_stream(b"fLaC\0\0"), Some("FLAC sound"));
+        assert_eq!((of_stream(b"\xff\xfe\x01\x02"), of_stream(b"[[\0\0")), (None, None), "samples may be so");
+        assert!(is_open(b"") && is_open(b"fLa") && is_open(&[1, 0, 2]) && !is_open(&[1, 0, 2, 0, 9]));
+    }
 
     #[test]
     fn each_kind_is_known_by_its_begin_and_a_cue_is_none_of_them() {

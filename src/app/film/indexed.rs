@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::riff::{Channels, RiffFault, SampleStream};
+use super::riff::{Channels, HEADER, RiffFault, SampleStream, is_wav};
 use super::{FilmError, WantedFile};
 use crate::film::sound::{IndexFault, IndexMaker, MOST_OCTETS, SoundIndex};
 
@@ -88,8 +88,8 @@ pub(crate) fn index_film(film: &Path, name: &str) -> Result<(Indexed, Vec<u8>), 
 /// The index of a WAV file; none where it is something that a player has to read.
 fn index_wav(film: &Path, name: &str) -> Result<Option<SoundIndex>, IndexingError> {
     let mut begin = Vec::new();
-    File::open(film)?.take(4).read_to_end(&mut begin)?;
-    if begin != b"RIFF" {
+    File::open(film)?.take(HEADER as u64).read_to_end(&mut begin)?;
+    if !is_wav(&begin) {
         return Ok(None);
     }
     match index_stream(File::open(film)?, name) {

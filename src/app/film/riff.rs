@@ -1,13 +1,19 @@
-//! SampleStream out of a stream: raw ones, or those behind a RIFF header, be its sizes known or not (FFFFFFFF, as programs write them into a
-//! pipe).
+//! Samples out of a stream: raw ones, or those behind the header of a WAV file, be its sizes known or not (FFFFFFFF, as programs write them
+//! into a pipe, and RF64 in a file of over 4 GB). Wave64 has the same chunks, with longer heads.
 
 use std::fmt;
 
+use crate::kind;
+
 /// What a stream that is raw has: 16 bits, one channel, so many samples a second.
 const RAW_SAMPLES_PER_S: u32 = 48_000;
-/// RIFF, its size, WAVE; the name and the size of a chunk.
-const RIFF: usize = 12;
-const CHUNK: usize = 8;
+/// How files of RIFF begin; the sizes that RF64 and BW64 have elsewhere are of no use here.
+const RIFFS: [&[u8]; 3] = [b"RIFF", b"RF64", b"BW64"];
+/// RIFF, its size, WAVE; then chunks, each with its name and its size.
+const RIFF: WavForm = WavForm { begin: 12, head: 8, filled_to: 2 };
+/// How Wave64 begins: a GUID for each name.
+const RIFF_GUID: &[u8] = b"riff\x2e\x91\xcf\x11\xa5\xd6\x28\xdb\x04\xc1\0\0";
+const WAVE64: WavForm = WavForm { begin: 40, head: 24, filled_to: 8 };
 /// What of a header is kept: more says that it is none.
 pub(super) const HEADER: usize = 64 * 1024;
 /// SampleStream a second that there are.
@@ -31,6 +37,15 @@ pub(crate) enum RiffFault {
     Empty,
     #[error("it is not a WAV file; make one of it, as with ffmpeg -i IN -c:a pcm_s16le OUT.wav")]
     Foreign,
+    #[error("it is {0}, not a WAV file; make one of it, as with ffmpeg -i IN -c:a pcm_s16le OUT.wav")]
+    Kind(&'static str),
+}
+
+impl RiffFault {
+    fn of(kind: &'static str) -> Self {
+        // What is to be done with it for a cue is of no use for sound.
+        Self::Kind(kind.split(':').next().unwrap_or(kind))
+    }
 }
 
 /// What a header says of samples.
@@ -94,14 +109,19 @@ impl SampleStream {
     pub(super) fn check(mut self, begin: &[u8]) -> Result<(), RiffFault> {
         match begin {
             [] => return Err(RiffFault::Empty),
-            [b'R', b'I', b'F', b'F', ..] => {}
-            _ => return Err(RiffFault::Foreign),
+            _ if is_wav(begin) => {}
+            _ => return Err(kind::of(begin).map_or(RiffFault::Foreign, RiffFault::of)),
         }
         self.push(begin, &mut Vec::new())?;
         self.format.map(drop).ok_or(RiffFault::NoData)
     }
 
-    /// SampleStream a second; none before that is known.
+    /// Channels; none before that is known.
+    pub(super) fn channels(&self) -> Option<usize> {
+        self.format.map(|format| format.channels)
+    }
+
+    /// Samples a second; none before that is known.
     pub(super) fn samples_per_s(&self) -> Option<u32> {
         self.format.map(|format| format.samples_per_s)
     }
@@ -143,30 +163,64 @@ fn mean(samples: impl Iterator<Item = i16>) -> i16 {
     i16::try_from(sum / count.max(1)).expect("a mean is among its samples")
 }
 
+/// True if a file that begins so is one of those that are read.
+pub(super) fn is_wav(begin: &[u8]) -> bool {
+    RIFFS.into_iter().chain([RIFF_GUID]).any(|magic| begin.starts_with(magic))
+}
+
 /// The format, and how long the header is; none while it is not whole.
 fn header(octets: &[u8]) -> Result<Option<(SoundFormat, usize)>, RiffFault> {
-    let is_riff = octets.iter().zip(b"RIFF").all(|(one, other)| one == other);
-    if !is_riff {
-        return Ok(Some((SoundFormat { samples_per_s: RAW_SAMPLES_PER_S, channels: 1 }, 0)));
+    let is_begun = |magic: &[u8]| octets.iter().zip(magic).all(|(one, other)| one == other);
+    if RIFFS.into_iter().any(is_begun) {
+        return RIFF.header(octets);
     }
-    let (mut at, mut format) = (RIFF, None);
-    while let Some(chunk) = octets.get(at..at + CHUNK) {
-        let size = u32::from_le_bytes([chunk[4], chunk[5], chunk[6], chunk[7]]) as usize;
-        match &chunk[..4] {
-            b"data" => return format.map(|format| Some((format, at + CHUNK))).ok_or(RiffFault::NoFormat),
-            b"fmt " => {
-                let Some(fields) = octets.get(at + CHUNK..at + CHUNK + 16) else { break };
-                format = Some(read_format(fields)?);
+    if is_begun(RIFF_GUID) {
+        return WAVE64.header(octets);
+    }
+    match kind::of_stream(octets) {
+        Some(kind) => Err(RiffFault::of(kind)),
+        None if kind::is_open(octets) => Ok(None),
+        None => Ok(Some((SoundFormat { samples_per_s: RAW_SAMPLES_PER_S, channels: 1 }, 0))),
+    }
+}
+
+/// How the chunks of a file lie: where the first begins, how long the head of each is, and to a multiple of what its content is filled.
+struct WavForm {
+    begin: usize,
+    head: usize,
+    filled_to: usize,
+}
+
+impl WavForm {
+    fn header(&self, octets: &[u8]) -> Result<Option<(SoundFormat, usize)>, RiffFault> {
+        let (mut at, mut format) = (self.begin, None);
+        while let Some(head) = octets.get(at..at + self.head) {
+            let content = at + self.head;
+            match &head[..4] {
+                b"data" => return format.map(|format| Some((format, content))).ok_or(RiffFault::NoFormat),
+                b"fmt " => {
+                    let Some(fields) = octets.get(content..content + 16) else { break };
+                    format = Some(read_format(fields)?);
+                }
+                _ => {}
             }
-            _ => {}
+            at = content + self.length(head).next_multiple_of(self.filled_to);
+            if at > HEADER {
+                return Err(RiffFault::NoData);
+            }
         }
-        // Chunks begin at even places.
-        at = at.saturating_add(CHUNK).saturating_add(size).saturating_add(size % 2);
-        if at > HEADER {
-            return Err(RiffFault::NoData);
-        }
+        Ok(None)
     }
-    Ok(None)
+
+    /// How long the content of a chunk with that head is, if that is not beyond what is kept.
+    fn length(&self, head: &[u8]) -> usize {
+        let octets = |range: std::ops::Range<usize>| {
+            head[range].iter().rev().fold(0, |n: u64, octet| n << 8 | u64::from(*octet))
+        };
+        // Wave64 counts the head as well.
+        let length = if self.head == WAVE64.head { octets(16..24).saturating_sub(24) } else { octets(4..8) };
+        usize::try_from(length).unwrap_or(HEADER).min(HEADER)
+    }
 }
 
 fn read_format(fields: &[u8]) -> Result<SoundFormat, RiffFault> {
@@ -225,7 +279,71 @@ mod tests {
         mixed.0.push(&wav(1, 2, 16, 8, &[4, 2, i16::MIN, i16::MIN]), &mut mixed.1).expect("it is sound");
         assert_eq!(mixed.1, [3, i16::MIN], "of both channels");
         assert_eq!(read(&[1, 0, 2, 0, 9], 2), (vec![1, 2], Some(48_000)), "raw");
-        assert_eq!(read(b"RIFX\0\0", 1).0.len(), 3, "it is none");
+        assert_eq!(read(b"RAFX\0\0", 1).0.len(), 3, "it is none");
+    }
+
+    /// The same sound in a file of another form.
+    fn of_form(form: &str, samples: &[i16]) -> Vec<u8> {
+        let riff = wav(1, 2, 16, u32::MAX, samples);
+        let (format, sound) = (&riff[20..36], &riff[56..]);
+        let guid = |name: &[u8]| [name, b"\xf3\xac\xd3\x11\x8c\xd1\x00\xc0\x4f\x8e\xdb\x8a"].concat();
+        let size = |length: usize| (length as u64 + 24).to_le_bytes();
+        let ds64 = [&b"ds64"[..], &28_u32.to_le_bytes(), &[0; 28]].concat();
+        match form {
+            "RF64" | "BW64" => [form.as_bytes(), &riff[4..12], &ds64, &riff[12..]].concat(),
+            _ => [
+                RIFF_GUID,
+                &[0xff; 8],
+                &guid(b"wave"),
+                &guid(b"junk"),
+                &size(3),
+                &[7; 8],
+                &guid(b"fmt "),
+                &size(16),
+                format,
+                &guid(b"data"),
+                &size(sound.len()),
+                sound,
+            ]
+            .concat(),
+        }
+    }
+
+    #[test]
+    fn files_of_over_4_gb_are_read_as_others_are_in_all_their_forms() {
+        for form in ["RF64", "BW64", "W64"] {
+            let octets = of_form(form, &[1, -1, 2, -2, 3, -3]);
+            for piece in [1, 7, 4_096] {
+                assert_eq!(
+                    read(&octets, piece),
+                    (vec![1, 2, 3], Some(48_000)),
+                    "{form} in pieces of {piece}"
+                );
+            }
+            assert_eq!(SampleStream::default().check(&octets), Ok(()), "{form}");
+            assert!(
+                is_wav(&octets) && SampleStream::default().check(&octets[..30]) == Err(RiffFault::NoData)
+            );
+        }
+        let endless = [RIFF_GUID, &[0; 24], b"junk", &[0xff; 20]].concat();
+        assert_eq!(SampleStream::default().check(&endless), Err(RiffFault::NoData));
+    }
+
+    #[test]
+    fn sound_of_another_kind_is_called_that_in_a_file_and_on_a_line() {
+        for (begin, name) in [
+            (&b"fLaC\0\0\0\x22"[..], "it is FLAC sound, not a WAV file"),
+            (b"OggS\0\x02\0\0", "it is Ogg sound or film, not"),
+            (b"\0\0\0\x20ftypM4A ", "it is an MP4 or MOV file, not"),
+            (b"RIFX\0\0\0\0WAVE", "(RIFX), not a WAV file"),
+            (b"PK\x03\x04\0\0\0\0", "it is a spreadsheet or an archive, not a WAV file; make one"),
+        ] {
+            let mut stream = SampleStream::default();
+            let on_a_line =
+                begin.chunks(1).try_for_each(|piece| stream.push(piece, &mut Vec::new())).unwrap_err();
+            assert_eq!(SampleStream::default().check(begin), Err(on_a_line), "{name}");
+            assert!(on_a_line.to_string().contains(name), "{on_a_line}");
+        }
     }
 
     #[test]

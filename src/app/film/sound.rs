@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::riff::{RiffFault, SampleStream};
+use super::riff::{Channels, HEADER, RiffFault, SampleStream};
 use crate::film::ltc::{LtcDecoder, LtcFrame, LtcGenerator};
 use crate::film::source::FilmArgError;
 use crate::film::timecode::{FrameRate, Timecode};
@@ -56,6 +56,10 @@ pub(crate) fn wav_header(samples: Option<u32>) -> Vec<u8> {
 pub(crate) struct LtcFound {
     /// How long the recording is.
     pub(crate) seconds: f64,
+    /// The channel that was looked in: the first, unless another one has timecode and that has none.
+    pub(crate) channel: u8,
+    /// How many there are.
+    pub(crate) channels: u8,
     /// Frames whose labels are sure.
     pub(crate) frames: u64,
     /// The first label, and the last.
@@ -72,16 +76,29 @@ pub(crate) struct LtcFound {
     pub(crate) backwards: u64,
 }
 
-/// Looks for timecode in the octets of a WAV file.
+/// Looks for timecode in the octets of a WAV file: in its first channel, else in those after it.
 ///
 /// # Errors
 /// In words, where it is none that can be read.
 pub(crate) fn look_for_ltc(
     octets: &[u8],
 ) -> Result<LtcFound, impl std::error::Error + Send + Sync + 'static> {
-    let (mut samples, mut sound) = (SampleStream::default(), Vec::new());
+    SampleStream::default().check(&octets[..octets.len().min(HEADER)])?;
+    let first = look_in(octets, 1)?;
+    let mut others = (2..=first.channels).map(|channel| look_in(octets, channel));
+    let other = if first.frames > 0 {
+        None
+    } else {
+        others.find(|found| !matches!(found, Ok(found) if found.frames == 0))
+    };
+    other.unwrap_or(Ok::<_, RiffFault>(first))
+}
+
+/// Looks for it in a channel, counted from 1.
+fn look_in(octets: &[u8], channel: u8) -> Result<LtcFound, RiffFault> {
+    let (mut samples, mut sound) = (SampleStream::of(Channels::One(channel)), Vec::new());
     samples.push(octets, &mut sound)?;
-    let per_s = samples.samples_per_s().ok_or(RiffFault::NoData)?;
+    let (per_s, channels) = samples.samples_per_s().zip(samples.channels()).ok_or(RiffFault::NoData)?;
     let mut decoder = LtcDecoder::new(per_s);
     let frames: Vec<LtcFrame> = sound.iter().filter_map(|sample| decoder.push(*sample)).collect();
     let step_s = |pair: &[LtcFrame]| (pair[1].end - pair[0].end) / f64::from(per_s);
@@ -92,8 +109,10 @@ pub(crate) fn look_for_ltc(
     let label = |frame: &LtcFrame| frame.label.to_string();
     #[expect(clippy::cast_precision_loss, reason = "some hours of samples")]
     let seconds = sound.len() as f64 / f64::from(per_s);
-    Ok::<_, RiffFault>(LtcFound {
+    Ok(LtcFound {
         seconds,
+        channel,
+        channels: u8::try_from(channels).unwrap_or(u8::MAX),
         frames: frames.len() as u64,
         first: frames.first().map(label),
         last: frames.last().map(label),
@@ -127,6 +146,40 @@ mod tests {
         let broken = LtcSound::new("25", "01:00:00:00").unwrap().enumerate().map(gap);
         assert_eq!(look_for_ltc(&file(4, broken)).unwrap().jumps, 1);
         assert_eq!(look_for_ltc(&file(1, std::iter::repeat(0))).unwrap().frames, 0);
+    }
+
+    #[test]
+    fn timecode_in_another_channel_is_found_there() {
+        let both = |channel: usize| {
+            let frame = move |sample: i16| {
+                (1..=3).flat_map(move |one| if one == channel { sample } else { 0 }.to_le_bytes())
+            };
+            let sound = LtcSound::new("25", "01:00:00:00").unwrap().take(2 * SAMPLES_PER_S as usize);
+            let mut octets = wav_header(None);
+            octets[22] = 3;
+            octets.extend(sound.flat_map(frame));
+            look_for_ltc(&octets).unwrap()
+        };
+        for channel in 1..=3 {
+            let found = both(channel);
+            assert!(found.frames > 40 && found.channels == 3, "{found:?}");
+            assert_eq!(usize::from(found.channel), channel);
+        }
+        let none = both(4);
+        assert_eq!((none.frames, none.channel, none.channels), (0, 1, 3));
+    }
+
+    #[test]
+    fn a_recording_of_another_kind_is_refused_and_one_of_over_4_gb_is_read() {
+        let sound = || LtcSound::new("25", "01:00:00:00").unwrap();
+        let mut rf64 = file(2, sound());
+        rf64[..4].copy_from_slice(b"RF64");
+        let found = look_for_ltc(&rf64).unwrap();
+        assert!(found.frames > 40 && (found.fps.unwrap() - 25.0).abs() < 0.01, "{found:?}");
+        for begin in [&b"fLaC"[..], b"raw samples"] {
+            let told = look_for_ltc(&[begin, &file(1, sound())[44..]].concat()).unwrap_err().to_string();
+            assert!(told.contains("not a WAV file"), "{told}");
+        }
     }
 
     #[test]

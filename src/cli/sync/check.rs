@@ -10,7 +10,7 @@ use crate::cli::{Exit, Failure, OrExit as _, print};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue sync check reel.wav")]
 pub(in crate::cli) struct Args {
-    /// The file: 16 bits; only its first channel is read.
+    /// The file: 16 bits, as WAV, RF64 or W64. Of its channels the first that has timecode is read.
     file: PathBuf,
     /// Print one JSON object.
     #[arg(long)]
@@ -27,18 +27,29 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::out(&text(&found))?;
     }
     if found.frames == 0 {
-        return Err(anyhow!("{path}: no timecode in the first channel")).or_exit(Exit::BadCue);
+        let place = if found.channels == 1 {
+            "it".to_owned()
+        } else {
+            format!("any of its {} channels", found.channels)
+        };
+        return Err(anyhow!("{path}: no timecode in {place}")).or_exit(Exit::BadCue);
     }
     Ok(Exit::Done)
 }
 
 fn text(found: &LtcFound) -> String {
-    let LtcFound { frames, first, last, fps, level_db, jumps, backwards, seconds } = found;
+    let LtcFound { frames, first, last, fps, level_db, jumps, backwards, seconds, channel, channels } = found;
     let mut text = format!("{seconds:.1} s of sound, {frames} frames of timecode");
     if let (Some(first), Some(last)) = (first, last) {
         let fps = fps.map_or("?".to_owned(), |fps| format!("{fps:.3}"));
         let _ = write!(text, " from {first} to {last}, {fps} a second, {level_db:.0} dBFS"); // a String takes it
         let _ = write!(text, "\n{jumps} jumps or gaps, {backwards} frames backwards");
+        if *channel > 1 {
+            let _ = write!(
+                text,
+                "\nin channel {channel} of {channels}, and none before it: set channel = {channel} in [sync.ltc]"
+            );
+        }
     }
     text + "\n"
 }
