@@ -118,6 +118,47 @@ fn every_fault_of_every_file_is_listed_and_the_worst_kind_is_the_exit_code() {
 }
 
 #[test]
+fn a_file_of_another_kind_is_called_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let day =
+        write(folder.path(), "day.toml", "title = \"Day\"\n[[entry]]\ncue = \"storm\"\nat = \"19:00\"\n");
+    for args in [vec!["check", &day], vec!["check", CUE, "--config", &day]] {
+        let run = kinocue(&args);
+        assert_eq!(run.code, Some(78), "{}", run.stderr);
+        assert!(
+            run.stderr.contains("day.toml:1:1: this is a playlist, not a configuration;"),
+            "{}",
+            run.stderr
+        );
+        assert!(run.stderr.contains("\n1 fault\n"), "{}", run.stderr);
+    }
+    for (name, begin, says) in [
+        ("ride.bag", "#ROSBAG V2.0\nE\0\0\0", "is a bag of ROS 1; a cue is a CSV or MCAP file"),
+        ("ride.db3", "SQLite format 3\0", "is an SQLite database, as a bag of ROS 2 (.db3) is; a cue is"),
+        ("reel.wav", "fLaC\0\0\0", "is FLAC sound; a cue is"),
+    ] {
+        let run = kinocue(&["check", &write(folder.path(), name, begin)]);
+        assert_eq!(run.code, Some(65), "{}", run.stderr);
+        assert!(run.stderr.contains(says) && run.stderr.ends_with("\n1 fault\n"), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn a_sparse_cue_that_the_spline_makes_undershoot_passes_with_the_line_that_it_is_told_to_have() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = "time_ms,a1\n0,0\n1000,0\n2000,0.3\n4000,0.3\n6000,0\n7000,0\n";
+    let run = kinocue(&["check", &write(folder.path(), "sparse.csv", rows)]);
+    let line = "# interpolation: monotone";
+    assert!(
+        run.code == Some(65) && run.stderr.contains(&format!("write \"{line}\" above the header")),
+        "{}",
+        run.stderr
+    );
+    let run = kinocue(&["check", &write(folder.path(), "written.csv", &format!("{line}\n{rows}"))]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+}
+
+#[test]
 fn a_cue_is_held_against_the_hall() {
     let run = kinocue(&["check", "cues/voyage.csv", "--config", HALL]);
     assert_eq!(run.code, Some(65));

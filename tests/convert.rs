@@ -70,6 +70,30 @@ fn rows_and_bytes_are_imported() {
 }
 
 #[test]
+fn a_spreadsheet_is_converted_by_the_very_command_that_its_refusal_offers() {
+    let name = "it's a \"cue\" $x.csv";
+    let text = "# title: A nod, then 1.5 bows\n# units: mm, deg\nTime_ms;A1;A2;fx_air\n0;0;0;0,0\n1000;0,5;-0,25;1,0\n";
+    let folder = folder_with(name, text);
+    let (code, said) = convert(folder.path(), &[name, "no.csv"]);
+    assert_eq!(code, Some(65), "{said}");
+    let offered = said.split('`').nth(1).expect("a command is offered").replace("kinocue ", "\"$KINOCUE\" ");
+    let run = std::process::Command::new("sh")
+        .args(["-c", &offered])
+        .env("KINOCUE", assert_cmd::cargo::cargo_bin("kinocue"))
+        .current_dir(folder.path())
+        .output()
+        .expect("there is a shell");
+    assert!(run.status.success(), "{offered}: {}", String::from_utf8_lossy(&run.stderr));
+    assert_eq!(
+        fs::read_to_string(folder.path().join("OUT.csv")).unwrap(),
+        "# kinocue-csv: 1\n# title: A nod, then 1.5 bows\n# units: mm, deg\n# interpolation: spline\n\
+         time_ms,a1,a2,fx_air\n0,0,0,0\n1000,0.5,-0.25,1\n"
+    );
+    let (code, said) = convert(folder.path(), &[name, "no.csv", "--from", "csv", "--units", "mm"]);
+    assert!(code == Some(64) && said.contains("--from csv takes no --units"), "{said}");
+}
+
+#[test]
 fn nothing_is_guessed_and_nothing_overwritten() {
     let folder = folder_with("a.csv", CUE);
     fs::write(folder.path().join("b.csv"), "old").unwrap();

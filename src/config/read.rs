@@ -84,6 +84,13 @@ pub(super) fn document(path: &Path, text: &str) -> Result<Config, ConfigFaults> 
 }
 
 fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
+    if table.contains_key("entry") && !table.contains_key("controller") {
+        faults.note(
+            0,
+            "this is a playlist, not a configuration; a hall checks it when `kinocue playlist ID` loads it",
+        );
+        return None;
+    }
     let mut section = Section::new("the file", 0, table, faults);
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
