@@ -75,7 +75,8 @@ fn judge_stroke(subject: &Subject<'_>, notes: &mut Notes) {
     let seat = &subject.controller.seat;
     let stroke = f64::from(tenths) / 10.0;
     let longest = cylinders(subject).map(AxisGeometry::stroke).fold(0.0, f64::max);
-    let may_be_rise = subject.controller.connection.dialect == Dialect::Smc && subject.pa(ALL_RISE) == Some(0);
+    let may_be_rise =
+        subject.controller.connection.dialect == Dialect::Smc && subject.pa(ALL_RISE) == Some(0);
     if may_be_rise && stroke < longest {
         return;
     }
@@ -93,7 +94,8 @@ fn judge_stroke(subject: &Subject<'_>, notes: &mut Notes) {
 fn judge_rise(subject: &Subject<'_>, cylinder: f64, notes: &mut Notes) {
     let seat = &subject.controller.seat;
     let all = seat.own().iter().enumerate().filter(|(_, axis)| axis.unit == AxisUnit::Millimetre);
-    let past = all.filter_map(|(index, axis)| {
+    // Of axes that are as far past it the first is named.
+    let past = all.rev().filter_map(|(index, axis)| {
         let (register, tenths) = rise(subject, index)?;
         let rise = f64::from(tenths) / 10.0;
         let past = rise + axis.stroke() - cylinder;
@@ -107,7 +109,11 @@ fn judge_rise(subject: &Subject<'_>, cylinder: f64, notes: &mut Notes) {
         index + 1
     );
     let room = ((cylinder - stroke) * 10.0).floor();
-    notes.add(Check::Rise, found, format!("set PA{register:02x} = {room} or less, or correct stroke_mm of the seat type"));
+    notes.add(
+        Check::Rise,
+        found,
+        format!("set PA{register:02x} = {room} or less, or correct stroke_mm of the seat type"),
+    );
 }
 
 /// Where the rise of an axis stands, and what it holds: PA40 is that of all axes, and where it is 0 each has its own.

@@ -37,7 +37,7 @@ fn no_other_command_sends_it_a_frame_or_a_write_and_each_names_the_cause() {
         };
         of(&["latency", "--seconds", "1"], 76);
         of(&["home", "--seats-empty"], 76);
-        of(&["preflight"], 1);
+        of(&["preflight"], 69);
         of(&["register", "read", "PA02"], 76);
         of(&["register", "write", "PA02=3", "--yes"], 76);
     }
