@@ -106,7 +106,11 @@ impl FieldSheet {
         self.head(bytes, what, false);
         self.answer(reply.code, dialect);
         self.slot(reply.code, reply.channel, space_name(space), reply.error, dialect);
-        self.told(reply.start, reply.num, reply.data, space);
+        self.told(reply.start, reply.num, reply.values(dialect), space);
+        if dialect == Dialect::Mbox && reply.code.refused() {
+            // In place of words, of 16 or 32 bits (IMAX manual 2.2.2.3).
+            self.error(reply.data.iter().find(|word| *word != 0).unwrap_or(0));
+        }
         if reply.access == Access::Read && space == Some(Space::Monitor) {
             self.monitored_positions(reply.start, reply.data, dialect);
         }
@@ -223,7 +227,11 @@ impl FieldSheet {
         self.answer(reply.code, Dialect::Mbox);
         self.field("channel", reply.channel, reply.channel);
         self.asked(reply.start, reply.num, None);
-        self.wide_registers(reply.start, &reply.values().collect::<Vec<_>>());
+        let values: Vec<_> = reply.values().collect();
+        match values.first() {
+            Some(error) if reply.code.refused() => self.error(u16::try_from(*error).unwrap_or(u16::MAX)),
+            _ => self.wide_registers(reply.start, &values),
+        }
     }
 }
 
@@ -274,6 +282,25 @@ v3         none
         let text = read("55aa00001203000a00000000005500010005", MessageReading::Smc).text();
         assert!(text.contains("x = 3: running with an error"), "{text}");
         assert!(text.contains("Err10: alarm of the servo of axis 1"), "{text}");
+    }
+
+    #[test]
+    fn a_refusal_of_a_read_or_write_shows_its_error_where_each_dialect_has_it() {
+        for function in ["1103", "1203"] {
+            let smc = format!("55aa0000{function}000a0000000000550001");
+            let mbox = format!("55aa0000{function}00010000000000550001000a");
+            let wide = format!("55aa0000{function}000100000000005500010000000a");
+            let readings =
+                [(smc, MessageReading::Smc), (mbox, MessageReading::Mbox), (wide, MessageReading::Imax)];
+            for (hex, reading) in readings {
+                let text = read(&hex, reading).text();
+                assert!(
+                    text.contains("error      Err10: alarm of the servo of axis 1"),
+                    "{reading:?}: {text}"
+                );
+                assert!(!text.contains("0x55 "), "it tells no register: {text}");
+            }
+        }
     }
 
     #[test]

@@ -66,7 +66,12 @@ impl SixpackDecoder {
                     self.asked = Some(command);
                 }
                 let known = (command.words(), command.frame(frame.address) == frame);
-                worded(("request", "unit"), frame, known, |to| command.tell(to))
+                let (mut text, mut fields) = worded(("request", "unit"), frame, known, |to| command.tell(to));
+                if let Some(fault) = command.fault() {
+                    text += &format!("  ({fault})");
+                    fields.insert("fault".to_owned(), json!(fault));
+                }
+                (text, fields)
             }
         };
         SerialSaid { direction, text, fields, is_message: true }

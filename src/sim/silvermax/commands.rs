@@ -10,7 +10,7 @@ use crate::wire::silvermax::{
 /// What commands answer: data, or that they are done.
 type CommandAnswer = Result<Option<Words>, NakReason>;
 
-/// HLT, RST, SPR, VMI, GOP, KDD, RSM, RSN, TIM.
+/// HLT, RST, SPR, VMI, GOL, KDD, RSM, RSN, TIM.
 const FORBIDDEN: [u8; 9] = [2, 4, 13, 15, 143, 183, 196, 198, 218];
 
 /// Motions: those that wait for the running one.
@@ -58,6 +58,9 @@ impl Unit {
         }
         if FORBIDDEN.contains(&request.number) {
             self.tally.forbidden += 1;
+        }
+        if command.class == Class::E {
+            return Err(NakReason::Command);
         }
         if command.class == Class::A {
             return self.take_at_once(request.number, parameters);

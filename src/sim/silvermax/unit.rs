@@ -24,7 +24,7 @@ pub(crate) struct Tally {
     pub(crate) kills: u32,
     /// How often it started.
     pub(crate) resets: u32,
-    /// Commands that kinocue must never send: HLT, RST, VMI, TIM, GOP, KDD, and those that write its memory.
+    /// Commands that kinocue must never send: HLT, RST, VMI, TIM, GOL, KDD, and those that write its memory.
     pub(crate) forbidden: u32,
 }
 

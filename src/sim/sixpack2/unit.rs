@@ -246,6 +246,10 @@ impl SixpackUnit {
 
     fn obey(&mut self, frame: SixpackFrame, now: MonoTime) {
         let command = SixpackCommand::of(frame);
+        if command.fault().is_some() && usize::from(frame.parameters[0]) < MOTORS {
+            self.books.unknown += 1;
+            return;
+        }
         match command {
             SixpackCommand::ClockDivider(told) => {
                 let moves = self.motors.iter().any(|motor| !motor.is_at_rest());

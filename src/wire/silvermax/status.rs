@@ -55,9 +55,10 @@ pub(crate) const fn kill_bits(register: i32) -> u16 {
     u16::from_le_bytes([low, high])
 }
 
-/// Conditions that killed, by name.
+/// Conditions that killed, by name: bits of the internal status word (KMC, page 57).
 pub(crate) fn conditions(bits: u16) -> String {
-    let names: Vec<_> = Io(bits).names().map(|name| if name == "not hot" { "heat" } else { name }).collect();
+    let names = Internal(bits).names().map(|name| if name == "not hot" { "heat" } else { name });
+    let names: Vec<_> = names.collect();
     if names.is_empty() { "what it does not say".to_owned() } else { names.join(", ") }
 }
 
@@ -132,5 +133,20 @@ impl StatusWord for Io {
 
     fn word(self) -> u16 {
         self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_killed_is_named_as_the_internal_status_word_has_it() {
+        let names = ["low voltage", "high voltage", "delay over", "input found", "halted"];
+        for (bit, name) in (10..=14).rev().zip(names) {
+            assert_eq!(kill_names(1 << (16 + bit)), name);
+        }
+        assert_eq!(conditions(1 << 9 | 1 << 7 | 1 << 4), "holding error, heat, input 1");
+        assert_eq!(conditions(0), "what it does not say");
     }
 }

@@ -225,8 +225,55 @@ fn commands_stand_in_the_order_of_their_numbers() {
         assert_eq!(command(number).map(|command| command.mnemonic), Some(mnemonic));
     }
     let known: Vec<u8> = (0..=255).filter(|number| command(*number).is_some()).collect();
-    assert!(known.len() > 85, "{known:?}");
-    assert_eq!(command(7), None);
+    assert_eq!(known.len(), 129, "{known:?}");
+    assert_eq!(command(16), None);
+}
+
+#[test]
+fn each_example_of_the_reference_is_a_command_with_its_parameters_in_their_range() {
+    for (line, mnemonic) in [
+        ("@16 137 32 1200 10", "JRE"),
+        ("@16 138 10 122", "WCL"),
+        ("@16 148 0 10 10 10 10 200 1000", "CTC"),
+        ("@16 150 10 4", "AHC"),
+        ("@16 152 0", "OLP"),
+        ("@16 156 150", "LRP"),
+        ("@16 162 5 1 10", "JMP/JOI"),
+        ("@16 162 112 112 0", "JMP/JOI"),
+        ("@16 168 1631 14843 31816 2057 1758 2329 32767 8213", "MCT"),
+        ("@16 169 23000 24000 30000", "FLC"),
+        ("@16 170", "EEM"),
+        ("@16 171", "DEM/DDB"),
+        ("@16 172 5 160 37", "PAC"),
+        ("@16 180 1024", "SSD"),
+        ("@16 184 0", "DIR"),
+        ("@16 191 1", "MDT"),
+        ("@16 194 1 0", "WBS"),
+        ("@16 195 10813", "SCF"),
+        ("@16 201 50 2 1", "PCL/PCI"),
+        ("@16 201 50 16 16", "PCL/PCI"),
+        ("@16 202 7 0", "PRT/PRI"),
+        ("@16 204 1 1", "WBE"),
+        ("@16 208 200", "PLR"),
+        ("@16 211 65524", "CAI"),
+        ("@16 215 5 10", "CLC"),
+        ("@16 222 20000 5", "TRU"),
+        ("@16 223 11", "RSD"),
+        ("@16 230 83", "AHD"),
+        ("@16 236 20 0 0", "XAT"),
+        ("@16 238 61440 61440 10", "JNA"),
+        ("@16 245 28", "PCP"),
+        ("@16 251", "EDH"),
+    ] {
+        let request = AnyRequest::parse(line.as_bytes()).unwrap();
+        let command = request.command().unwrap();
+        assert_eq!(
+            (command.mnemonic, command.parameters.len()),
+            (mnemonic, request.parameters.as_slice().len())
+        );
+        let all = command.parameters.iter().zip(request.parameters.as_slice());
+        all.for_each(|(parameter, value)| assert!(parameter.takes(*value), "{line}: {}", parameter.name));
+    }
 }
 
 #[test]

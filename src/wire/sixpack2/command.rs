@@ -196,6 +196,24 @@ messages! {
     }
 }
 
+/// Motors of a unit, and the longest travel that it takes (motor parameters, page 38).
+const MOTORS: i64 = 6;
+const MOST_POSLIMIT: i64 = 0x7fff_ffff;
+
+impl SixpackCommand {
+    /// Why no unit takes it; `None` where one does.
+    #[must_use]
+    pub(crate) fn fault(self) -> Option<&'static str> {
+        let mut fault = None;
+        self.tell(|name, value| match name {
+            "motor" if value >= MOTORS => fault = Some("no such motor: a unit has 0 to 5"),
+            "poslimit" if value > MOST_POSLIMIT => fault = Some("Poslimit goes up to 0x7fffffff"),
+            _ => {}
+        });
+        fault
+    }
+}
+
 /// Flags of `P5` of `$15` that matter here.
 pub(crate) mod p5 {
     /// Begin to search zero, now.

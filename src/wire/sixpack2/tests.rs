@@ -150,6 +150,15 @@ fn a_stop_is_the_golden_one_and_all_actions_are_never_asked_for_later() {
 }
 
 #[test]
+fn a_motor_that_no_unit_has_and_a_travel_past_its_range_are_faults() {
+    let fault = |text: &str| SixpackCommand::of(SixpackFrame::from_octets(octets(text))).fault();
+    assert_eq!(fault("01 15 05 FF FF FF 7F 00 20"), None);
+    assert_eq!(fault("01 15 06 00 00 00 00 00 20"), Some("no such motor: a unit has 0 to 5"));
+    assert_eq!(fault("01 15 00 00 00 00 80 00 20"), Some("Poslimit goes up to 0x7fffffff"));
+    assert_eq!(fault("01 24 06 40 1F 00 00 00 00"), Some("no such motor: a unit has 0 to 5"));
+}
+
+#[test]
 fn a_lost_octet_shifts_frames_until_a_silence_or_a_break() {
     let order = SixpackOrder::Target(PiTarget { motor: 0, target: 8_000 }).frame(1);
     let (soon, long) = (Duration::from_millis(1), Duration::from_millis(21));
