@@ -345,6 +345,8 @@ pub struct ControllerStatus {
     pub error: Option<u16>,
     /// Error number of each drive; null if it never told.
     pub servo_errors: Option<Vec<u16>>,
+    /// Torque of each axis as its status reports have it, in their own unit; null if none came within the last seconds.
+    pub forces: Option<Vec<i16>>,
     /// Inputs, bit 0 = X01; null if it never told.
     pub inputs: Option<u16>,
     /// Inputs of belts that are open, from 1 for X01; null if it has no belts, or has not told lately.

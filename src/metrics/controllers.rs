@@ -29,6 +29,7 @@ fn health(all: &[ControllerStatus]) -> Vec<MetricFamily> {
         gauges(all, "controller_ack_ratio", "Share of requested acks that came, in the last second", |one| {
             one.ack_rate
         }),
+        torques(all),
         latencies(all),
     ]
 }
@@ -59,6 +60,19 @@ const fn answers(health: Health) -> Option<f64> {
         Health::Lost | Health::Unknown => Some(0.0),
         Health::Unwatched | Health::Out => None,
         _ => Some(1.0),
+    }
+}
+
+/// The unit is that of the reports, which no manual says.
+fn torques(all: &[ControllerStatus]) -> MetricFamily {
+    let values = all.iter().flat_map(|one| {
+        let axes = (1..).zip(one.forces.iter().flatten());
+        axes.map(|(axis, force): (u32, _)| (and(one, "axis", &axis.to_string()), f64::from(*force)))
+    });
+    MetricFamily {
+        name: "controller_torque",
+        help: "Torque of each axis as the controller reports it (0x3101, DP90 to DP95), in its own unit",
+        values: MetricValues::Gauges(values.collect()),
     }
 }
 

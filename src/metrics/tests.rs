@@ -43,6 +43,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         emergency_stop: false,
         error: Some(0),
         servo_errors: None,
+        forces: Some(vec![12, -3]),
         belts_open: None,
         inputs: Some(0),
         outputs: None,
@@ -286,6 +287,7 @@ fn figures_are_in_base_units() {
         ("kinocue_acks_total{controller=\"B1\",result=\"lost\"}", 8.0),
         ("kinocue_limit_interventions_total{controller=\"B1\"}", 3.0),
         ("kinocue_controller_ack_latency_seconds{controller=\"B1\",quantile=\"0.5\"}", 40e-6),
+        ("kinocue_controller_torque{controller=\"B1\",axis=\"2\"}", -3.0),
         ("kinocue_osc_messages_total{result=\"refused\"}", 3.0),
     ] {
         assert_eq!(page.samples.get(series), Some(&value), "{series}");

@@ -1,5 +1,7 @@
 //! The status: how all of it stands, in the words of the hall.
 
+use std::time::Duration;
+
 use jiff::Zoned;
 
 use super::coded::{NextCode, StandingCode};
@@ -48,6 +50,8 @@ const BOUNDS_US: [f64; 16] = [
 
 /// So many seats are named that will not move.
 const FEW: usize = 8;
+/// Torque that was reported longer ago says nothing of now.
+const FORCES: Duration = Duration::from_secs(3);
 
 /// What the status is made of.
 #[derive(Debug, Clone, Copy)]
@@ -222,6 +226,7 @@ impl StatusParts<'_> {
             emergency_stop: state.emergency_stop(),
             error: state.error.map(|heard| heard.value),
             servo_errors: state.servo_errors.map(|heard| heard.value.to_vec()),
+            forces: state.forces.filter(|heard| heard.age(now) <= FORCES).map(|heard| heard.value.to_vec()),
             inputs: state.inputs.map(|heard| heard.value),
             belts_open: belts::open(controller, &state, now).map(belts::numbers),
             outputs: state.outputs.map(|heard| heard.value),
