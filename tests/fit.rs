@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use assert_cmd::Command;
+use proptest::prelude::*;
 use serde_json::Value;
 
 struct Run {
@@ -269,4 +270,68 @@ fn no_file_is_lost() {
     assert_eq!(kinocue(&["fit", "nowhere.csv", "-o", &path(folder.path(), "x.csv")]).code, Some(66));
     let help = kinocue(&["fit", "--help"]).stdout;
     assert!(help.contains("Examples:") && help.contains("--smooth"), "{help}");
+}
+
+/// A hall of one controller whose effects are air alone.
+fn hall(dialect: &str, axes: usize, vibration: &str) -> String {
+    format!(
+        "[show]\nbind = \"127.0.0.1:8410\"\n[effects]\nair = 1\n[seat.s]\naxes = {axes}\nstroke_mm = 150.0\nlead_mm = 5.0\n\
+         pulses_per_rev = 10000\nmax_velocity_mm_s = 240.0\nmax_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\n\
+         vibration = \"{vibration}\"\n[[controller]]\nname = \"A1\"\nseat = \"s\"\naddress = \"127.0.0.1:7408\"\n\
+         dialect = \"{dialect}\"\n"
+    )
+}
+
+/// A ride of so many axes, the first of which vibrates.
+fn shaken(axes: usize, swing: f64, amplitude: f64, effect: &str) -> String {
+    let names: Vec<_> = (1..=axes).map(|axis| format!("a{axis}")).collect();
+    let mut text = format!("time_ms,{},v1_hz,v1_amp,fx_{effect}\n", names.join(","));
+    for row in 0..=100 {
+        let place = 0.5 + swing * (f64::from(row) * 0.04 * std::f64::consts::PI).sin();
+        let places = vec![format!("{place:.6}"); axes].join(",");
+        text += &format!("{},{places},20,{amplitude},0\n", row * 20);
+    }
+    text
+}
+
+#[test]
+fn a_cue_with_vibration_is_fit_for_an_imax_only_where_its_seat_type_leaves_vibration_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(folder.path(), "ride.csv", shaken(3, 0.1, 0.01, "air"));
+    let out = path(folder.path(), "out.csv");
+    let with = write(folder.path(), "with.toml", hall("mbox", 3, "100%"));
+    let run = kinocue(&["fit", &cue, "-o", &out, "--config", &with]);
+    assert_eq!(run.code, Some(65), "{}", run.stderr);
+    assert!(run.stderr.contains("write vibration = \"0%\" in [seat.s]"), "{}", run.stderr);
+    assert!(!Path::new(&out).exists());
+    let without = write(folder.path(), "without.toml", hall("mbox", 3, "0%"));
+    fit(&[&cue, "-o", &out, "--config", &without]);
+    let run = kinocue(&["check", &out, "--config", &without]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stdout.contains("vibration is left out on seat s"), "{}", run.stdout);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_file_is_called_fit_that_check_refuses_for_the_same_hall(
+        dialect in prop::sample::select(&["smc", "mbox"][..]),
+        vibration in prop::sample::select(&["100%", "40%", "0%"][..]),
+        (seat_axes, cue_axes) in (1_usize..8, 1_usize..8),
+        swing in 0.0..0.49_f64,
+        amplitude in prop::sample::select(&[0.0, 0.01, 0.2, 0.6][..]),
+        effect in prop::sample::select(&["air", "air", "air", "rain"][..]),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let cue = write(folder.path(), "ride.csv", shaken(cue_axes, swing, amplitude, effect));
+        let hall = write(folder.path(), "hall.toml", hall(dialect, seat_axes, vibration));
+        let out = path(folder.path(), "out.csv");
+        let run = kinocue(&["fit", &cue, "-o", &out, "--config", &hall]);
+        prop_assert_eq!(run.code == Some(0), Path::new(&out).exists());
+        if run.code == Some(0) {
+            let checked = kinocue(&["check", &out, "--config", &hall]);
+            prop_assert_eq!(checked.code, Some(0), "{}", checked.stderr);
+        }
+    }
 }

@@ -262,9 +262,11 @@ impl CheckReport {
         let small = metres::of_cue(&timeline, &judge.seats(timeline.axes()));
         small.iter().for_each(|text| self.note(path, text));
         judge.stroke(&timeline).faults.iter().for_each(|faults| self.cue_faults(faults));
-        for misfit in judge.hall.iter().flat_map(|hall| hall.misfits(&timeline)) {
-            let place = timeline.cue().column_place(&misfit.column(), misfit.at());
+        for (place, misfit) in judge.misfits(&timeline) {
             self.fault(Exit::BadCue, FaultReport::new(path, &place, misfit.to_string()));
+        }
+        for seat in judge.hall.iter().flat_map(|hall| hall.unshaken_seats(&timeline)) {
+            self.note(path, &format!("vibration is left out on seat {seat} (its vibration = 0%)"));
         }
         let terms = judge.terms(&timeline, self.level);
         let driven = args.drives.judge(path, &timeline, &terms);

@@ -12,6 +12,7 @@ use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, OrExit as _, exit, print};
 use crate::config::parse_level;
 use crate::cue::Cue;
+use crate::drive::terms;
 use crate::motion::AxisUnit;
 use crate::proof::{self, FitManner, Fitted};
 use crate::timeline::Timeline;
@@ -22,7 +23,7 @@ use crate::timeline::Timeline;
 /// room to stop is brought to rest over its last stretch, if that changes it less. --smooth allows a zero-phase low-pass filter against
 /// what scaling cannot cure, such as the steps of coarse sources and the corners of straight lines; of all pairs of filter and scale it
 /// uses the one that changes the cue least. Vibration that the seat cannot take on top of the motion is lowered too. What the serial
-/// links of the hall cannot carry is reported, not fixed. The result passes `kinocue check` with the same options.
+/// links of the hall cannot carry, and what it has not (effects, axes, vibration), is reported, not fixed. The result passes `kinocue check` with the same options.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue fit cues/coaster.csv -o fitted.csv",
@@ -82,6 +83,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         let error = anyhow!("{}: the fitted cue still breaks limits; nothing is written", args.cue.display());
         return Err(error).or_exit(Exit::CheckFailed);
     }
+    refuse_what_the_hall_misses(args, &judge, &fitted)?;
     refuse_what_links_miss(args, &judge, &fitted)?;
     convert::write(fitted.timeline.cue(), &[], &args.output, target)?;
     let report = FitReport::new(args, &fitted);
@@ -103,8 +105,27 @@ pub(super) fn mends(cue: &Cue, judge: &Judge, smooth: bool) -> bool {
     let terms = judge.terms(&timeline, 1.0);
     let fitted = proof::fit(timeline, &terms, FitManner { per_axis: false, smooth });
     fitted.is_ok_and(|fitted| {
-        is_fit(&fitted, judge) && judge.links(&fitted.timeline, 1.0).violations.is_empty()
+        is_fit(&fitted, judge)
+            && judge.misfits(&fitted.timeline).is_empty()
+            && judge.links(&fitted.timeline, 1.0).violations.is_empty()
     })
+}
+
+/// What the hall has not, no change of the motion gives it; nor a rate that its links cannot play.
+fn refuse_what_the_hall_misses(args: &Args, judge: &Judge, fitted: &Fitted) -> Result<(), Failure> {
+    let misfits = judge.misfits(&fitted.timeline);
+    let links: Vec<_> = judge.hall.iter().flat_map(|hall| terms::in_words(hall).1).collect();
+    if misfits.is_empty() && links.is_empty() {
+        return Ok(());
+    }
+    let cue = args.cue.display();
+    let of_cue = misfits.iter().map(|(place, misfit)| format!("{cue}:{place}{misfit}\n"));
+    let lines: String = of_cue.chain(links.iter().map(|why| format!("{why}\n"))).collect();
+    let exit = if misfits.is_empty() { Exit::CheckFailed } else { Exit::BadCue };
+    Err(anyhow!(
+        "{lines}fit cannot mend what the hall cannot do: change the hall or the cue; nothing is written"
+    ))
+    .or_exit(exit)
 }
 
 /// What a link makes of a cue is a matter of its rate and of the level: it is told, and nothing is changed for it.

@@ -10,8 +10,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use super::{Exit, Failure, OrExit as _, names};
 use crate::app::staged::{at_any_pace, seat_at_any_pace};
-use crate::config::{self, Config, ConfigFaults, HallStroke};
-use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
+use crate::config::{self, Config, ConfigFaults, HallStroke, Misfit};
+use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Place, Source};
 use crate::film::follower::PaceLimits;
 use crate::motion::{SeatAxis, SeatType};
 use crate::plain;
@@ -184,6 +184,12 @@ impl Judge {
             (Some(seat), None) => of_seat(seat),
             (None, None) => of_seat(&Arc::new(SeatType::bench3(axes))),
         }
+    }
+
+    /// What the hall cannot do of a cue, with its places in the file.
+    pub(super) fn misfits(&self, timeline: &Timeline) -> Vec<(Place, Misfit)> {
+        let misfits = self.hall.iter().flat_map(|hall| hall.misfits(timeline));
+        misfits.map(|misfit| (timeline.cue().column_place(&misfit.column(), misfit.at()), misfit)).collect()
     }
 
     /// The hall with what it leaves of its limits for every pace that a film may ask for, where one leads all its shows.

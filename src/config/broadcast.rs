@@ -201,6 +201,7 @@ fn port_of(
             ("dialect", at.dialect == station.dialect),
             ("fan_out", at.fan_out == station.fan_out),
             ("vibration_port_octets", at.vibration_port == station.vibration_port),
+            ("wide_channel", at.counts_axes == station.counts_axes),
             ("axis_offset", one.axis_offset == first.axis_offset || at.fan_out == FanOut::Shared),
         ];
         if let Some((what, _)) = differs.iter().find(|(_, same)| !same) {

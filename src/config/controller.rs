@@ -56,6 +56,8 @@ pub struct Station {
     pub(crate) dialect: Dialect,
     /// How it has Port Out in vibration frames.
     pub(crate) vibration_port: VibrationPort,
+    /// True if the object channel of its frames of more than six axes is their number (SMC manual 2.2.2.5), and not 2 (2.2.2.7).
+    pub(crate) counts_axes: bool,
     /// The accept and reply code of its frames.
     pub(crate) accept: Accept,
 }

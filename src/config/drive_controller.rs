@@ -163,6 +163,7 @@ fn refuse_keys(section: &mut Section<'_, '_, '_>) {
     for (key, why) in [
         ("accept", "drives have no accept code; omit it"),
         ("vibration_port_octets", "drives have no vibration frames; omit it"),
+        ("wide_channel", "drives have no object channel; omit it"),
         ("belt_inputs", "kinocue reads no belts through drives; omit it"),
         (
             "estop_inputs",

@@ -40,12 +40,16 @@ pub enum Misfit {
         hint: String,
     },
     /// Vibration of an axis whose controller has no message for it.
-    #[error("v{axis}_hz: vibration cannot be sent to {controller}, as its dialect, mbox, has none")]
+    #[error(
+        "v{axis}_hz: vibration cannot be sent to {controller}, as its dialect, mbox, has none; to leave it out there, write vibration = \"0%\" in [seat.{seat}]"
+    )]
     NoVibration {
         /// The axis, from 1.
         axis: usize,
         /// The controller's name.
         controller: String,
+        /// The type of its seat.
+        seat: String,
     },
     /// Vibration in a frame that has no room for it.
     #[error(
@@ -204,7 +208,7 @@ impl Config {
             let hint = did_you_mean(name, self.effects.iter().map(|effect| effect.name.as_str()));
             Misfit::UnknownEffect { name: name.clone(), hint }
         });
-        let shaken = self.controllers.iter().filter_map(|controller| unshakeable(controller, timeline));
+        let shaken = self.shaken_seats().filter_map(|controller| unshakeable(controller, timeline));
         let shaken = shaken.chain(self.overshaken(timeline));
         untaken.chain(unknown).chain(shaken).chain(self.unset_levels(timeline)).collect()
     }
@@ -220,7 +224,8 @@ impl Config {
             self.controllers.iter().find_map(|one| {
                 let most = Some(one.at_most[place]).filter(|most| *most > 0.0)?;
                 let controller = one.name.clone();
-                let vibrating = one.sees(timeline.axes()).find(|axis| timeline.vibrates(*axis));
+                let mut seen = one.sees(timeline.axes()).filter(|_| one.seat.vibration > 0.0);
+                let vibrating = seen.find(|axis| timeline.vibrates(*axis));
                 if let Some(axis) = vibrating.filter(|_| !track.channel.row().beside_vibration) {
                     return Some(Misfit::OutputWithVibration { column, controller, axis: axis + 1 });
                 }
@@ -230,11 +235,30 @@ impl Config {
         switches.filter_map(misfit).collect()
     }
 
+    /// Those on whose seats vibration is not left out.
+    fn shaken_seats(&self) -> impl Iterator<Item = &Controller> {
+        self.controllers.iter().filter(|one| one.seat.vibration > 0.0)
+    }
+
+    /// The seat types on which vibration of a cue is left out.
+    #[must_use]
+    pub(crate) fn unshaken_seats(&self, timeline: &Timeline) -> Vec<&str> {
+        let is_left_out = |one: &&Controller| {
+            one.seat.vibration == 0.0
+                && one.window().any(|axis| axis < timeline.axes() && timeline.vibrates(axis))
+        };
+        let mut names: Vec<_> =
+            self.controllers.iter().filter(is_left_out).map(|one| one.seat.name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
     /// The axes that swing too far, once for each seat type.
     fn overshaken(&self, timeline: &Timeline) -> Vec<Misfit> {
         let mut judged: Vec<(usize, SeatAxis)> = Vec::new();
         let mut misfits = Vec::new();
-        for controller in self.controllers.iter().filter(|one| unshakeable(one, timeline).is_none()) {
+        for controller in self.shaken_seats().filter(|one| unshakeable(one, timeline).is_none()) {
             for (index, axis) in controller.window().enumerate() {
                 let on = SeatAxis::new(&controller.seat, index);
                 if !judged.iter().any(|(before, seat)| *before == axis && seat.is_as(&on)) {
@@ -294,7 +318,11 @@ fn unshakeable(controller: &Controller, timeline: &Timeline) -> Option<Misfit> {
     let axis = 1 + controller.sees(timeline.axes()).find(|&axis| timeline.vibrates(axis))?;
     let controller_name = controller.name.clone();
     match controller.station()?.dialect {
-        Dialect::Mbox => Some(Misfit::NoVibration { axis, controller: controller_name }),
+        Dialect::Mbox => Some(Misfit::NoVibration {
+            axis,
+            controller: controller_name,
+            seat: controller.seat.name.clone(),
+        }),
         Dialect::Smc if axes > MAX_VIBRATING_AXES => {
             Some(Misfit::WideVibration { axis, controller: controller_name, axes })
         }
@@ -362,6 +390,22 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert!(found[0].starts_with("fx_watter: unknown effect"), "{found:?}");
         assert!(found[0].ends_with("did you mean water?"), "{found:?}");
+    }
+
+    #[test]
+    fn vibration_that_a_seat_type_leaves_out_is_refused_nowhere_on_it() {
+        let timeline = cue("a1,a2,v2_hz,v2_amp", "0,0,20,0.9");
+        for target in ["1,dialect=mbox", "1,axes=10", "1"] {
+            let mut config = from_to_args(&[format!("127.0.0.1:{target}")], &[], 2).unwrap();
+            assert!(config.unshaken_seats(&timeline).is_empty());
+            assert!(!config.misfits(&timeline).is_empty(), "{target}");
+            for controller in &mut config.controllers {
+                let seat = SeatType { vibration: 0.0, ..(*controller.seat).clone() };
+                controller.seat = Arc::new(seat);
+            }
+            assert!(config.misfits(&timeline).is_empty(), "{target}");
+            assert_eq!(config.unshaken_seats(&timeline), ["bench3"]);
+        }
     }
 
     #[test]

@@ -367,12 +367,15 @@ fn station(section: &mut Section<'_, '_, '_>, fan_out: FanOut) -> Option<Station
     }
     let dialect = dialect(section);
     let vibration_port = vibration_port(section, dialect).unwrap_or_default();
+    let wide = section.get("wide_channel");
+    let counts_axes = wide.and_then(|entry| entry.choice(&[("2", false), ("axes", true)], section.faults));
     let accept = accept(section).unwrap_or(Accept::All);
     Some(Station {
         address: address?,
         fan_out,
         dialect: dialect.unwrap_or(Dialect::Smc),
         vibration_port,
+        counts_axes: counts_axes.unwrap_or(false),
         accept,
     })
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::axis::{AxisKeys, NEEDED, OwnAxis, TABLES, leaves_to_seat, own_axis, refuse_far_park};
 use super::fault::Faults;
+use super::level::level;
 use super::section::{Entry, Section};
 use crate::motion::{AxisGeometry, AxisUnit, FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
 
@@ -28,6 +29,7 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
     section.require(&needed(own));
     let said = AxisKeys::of_seat(&mut section);
     let interval = section.whole_in("max_interval_ms", 1..=65_535);
+    let vibration = level(&mut section, "vibration");
     let [park, neutral] = ["park", "neutral"].map(|key| SeatPose::read(&mut section, key, axes));
     // The table of drives is read once all seats are known: `drive`.
     let [stroke, _] = ["stroke_mm", "drive"].map(|key| section.get(key));
@@ -61,6 +63,7 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
         axes,
         each: each.try_into().ok()?,
         max_interval_ms: interval.unwrap_or(FACTORY_INTERVAL_MS),
+        vibration: vibration.unwrap_or(1.0),
     })
 }
 

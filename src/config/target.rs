@@ -205,6 +205,7 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
             fan_out: options.fan_out,
             dialect: options.dialect,
             vibration_port: options.vibration_port,
+            counts_axes: false,
             accept: Accept::All,
         }),
         axis_offset: options.offset,

@@ -14,6 +14,9 @@ use crate::motion::{SeatType, Slot, Window};
 use crate::timeline::Timeline;
 use crate::wire::{Code, FrameNo, motion_channel_and_slots};
 
+/// The object channel of frames of more than six axes, as programs send it.
+const WIDE: u16 = 2;
+
 /// How a play is sent, whatever the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Manner {
@@ -43,18 +46,21 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         FanOut::Slice => slice(controller, slots, timeline, manner.level),
         FanOut::Shared => shared(config, controller, slots, timeline, manner.level),
     };
-    let vibrates = window.moving().filter_map(|(_, slot)| slot.axis).any(|axis| timeline.vibrates(axis));
+    let shake = controller.seat.vibration;
+    let shaken = |axis| shake > 0.0 && timeline.vibrates(axis);
+    let vibrates = window.moving().filter_map(|(_, slot)| slot.axis).any(shaken);
     let (lead, later) = lead(config, controller);
     let window = window.led_ahead(lead).acked_later(later);
     let codec = match &controller.connection {
         Connection::Udp(station) => Codec::Mbox(MotionCodec {
-            channel,
+            channel: if station.counts_axes { counting(channel, slots) } else { channel },
             code: Code(station.code()),
             vibrates,
+            shake,
             vibration_port: station.vibration_port,
             wiring: wiring(config, controller, timeline),
         }),
-        Connection::Link(drives) => Codec::Link { shake: drives.drive.vibration },
+        Connection::Link(drives) => Codec::Link { shake: shake * drives.drive.vibration },
     };
     Lane {
         window,
@@ -63,6 +69,11 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         longest_ms: controller.seat.max_interval_ms,
         next_frame: FrameNo::FIRST,
     }
+}
+
+/// The object channel of a frame with so many places, where that of more than six axes is their number.
+fn counting(channel: u16, slots: usize) -> u16 {
+    if channel == WIDE { u16::try_from(slots).unwrap_or(WIDE) } else { channel }
 }
 
 /// How long before its seat is there its poses have to come, and how much later it may be known that it was.
@@ -115,5 +126,59 @@ fn wiring(config: &Config, controller: &Controller, timeline: &Timeline) -> Wiri
         named: timeline.effect_names().iter().map(outputs).collect(),
         raw: config.allowed_outputs(controller),
         at_most: controller.at_most,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::config;
+    use crate::cue::{self, Source};
+    use crate::engine::{Beat, Mix};
+    use crate::wire::{MAX_LEN, MotionRequest, Timing};
+
+    /// What the one controller of a hall with such keys is sent of a cue of so many axes that vibrates.
+    fn sent(seat: &str, controller: &str, axes: usize) -> MotionRequest {
+        let hall = format!(
+            "[show]\nbind = \"127.0.0.1:8410\"\n[seat.s]\naxes = {axes}\nstroke_mm = 150.0\nlead_mm = 5.0\npulses_per_rev = 10000\n\
+             max_velocity_mm_s = 240.0\nmax_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\n{seat}\n[[controller]]\n\
+             name = \"A1\"\nseat = \"s\"\naddress = \"127.0.0.1:7408\"\n{controller}\n"
+        );
+        let config = config::parse(Path::new("hall.toml"), &hall).unwrap();
+        let names: Vec<_> = (1..=axes).map(|axis| format!("a{axis}")).collect();
+        let row = vec!["0"; axes].join(",");
+        let cue = format!("time_s,{},v1_hz,v1_amp\n0,{row},20,0.01\n1,{row},20,0.01\n", names.join(","));
+        let cue = cue::read(Path::new("test.csv"), cue.as_bytes(), &Source::Native).unwrap();
+        let manner = Manner { level: 1.0, silent: false };
+        let mut lane = lanes(&config, &Timeline::new(cue), manner).remove(0);
+        let mut buf = [0; MAX_LEN];
+        let (park, beat) = (lane.window.park(), Beat::still(Timing::Relative, 10));
+        let (_, octets) = lane.encode(&beat, &park, Mix::STILL, &mut buf);
+        MotionRequest::parse(octets).unwrap()
+    }
+
+    #[test]
+    fn frames_of_more_than_six_axes_have_the_object_channel_that_the_controller_takes() {
+        for (axes, of_programs, of_manual) in [(3, 0, 0), (6, 1, 1), (7, 2, 10), (10, 2, 10), (12, 2, 12)] {
+            for (key, channel) in [
+                ("", of_programs),
+                ("wide_channel = \"2\"", of_programs),
+                ("wide_channel = \"axes\"", of_manual),
+            ] {
+                let request = sent("vibration = \"0%\"", key, axes);
+                assert_eq!(request.channel, channel, "{axes} {key}");
+                assert_eq!(request.positions.len(), motion_channel_and_slots(axes).1);
+            }
+        }
+    }
+
+    #[test]
+    fn a_seat_type_that_leaves_vibration_out_gets_plain_frames() {
+        assert!(sent("", "", 3).vibration.is_some());
+        assert!(sent("vibration = \"40%\"", "", 3).vibration.is_some());
+        assert!(sent("vibration = \"0%\"", "", 3).vibration.is_none());
+        assert!(sent("vibration = \"0%\"", "dialect = \"mbox\"", 3).vibration.is_none());
     }
 }

@@ -24,6 +24,8 @@ pub struct SeatType {
     pub each: [AxisGeometry; MAX_AXES],
     /// The longest Time that the controller executes as it is, ms (PA0b).
     pub(crate) max_interval_ms: u32,
+    /// Level of vibration on such seats, 0 to 1, on top of all that operators set. At 0 their frames carry none.
+    pub(crate) vibration: f64,
 }
 
 impl SeatType {
@@ -41,6 +43,7 @@ impl SeatType {
             axes,
             each: [AxisGeometry::BENCH; MAX_AXES],
             max_interval_ms: FACTORY_INTERVAL_MS,
+            vibration: 1.0,
         }
     }
 

@@ -109,7 +109,8 @@ impl Subject<'_> {
         terms: &Terms,
         stencils: &Stencils,
     ) -> Option<Under<'a>> {
-        self.timeline.vibrates(self.axis).then(|| {
+        let is_shaken = self.on.seat.vibration > 0.0 && self.timeline.vibrates(self.axis);
+        is_shaken.then(|| {
             let loads = Loads::over(pieces, self.slot.limits, stencils, terms.rate, STRETCH, LIGHT);
             Under { pieces, loads }
         })

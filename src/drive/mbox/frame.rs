@@ -48,6 +48,8 @@ pub(crate) struct MotionCodec {
     pub(crate) code: Code,
     /// True if its frames carry vibration.
     pub(crate) vibrates: bool,
+    /// Level of vibration on its seat, 0 to 1, on top of the mix.
+    pub(crate) shake: f64,
     /// How these have Port Out.
     pub(crate) vibration_port: VibrationPort,
     /// Which outputs it switches.
@@ -65,6 +67,7 @@ impl MotionCodec {
         stamped: &mut Stamped,
         buf: &'b mut [u8; MAX_LEN],
     ) -> &'b [u8] {
+        let mix = Mix { vibration: self.shake * mix.vibration, ..mix };
         let slots = window.slots();
         let mut positions = [Pulses(0); MAX_AXES];
         let mut vibration = [Vibration::NONE; MAX_AXES];
