@@ -536,3 +536,19 @@ fn frames_that_may_be_confirmed_late_and_many_at_once_are_missed_only_when_they_
     // The oldest that was not acked was sent at 2610 ms at the latest.
     assert!((3_200..=3_360).contains(&(10 * gap)), "{gap}");
 }
+
+#[test]
+fn no_frame_may_leave_for_a_controller_that_reads_frames_otherwise_until_its_answers_can_be_read() {
+    let mut bench = Bench::found(0.0);
+    assert!(bench.belief.allows(&at(0.0), 3_000, ms(10)));
+    bench.evidence.lane(0).unwrap().on_layout(true);
+    // An ack and a reading change nothing of that.
+    bench.evidence.lane(0).unwrap().on_ack(FrameNo(1));
+    bench.read(0.0, 20, true);
+    assert_eq!(bench.evidence.lane(0).unwrap().acked(), Some(FrameNo(1)));
+    assert!(!bench.belief.allows(&at(0.0), 60_000, ms(30)), "not even one that moves nothing");
+    bench.evidence.lane(0).unwrap().on_layout(false);
+    bench.look(40);
+    assert!(bench.belief.allows(&at(0.0), 3_000, ms(40)));
+    assert_eq!(bench.evidence.lane(0).unwrap().acked(), Some(FrameNo(1)));
+}
