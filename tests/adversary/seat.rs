@@ -459,7 +459,12 @@ impl Seat {
         {
             // The last one may have taken longer than others.
             let longer_ms = if command.number < number { time_ms - period_ms } else { 0.0 };
-            let apart_ms = frames(number, command.number);
+            // Frames that take several ticks are as far apart; those of a blind lane take longer than any of these.
+            let takes_ms = command.time_ns as f64 / MS as f64;
+            let is_repeated = number != newest || command.number < number;
+            let ticks =
+                if is_repeated && takes_ms <= repeated_ms { (takes_ms / period_ms).max(1.0) } else { 1.0 };
+            let apart_ms = frames(number, command.number) * ticks;
             return apart_ms + longer_ms.clamp(0.0, (repeated_ms - apart_ms).max(0.0));
         }
         let apart_ms = (command.sent_ns - command.lost_since) as f64 / MS as f64 + period_ms;
