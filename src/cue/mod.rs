@@ -37,7 +37,7 @@ pub use fault::CueFaults;
 pub(crate) use fault::{Collector, FAULTS_TOLD, Fault, FaultClass, Place};
 pub use mcap::recover;
 pub use mcap::write as write_mcap;
-use other_kind::other_kind;
+use other_kind::{ends_in, refuse_other_kind};
 use place::{CueFile, Origin};
 pub(crate) use problem::Problem;
 pub(crate) use splice::Splice;
@@ -400,18 +400,6 @@ fn read_native(path: &Path, mut input: impl Read) -> Result<Cue, CueFaults> {
     }
     let input = front.as_slice().chain(input);
     if named_so || begins_so { mcap::read(path, input) } else { csv::read(path, input) }
-}
-
-/// Refuses a file that begins so, or has such a name, and is something else than text; what it is follows in words.
-fn refuse_other_kind(path: &Path, front: &[u8]) -> Result<(), CueFaults> {
-    let named =
-        ends_in(path, "toml").then_some("TOML: --config takes a configuration, kinocue playlist a playlist");
-    let kind = named.or_else(|| other_kind(front));
-    kind.map_or(Ok(()), |kind| Err(CueFaults::one(path, Problem::OtherKind(kind))))
-}
-
-fn ends_in(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
 }
 
 #[cfg(test)]

@@ -6,8 +6,9 @@ use std::path::Path;
 
 use super::fault::{Collector, CueFaults, Place};
 use super::limits::MAX_FILE;
+use super::other_kind::refuse_other_kind;
 use super::problem::{Problem, may_part_thousands};
-use super::{Cue, csv, refuse_other_kind, value};
+use super::{Cue, csv, value};
 
 /// What spreadsheets have between the columns where commas are taken.
 pub(super) const SEPARATORS: [char; 3] = [';', '\t', '|'];
@@ -24,7 +25,7 @@ pub(super) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
     }
     refuse_other_kind(path, &octets)?;
     let mut faults = Collector::default();
-    if let Err((place, problem)) = Sheet::default().translate(&mut octets) {
+    if let Err((place, problem)) = SheetReading::default().translate(&mut octets) {
         faults.add(place, None, problem);
     }
     faults.into_faults(path).map_or_else(|| csv::read(path, octets.as_slice()), Err)
@@ -32,7 +33,7 @@ pub(super) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
 
 /// What is known of a file while its lines are gone through.
 #[derive(Debug, Default)]
-struct Sheet {
+struct SheetReading {
     /// Once it is known, from the header at the latest.
     separator: Option<u8>,
     in_rows: bool,
@@ -51,7 +52,7 @@ struct MarkedNumber {
 
 const MARKS: [u8; 2] = [b',', b'.'];
 
-impl Sheet {
+impl SheetReading {
     fn translate(mut self, octets: &mut [u8]) -> Result<(), (Place, Problem)> {
         let begin = if octets.starts_with(BOM) { BOM.len() } else { 0 };
         for (number, line) in (1..).zip(octets[begin..].split_mut(|octet| *octet == b'\n')) {
