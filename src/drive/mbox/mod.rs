@@ -62,6 +62,8 @@ pub(crate) struct MboxPeer {
     pub(super) probe: Probe,
     /// What may be on there.
     pub(super) on: OnBelief,
+    /// It answered in another layout, and has not been seen as a whole since: a write would mean something else there.
+    is_foreign: bool,
     /// How often it was asked for a sign of life: of what it tells, one is asked for at a time.
     turn: usize,
 }
@@ -93,6 +95,7 @@ impl MboxPeer {
             pending: Pending::new(),
             position: Positions::new(Arc::clone(seat), first_slot, led, on.shakes()),
             on,
+            is_foreign: false,
             probe: Probe::new(dialect, axes, controller.estop_inputs),
             turn: 0,
         }
@@ -102,7 +105,7 @@ impl MboxPeer {
         let mut written = 0;
         let next = match need {
             // What is off is only read.
-            Need::Dark if self.on.left_on().outputs => {
+            Need::Dark if self.on.left_on().outputs && !self.is_foreign => {
                 written = u32::from(self.darken(send));
                 None
             }
@@ -174,6 +177,7 @@ impl MboxPeer {
             FromController::PrintedImax => {
                 // Only a whole look from now on says that somebody else is there.
                 self.probe.abandon();
+                self.is_foreign = true;
                 out.push(Evidence::Unreadable);
             }
             _ => {}
@@ -238,6 +242,7 @@ impl MboxPeer {
     fn take_seen(&mut self, at: MonoTime) -> Option<Seen> {
         let reading = self.position.reading(at)?;
         let sighting = self.probe.take()?;
+        self.is_foreign = false;
         Some(Seen {
             sighting,
             rests: reading.rests,
