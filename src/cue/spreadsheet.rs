@@ -66,7 +66,8 @@ impl SheetReading {
         }
         let sure = self.is_sure;
         // Between commas a point has always been that of a number.
-        let is_open = |mark: u8| !sure && !(mark == b'.' && self.separator == Some(b','));
+        let is_point = |mark: u8| mark == b'.' && self.separator == Some(b',');
+        let is_open = |mark: u8| !sure && !is_point(mark);
         let doubt =
             MARKS.into_iter().zip(self.marked).find_map(|(mark, number)| number.filter(|_| is_open(mark)));
         doubt.map_or(Ok(()), |MarkedNumber { text, line, column }| {
