@@ -1,7 +1,7 @@
 //! What is done for the commands of surfaces.
 
 use super::act::Act;
-use super::belts;
+use super::begin;
 use super::features::Features;
 use super::film;
 use super::gear;
@@ -41,12 +41,13 @@ impl Features {
             Command::Home => refuse_winding(hall, &hall.live.table())
                 .and_then(|()| request_when_free(Transition::Home, hall)),
             Command::Arm { seats_empty: true } => home_and_arm(hall),
-            Command::Arm { seats_empty: false } => request_when_free(Transition::Arm, hall),
+            Command::Arm { seats_empty: false } => begin::needs_a_seat("arm", false, hall)
+                .and_then(|()| request_when_free(Transition::Arm, hall)),
             Command::ArmFor(group) => FleetStarts::arm(group, hall),
             Command::StartAt(order) => self.starts.ask(order, who, hall),
             Command::Commit { ticket } => self.starts.commit(ticket, who, hall),
             Command::Disarm => request(Transition::Disarm),
-            Command::Go => belts::check(hall).map(|()| vec![go(Transition::Go, who)]),
+            Command::Go => begin::check("go", hall).map(|()| vec![go(Transition::Go, who)]),
             Command::GoFrom(film) => go_from(*film, who, hall),
             Command::Pause => request(Transition::Pause),
             Command::Resume => resume(who, hall),
@@ -121,6 +122,7 @@ fn request_when_free(wanted: Transition, hall: &HallContext) -> Result<Vec<Act>,
 
 /// Arms, and homes first where a position is unknown.
 fn home_and_arm(hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    begin::needs_a_seat("arm", true, hall)?;
     if hall.mirror.next == Next::ArmAndHome {
         refuse_winding(hall, &hall.live.table())?;
     }
@@ -134,10 +136,11 @@ fn go(by: Transition, who: &Who) -> Act {
 /// Goes on after a pause, or with a show that another machine led when it died: the seats join it where its film is by now.
 fn resume(who: &Who, hall: &HallContext) -> Result<Vec<Act>, Problem> {
     if !hall.has_taken_over() {
+        begin::needs_a_seat("resume", false, hall)?;
         return request(Transition::Resume);
     }
     hall.is_free()?;
-    belts::check(hall)?;
+    begin::check("resume", hall)?;
     let go = go(Transition::Resume, who);
     match hall.goes_on() {
         Some(GoesOn::WithFilm) => Ok(vec![go]),
@@ -161,7 +164,7 @@ fn begin_at(film: ShowTime, go: Act, hall: &HallContext) -> Vec<Act> {
 
 /// Lets what is loaded go from there on, by a join onto the moving cue.
 fn go_from(film: ShowTime, who: &Who, hall: &HallContext) -> Result<Vec<Act>, Problem> {
-    belts::check(hall)?;
+    begin::check("go", hall)?;
     if hall.mirror.state != State::Armed {
         let detail = format!("cannot go from {film} while {}", hall.mirror.state);
         return Err(Problem::new(Code::State, detail, "arm first; while the cue plays or is paused, seek"));

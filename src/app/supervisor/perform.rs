@@ -6,7 +6,7 @@ use super::job::Job;
 use super::procedures::Awaited;
 use super::reload::{not_taken, reload};
 use super::state_mirror::{ANSWER, busy};
-use super::{Supervisor, belts, player};
+use super::{Supervisor, begin, player};
 use crate::control::{Problem, Surface};
 use crate::record::{LogNote, Note};
 use crate::rt::Command as TickCommand;
@@ -61,7 +61,7 @@ impl Supervisor {
             Act::Otherwise(acts) => self.procedures.first().otherwise = acts,
             Act::Name(name) => self.procedures.first().name = Some(name),
             Act::Fail(problem) => return Err(problem),
-            Act::CheckBelts => return belts::check(&self.hall),
+            Act::CheckBelts => return begin::check("go", &self.hall),
             Act::Go { by, who, surface } => self.let_go(by, who, surface)?,
             Act::ArmedFor(group) => self.features.starts.armed(group, &self.hall),
             Act::DropStart => {

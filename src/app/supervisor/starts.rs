@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use super::act::{Act, Feature, SupervisorEvent};
-use super::belts;
+use super::begin;
 use super::hall::{Counted, HallContext, ShowChange};
 use crate::control::{
     ArmedForStatus, ClockStatus, Code, Command, Desired, FleetStatus, Problem, StartOrder, StartPhase,
@@ -91,6 +91,7 @@ impl FleetStarts {
             let detail = "a film leads this show, so nothing else can start it at an instant";
             return Err(Problem::new(Code::State, detail, "start the film, or load a cue that follows none"));
         }
+        begin::needs_a_seat("arm", false, hall)?;
         hall.is_free()?;
         let armed = Act::ArmedFor(group.to_owned());
         let arm = Act::Tick(TickCommand::Request(Transition::Arm));
@@ -205,7 +206,7 @@ impl FleetStarts {
             let detail = format!("the hall is {}, not armed", hall.mirror.state);
             return Err(Problem::new(Code::State, detail, "arm it, by a person there"));
         }
-        belts::check(hall)?;
+        begin::check("start", hall)?;
         clock(hall)
     }
 
@@ -344,7 +345,7 @@ impl Feature for FleetStarts {
             SupervisorEvent::Begun(_) => self.armed_for = None,
             SupervisorEvent::Leaving => out.extend(self.call_off("the service ends".to_owned())),
             SupervisorEvent::Round(_) if self.may_begin() => {
-                if let Err(problem) = belts::check(hall) {
+                if let Err(problem) = begin::check("start", hall) {
                     out.extend(self.call_off(problem.detail));
                 }
             }
