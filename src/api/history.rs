@@ -1,7 +1,6 @@
 //! `/api/v1/history`: the last shows of the journal, each with what its recording says of it. Read on a thread for that, one at a time.
 
 use std::collections::HashMap;
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -16,6 +15,7 @@ use super::shared::{Shared, turn};
 use crate::control::Problem;
 use crate::journal::{self, ReportBounds, ReportShown, ShowRecord, ShowResult};
 use crate::record::{Closing, Margin, closing_of};
+use crate::sys::file;
 
 /// Shows that are told; more than a page shows.
 const SHOWS: usize = 20;
@@ -121,7 +121,7 @@ fn recorded_shows(dir: &Path) -> HashMap<String, RecordedShow> {
 }
 
 fn recorded_show(dir: &Path, name: String) -> Option<(String, RecordedShow)> {
-    let Closing { report, end } = closing_of(File::open(dir.join(&name)).ok()?).ok()?;
+    let Closing { report, end } = closing_of(file::open_ours(&dir.join(&name)).ok()?).ok()?;
     let start = serde_json::from_slice::<ShowRecord>(&report?).ok()?.start;
     let count = |key: &str| end.get(key).and_then(|count| count.parse().ok()).unwrap_or_default();
     let most: Vec<Margin> =

@@ -1,7 +1,7 @@
 //! `/api/v1/recordings` and `/api/v1/record`: what was recorded, and what a person has recorded. Files are read on a thread for that,
 //! and sent piece by piece, one at a time.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,6 +29,7 @@ use crate::control::{Code, Command, Problem, is_recording};
 use crate::journal::{Outcome, ShowRecord};
 use crate::library::RecordingPicture;
 use crate::record::closing_of;
+use crate::sys::file;
 
 /// The newest that are listed, and no more.
 const MOST: usize = 500;
@@ -102,7 +103,7 @@ pub(super) async fn one(
     let path = path_of(&shared, &name)?;
     let turn = turn(&shared.reports, "a file").await?;
     let opened = shared.blocking(move || {
-        let file = File::open(&path).map_err(|_| no_recording(&path))?;
+        let file = file::open_ours(&path).map_err(|_| no_recording(&path))?;
         let len = file.metadata().map_err(|_| no_recording(&path))?.len();
         Ok((file, len))
     });
@@ -157,6 +158,7 @@ pub(super) async fn picture(
     let turn = turn(&shared.pictures, "a picture").await?;
     let drawn = shared.awaiting(StillAsked::of(&request), move |awaited| {
         let _turn = turn; // held until it is drawn
+        file::open_ours(&path).map_err(|_| no_recording(&path))?;
         library.picture(&path, query.seat.as_deref(), Some(awaited))
     });
     drawn.await.map(JsonReply)
@@ -220,7 +222,10 @@ fn list(dir: &Path) -> Vec<RecordingInfo> {
 
 /// The names of all recordings that are whole, newest first.
 pub(super) fn names(dir: &Path) -> Vec<String> {
-    let name = |entry: fs::DirEntry| entry.file_name().into_string().ok().filter(|name| is_recording(name));
+    let name = |entry: fs::DirEntry| {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        entry.file_name().into_string().ok().filter(|name| is_file && is_recording(name))
+    };
     let mut all: Vec<_> = fs::read_dir(dir).into_iter().flatten().flatten().filter_map(name).collect();
     all.sort_unstable_by(|one, other| other.cmp(one));
     all
@@ -228,7 +233,7 @@ pub(super) fn names(dir: &Path) -> Vec<String> {
 
 /// What came of the show that a file is of.
 fn outcome(path: &Path) -> Option<RecordedOutcome> {
-    let report = closing_of(File::open(path).ok()?).ok()?.report?;
+    let report = closing_of(file::open_ours(path).ok()?).ok()?.report?;
     let Outcome { result, missed_ticks, frames, .. } =
         serde_json::from_slice::<ShowRecord>(&report).ok()?.outcome?;
     Some(RecordedOutcome { result, lost: frames.lost, missed_ticks })

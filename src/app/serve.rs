@@ -37,6 +37,7 @@ use crate::sd::{self, WatchdogThread};
 use crate::settings::SettingsFile;
 use crate::state::LedBefore;
 use crate::sys::clock::Monotonic;
+use crate::sys::file::create_ours;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
 
@@ -122,7 +123,7 @@ impl Mark {
 
     fn leave(&self) -> Result<(), ServeError> {
         // Without a word in it, so that a full disk keeps no hall shut.
-        fs::File::create(&self.0).map_err(|cause| self.failed(cause))?;
+        create_ours(&self.0).map_err(|cause| self.failed(cause))?;
         Ok(())
     }
 

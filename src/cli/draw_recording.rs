@@ -22,7 +22,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     args.bounds.lower("the drawing")?;
-    let opened = OpenRecording::open(&args.recording);
+    let opened = OpenRecording::open_ours(&args.recording);
     confine();
     let file = match opened {
         Ok(file) => file,

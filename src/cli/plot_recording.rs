@@ -6,12 +6,13 @@ use std::io::{BufReader, Seek as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::anyhow;
+use anyhow::{Context as _, anyhow};
 
 use super::record::{open, seat_in, unread};
 use super::{Exit, Failure, OrExit as _};
 use crate::plot::{self, FilmAxis, Gathered, Look, Picture};
 use crate::record::{Contents, Summary, Wanted, beginning, read_ahead, summarize};
+use crate::sys::file;
 use crate::time::ShowTime;
 
 /// What is drawn of a recording.
@@ -41,6 +42,13 @@ pub(super) struct OpenRecording<'a> {
 impl<'a> OpenRecording<'a> {
     pub(super) fn open(path: &'a Path) -> Result<Self, Failure> {
         Ok(Self { path, file: open(path)?.into_inner() })
+    }
+
+    /// The same of a file in the folder of a service: no link leads out of it.
+    pub(super) fn open_ours(path: &'a Path) -> Result<Self, Failure> {
+        let file =
+            file::open_ours(path).with_context(|| path.display().to_string()).or_exit(Exit::NoInput)?;
+        Ok(Self { path, file })
     }
 
     /// All of it, from its beginning; a pipe has none to go back to, and nothing more is in it the second time.

@@ -17,6 +17,7 @@ use crate::drive::Manner;
 use crate::engine::Show;
 use crate::library::{Drawing, Hashed, MAX_POINTS, Verdict, draw, needs_hall};
 use crate::proof::{Digest, Proof, Terms, prove_in};
+use crate::sys;
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
@@ -40,7 +41,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     args.bounds.lower("the check")?;
     let config = load::config(&args.config);
-    let open = || File::open(&args.cue).context("cannot read the cue").or_exit(Exit::Io);
+    let open = || sys::file::open(&args.cue).context("cannot read the cue").or_exit(Exit::Io);
     if let Some(points) = args.curve {
         let file = open()?;
         confine();

@@ -8,9 +8,11 @@ use anyhow::{Context as _, anyhow};
 
 use super::token::Token;
 use super::{Exit, Failure, OrExit as _, load};
+use crate::config::MAX_FILE_LEN;
 use crate::config::{Config, Controller, Station};
 use crate::control::Role;
 use crate::sim::{Farm, Options, Setup, pa};
+use crate::sys;
 
 /// The hall of a rehearsal that names none.
 const HALL: &str = include_str!("../../systemd/simulated.toml");
@@ -37,9 +39,9 @@ impl Rehearsal {
     /// Where one of these is not of this machine alone, or taken.
     pub(super) fn begin(config: Option<&Path>, state: &Path) -> Result<Self, Failure> {
         let text = match config {
-            Some(path) => {
-                fs::read_to_string(path).with_context(|| path.display().to_string()).or_exit(Exit::NoInput)?
-            }
+            Some(path) => sys::file::text(path, MAX_FILE_LEN)
+                .with_context(|| path.display().to_string())
+                .or_exit(Exit::NoInput)?,
             None => HALL.to_owned(),
         };
         let (copy, token) =
@@ -60,7 +62,7 @@ impl Rehearsal {
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    let written = fs::create_dir_all(folder).and_then(|()| fs::write(path, text));
+    let written = fs::create_dir_all(folder).and_then(|()| sys::file::write_ours(path, text));
     written.with_context(|| path.display().to_string()).or_system()
 }
 

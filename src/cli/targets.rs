@@ -16,6 +16,7 @@ use crate::device::{Fault, RegisterAnswer, Request, RequestOutcome, Talk, refusa
 use crate::drive::link::LinkLine;
 use crate::drive::rates::LinkLoad;
 use crate::motion::MAX_AXES;
+use crate::sys;
 use crate::sys::serial::{CanError, SerialError};
 use crate::wire::ReplyCode;
 
@@ -288,9 +289,12 @@ pub(super) fn state(controller: &Controller<Station>, answer: &RegisterAnswer) -
         .then(|| refusal(answer.code, answer.error, controller.connection.dialect))
 }
 
+/// The longest text that is read.
+const MOST_READ: u64 = 16 << 20;
+
 /// Reads a file whole.
 pub(super) fn read_file(path: &std::path::Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| {
+    sys::file::text(path, MOST_READ).map_err(|error| {
         let exit = if error.kind() == io::ErrorKind::NotFound { Exit::NoInput } else { Exit::Io };
         Failure { exit, error: anyhow::Error::new(error).context(path.display().to_string()) }
     })
@@ -300,6 +304,6 @@ pub(super) fn read_file(path: &std::path::Path) -> Result<String, Failure> {
 pub(super) fn write_file(path: &std::path::Path, text: &str) -> Result<(), Failure> {
     let mut part = path.as_os_str().to_owned();
     part.push(".part");
-    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
+    let written = sys::file::write_ours(part.as_ref(), text).and_then(|()| std::fs::rename(&part, path));
     written.with_context(|| format!("cannot write {}", path.display())).or_exit(Exit::Io)
 }

@@ -1,7 +1,6 @@
 //! `kinocue token`.
 
-use std::fs::File;
-use std::io::{self, Read as _};
+use std::io;
 use std::net::SocketAddr;
 
 use base64::Engine as _;
@@ -11,6 +10,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::{Exit, Failure, OrExit as _, print};
 use crate::control::Role;
+use crate::sys::file::random;
 
 /// 256 bits, which nobody guesses.
 const BYTES: usize = 32;
@@ -92,13 +92,6 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// From the generator of the kernel, which is ready long before a shell is.
-pub(super) fn chance<const N: usize>() -> io::Result<[u8; N]> {
-    let mut bytes = [0; N];
-    File::open("/dev/urandom")?.read_exact(&mut bytes)?;
-    Ok(bytes)
-}
-
 /// The console with the token in the fragment, which no browser sends anywhere.
 pub(super) fn link(address: SocketAddr, token: &str) -> String {
     format!("http://{address}/#token={token}")
@@ -110,7 +103,7 @@ impl<'n> Token<'n> {
     /// # Errors
     /// If the kernel gives no chance.
     pub(super) fn new(name: &'n str, role: Role) -> io::Result<Self> {
-        Ok(Self::of(name, role, &chance()?))
+        Ok(Self::of(name, role, &random()?))
     }
 
     fn of(name: &'n str, role: Role, bytes: &[u8; BYTES]) -> Self {
@@ -139,7 +132,7 @@ mod tests {
 
     #[test]
     fn no_two_are_alike() {
-        assert_ne!(chance::<BYTES>().unwrap(), chance().unwrap());
+        assert_ne!(random::<BYTES>().unwrap(), random().unwrap());
     }
 
     #[test]

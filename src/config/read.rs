@@ -1,7 +1,6 @@
 //! From the text of a configuration file to a [`Config`]: section by section, noting every fault.
 
-use std::fs::File;
-use std::io::{self, Read as _};
+use std::io::Read as _;
 use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +8,7 @@ use toml::de::DeTable;
 
 use crate::channel::{self, SWITCHES};
 use crate::motion::MAX_AXES;
+use crate::sys;
 
 use super::accept::acceptances;
 use super::acks::refuse_seldom_acks;
@@ -45,10 +45,7 @@ use super::{
 /// The text of a file of at most [`MAX_FILE_LEN`] bytes.
 pub(super) fn file(path: &Path) -> Result<String, ConfigFaults> {
     let unreadable = |source| ConfigFaults::Unreadable { path: path.to_owned(), source };
-    let file = File::open(path).map_err(unreadable)?;
-    if file.metadata().map_err(unreadable)?.is_dir() {
-        return Err(unreadable(io::ErrorKind::IsADirectory.into()));
-    }
+    let file = sys::file::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
     file.take(MAX_FILE_LEN + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     let bad = |at: usize, message: &str| {

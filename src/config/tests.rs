@@ -413,3 +413,13 @@ fn a_pose_of_fractions_does_not_say_where_an_axis_rests_that_has_its_zero_inside
     let own = parse(&format!("{seat}{CONTROLLER}{ranged}park = 0\n")).unwrap().seats[0].each;
     assert_eq!((own[0].park, own[1].park, own[1].neutral), (0.1, 0.5, 0.5));
 }
+
+#[test]
+fn a_pipe_in_the_place_of_a_configuration_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("hall.toml");
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).unwrap();
+    let ConfigFaults::Unreadable { source, .. } = load(&pipe).unwrap_err() else { panic!("it was read") };
+    assert!(source.to_string().contains("it is a pipe or a device, not a file"), "{source}");
+    assert!(load(folder.path()).is_err());
+}

@@ -15,6 +15,7 @@ use super::{Facts, Seen, text};
 use crate::net::SendCost;
 use crate::sys::clock::Monotonic;
 use crate::sys::confined::try_confinement;
+use crate::sys::file::of_kernel;
 use crate::sys::machine as sys;
 use crate::sys::realtime::PRIORITY;
 
@@ -57,7 +58,7 @@ pub(crate) fn facts() -> Facts {
 /// A text, or why it could not be read.
 fn read(path: impl AsRef<Path>) -> Seen<String> {
     let path = path.as_ref();
-    fs::read_to_string(path).map_err(|error| match error.kind() {
+    of_kernel(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound => format!("{} does not exist", path.display()),
         ErrorKind::PermissionDenied => format!("{} may not be read", path.display()),
         _ => format!("{}: {error}", path.display()),
@@ -66,7 +67,7 @@ fn read(path: impl AsRef<Path>) -> Seen<String> {
 
 /// A text, or nothing.
 fn text_of(path: impl AsRef<Path>) -> String {
-    fs::read_to_string(path).unwrap_or_default()
+    of_kernel(path.as_ref()).unwrap_or_default()
 }
 
 fn number<N: std::str::FromStr>(path: &str) -> Seen<N> {

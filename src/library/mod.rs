@@ -39,9 +39,11 @@ use std::time::Duration;
 use serde::de::DeserializeOwned;
 use sha2::{Digest as _, Sha256};
 
+use crate::config::MAX_FILE_LEN;
 use crate::config::{self, Config, Store};
 use crate::control::{Code, Problem};
 use crate::cue::{self, Source, limits};
+use crate::sys::file;
 use crate::sys::folder::{Folder, Stamp};
 use crate::sys::lock::lock;
 use crate::timeline::Timeline;
@@ -115,7 +117,7 @@ impl Hall {
     }
 
     fn text(&self) -> Vec<u8> {
-        fs::read(&self.config).unwrap_or_default() // the check itself says that it cannot be read
+        file::read(&self.config, MAX_FILE_LEN).unwrap_or_default() // the check itself says that it cannot be read
     }
 }
 

@@ -1,7 +1,6 @@
 //! The file of what is set. Written by a thread of its own, so that no disk, full or slow, holds up anybody: into another file,
 //! which is on the disk before it takes the place of the last, so that whatever crashes leaves one of the two.
 
-use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -9,7 +8,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use super::Settings;
-use crate::sys::file::want_of_files;
+use crate::sys::file::{create_ours, want_of_files};
 use crate::sys::folder::Folder;
 use crate::sys::realtime;
 
@@ -107,7 +106,7 @@ impl SettingsFile {
     /// Marks that what was loaded before the start is being loaded; to be called on a thread that may wait for the disk.
     pub(crate) fn loading(folder: &Path) -> Loading {
         let path = folder.join(LOADING);
-        let _ = File::create(&path); // without it, nothing warns the next start
+        let _ = create_ours(&path); // without it, nothing warns the next start
         Loading(path)
     }
 

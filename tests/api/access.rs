@@ -153,6 +153,27 @@ fn the_head_of_what_may_not_be_read_is_not_told_either() {
 }
 
 #[test]
+fn what_is_no_file_in_the_folder_of_recordings_is_none_and_holds_nobody_up() {
+    let hall = Hall::open();
+    let folder = hall.dir.path().join("recordings");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::create_dir_all(hall.dir.path().join("journal")).unwrap();
+    let [pipe, link] = ["2026-01-01T10-00-00-show-pipe.mcap", "2026-01-01T10-00-00-show-link.mcap"];
+    let made = std::process::Command::new("mkfifo").arg(folder.join(pipe)).status().unwrap();
+    assert!(made.success());
+    std::os::unix::fs::symlink("/etc/passwd", folder.join(link)).unwrap();
+    let get = |path: &str| as_role(&hall, Role::Engineer, "GET", path);
+    for name in [pipe, link] {
+        assert_eq!(get(&format!("/api/v1/recordings/{name}")).status, 404, "{name}");
+        assert_eq!(get(&format!("/api/v1/recordings/{name}/picture")).problem().0, 404, "{name}");
+    }
+    assert_eq!(get("/api/v1/recordings").value(), serde_json::json!([]));
+    assert_eq!(get("/api/v1/history").status, 200);
+    std::fs::write(folder.join("2026-01-01T10-00-00-show-one.mcap"), b"x").unwrap();
+    assert_eq!(get("/api/v1/recordings/2026-01-01T10-00-00-show-one.mcap").body, b"x");
+}
+
+#[test]
 fn without_a_token_there_is_nothing_but_the_page_and_whether_it_is_well() {
     let hall = Hall::open();
     for path in ["/api/v1/status", "/api/v1/events", "/api/v1/cues", "/metrics", "/api/v1/nothing"] {

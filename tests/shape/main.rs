@@ -3,6 +3,7 @@
 
 mod circles;
 mod counts;
+mod opens;
 mod repeats;
 mod source;
 

@@ -1,6 +1,6 @@
 //! Indexes of films' sound: made of a WAV file, or of any film by way of mpv; and read for a show.
 
-use std::fs::{File, FileType};
+use std::fs::FileType;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::riff::{Channels, HEADER, RiffFault, SampleStream, is_wav};
 use super::{FilmError, WantedFile};
 use crate::film::sound::{IndexFault, IndexMaker, MOST_OCTETS, SoundIndex};
+use crate::sys::file;
 
 /// What of a film is read at a time.
 const CHUNK: usize = 64 * 1024;
@@ -88,11 +89,11 @@ pub(crate) fn index_film(film: &Path, name: &str) -> Result<(Indexed, Vec<u8>), 
 /// The index of a WAV file; none where it is something that a player has to read.
 fn index_wav(film: &Path, name: &str) -> Result<Option<SoundIndex>, IndexingError> {
     let mut begin = Vec::new();
-    File::open(film)?.take(HEADER as u64).read_to_end(&mut begin)?;
+    file::open(film)?.take(HEADER as u64).read_to_end(&mut begin)?;
     if !is_wav(&begin) {
         return Ok(None);
     }
-    match index_stream(File::open(film)?, name) {
+    match index_stream(file::open(film)?, name) {
         Err(IndexingError::Sound(RiffFault::Format(_) | RiffFault::NoFormat)) => Ok(None),
         made => made.map(Some),
     }
@@ -146,7 +147,7 @@ fn read(path: &Path) -> Result<SoundIndex, FilmError> {
     INDEX.check(path)?;
     let failed = |source| FilmError::Open { what: path.display().to_string(), source };
     let mut octets = Vec::new();
-    File::open(path).and_then(|file| file.take(MOST_OCTETS + 1).read_to_end(&mut octets)).map_err(failed)?;
+    file::open(path).and_then(|file| file.take(MOST_OCTETS + 1).read_to_end(&mut octets)).map_err(failed)?;
     let read = if octets.len() as u64 > MOST_OCTETS {
         Err(IndexFault::Long)
     } else {

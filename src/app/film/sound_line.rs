@@ -19,6 +19,7 @@ use super::{ChildSlot, FilmError, WantedFile, WordSink, is_line, start};
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::source::{FilmArgs, LineKind, SoundLine};
 use crate::sys::clock::Monotonic;
+use crate::sys::file;
 use crate::time::{Clock as _, MonoTime};
 
 const RECORDING: WantedFile = WantedFile {
@@ -67,7 +68,7 @@ pub(super) fn start_reading(
 fn check(path: &Path, channels: Channels) -> Result<(), FilmError> {
     RECORDING.check(path)?;
     let mut begin = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(HEADER as u64).read_to_end(&mut begin));
+    let read = file::open(path).and_then(|file| file.take(HEADER as u64).read_to_end(&mut begin));
     read.map_err(failed(path))?;
     let wrong = |source| FilmError::Sound { what: path.display().to_string(), source };
     SampleStream::of(channels).check(&begin).map_err(wrong)
@@ -87,7 +88,7 @@ pub(super) fn start_line(
 ) -> Result<(), FilmError> {
     match input {
         SoundLine::File(path) => {
-            let file = File::open(path).map_err(failed(path))?;
+            let file = file::open(path).map_err(failed(path))?;
             start("line", move || end(&line, line.read(file)))?;
         }
         SoundLine::Stdin => {

@@ -11,7 +11,7 @@ mod settings;
 mod stand_by;
 
 use std::fs;
-use std::io::{self, Read as _};
+use std::io;
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
@@ -24,6 +24,7 @@ pub(crate) use stand_by::{PairPlaces, StoodBy, is_alone, stand_by};
 
 use super::runtime::Numbers;
 use crate::api::ApiError;
+use crate::config::MAX_FILE_LEN;
 use crate::config::{Config, Pair as PairConfig};
 use crate::log::{Line, Log, Priority};
 use crate::net::Lead;
@@ -31,7 +32,7 @@ use crate::pair::{Carried, Claim, LONGEST, PairKey, PairMisfit, Role};
 use crate::rt::Live;
 use crate::sd::WatchdogThread;
 use crate::sys::clock::Monotonic;
-use crate::sys::file::secret;
+use crate::sys::file::{random, read, secret};
 use crate::sys::lock::lock;
 use crate::time::{Clock as _, MonoTime};
 use crate::wire::FrameNo;
@@ -293,14 +294,12 @@ fn find_machine(pair: &PairConfig) -> Result<(usize, Vec<UdpSocket>), PairError>
 
 /// A number that nobody else has.
 fn session() -> io::Result<u64> {
-    let mut octets = [0; 8];
-    fs::File::open("/dev/urandom")?.read_exact(&mut octets)?;
-    Ok(u64::from_be_bytes(octets).max(1))
+    Ok(u64::from_be_bytes(random()?).max(1))
 }
 
 /// What tells the configuration of a file from another one; never 0.
 fn print_of(path: &Path) -> io::Result<u64> {
-    let [.., a, b, c, d, e, f, g, h] = <[u8; 32]>::from(Sha256::digest(fs::read(path)?));
+    let [.., a, b, c, d, e, f, g, h] = <[u8; 32]>::from(Sha256::digest(read(path, MAX_FILE_LEN)?));
     Ok(u64::from_be_bytes([a, b, c, d, e, f, g, h]).max(1))
 }
 

@@ -17,6 +17,7 @@ use crate::net::Lead;
 use crate::pair::{BEAT, Claim, PairMisfit, Role};
 use crate::sd::{self, Notifier, WatchdogThread};
 use crate::sys::clock::Monotonic;
+use crate::sys::file::write_ours;
 use crate::sys::lock::lock;
 use crate::time::{Clock as _, MonoTime};
 
@@ -103,7 +104,7 @@ pub(crate) fn stand_by(
     shared.say(Priority::Notice, format!("{name} leads the hall"));
     let _ = fs::create_dir_all(places.state); // what cannot be kept there is told
     let took_over = takes_over(&shared, places.state);
-    let write = |file: &PathBuf| fs::write(file, format!("{name}\n"));
+    let write = |file: &PathBuf| write_ours(file, format!("{name}\n"));
     shared.lead_files.iter().try_for_each(write).map_err(PairError::System)?;
     await_address(config.show.bind, &shared.lead_files[0])?;
     Ok(StoodBy::Leads(Pair { shared, took_over, feeder }))

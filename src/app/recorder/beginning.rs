@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::app::recording::in_io;
 use crate::record::{Entry, EntryMaker, Opening, Recording};
+use crate::sys::file;
 
 /// The largest cue that is attached, octets.
 const MOST_ATTACHED: u64 = 64 << 20;
@@ -30,6 +31,5 @@ pub(super) fn begun<'a>(
 
 /// A file of a size that is attached.
 pub(super) fn small_file(path: &Path) -> Option<Vec<u8>> {
-    let is_small = std::fs::metadata(path).is_ok_and(|about| about.len() <= MOST_ATTACHED);
-    is_small.then(|| std::fs::read(path).ok()).flatten()
+    file::read(path, MOST_ATTACHED).ok()
 }

@@ -229,7 +229,10 @@ impl Disk {
     /// Recordings of this folder that were cut short; what has another name is somebody else's, who may be writing it.
     pub(super) fn cut_short(&self) -> Vec<PathBuf> {
         let Ok(files) = fs::read_dir(&self.dir) else { return Vec::new() };
-        let path = |entry: io::Result<fs::DirEntry>| Some(entry.ok()?.path());
+        let path = |entry: io::Result<fs::DirEntry>| {
+            let entry = entry.ok()?;
+            entry.file_type().is_ok_and(|kind| kind.is_file()).then(|| entry.path())
+        };
         let is_cut = |path: &PathBuf| {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             name.strip_suffix(PART).is_some_and(|stem| is_recording(&format!("{stem}{WHOLE}")))

@@ -16,6 +16,7 @@ use crate::record::{
     self, Entry, EntryMaker, IncidentCause, Opening, Recording, RecoverError, Wanted, WantedSamples,
     read_flight,
 };
+use crate::sys::file;
 use crate::time::MonoTime;
 
 /// How often it is asked whether it may go on.
@@ -26,7 +27,7 @@ pub(super) type Leftover = (Opening, Vec<Entry>);
 
 /// What the flight recorder of an earlier program held, if that did not end in order: then there is a file.
 pub(super) fn flight(path: &Path) -> Option<Leftover> {
-    let file = File::open(path).ok()?;
+    let file = file::open_ours(path).ok()?;
     let (opening, entries) = read_flight(&file).ok().flatten()?;
     let opening = Opening::of_octets(&opening)?;
     (!entries.is_empty()).then_some((opening, entries))
@@ -146,9 +147,9 @@ fn taken(path: &Path) -> io::Error {
 
 /// Writes what is whole of it to another file, and reads that back.
 fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
-    let input = Patient { file: BufReader::new(File::open(from)?), may };
+    let input = Patient { file: BufReader::new(file::open_ours(from)?), may };
     let (recovered, out) =
-        record::recover(input, BufWriter::new(File::create(to)?)).map_err(|error| match error {
+        record::recover(input, BufWriter::new(file::create_ours(to)?)).map_err(|error| match error {
             RecoverError::Write(error) => error,
             RecoverError::Read(error) => io::Error::new(io::ErrorKind::InvalidData, error),
         })?;
@@ -159,7 +160,7 @@ fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
         return Err(io::Error::new(io::ErrorKind::InvalidData, "it has no complete message"));
     }
     out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-    let again = Patient { file: BufReader::new(File::open(to)?), may };
+    let again = Patient { file: BufReader::new(file::open_ours(to)?), may };
     let unwanted = Wanted { samples: WantedSamples::None, full: false, ..Wanted::ALL };
     let read = record::read(again, unwanted, &mut |_, _, _| ()).map_err(io::Error::other)?;
     if read.trouble.is_some() || read.messages != recovered.messages {

@@ -21,9 +21,11 @@ pub(crate) use link::{RecordAsk, RecordLink, ShowStart};
 
 use super::recording;
 use super::runtime::Runtime;
+use crate::config::MAX_FILE_LEN;
 use crate::config::RecordMode;
 use crate::record::{About, EntryMaker, Intake, Opening, file_octets_a_second, octets_a_second};
 use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::sys::file;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
 use disk::Disk;
@@ -69,7 +71,7 @@ impl HallRecorder {
         let seats = recording::seats(&config, runtime.lanes());
         let clocks = (Monotonic.now(), wall_now_ns());
         let about = About::of_hall(&config.show.name, rate, clocks);
-        let text = fs::read(&places.config).unwrap_or_default();
+        let text = file::read(&places.config, MAX_FILE_LEN).unwrap_or_default();
         let digest: String = Sha256::digest(&text).iter().map(|octet| format!("{octet:02x}")).collect();
         let opening = Opening::new(&about, &seats)
             .judged(&runtime.judging(true))

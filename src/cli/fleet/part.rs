@@ -34,7 +34,8 @@ impl CuePart {
         let path = folder.join(format!("{}{ENDING}", cue.sha256));
         let mut options = OpenOptions::new();
         options.read(true).write(true).create(true).truncate(false).mode(0o600);
-        let file = options.custom_flags(OFlags::NOFOLLOW.bits().cast_signed()).open(&path)?;
+        let file =
+            options.custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed()).open(&path)?;
         let length = file.metadata()?.len();
         let has = if length == cue.bytes { cue.chunks() } else { (length / CHUNK).min(cue.chunks() - 1) };
         // What was cut in the middle of a message is fetched again.

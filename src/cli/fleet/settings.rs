@@ -1,15 +1,16 @@
 //! `fleet.toml` of a hall's link and `desk.toml` of a desk: where the engine is, who it is that comes, and by which key.
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use nkeys::{KeyPair, KeyPairType};
 use toml::de::DeTable;
 
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::config::{self, Entry, Faults, Section, is_fleet_id};
+use crate::sys;
 use crate::sys::file::secret;
 
 /// The longest file that is read: a desk has each of its halls twice, as `fleet init` makes it.
@@ -106,12 +107,11 @@ fn groups(section: &mut Section<'_, '_, '_>) -> BTreeMap<String, Vec<String>> {
 
 fn read<T>(path: &Path, take: impl FnOnce(&mut Section<'_, '_, '_>) -> Option<T>) -> Result<T, Failure> {
     let name = path.display();
-    let about = fs::metadata(path).with_context(|| format!("cannot read {name}")).or_exit(Exit::NoInput)?;
-    if about.len() > LONGEST {
-        return Err(anyhow!("{name} is longer than {LONGEST} bytes")).or_exit(Exit::Config);
-    }
-    let text =
-        fs::read_to_string(path).with_context(|| format!("cannot read {name}")).or_exit(Exit::NoInput)?;
+    let text = sys::file::text(path, LONGEST).map_err(|error| {
+        let exit = if error.kind() == ErrorKind::FileTooLarge { Exit::Config } else { Exit::NoInput };
+        Failure { exit, error: anyhow::Error::new(error).context(format!("cannot read {name}")) }
+    });
+    let text = text?;
     let mut faults = Faults::of(&text);
     let (tree, errors) = DeTable::parse_recoverable(&text);
     for error in errors {
@@ -243,6 +243,7 @@ fn member(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
     use std::os::unix::fs::PermissionsExt as _;
 
     use super::*;

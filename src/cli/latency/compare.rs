@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::latency::{Comparison, TimesRow, read};
 use crate::rt::Times;
+use crate::sys;
 
 /// A log of an hour is some megabytes; what is longer than this is none of ours.
 const MAX_LEN: u64 = 256 << 20;
@@ -40,7 +41,7 @@ fn load(path: &Path) -> Result<Times, Failure> {
         named(if missing { Exit::NoInput } else { Exit::Io }, error.into())
     };
     let mut text = Vec::new();
-    std::fs::File::open(path).and_then(|file| file.take(MAX_LEN).read_to_end(&mut text)).map_err(io)?;
+    sys::file::open(path).and_then(|file| file.take(MAX_LEN).read_to_end(&mut text)).map_err(io)?;
     read(&text).or_exit(Exit::BadCue).map_err(|failure| named(failure.exit, failure.error))
 }
 

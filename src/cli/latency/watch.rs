@@ -18,6 +18,7 @@ use crate::doctor::lateness::us;
 use crate::latency::{Log, between};
 use crate::rt::{Live, Times};
 use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::sys::file::create_ours;
 use crate::time::{Clock as _, MonoTime};
 use crate::tracker::Histogram;
 
@@ -39,7 +40,7 @@ impl UnfinishedFile {
         let mut part = path.as_os_str().to_owned();
         part.push(".part");
         let part = PathBuf::from(part);
-        let file = File::create(&part);
+        let file = create_ours(&part);
         let file = file.with_context(|| format!("cannot write {}", path.display())).or_exit(Exit::Io)?;
         Ok(Self { path: path.to_path_buf(), part, file })
     }

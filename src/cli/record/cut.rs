@@ -1,6 +1,5 @@
 //! `kinocue record cut`.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
@@ -10,6 +9,7 @@ use anyhow::{Context as _, anyhow};
 use super::super::{Exit, Failure, OrExit as _, exit, print};
 use super::{open, tell_flaws};
 use crate::record::{Chunk, Contents, CutError, CutManner, Piece, RecordedSeat, Stretch, cut, each_tick};
+use crate::sys::file;
 use crate::time::{ShowTime, parse_time};
 
 /// Cuts a stretch out of a full recording, with every tick as plain topics that any viewer can draw.
@@ -58,7 +58,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (from, until) = args.film.unwrap_or((ShowTime::from_nanos(i64::MIN), ShowTime::from_nanos(i64::MAX)));
     let stretch = Stretch { from, until, seat: args.seat.clone() };
     let part = args.output.with_extension("cutting");
-    let file = File::create(&part).with_context(|| part.display().to_string()).or_exit(Exit::Io)?;
+    let file = file::create_ours(&part).with_context(|| part.display().to_string()).or_exit(Exit::Io)?;
     let out = BufWriter::new(file);
     let result = if args.csv {
         csv(&args.file, &stretch, out)

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, anyhow};
+use anyhow::Context as _;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
@@ -12,6 +12,7 @@ use super::client::{ServerArgs, dump_record as dump};
 use super::{Exit, Failure, OrExit as _, names, print};
 use crate::plain;
 use crate::record::{Contents, ReadError};
+use crate::sys;
 
 mod compare;
 mod cut;
@@ -54,11 +55,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 
 /// A recording to be read.
 pub(super) fn open(path: &Path) -> Result<BufReader<File>, Failure> {
-    let file = File::open(path).with_context(|| path.display().to_string()).or_exit(Exit::NoInput)?;
-    let is_folder = file.metadata().is_ok_and(|metadata| metadata.is_dir());
-    if is_folder {
-        return Err(anyhow!("{}: is a folder, not a recording", path.display())).or_exit(Exit::NoInput);
-    }
+    let file = sys::file::open(path).with_context(|| path.display().to_string()).or_exit(Exit::NoInput)?;
     Ok(BufReader::new(file))
 }
 

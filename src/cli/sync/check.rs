@@ -5,6 +5,7 @@ use anyhow::{Context as _, anyhow};
 
 use crate::app::film::{LtcFound, look_for_ltc};
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::sys;
 
 /// Checks the timecode in a WAV file: its labels, gaps, jumps and level.
 #[derive(Debug, clap::Args)]
@@ -17,9 +18,13 @@ pub(in crate::cli) struct Args {
     json: bool,
 }
 
+/// The longest recording that is read: some hours of sound.
+const LONGEST: u64 = 4 << 30;
+
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let path = args.file.display();
-    let octets = std::fs::read(&args.file).with_context(|| path.to_string()).or_exit(Exit::NoInput)?;
+    let octets =
+        sys::file::read(&args.file, LONGEST).with_context(|| path.to_string()).or_exit(Exit::NoInput)?;
     let found = look_for_ltc(&octets).with_context(|| path.to_string()).or_exit(Exit::BadCue)?;
     if args.json {
         print::json(&found)?;

@@ -1,7 +1,7 @@
 //! What a homing by this program tells, whatever drives it leads.
 
-use std::fs::File;
-use std::io::{self, Read as _};
+use crate::sys::file::random;
+use std::io;
 
 use sha2::{Digest as _, Sha256};
 
@@ -40,10 +40,8 @@ pub(crate) fn sum_of(settings: &str) -> u64 {
 /// # Errors
 /// Where the system gives no chance.
 pub(crate) fn canary() -> io::Result<i32> {
-    let mut octets = [0; 4];
-    File::open("/dev/urandom")?.read_exact(&mut octets)?;
     // 0 is what a unit has after a reset.
-    Ok(match i32::from_le_bytes(octets) {
+    Ok(match i32::from_le_bytes(random()?) {
         0 => 1,
         number => number,
     })
