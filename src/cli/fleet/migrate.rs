@@ -1,25 +1,26 @@
 //! `kinocue fleet init --migrate`: a desk of an earlier version, whose one key logged in at the engine and signed letters, gets a second
 //! one for letters.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
 
 use super::init::{LETTERS, put, seed};
+use super::settings::LONGEST;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::fleet::new_letter_key;
+use crate::sys::file;
 
 /// Makes the key, has the settings name it, and prints what each hall needs of it.
 pub(super) fn migrate(path: &Path) -> Result<Exit, Failure> {
     let name = path.display();
     let text =
-        fs::read_to_string(path).with_context(|| format!("cannot read {name}")).or_exit(Exit::NoInput)?;
+        file::text(path, LONGEST).with_context(|| format!("cannot read {name}")).or_exit(Exit::NoInput)?;
     let with = with_letters(&text).map_err(|why| anyhow!("{name} {why}")).or_exit(Exit::Usage)?;
     let letters = new_letter_key();
     let folder = path.parent().unwrap_or(Path::new("."));
     put(&folder.join(LETTERS), &seed(&letters)?, 0o600)?;
-    fs::write(path, with).with_context(|| format!("cannot write {name}")).or_exit(Exit::Io)?;
+    file::write_ours(path, with).with_context(|| format!("cannot write {name}")).or_exit(Exit::Io)?;
     print::out(&format!(
         "made {}, and {name} names it\n\n\
          In kinocue.toml of each hall, the [[fleet.key]] of this desk gets another public half; then reload or restart the hall:\n\

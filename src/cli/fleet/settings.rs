@@ -14,7 +14,7 @@ use crate::sys;
 use crate::sys::file::secret;
 
 /// The longest file that is read: a desk has each of its halls twice, as `fleet init` makes it.
-const LONGEST: u64 = 1 << 20;
+pub(super) const LONGEST: u64 = 1 << 20;
 
 /// How a member of a fleet comes to the engine.
 #[derive(Debug, Clone)]
