@@ -56,16 +56,17 @@ struct Sway {
     high: f64,
     since: MonoTime,
     turns: u32,
-    /// Where it was seen to go last, and whether that was up.
+    /// Where it was seen to go last, whether that was up, and when that answer arrived.
     last: f64,
     rises: Option<bool>,
+    at: MonoTime,
     seen: [u32; PositionSource::ALL.len()],
 }
 
 impl Sway {
     const fn begin(place: f64, since: MonoTime) -> Self {
         let seen = [0; PositionSource::ALL.len()];
-        Self { low: place, high: place, since, turns: 0, last: place, rises: None, seen }
+        Self { low: place, high: place, since, turns: 0, last: place, rises: None, at: since, seen }
     }
 
     /// True if it was no farther from all that was seen of it than `within`.
@@ -73,14 +74,15 @@ impl Sway {
         self.high.max(fraction) - self.low.min(fraction) <= within
     }
 
-    /// The same with one more answer of these sources.
-    fn go_on(mut self, fraction: f64, sources: &[PositionSource]) -> Self {
+    /// The same with one more answer of these sources, which was made between `made` and `at`. It shows which way the axis goes only if it
+    /// was made after the one before had arrived: of two that were on their way together nobody knows which is the older.
+    fn go_on(mut self, fraction: f64, sources: &[PositionSource], made: MonoTime, at: MonoTime) -> Self {
         (self.low, self.high) = (self.low.min(fraction), self.high.max(fraction));
         sources.iter().for_each(|source| self.seen[*source as usize] += 1);
-        if (fraction - self.last).abs() > STILL / 2.0 {
+        if made >= self.at && (fraction - self.last).abs() > STILL / 2.0 {
             let rises = fraction > self.last;
             self.turns += u32::from(self.rises.is_some_and(|before| before != rises));
-            (self.last, self.rises) = (fraction, Some(rises));
+            (self.last, self.rises, self.at) = (fraction, Some(rises), at);
         }
         self
     }
@@ -237,7 +239,12 @@ impl Positions {
     /// old, and where they differ nobody knows which: says whether they do.
     pub(super) fn on_repeated(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> bool {
         self.repeats_until = at + ANSWERED_WITHIN;
-        self.is_contradicted(first, positions, at)
+        let is_contradicted = self.is_contradicted(first, positions, at);
+        // A place of now and one of before look like the two ends of a swing.
+        for told in self.told.iter_mut().flatten().filter(|_| is_contradicted) {
+            told.sway = Sway::begin(told.fraction, at);
+        }
+        is_contradicted
     }
 
     /// Hears a report. It comes unasked, past frames that are held back on their way: it makes a place of those axes alone that have no
@@ -311,7 +318,7 @@ impl Positions {
             let sway = recent.map(|told| told.sway).filter(|sway| sway.has(fraction, self.sways()));
             let moved = before.is_some_and(|told| told.moved || rest.is_none());
             let rest = rest.unwrap_or_else(|| Stay::begin(fraction, at)).seen_by(sources, made);
-            let sway = sway.unwrap_or(Sway::begin(fraction, at)).go_on(fraction, sources);
+            let sway = sway.unwrap_or(Sway::begin(fraction, at)).go_on(fraction, sources, made, at);
             self.told[axis] = Some(Told { fraction, at: made, rest, sway, moved });
         }
     }
