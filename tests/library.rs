@@ -236,20 +236,31 @@ fn a_check_that_fails_takes_nothing_in() {
     );
 }
 
+/// A command on a cue that stands still with its answer: the pipe for it is full of blanks. With the end that reads them.
+fn held_at_its_answer(command: &[&str], cue: &Path) -> (std::process::Child, std::io::PipeReader) {
+    let (answer, mut full) = std::io::pipe().unwrap();
+    let flags = rustix::fs::fcntl_getfl(&full).unwrap();
+    rustix::fs::fcntl_setfl(&full, flags | rustix::fs::OFlags::NONBLOCK).unwrap();
+    while std::io::Write::write(&mut full, b" ").is_ok() {}
+    rustix::fs::fcntl_setfl(&full, flags).unwrap();
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_kinocue"));
+    let child = child.args(command).arg(cue).stdout(full).spawn().unwrap();
+    let call = || fs::read_to_string(format!("/proc/{}/syscall", child.id())).unwrap();
+    let of_write = format!("{} 0x1 ", libc::SYS_write);
+    while !call().starts_with(&of_write) {
+        std::thread::yield_now();
+    }
+    (child, answer)
+}
+
 #[test]
-fn the_check_lowers_itself_before_it_reads() {
+fn the_check_has_lowered_itself_by_the_time_it_answers() {
     let fixture = Fixture::new();
     let hall = fixture.dir.path().join("hall.toml");
-    let pipe = fixture.dir.path().join("pipe.csv");
-    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
-    assert!(made.success());
-    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_kinocue"))
-        .args(["prove".as_ref(), pipe.as_os_str(), "--json".as_ref(), "--config".as_ref(), hall.as_os_str()])
-        .stdout(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    // Opening a pipe to write waits until the other end is open to read: the child is past its first steps then.
-    let feed = fs::OpenOptions::new().write(true).open(&pipe).unwrap();
+    let cue = fixture.dir.path().join("ride.csv");
+    fs::write(&cue, GOOD).unwrap();
+    let (mut child, mut answer) =
+        held_at_its_answer(&["prove", "--json", "--config", hall.to_str().unwrap()], &cue);
     let of = |name: &str| fs::read_to_string(format!("/proc/{}/{name}", child.id())).unwrap();
     let stat = of("stat");
     let fields: Vec<_> = stat.rsplit_once(") ").unwrap().1.split(' ').collect();
@@ -262,7 +273,7 @@ fn the_check_lowers_itself_before_it_reads() {
         assert_eq!(limit(none).trim_start_matches(none).split_whitespace().next(), Some("0"), "{limits}");
     }
     assert_eq!(of("oom_score_adj").trim(), "1000");
-    drop(feed);
+    std::io::Read::read_to_end(&mut answer, &mut Vec::new()).unwrap();
     child.wait().unwrap();
 }
 
@@ -275,7 +286,7 @@ fn filters(process: &str) -> Option<u32> {
 
 /// What it may do then is tried in `sys::confined`, by threads that are confined in the same way.
 #[test]
-fn what_takes_a_file_from_outside_apart_is_confined_before_it_has_read_an_octet() {
+fn what_takes_a_file_from_outside_apart_is_confined() {
     let doctor = assert_cmd::Command::new(env!("CARGO_BIN_EXE_kinocue"))
         .args(["doctor", "--seconds", "0", "--json"])
         .output()
@@ -291,34 +302,19 @@ fn what_takes_a_file_from_outside_apart_is_confined_before_it_has_read_an_octet(
     };
     let fixture = Fixture::new();
     let hall = fixture.dir.path().join("hall.toml");
-    let pipe = fixture.dir.path().join("pipe.csv");
-    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let cue = fixture.dir.path().join("ride.csv");
+    fs::write(&cue, GOOD).unwrap();
     let hall = hall.to_str().unwrap();
     for command in [
         &["prove", "--json", "--config", hall][..],
         &["prove", "--config", hall, "--curve", "10"],
         &["draw-recording"],
     ] {
-        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_kinocue"))
-            .args(command)
-            .arg(&pipe)
-            .stdout(std::process::Stdio::piped())
-            .spawn()
-            .unwrap();
-        // Nothing is written to the pipe yet, so nothing was read.
-        let mut feed = fs::OpenOptions::new().write(true).open(&pipe).unwrap();
-        let id = child.id().to_string();
-        let mut are = filters(&id);
-        while are == Some(own) {
-            std::thread::yield_now();
-            are = filters(&id);
-        }
-        assert_eq!(are, Some(own + 1), "{command:?}");
-        std::io::Write::write_all(&mut feed, GOOD.as_bytes()).unwrap();
-        drop(feed);
-        assert!(child.wait().unwrap().code().is_some(), "{command:?}: ended by a signal");
+        let (mut child, mut answer) = held_at_its_answer(command, &cue);
+        assert_eq!(filters(&child.id().to_string()), Some(own + 1), "{command:?}");
         let mut told = String::new();
-        std::io::Read::read_to_string(child.stdout.as_mut().unwrap(), &mut told).unwrap();
+        std::io::Read::read_to_string(&mut answer, &mut told).unwrap();
+        assert!(child.wait().unwrap().code().is_some(), "{command:?}: ended by a signal");
         let told: serde_json::Value =
             serde_json::from_str(&told).unwrap_or_else(|_| panic!("{command:?}: {told}"));
         assert!(told.is_object(), "{told}");
