@@ -19,7 +19,6 @@ use sha2::{Digest as _, Sha256};
 
 use super::access::{Access, one};
 use super::input::whole;
-use super::live::LIVE;
 use super::once::{KeptReply, KeyHolder, KeyedRequest};
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
@@ -33,6 +32,8 @@ use crate::log::{Line, Log, Priority};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
 
+/// Where a page opens its channel.
+pub(super) const LIVE: &str = "/api/v1/live";
 /// Of two requests with the same one the second does nothing.
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 /// Our wall clock in every reply, unix milliseconds, so that a page can tell how far its own is off.

@@ -23,15 +23,13 @@ use crate::control::{Place, Problem, Status, Who};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
 
-/// Where it is.
-pub(super) const LIVE: &str = "/api/v1/live";
 /// How long the first message may take to come.
 const HELLO: Duration = Duration::from_secs(5);
 /// How long a page may say nothing: one that sleeps makes room.
 const SILENCE: Duration = Duration::from_secs(10);
 /// How long a page that is turned away has to leave.
 const PARTING: Duration = Duration::from_secs(1);
-/// Answers that wait to be sent.
+/// LiveAnswers that wait to be sent.
 const ANSWERS: usize = 4;
 
 /// The other end.
@@ -117,19 +115,24 @@ impl Guest {
 }
 
 /// Takes what a page says, until it says nothing any more.
-async fn listen(shared: &Shared, who: &Who, mut from: impl AsyncRead + Unpin, answer: mpsc::Sender<Answer>) {
+async fn listen(
+    shared: &Shared,
+    who: &Who,
+    mut from: impl AsyncRead + Unpin,
+    answer: mpsc::Sender<LiveAnswer>,
+) {
     while let Ok(Ok(message)) = timeout(SILENCE, websocket::read(&mut from)).await {
         let what = match message {
             Message::Text(text) if text.trim().eq_ignore_ascii_case("stop") => {
                 shared.handle.stop(); // before all else
                 shared.handle.note_stop(who.clone());
-                Answer::Text("{\"stop\":\"received\"}".to_owned())
+                LiveAnswer::Text("{\"stop\":\"received\"}".to_owned())
             }
             Message::Text(text) if text == "echo" => {
-                Answer::Text(format!("{{\"time\":{}}}", wall_now_ns() / 1_000_000))
+                LiveAnswer::Text(format!("{{\"time\":{}}}", wall_now_ns() / 1_000_000))
             }
             Message::Text(_) => return,
-            Message::Ping(payload) => Answer::Pong(payload),
+            Message::Ping(payload) => LiveAnswer::Pong(payload),
             Message::Pong => continue,
         };
         drop(answer.try_send(what)); // who takes no answers gets none
@@ -137,13 +140,13 @@ async fn listen(shared: &Shared, who: &Who, mut from: impl AsyncRead + Unpin, an
 }
 
 /// What is said to one page.
-enum Answer {
+enum LiveAnswer {
     Text(String),
     Pong(Vec<u8>),
 }
 
 /// Sends answers and statuses, each status whole, ten a second at the most, until the other end takes nothing any more.
-async fn push(shared: &Shared, mut to: impl AsyncWrite + Unpin, mut answers: mpsc::Receiver<Answer>) {
+async fn push(shared: &Shared, mut to: impl AsyncWrite + Unpin, mut answers: mpsc::Receiver<LiveAnswer>) {
     let mut statuses = shared.handle.watch();
     statuses.mark_changed();
     let mut pace = interval(PACE);
@@ -152,8 +155,8 @@ async fn push(shared: &Shared, mut to: impl AsyncWrite + Unpin, mut answers: mps
         let sent = tokio::select! {
             biased;
             answer = answers.recv() => match answer {
-                Some(Answer::Text(text)) => websocket::send(&mut to, &[text.as_bytes()]).await,
-                Some(Answer::Pong(payload)) => websocket::pong(&mut to, &payload).await,
+                Some(LiveAnswer::Text(text)) => websocket::send(&mut to, &[text.as_bytes()]).await,
+                Some(LiveAnswer::Pong(payload)) => websocket::pong(&mut to, &payload).await,
                 None => return,
             },
             status = next(&mut statuses, &mut pace) => match status {

@@ -83,7 +83,7 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(recordings::dump));
     let (router, document) = router.split_for_parts();
     // OpenAPI has no words for a WebSocket; docs/http.md has.
-    let router = router.route(live::LIVE, get(live::live));
+    let router = router.route(gate::LIVE, get(live::live));
     (router.fallback(service::page).method_not_allowed_fallback(service::wrong_method), completed(document))
 }
 

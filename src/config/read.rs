@@ -81,14 +81,7 @@ pub(super) fn document(path: &Path, text: &str) -> Result<Config, ConfigFaults> 
 }
 
 fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
-    if table.contains_key("entry") && !table.contains_key("controller") {
-        faults.note(
-            0,
-            "this is a playlist, not a configuration; a hall checks it when `kinocue playlist ID` loads it",
-        );
-        return None;
-    }
-    let mut section = Section::new("the file", 0, table, faults);
+    let mut section = not_a_playlist(table, faults)?;
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
     let [api_at, link_at, record_at, buttons_at, notify_at, fleet_at] =
@@ -150,6 +143,20 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         sync,
         film,
     })
+}
+
+/// The file as a section; none of a playlist, which is a fault.
+fn not_a_playlist<'t, 'f, 'x>(
+    table: &'t DeTable<'t>,
+    faults: &'f mut Faults<'x>,
+) -> Option<Section<'t, 'f, 'x>> {
+    if table.contains_key("entry") && !table.contains_key("controller") {
+        let told =
+            "this is a playlist, not a configuration; a hall checks it when `kinocue playlist ID` loads it";
+        faults.note(0, told);
+        return None;
+    }
+    Some(Section::new("the file", 0, table, faults))
 }
 
 /// The sections that say together which controllers there are.

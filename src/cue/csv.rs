@@ -9,7 +9,6 @@ use super::fault::{Collector, CueFaults, Place};
 use super::header::{Column, Header};
 use super::limits::MAX_ROWS;
 use super::problem::Problem;
-use super::spreadsheet::SEPARATORS;
 use super::table::{Lines, Splitter, column_of};
 use super::unit::DeclaredUnits;
 use super::{Cue, Effects, Origin, Steps, value};
@@ -17,6 +16,9 @@ use crate::channel::{Samples, TrackId};
 use crate::motion::MAX_AXES;
 use crate::plain;
 use crate::time::ShowTime;
+
+/// What spreadsheets have between the columns where commas are taken.
+pub(super) const SEPARATORS: [char; 3] = [';', '\t', '|'];
 
 /// Reads a CSV cue; `path` names it in faults.
 pub(super) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {

@@ -10,8 +10,6 @@ use super::other_kind::refuse_other_kind;
 use super::problem::{Problem, may_part_thousands};
 use super::{Cue, csv, value};
 
-/// What spreadsheets have between the columns where commas are taken.
-pub(super) const SEPARATORS: [char; 3] = [';', '\t', '|'];
 const BOM: &[u8] = b"\xef\xbb\xbf";
 
 /// Reads a spreadsheet's CSV; `path` names it in faults.
@@ -147,7 +145,7 @@ fn separator_of(header: &[u8]) -> u8 {
             !inside
         })
         .collect();
-    let others = SEPARATORS.into_iter().filter_map(|separator| u8::try_from(separator).ok());
+    let others = csv::SEPARATORS.into_iter().filter_map(|separator| u8::try_from(separator).ok());
     [b','].into_iter().chain(others).find(|separator| outside.contains(separator)).unwrap_or(b',')
 }
 

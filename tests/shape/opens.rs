@@ -23,7 +23,7 @@ const EXCEPT: &[(&str, usize, &str)] = &[
     ("src/cli/decode/input.rs", 1, "a person may pipe a capture into it"),
     ("src/cli/decode/serial.rs", 1, "a person may pipe octets into it"),
     ("src/cli/fleet/demo.rs", 7, "files of a folder that it has just made for itself"),
-    ("src/cli/fleet/init.rs", 1, "create_new"),
+    ("src/cli/fleet/made.rs", 1, "create_new"),
     ("src/cli/fleet/part.rs", 1, "to go on with it; no link, and it waits for nobody"),
     ("src/cli/sim.rs", 1, "a log, which a person may have a terminal or a pipe for"),
     ("src/cli/sync/index.rs", 1, "a person names where it goes"),

@@ -1,15 +1,14 @@
 //! `kinocue fleet init`: keys, the configuration of the engine with what each member may, and the settings of links and desk.
 
 use std::fmt::Write as _;
-use std::fs::{self, OpenOptions};
-use std::io::Write as _;
-use std::os::unix::fs::OpenOptionsExt as _;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow};
 use nkeys::KeyPair;
 
 use super::engine::inbox;
+use super::made::{LETTERS, put, seed};
 use super::migrate::migrate;
 use super::settings::is_loopback;
 use crate::cli::{Exit, Failure, OrExit as _, print};
@@ -132,9 +131,6 @@ pub(super) fn make(plan: &Plan<'_>, folder: &Path) -> Result<(), Failure> {
     );
     put(&of_desk.join("desk.toml"), &(settings + PAGE), 0o644)
 }
-
-/// The file of the key for letters of a desk, beside its settings.
-pub(super) const LETTERS: &str = "letters.nk";
 
 /// What the settings of a desk say of its page.
 const PAGE: &str = "
@@ -261,20 +257,6 @@ fn user(text: &mut String, name: &str, public: &str, rights: &Rights, answers: b
         list(&rights.publish),
         list(&rights.subscribe)
     );
-}
-
-pub(super) fn seed(pair: &KeyPair) -> Result<String, Failure> {
-    Ok(pair.seed().context("the key has no secret half").or_exit(Exit::Internal)? + "\n")
-}
-
-/// Writes a new file, with its mode from the start on.
-pub(super) fn put(path: &Path, text: &str, mode: u32) -> Result<(), Failure> {
-    let write = || {
-        fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
-        let mut file = OpenOptions::new().write(true).create_new(true).mode(mode).open(path)?;
-        file.write_all(text.as_bytes())
-    };
-    write().with_context(|| format!("cannot write {}", path.display())).or_exit(Exit::Io)
 }
 
 /// What a person does with it.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
 
-use super::init::{LETTERS, put, seed};
+use super::made::{LETTERS, put, seed};
 use super::settings::LONGEST;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::fleet::new_letter_key;

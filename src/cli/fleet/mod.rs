@@ -17,6 +17,7 @@ mod init;
 mod lease;
 mod link;
 mod log;
+mod made;
 mod migrate;
 mod object;
 mod page;
