@@ -8,8 +8,7 @@ use crate::time::MonoTime;
 
 impl Belief {
     /// True if a frame to `pose`, to be reached in so many milliseconds, keeps the greatest speed of every axis from wherever
-    /// it may be, and its controller is not known to read frames otherwise. While acks come, an axis is where its last frame leads;
-    /// [`Belief::lead`] takes into account what is not acked yet, where each frame asks for an ack.
+    /// it may be, and its controller is not known to read frames otherwise. Losses shorter than [`super::GAP`] are left out: while acks come, an axis is where its last frame leads.
     #[must_use]
     pub(crate) fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
         let time = f64::from(lasts_ms);
@@ -38,7 +37,7 @@ impl Belief {
     }
 
     /// True if a seat may be at any place that its open frames lead through, not at the last alone.
-    pub(super) fn may_be_anywhere_between(&self, now: MonoTime) -> bool {
+    fn may_be_anywhere_between(&self, now: MonoTime) -> bool {
         self.gap || self.is_quiet(now)
     }
 
@@ -70,7 +69,6 @@ impl Belief {
         // What was refused before it is missing as well, until it is acked. One of these may have been to ask: whoever took this frame has to ack
         // a later one all the sooner.
         let (since, asked_then) = self.refused.take().unwrap_or((at, false));
-        self.open.push(frame, at, self.spans.last(), pose);
         self.spans.push(frame, asked || asked_then, pose, since);
         if !matches!(self.known, Known::Commanded(_)) {
             self.known = Known::Commanded(at);

@@ -10,8 +10,6 @@ mod check;
 mod evidence;
 mod history;
 mod kinds;
-mod loss;
-mod open;
 mod shaking;
 mod span;
 #[cfg(test)]
@@ -24,9 +22,6 @@ pub use evidence::{EvidenceTable, LaneEvidence, Reading};
 use history::History;
 pub use kinds::Taken;
 pub(crate) use kinds::{Fall, Found, Known, Tally};
-use loss::HeldBack;
-pub(crate) use loss::Lead;
-use open::OpenFrames;
 use shaking::Shaking;
 use span::Spans;
 
@@ -99,8 +94,6 @@ pub(crate) struct Belief {
     foreign: bool,
     known: Known,
     spans: Spans,
-    open: OpenFrames,
-    held_back: HeldBack,
     history: History,
     acked: Option<FrameNo>,
     shaking: Shaking,
@@ -143,8 +136,6 @@ impl Belief {
             foreign: false,
             known: Known::Nothing,
             spans: Spans::over(GAP + window.acked_after()),
-            open: OpenFrames::none(),
-            held_back: HeldBack::not(),
             history: History::at([0.0; MAX_AXES]),
             acked: None,
             shaking: Shaking::default(),
@@ -188,7 +179,6 @@ impl Belief {
             && self.acked.is_none_or(|before| acked.since(before) > 0)
         {
             self.acked = Some(acked);
-            self.open.sent_at(acked).into_iter().for_each(|at| self.held_back.on_ack(now.since(at)));
             self.spans.confirm(acked);
             self.shaking.on_ack(acked);
         }
@@ -251,7 +241,7 @@ impl Belief {
         let mut pose = *self.spans.last();
         slots_in(told).for_each(|slot| pose[slot] = reading.pose[slot]);
         self.within = told | if agrees { self.within } else { 0 };
-        self.restart_at(pose);
+        self.spans.restart_at(pose);
         self.sways = if sways { reading.sways } else { 0.0 };
         self.known = Known::Measured(reading.at, reading.by);
         self.gap &= self.within != self.own || sways;
@@ -280,7 +270,7 @@ impl Belief {
         }
         (self.within, self.known) = (0, Known::Contradicted(now));
         // However many acks come yet, it is not where they say; nor at rest where it stands between two frames of its queue.
-        self.restart_at(*self.spans.last());
+        self.spans.restart_at(*self.spans.last());
         self.busy_until = self.busy_until.max(self.busy_at_most);
         Found::Astray
     }
@@ -288,7 +278,7 @@ impl Belief {
     /// That the ack thread is slow is no gap at first: what an ack may still be read for is not missing.
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
         let refused = self.refused.is_some_and(|(since, _)| now.since(since) > GAP);
-        let later = self.acked_after + self.held_back.longer(self.period);
+        let later = self.acked_after;
         let is_missed = |since| told.since(since) > GAP + later || now.since(since) > GAP_UNTOLD + later;
         let unheard = || self.spans.waiting_since(self.acked, self.period).is_some_and(is_missed);
         refused || (self.asks() && unheard())
@@ -402,7 +392,7 @@ impl Belief {
     /// The seat may have been moved unseen: what was known of it is known no more.
     pub(crate) fn forget(&mut self) {
         (self.known, self.within, self.sways) = (Known::Nothing, 0, 0.0);
-        self.restart_at(*self.spans.last());
+        self.spans.restart_at(*self.spans.last());
     }
 }
 

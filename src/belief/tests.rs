@@ -1,5 +1,3 @@
-mod loss;
-
 use super::*;
 use crate::motion::{SeatType, Slot};
 

@@ -10,8 +10,6 @@
 //! A line meets the next in a step of speed. The measure (`motion::Spacing`) takes acceleration from poses 20 ms apart, so a
 //! step `d` alone within its sight is `d / 20 ms`: one of `a` x 20 ms is just what the limit `a` allows, as long as no two of
 //! them fall within 20 ms. That is why no line is shorter.
-//! Such a step shows as a jerk of `0.9 a / 20 ms` (docs/limiter.md, section 2: a jump of slope by `c` adds `c/g²`): 135,000 mm/s³ on the bench seat,
-//! 2.3 times its limit. Half of that would take twice the lines, each of which takes long near the greatest speed.
 //!
 //! What is gone is not known to be gone: after the line `h` is `h + s T = h V / (V - s)`, and near `V` that grows quickly.
 //! Where all of the way to rest at the gentlest steps fits neither the stroke, nor the Times of the controller, nor a

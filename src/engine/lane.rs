@@ -142,11 +142,6 @@ impl LaneMotion {
         self.is_there() && self.ahead == 0
     }
 
-    /// Its frame takes so many ticks, this one included.
-    pub(super) const fn stretch(&mut self, ticks: u32) {
-        self.ahead = ticks;
-    }
-
     /// Whether it is wanted, and neither out nor on its way there.
     #[must_use]
     pub(crate) const fn is_in(&self) -> bool {

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use super::mail::{Mail, Sent};
-use crate::belief::{Belief, Fall, Found, Known, KnownPose, Lead, Taken, Tally};
+use crate::belief::{Belief, Fall, Found, Known, KnownPose, Taken, Tally};
 use crate::drive::Lane;
 use crate::engine::{Beat, Engine, LaneOrder};
 use crate::motion::Pose;
@@ -49,14 +49,6 @@ struct Place {
     belief: Belief,
     /// The longest Time that its controller executes as it is, ms (PA0b).
     longest_ms: u32,
-}
-
-impl Place {
-    /// An absolute Time takes the longer the more of the frames before it are lost: by itself it keeps the greatest speed.
-    #[inline]
-    fn is_plain(&self, beat: &Beat, at: MonoTime) -> bool {
-        self.belief.is_sure() || beat.timing == Timing::Absolute || !self.belief.may_hold_back(at)
-    }
 }
 
 impl Places {
@@ -242,56 +234,23 @@ impl Places {
         self.lanes[lane].belief.look(evidence, told, now)
     }
 
-    /// This tick's frame of a lane: what it says, and where it leads. Where it would be too fast from somewhere that
+    /// Whether this tick's frame of a lane may leave, and what it says of time. Where it would be too fast from somewhere that
     /// the seat may be, the lane is held: nothing is sent to it, and it is looked at. One that is blind gets a frame of its own.
     #[inline]
     #[must_use]
-    pub fn admit(&mut self, lane: usize, engine: &mut Engine, at: MonoTime) -> Option<(Beat, Pose)> {
+    pub fn admit(&mut self, lane: usize, engine: &mut Engine, at: MonoTime) -> Option<Beat> {
         let beat = if engine.lane(lane).is_blind() {
             self.slow_down(lane, engine, at)?
         } else {
-            let beat = *engine.beat_of(lane);
-            if !self.lanes[lane].is_plain(&beat, at) {
-                return self.hold_back(lane, engine, &beat, at);
-            }
-            beat
+            *engine.beat_of(lane)
         };
-        let (belief, pose) = (&self.lanes[lane].belief, *engine.lane(lane).pose());
-        if belief.allows(&pose, beat.lasts_ms, at) {
-            return Some((beat, pose));
+        let belief = &mut self.lanes[lane].belief;
+        if belief.allows(engine.lane(lane).pose(), beat.lasts_ms, at) {
+            return Some(beat);
         }
-        self.withhold(lane, engine);
-        None
-    }
-
-    /// Whether the seat of a lane is where it was asked to be, and its next frame begins there.
-    #[must_use]
-    pub(super) fn is_plain(&self, lane: usize, beat: &Beat, at: MonoTime) -> bool {
-        self.lanes[lane].is_plain(beat, at)
-    }
-
-    /// The frame of a lane whose last frames may not have arrived.
-    #[cold]
-    fn hold_back(
-        &mut self,
-        lane: usize,
-        engine: &mut Engine,
-        beat: &Beat,
-        at: MonoTime,
-    ) -> Option<(Beat, Pose)> {
-        let Place { belief, .. } = &mut self.lanes[lane];
-        let lead = belief.lead(engine.lane(lane).pose(), at, |ticks| engine.span_ms(ticks));
-        let Some(Lead { to, lasts_ms, ticks }) = lead else {
-            self.withhold(lane, engine);
-            return None;
-        };
-        engine.stretch(lane, ticks);
-        Some((Beat { time_ms: lasts_ms, lasts_ms, ..*beat }, to))
-    }
-
-    fn withhold(&mut self, lane: usize, engine: &mut Engine) {
-        self.lanes[lane].belief.withheld();
+        belief.withheld();
         engine.order(lane, LaneOrder::FallOut(Fall::Gap));
+        None
     }
 
     #[cold]

@@ -39,7 +39,6 @@ mod ether;
 mod fresh;
 mod hall;
 mod judge;
-mod losses;
 mod master;
 mod named;
 mod odd;
