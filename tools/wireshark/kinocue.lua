@@ -482,17 +482,32 @@ local function add_monitored(tree, tvb, start, words, note)
   end
 end
 
+-- The first word of a refusal that is not 0, in which an MBOX tells its error in place of registers; else the last.
+local function refusal_of(tvb, message)
+  for index = 0, message.words - 2 do
+    local range = tvb(WORDS + 2 * index, 2)
+    if range:uint() ~= 0 then
+      return range
+    end
+  end
+  return tvb(WORDS + 2 * (message.words - 1), 2)
+end
+
 local function add_registers(tree, tvb, message, note)
   local start, count = u16(tvb, 12), u16(tvb, 14)
   local space = space_of(message, u16(tvb, 6))
+  local refused = dialect() == "mbox" and not message.is.servo and message.low > RUNNING
   tree:add(f.register, tvb(12, 2)):append_text(" (" .. register_name(space, start) .. ")")
   tree:add(f.count, tvb(14, 2))
-  if message.words == 0 then
+  if message.words == 0 or refused then
     local first = register_name(space, start)
     table.insert(note, count == 1 and first or string.format("%d registers from %s", count, first))
     for index = 0, math.min(count, MAX_WORDS) - 1 do
       tree:add(f.name, tvb(12, 4), register_name(space, start + index)):set_generated()
     end
+  end
+  if refused and message.words > 0 then
+    return add_error(tree, refusal_of(tvb, message), note)
   end
   for index = 0, message.words - 1 do
     local range, name = tvb(WORDS + 2 * index, 2), register_name(space, start + index)

@@ -1,10 +1,9 @@
 //! `kinocue fleet init`: keys, the configuration of the engine with what each member may, and the settings of links and desk.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use nkeys::KeyPair;
 
 use super::engine::inbox;
