@@ -218,9 +218,8 @@ fn serve_halls(
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let record_places = places.of_recordings(&config);
-    let recordings = record_places.recordings.clone();
-    let surfaces =
-        Surfaces::open(&config, &places.sockets, &handle, library.clone(), recordings, pages, &log)?;
+    let dir = record_places.recordings.clone();
+    let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), dir, pages, &log)?;
     if pair.is_none() {
         is_alone(&places.sockets.fleet);
     }
