@@ -14,7 +14,7 @@ use crate::time::MonoTime;
 /// An answer that comes later than this is none; so long after an answer was repeated others may be.
 pub(super) const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
 /// An answer is lost rather than late after this.
-const LATE: Duration = Duration::from_millis(300);
+pub(super) const LATE: Duration = Duration::from_millis(300);
 /// Requests of the same registers that may be open at a time; of more the older ones count.
 const OPEN: usize = 8;
 

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::pending::{ANSWERED_WITHIN, Claim};
+use super::pending::{ANSWERED_WITHIN, Claim, LATE};
 use super::reads::PositionSource;
 use crate::belief::{Reading, Source};
 use crate::motion::{MAX_AXES, Pulses, SeatType, in_stroke};
@@ -30,10 +30,14 @@ const OUTSIDE: f64 = 0.002;
 /// meanwhile: whoever jogs an axis, or one that sinks, goes one way. As long, and by so many answers, it has to be seen in one place that
 /// may vibrate: some of them may find it at the same place of each swing.
 const SWAY: Duration = Duration::from_millis(500);
-const TURNS: u32 = 3;
+/// The same in two stretches, one after the other.
+const STRETCH: Duration = Duration::from_millis(300);
+const TURNS: u32 = 2;
 /// And in each second, at the least: keys are not pressed as often.
 const TURNS_S: f64 = 3.0;
 const STILL_TIMES: u32 = 6;
+/// How far apart the middles of two such stretches may be, as a share of the swing: an axis that goes elsewhere meanwhile has others.
+const SAME_MIDDLE: f64 = 0.15;
 
 /// What one axis told.
 #[derive(Debug, Clone, Copy)]
@@ -56,17 +60,20 @@ struct Sway {
     high: f64,
     since: MonoTime,
     turns: u32,
-    /// Where it was seen to go last, whether that was up, and when that answer arrived.
+    /// Where it was seen to go last, and whether that was up.
     last: f64,
     rises: Option<bool>,
-    at: MonoTime,
     seen: [u32; PositionSource::ALL.len()],
+    /// The middle and the width of the stretch before, and whether that had the same middle as the one before it.
+    before: Option<(f64, f64)>,
+    is_steady: bool,
 }
 
 impl Sway {
     const fn begin(place: f64, since: MonoTime) -> Self {
         let seen = [0; PositionSource::ALL.len()];
-        Self { low: place, high: place, since, turns: 0, last: place, rises: None, at: since, seen }
+        let (before, is_steady) = (None, false);
+        Self { low: place, high: place, since, turns: 0, last: place, rises: None, seen, before, is_steady }
     }
 
     /// True if it was no farther from all that was seen of it than `within`.
@@ -75,30 +82,37 @@ impl Sway {
     }
 
     /// The same with one more answer of these sources, which was made between `made` and `at`. It shows which way the axis goes only if it
-    /// was made after the one before had arrived: of two that were on their way together nobody knows which is the older.
+    /// was not held back: of two that were on their way together nobody knows which is the older.
     fn go_on(mut self, fraction: f64, sources: &[PositionSource], made: MonoTime, at: MonoTime) -> Self {
         (self.low, self.high) = (self.low.min(fraction), self.high.max(fraction));
         sources.iter().for_each(|source| self.seen[*source as usize] += 1);
-        if made >= self.at && (fraction - self.last).abs() > STILL / 2.0 {
+        if at.since(made) <= LATE && (fraction - self.last).abs() > STILL / 2.0 {
             let rises = fraction > self.last;
             self.turns += u32::from(self.rises.is_some_and(|before| before != rises));
-            (self.last, self.rises, self.at) = (fraction, Some(rises), at);
+            (self.last, self.rises) = (fraction, Some(rises));
         }
-        self
+        if self.is_whole(at) { self.begin_next(fraction, at) } else { self }
     }
 
-    fn has_lasted(&self, at: MonoTime, long: Duration) -> bool {
+    /// True of a stretch that shows a vibration, if the next one shows the same.
+    fn is_whole(&self, at: MonoTime) -> bool {
         let lasts = at.since(self.since);
         let turns = self.turns >= TURNS && f64::from(self.turns) >= TURNS_S * lasts.as_secs_f64();
-        turns && lasts >= long && self.seen.iter().all(|times| *times >= TIMES)
+        turns && lasts >= STRETCH && self.seen.iter().all(|times| *times >= TIMES)
     }
 
-    const fn middle(&self) -> f64 {
-        f64::midpoint(self.low, self.high)
+    fn begin_next(self, fraction: f64, at: MonoTime) -> Self {
+        let (middle, width) = (f64::midpoint(self.low, self.high), self.high - self.low);
+        let is_same =
+            |(before, wide): (f64, f64)| (before - middle).abs() <= SAME_MIDDLE * width.min(wide) + STILL;
+        let is_steady = self.before.is_some_and(is_same);
+        Self { before: Some((middle, width)), is_steady, ..Self::begin(fraction, at) }
     }
 
-    fn width(&self) -> f64 {
-        self.high - self.low
+    /// The middle of the swing, and its width.
+    fn swing(&self) -> (f64, f64) {
+        let now = (f64::midpoint(self.low, self.high), self.high - self.low);
+        self.before.filter(|_| self.is_steady).unwrap_or(now)
     }
 }
 
@@ -239,12 +253,7 @@ impl Positions {
     /// old, and where they differ nobody knows which: says whether they do.
     pub(super) fn on_repeated(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> bool {
         self.repeats_until = at + ANSWERED_WITHIN;
-        let is_contradicted = self.is_contradicted(first, positions, at);
-        // A place of now and one of before look like the two ends of a swing.
-        for told in self.told.iter_mut().flatten().filter(|_| is_contradicted) {
-            told.sway = Sway::begin(told.fraction, at);
-        }
-        is_contradicted
+        self.is_contradicted(first, positions, at)
     }
 
     /// Hears a report. It comes unasked, past frames that are held back on their way: it makes a place of those axes alone that have no
@@ -409,8 +418,8 @@ impl Positions {
                     reading.at = reading.at.min(at);
                     let rests = told.rest.has_lasted(rest);
                     if !rests {
-                        sways &= told.sway.has_lasted(told.at, long.max(SWAY));
-                        widest = widest.max(told.sway.width());
+                        sways &= told.sway.is_steady;
+                        widest = widest.max(told.sway.swing().1);
                     }
                     reading.rests &= rests;
                     reading.moves |= told.moved && !rests;
@@ -432,7 +441,7 @@ impl Positions {
     fn settle_on_middles(&self, reading: &mut Reading, widest: f64) {
         for axis in 0..self.seat.axes.min(MAX_AXES - self.first_slot) {
             if let Some(told) = self.told[axis] {
-                reading.pose[self.first_slot + axis] = told.sway.middle();
+                reading.pose[self.first_slot + axis] = told.sway.swing().0;
             }
         }
         reading.sways = 2.0 * self.shakes.min(widest) + STILL;
