@@ -44,9 +44,11 @@ struct MtcTaker {
 
 impl LineTaker for MtcTaker {
     fn take(&mut self, bytes: &[u8], at: MonoTime) -> io::Result<()> {
-        self.reader.hear(bytes, at, &mut |what| {
-            self.told.tell(what);
-        });
+        for byte in bytes {
+            self.reader.hear(*byte, at, &mut |what| {
+                self.told.tell(what);
+            });
+        }
         self.told.note(|notes| notes.label(self.reader.labels()));
         Ok(())
     }

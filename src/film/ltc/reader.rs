@@ -80,7 +80,9 @@ impl LtcReader {
         if let Some(rate) = self.labels.rate() {
             self.decoder.set_rate(rate);
         }
-        out(Observation::new(at, media.map_or(FilmWord::Unplaced, FilmWord::Position)));
+        if let Some(media) = media {
+            out(Observation::new(at, FilmWord::Position(media)));
+        }
     }
 
     /// Says once that the line carries no frames, and whether it carries anything.
