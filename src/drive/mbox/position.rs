@@ -104,9 +104,11 @@ impl Sway {
     fn begin_next(self, fraction: f64, at: MonoTime) -> Self {
         let (middle, width) = (f64::midpoint(self.low, self.high), self.high - self.low);
         let is_same =
-            |(before, wide): (f64, f64)| (before - middle).abs() <= SAME_MIDDLE * width.min(wide) + STILL;
-        let is_steady = self.before.is_some_and(is_same);
-        Self { before: Some((middle, width)), is_steady, ..Self::begin(fraction, at) }
+            |(before, wide): &(f64, f64)| (before - middle).abs() <= SAME_MIDDLE * width.min(*wide) + STILL;
+        let same = self.before.filter(is_same);
+        // It swings as far as any of them shows.
+        let widest = same.map_or(width, |(_, wide)| width.max(wide));
+        Self { before: Some((middle, widest)), is_steady: same.is_some(), ..Self::begin(fraction, at) }
     }
 
     /// The middle of the swing, and its width.
