@@ -26,9 +26,12 @@ fn doors(pid: u32) -> BTreeSet<u16> {
     tables.iter().flat_map(|table| table.lines().filter_map(port)).collect()
 }
 
-/// What a page of somebody else has a browser say beside its request: led by its own name (DNS rebinding), from its own origin, without
-/// one, or for a picture.
-fn pages(address: SocketAddr) -> Vec<(Option<String>, Vec<(&'static str, String)>)> {
+/// The `Host` of a request, where it is another than that of the port, and the headers beside it.
+type Headers = (Option<String>, Vec<(&'static str, String)>);
+
+/// Headers that a browser sends for a page of somebody else: led by its own name (DNS rebinding), from its own origin, without one, or for
+/// a picture.
+fn pages(address: SocketAddr) -> Vec<Headers> {
     let port = address.port();
     let own = |text: &str| text.to_owned();
     let evil = format!("evil.example:{port}");
