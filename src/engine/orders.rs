@@ -55,7 +55,8 @@ impl Engine {
             }
             LaneOrder::Cut => self.lanes.all[lane].cut(),
             LaneOrder::FallOut(why) => self.lanes.fall_out(lane, why),
-            LaneOrder::GoBlind if self.sends_nothing() => self.lanes.fall_out(lane, Fall::Gap),
+            // Of one at rest no frame is missing that it would need: it is read while it rests, and before the next goes to it.
+            LaneOrder::GoBlind if self.sends_nothing() => {}
             LaneOrder::GoBlind => self.lanes.all[lane].go_blind(),
             LaneOrder::LoseSight => self.lanes.lose_sight(lane),
         }
