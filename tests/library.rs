@@ -238,14 +238,14 @@ fn a_check_that_fails_takes_nothing_in() {
 
 /// A command on a cue that stands still with its answer: the pipe for it is full of blanks. With the end that reads them.
 fn held_at_its_answer(command: &[&str], cue: &Path) -> (std::process::Child, std::io::PipeReader) {
-    let (answer, mut full) = std::io::pipe().unwrap();
-    let flags = rustix::fs::fcntl_getfl(&full).unwrap();
-    rustix::fs::fcntl_setfl(&full, flags | rustix::fs::OFlags::NONBLOCK).unwrap();
+    let (answer, mut full) = std::io::pipe().expect("a pipe");
+    let flags = rustix::fs::fcntl_getfl(&full).expect("the flags of a pipe");
+    rustix::fs::fcntl_setfl(&full, flags | rustix::fs::OFlags::NONBLOCK).expect("a pipe that does not block");
     while std::io::Write::write(&mut full, b" ").is_ok() {}
-    rustix::fs::fcntl_setfl(&full, flags).unwrap();
+    rustix::fs::fcntl_setfl(&full, flags).expect("a pipe that blocks");
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_kinocue"));
-    let child = child.args(command).arg(cue).stdout(full).spawn().unwrap();
-    let call = || fs::read_to_string(format!("/proc/{}/syscall", child.id())).unwrap();
+    let child = child.args(command).arg(cue).stdout(full).spawn().expect("the program starts");
+    let call = || fs::read_to_string(format!("/proc/{}/syscall", child.id())).expect("its system call");
     let of_write = format!("{} 0x1 ", libc::SYS_write);
     while !call().starts_with(&of_write) {
         std::thread::yield_now();
