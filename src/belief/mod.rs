@@ -325,8 +325,13 @@ impl Belief {
     /// rest; where no acks are asked for, whether it is known at all.
     #[must_use]
     pub(crate) fn may_begin(&self, since: MonoTime, now: MonoTime) -> bool {
-        let read = !self.asks() || matches!(self.known, Known::Measured(at, _) if at >= since);
-        read && self.start(now).is_some()
+        self.was_read(since) && self.start(now).is_some()
+    }
+
+    /// Whether a reading from `since` or later is the latest that is known of the seat; true where no acks are asked for.
+    #[must_use]
+    pub(crate) fn was_read(&self, since: MonoTime) -> bool {
+        !self.asks() || matches!(self.known, Known::Measured(at, _) if at >= since)
     }
 
     /// Whether a reading told where some axes are, and of others nothing is known.

@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::mail::{Mail, Sent};
 use crate::belief::{Belief, Fall, Found, Known, KnownPose, Taken, Tally};
 use crate::drive::Lane;
-use crate::engine::{Beat, Engine, LaneOrder};
+use crate::engine::{Beat, Engine, LaneOrder, PlayProgress};
 use crate::motion::Pose;
 use crate::net::Delivery;
 use crate::time::{MonoTime, Rate};
@@ -186,7 +186,10 @@ impl Places {
         if wait.begins {
             // The way of one that is blind is slow enough from wherever it is.
             let is_led = motion.takes_part() && !motion.is_blind();
-            is_led && !self.lanes[lane].belief.may_begin(wait.since, now)
+            let belief = &self.lanes[lane].belief;
+            // Where all is over nothing is to begin: that its seat was read since is enough.
+            let is_over = matches!(engine.progress(), PlayProgress::Over(_));
+            is_led && !(if is_over { belief.was_read(wait.since) } else { belief.may_begin(wait.since, now) })
         } else {
             motion.is_unseen()
         }
