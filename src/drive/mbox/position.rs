@@ -326,7 +326,10 @@ impl Positions {
             let before = self.told[axis];
             let recent = before.filter(|told| made.since(told.at) <= APART);
             let rest = recent.map(|told| told.rest).filter(|rest| rest.has(fraction, STILL));
-            let sway = recent.map(|told| told.sway).filter(|sway| sway.has(fraction, self.sways()));
+            // Old answers among new ones make a seat at rest swing from the one place to the other.
+            let repeats = self.may_be_repeated(at);
+            let swung = recent.filter(|_| !repeats).map(|told| told.sway);
+            let sway = swung.filter(|sway| sway.has(fraction, self.sways()));
             let moved = before.is_some_and(|told| told.moved || rest.is_none());
             let rest = rest.unwrap_or_else(|| Stay::begin(fraction, at)).seen_by(sources, made);
             let sway = sway.unwrap_or(Sway::begin(fraction, at)).go_on(fraction, sources, made, at);
