@@ -204,7 +204,7 @@ impl Command {
         self.row().1
     }
 
-    /// True if it is dropped once [`super::FRESH`] is over: it begins a motion, or frees the way to one, in a hall that may be
+    /// True if it is dropped once it is two seconds old: it begins a motion, or frees the way to one, in a hall that may be
     /// another by then.
     #[must_use]
     pub(crate) const fn goes_stale(&self) -> bool {

@@ -387,7 +387,8 @@ fn half_open_connections_of_the_players_own_machine_keep_the_player_out_at_no_ti
     let mut held = Vec::new();
     for n in 0..300_u16 {
         held.push(half(
-            [&b""[..], b"PUT /api/v1/sync/posi", b"PUT /api/v1/sync/position HTTP/1.1\r\nhost:"][usize::from(n % 3)],
+            [&b""[..], b"PUT /api/v1/sync/posi", b"PUT /api/v1/sync/position HTTP/1.1\r\nhost:"]
+                [usize::from(n % 3)],
         ));
         if n % 50 == 49 {
             let answer = put(60_000.0 + f64::from(n));
