@@ -184,6 +184,12 @@ impl Member {
         }
     }
 
+    /// True if a sighting is of another controller, or of one that restarted or that somebody else leads: wherever its seat stands.
+    pub(super) fn is_refuted_by(&self, sighting: &Sighting, at: MonoTime) -> bool {
+        let why = self.against(sighting, self.counted.unwrap_or(self.traffic), at);
+        matches!(why, Some(Why::Other(_) | Why::Rebooted(_) | Why::OtherMaster(_)))
+    }
+
     /// It has restarted, or let go of its seat.
     pub(super) fn on_lost_zero(&mut self) {
         self.must_rehome.get_or_insert(Why::NotHome(self.controller));

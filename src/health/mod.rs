@@ -107,6 +107,12 @@ impl HealthTable {
         &self.groups
     }
 
+    /// True if a sighting is of another controller than that which was seen before, or of one that restarted.
+    #[must_use]
+    pub(crate) fn is_refuted_by(&self, controller: usize, sighting: &Sighting, at: MonoTime) -> bool {
+        self.members[controller].is_refuted_by(sighting, at)
+    }
+
     /// How a group stands.
     #[must_use]
     pub(crate) fn standing(&self, group: usize) -> HealthState {

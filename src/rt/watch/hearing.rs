@@ -124,8 +124,9 @@ impl Watch {
 
     fn on_seen(&mut self, controller: usize, seen: Seen, at: MonoTime) {
         let Seen { sighting, rests, sways, .. } = seen;
-        // A vibration ends with the next frame.
-        if rests || sways || !self.stands(controller).is_looked_at() {
+        // A vibration ends with the next frame. Two controllers of one address contradict each other, so that no place is ever known.
+        let is_another = || self.health.is_refuted_by(controller, &sighting, at);
+        if rests || sways || !self.stands(controller).is_looked_at() || is_another() {
             self.judge(HealthInput::Seen(controller, sighting, at));
             if let Some(standby) = &mut self.standby {
                 standby.on_seen(controller, seen);
