@@ -13,7 +13,7 @@ use std::thread;
 use programs::is_installed;
 
 /// What only the reader has: devices, films, captures, a packaged service; programs of others.
-const YOURS: [&str; 24] = [
+const YOURS: [&str; 25] = [
     "arm --fleet", // a hall of a fleet
     "offset=6",    // controllers of six axes
     "alsa:",
@@ -23,6 +23,7 @@ const YOURS: [&str; 24] = [
     "storm.mkv",
     "film.sock",
     "ride.bin",
+    "--from csv saved.csv",
     "before.mcap",
     "ride.part.mcap",
     "| jq",

@@ -27,7 +27,7 @@ use crate::timeline::Timeline;
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue fit cues/coaster.csv -o fitted.csv",
-    "kinocue fit cues/storm.mcap -o fitted.mcap --config examples/hall.toml --per-axis",
+    "kinocue fit cues/bench-ride.csv -o fitted.mcap --config examples/hall.toml --per-axis",
     "kinocue fit cues/bench-ride.csv -o smooth.csv --smooth",
     "kinocue fit cues/bench-ride.csv -o film.csv --config examples/hall.toml --chase",
     "kinocue fit examples/rows.csv -o ride.csv --from rows --units mm --smooth --json",
