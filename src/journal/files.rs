@@ -1,11 +1,11 @@
 //! The files of a journal: their names, in order of time, and which of them are kept.
 
-use std::io;
+use std::{fmt, io};
 
-use jiff::ToSpan as _;
 use jiff::civil::Date;
 
 use super::Limits;
+use super::age::too_old;
 use crate::sys::folder::Folder;
 
 /// What a file holds. Each kind has half of the room, so that no flood of asks washes shows out.
@@ -60,20 +60,49 @@ pub(super) fn all(folder: &Folder) -> io::Result<Vec<FileId>> {
     Ok(files)
 }
 
-/// Removes the files of `current`'s kind that are too old on its day, and the oldest while they take more than half of the
-/// room; never `current` or one of a later day.
-pub(super) fn clear_out(folder: &Folder, limits: &Limits, current: FileId) -> io::Result<()> {
-    let oldest = current.day.checked_sub(i64::from(limits.max_age_days).days()).unwrap_or(Date::MIN);
-    let files: Vec<_> = all(folder)?.into_iter().filter(|file| file.kind == current.kind).collect();
+/// Removes the oldest files of `current`'s kind while they take more than half of the room; never `current` or one of a later day.
+pub(super) fn clear_out(folder: &Folder, limits: &Limits, current: FileId) -> io::Result<Vec<RemovedFile>> {
+    let files = of_kind(folder, current.kind)?;
     let size = |file: &FileId| Ok::<_, io::Error>(folder.stamp(&file.name())?.map_or(0, |stamp| stamp.size));
     let mut total = files.iter().map(size).sum::<io::Result<u64>>()?;
     // The current one may still grow to its full size.
     let most = (limits.max_total / 2).saturating_sub(limits.max_size);
-    for file in files.iter().filter(|file| **file < current) {
-        if file.day < oldest || total > most {
-            total = total.saturating_sub(size(file)?);
+    let mut gone = Vec::new();
+    for file in files.into_iter().filter(|file| *file < current) {
+        if total > most {
+            total = total.saturating_sub(size(&file)?);
             folder.remove(&file.name())?;
+            gone.push(RemovedFile { file, why: "more than max_total_mib" });
         }
     }
-    Ok(())
+    Ok(gone)
+}
+
+/// Removes those that are too old on its day; to be called once on each day, and only while the clock is known to be right.
+pub(super) fn age_out(folder: &Folder, limits: &Limits, current: FileId) -> io::Result<Vec<RemovedFile>> {
+    let files = of_kind(folder, current.kind)?;
+    let old = too_old(files.iter().map(|file| file.day), current.day, limits.max_age_days);
+    let mut gone = Vec::new();
+    for file in files.into_iter().filter(|file| old.contains(&file.day)) {
+        folder.remove(&file.name())?;
+        gone.push(RemovedFile { file, why: "older than max_age_days" });
+    }
+    Ok(gone)
+}
+
+/// A file that is gone, and why.
+#[derive(Debug)]
+pub(super) struct RemovedFile {
+    file: FileId,
+    why: &'static str,
+}
+
+impl fmt::Display for RemovedFile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the journal's file {} was deleted: {}", self.file.name(), self.why)
+    }
+}
+
+fn of_kind(folder: &Folder, kind: FileKind) -> io::Result<Vec<FileId>> {
+    Ok(all(folder)?.into_iter().filter(|file| file.kind == kind).collect())
 }

@@ -3,7 +3,8 @@
 //!
 //! - **Files** are `kinocue-DATE-NNN.jsonl` for shows and `kinocue-asked-DATE-NNN.jsonl` for commands, one or more for
 //!   each day, the day being that of the records' own times. A new one begins with a day and where one would grow over its
-//!   limit; the oldest go by age and by the size of all of their kind, each of which has half of the room.
+//!   limit; the oldest go by age and by the size of all of their kind, each of which has half of the room. By age at most two days go on
+//!   one day, and only while the clock is synchronised.
 //! - **Commands** are bounded in length, and repeats are folded, so that nobody can flush out what others did.
 //! - **A line** is written by one write(2) with `O_APPEND`. Where a crash or a full disk has cut one, the next begins on a
 //!   line of its own, and whoever reads passes the cut one over with a note.
@@ -14,6 +15,7 @@
 //!
 //! One folder belongs to one hall.
 
+mod age;
 mod files;
 mod fold;
 mod read;
@@ -26,6 +28,7 @@ mod tests;
 mod tried;
 mod writer;
 
+pub(crate) use age::too_old;
 pub(crate) use fold::{FoldedAction, Folds};
 pub use record::{Action, FilmProof, Outcome, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
@@ -47,6 +50,7 @@ use jiff::civil::Date;
 
 use crate::config::Log;
 use crate::sys::lock::lock;
+use crate::sys::machine;
 use record::{Line, day_of};
 use writer::{QueuedLine, Writer};
 
@@ -98,9 +102,13 @@ impl Journal {
     /// what is wrong shows in [`Journal::trouble`].
     #[must_use]
     pub fn open(dir: &Path, limits: Limits, now: &Zoned) -> Self {
+        Self::open_by(dir, limits, now, machine::clock_is_synchronised)
+    }
+
+    fn open_by(dir: &Path, limits: Limits, now: &Zoned, is_synchronised: fn() -> bool) -> Self {
         let standing = Arc::new(Standing::default());
         let (to, entries) = mpsc::sync_channel::<QueuedLine>(WAITING);
-        let mut writer = Writer::new(dir, limits);
+        let mut writer = Writer::new(dir, limits, is_synchronised);
         let of_thread = Arc::clone(&standing);
         let write = move || entries.iter().for_each(|entry| of_thread.write(&mut writer, &entry));
         let thread = thread::Builder::new().name("journal".to_owned()).spawn(write);
@@ -181,6 +189,7 @@ impl Standing {
         } else {
             writer.append(entry)
         };
+        lock(&self.news).append(&mut writer.gone);
         match written {
             Ok(()) if troubled => {
                 *lock(&self.trouble) = None;

@@ -235,10 +235,42 @@ fn files_go_by_age() {
     let dir = tempfile::tempdir().unwrap();
     for today in ["2026-11-18", "2026-11-19", "2026-11-21"] {
         let limits = Limits { max_age_days: 2, ..LIMITS };
-        drop(Journal::open(dir.path(), limits, &zoned(&format!("{today}T08:00:00Z"))));
+        drop(Journal::open_by(dir.path(), limits, &zoned(&format!("{today}T08:00:00Z")), || true));
     }
     let names: Vec<_> = files(dir.path()).iter().map(|file| file.file_name().unwrap().to_owned()).collect();
     assert_eq!(names, ["kinocue-2026-11-19-000.jsonl", "kinocue-2026-11-21-000.jsonl"]);
+}
+
+#[test]
+fn nothing_goes_by_age_while_the_clock_may_be_wrong_or_has_leapt_and_what_goes_is_said_with_its_reason() {
+    let dir = tempfile::tempdir().unwrap();
+    let limits = Limits { max_age_days: 10, ..LIMITS };
+    let open = |of: Date, is_synchronised: fn() -> bool| {
+        let now = of.to_zoned(TimeZone::UTC).unwrap();
+        let mut journal = Journal::open_by(dir.path(), limits, &now, is_synchronised);
+        journal.note(&action(&format!("{of}T09:00:00.000+00:00"), "pause"));
+        let standing = Arc::clone(&journal.standing);
+        drop(journal);
+        std::mem::take(&mut *standing.news.lock().unwrap())
+    };
+    let of = |days: i32| day("2026-11-01").checked_add(jiff::Span::new().days(days)).unwrap();
+    let files_of_shows =
+        || files(dir.path()).iter().filter(|file| !file.to_string_lossy().contains("asked")).count();
+    (0..20).for_each(|days| assert_eq!(open(of(days), || false), [""; 0], "nobody holds the clock"));
+    assert_eq!(files_of_shows(), 20);
+    for ahead in ["2035-01-01", "2061-07-01"] {
+        assert_eq!(open(day(ahead), || true), [""; 0], "{ahead}: two years after the newest file");
+    }
+    assert_eq!(files_of_shows(), 22);
+    let words = |name: &str| format!("the journal's file {name} was deleted: older than max_age_days");
+    let mut gone = open(of(20), || true);
+    gone.sort();
+    let names = ["2026-11-01", "2026-11-02"];
+    let names = ["-", "-asked-"].map(|kind| names.map(|day| format!("kinocue{kind}{day}-000.jsonl")));
+    let mut expected: Vec<String> = names.iter().flatten().map(|name| words(name)).collect();
+    expected.sort();
+    assert_eq!(gone, expected, "of each kind no more on a day");
+    assert_eq!(open(of(20), || true), [""; 0], "though it is started again");
 }
 
 #[test]

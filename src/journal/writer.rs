@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use jiff::civil::Date;
 
 use super::Limits;
-use super::files::{self, FileId, FileKind};
+use super::files::{self, FileId, FileKind, RemovedFile};
 use crate::sys::folder::{Folder, Stamp};
 
 /// A line on its way to the disk.
@@ -35,6 +35,10 @@ pub(super) struct Writer {
     folder: Option<Folder>,
     /// For each kind.
     current: [Option<Current>; 2],
+    /// True while the clock is known to be right.
+    is_synchronised: fn() -> bool,
+    /// What was deleted, in words.
+    pub(super) gone: Vec<String>,
 }
 
 /// The file that lines are added to.
@@ -45,11 +49,20 @@ struct Current {
     size: u64,
     /// True if its last line has no end.
     torn: bool,
+    /// It is the first of its day, and what is too old on that day is still there: nothing goes by a clock that may be wrong.
+    is_age_due: bool,
 }
 
 impl Writer {
-    pub(super) fn new(dir: &Path, limits: Limits) -> Self {
-        Self { dir: dir.to_owned(), limits, folder: None, current: [None, None] }
+    pub(super) fn new(dir: &Path, limits: Limits, is_synchronised: fn() -> bool) -> Self {
+        Self {
+            dir: dir.to_owned(),
+            limits,
+            folder: None,
+            current: [None, None],
+            is_synchronised,
+            gone: Vec::new(),
+        }
     }
 
     /// Writes a line. After an error everything is opened anew the next time.
@@ -77,11 +90,18 @@ impl Writer {
             None => {
                 let current = Current::open(folder, entry, &self.limits)?;
                 // Old files that cannot be removed are no reason to write nothing.
-                let _ = files::clear_out(folder, &self.limits, current.id);
+                let gone = files::clear_out(folder, &self.limits, current.id).unwrap_or_default();
+                self.gone.extend(gone.iter().map(RemovedFile::to_string));
                 current
             }
         };
-        place.insert(current).append(entry)
+        let current = place.insert(current);
+        if current.is_age_due && (self.is_synchronised)() {
+            current.is_age_due = false;
+            let gone = files::age_out(folder, &self.limits, current.id).unwrap_or_default();
+            self.gone.extend(gone.iter().map(RemovedFile::to_string));
+        }
+        current.append(entry)
     }
 }
 
@@ -100,7 +120,8 @@ impl Current {
                     file.read_exact_at(&mut last, size - 1)?;
                 }
                 folder.sync()?;
-                return Ok(Self { id, file, size, torn: last != [b'\n'] });
+                let is_age_due = size == 0 && id.number == 0;
+                return Ok(Self { id, file, size, torn: last != [b'\n'], is_age_due });
             }
             id.number += 1;
         }

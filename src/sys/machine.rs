@@ -122,6 +122,12 @@ pub(crate) fn clock_sync() -> io::Result<ClockSync> {
     })
 }
 
+/// True if the kernel says that the wall clock is held to the true time; a kernel that does not say is taken for one that says no.
+#[must_use]
+pub(crate) fn clock_is_synchronised() -> bool {
+    clock_sync().is_ok_and(|sync| sync.synchronised)
+}
+
 /// The finest step of a sleep on the monotonic clock, ns: 1 with high-resolution timers, a kernel tick without.
 #[must_use]
 pub(crate) fn timer_resolution_ns() -> u64 {

@@ -107,9 +107,18 @@ impl ServiceLog {
         self.say(Priority::Warning, WarningCode::Note.word(), note);
     }
 
-    /// Says how the journal goes.
-    pub(super) fn say_journal(&self, news: Vec<String>) {
-        news.into_iter().for_each(|news| self.say(Priority::Warning, "journal", news));
+    /// Says how the keeping of files goes, all that is new in one line: of one cause no second line would be written at once.
+    pub(super) fn say_kept(&self, cause: &'static str, news: &[String]) {
+        /// Sentences of a line; more are counted.
+        const MOST: usize = 30;
+        if news.is_empty() {
+            return;
+        }
+        let mut text = news[..news.len().min(MOST)].join("; ");
+        if news.len() > MOST {
+            text += &format!("; and {} more", news.len() - MOST);
+        }
+        self.say(Priority::Warning, cause, text);
     }
 
     /// Says what became better in keeping what people set.
