@@ -44,6 +44,8 @@ pub(super) enum RecordPart {
     Flight,
     /// What an earlier program left.
     Earlier,
+    /// The room for more.
+    Room,
 }
 
 impl RecordPart {
@@ -54,6 +56,7 @@ impl RecordPart {
             Self::Incident => "incident",
             Self::Flight => "flight",
             Self::Earlier => "earlier",
+            Self::Room => "room",
         }
     }
 }
@@ -95,6 +98,8 @@ struct SharedFigures {
     /// The folder of recordings.
     dir: OnceLock<PathBuf>,
     status: Mutex<RecordStatus>,
+    /// For the log.
+    said: Mutex<Vec<String>>,
     marks: Mutex<AskBudget>,
     dumps: Mutex<AskBudget>,
 }
@@ -240,6 +245,16 @@ impl RecordLink {
     /// Changes how it stands.
     pub(super) fn tell(&self, change: impl FnOnce(&mut RecordStatus)) {
         change(&mut self.shared.status.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// Has a line for the log.
+    pub(super) fn say(&self, line: String) {
+        self.shared.said.lock().unwrap_or_else(PoisonError::into_inner).push(line);
+    }
+
+    /// Takes the lines that are to be logged.
+    pub(crate) fn take_said(&self) -> Vec<String> {
+        std::mem::take(&mut self.shared.said.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Counts an incident.

@@ -3,6 +3,7 @@
 
 mod beginning;
 mod disk;
+mod kept;
 mod leftovers;
 mod link;
 mod open;
@@ -93,7 +94,7 @@ impl HallRecorder {
         let flight_len = (octets_a_s * u64::from(config.record.flight_s)).clamp(LEAST_FLIGHT, MOST_FLIGHT);
         // Before the new one takes its place.
         let leftover = leftovers::flight(&flight);
-        let disk = Disk::new(&config.record, &places.recordings);
+        let disk = Disk::new(&config.record, &places.recordings).telling(link.clone());
         let worker = Worker::new(intake, asks, link.clone(), opening, maker, disk, config.record.clone());
         let safe = safe_configuration(&text);
         let told = link.clone();

@@ -428,7 +428,8 @@ impl Worker {
         if let Ok(free) = self.disk.free() {
             self.link.tell(|status| status.free_bytes = free);
             if let Ok(room) = self.disk.room(free) {
-                self.link.has_room(room.max(1));
+                self.link.has_room(room);
+                self.link.trouble(RecordPart::Room, (room == 0).then(|| self.disk.unreached()));
             }
         }
         let file = self.show.as_ref().and_then(|show| show.file.as_ref());

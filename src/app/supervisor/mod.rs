@@ -349,6 +349,7 @@ impl Supervisor {
         let log = &self.ports.service_log;
         self.features.records.settle_folds(now).iter().for_each(|action| log.say_ask(action));
         log.say_kept("journal", &self.features.records.news());
+        log.say_kept("recordings", &self.hall.recorder.take_said());
         self.asks_told.settle(&self.hall);
         log.say_settings(self.ports.settings_file.news());
         self.keep_settings();
