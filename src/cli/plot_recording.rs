@@ -11,7 +11,7 @@ use anyhow::{Context as _, anyhow};
 use super::record::{open, seat_in, unread};
 use super::{Exit, Failure, OrExit as _};
 use crate::plot::{self, FilmAxis, Gathered, Look, Picture};
-use crate::record::{Contents, Summary, Wanted, beginning, read_ahead, summarize};
+use crate::record::{Contents, ReadError, Summary, Wanted, WantedFull, beginning, read_ahead, summarize};
 use crate::sys::file;
 use crate::time::ShowTime;
 
@@ -67,7 +67,7 @@ pub(super) fn meant(path: &Path) -> Result<Option<PathBuf>, Failure> {
     if path == Path::new("last") && !path.exists() {
         return newest(Path::new(".")).map(Some);
     }
-    let is_one = path.is_file() && beginning(open(path)?).is_ok();
+    let is_one = path.is_file() && matches!(beginning(open(path)?), Ok(_) | Err(ReadError::Order(_)));
     Ok(is_one.then(|| path.to_owned()))
 }
 
@@ -114,7 +114,7 @@ fn gathered(file: &OpenRecording<'_>, look: Look, contents: &Contents) -> Result
     let seat = contents.seats[look.lane].name.as_str();
     let is_whole = contents.messages.contains_key("/full/sent");
     let mut gathered = Gathered::new(contents, look, is_whole);
-    let wanted = Wanted { seat: Some(seat), ..Wanted::ALL };
+    let wanted = Wanted { seat: Some(seat), full: WantedFull::Ticks, ..Wanted::ALL };
     read_ahead(file.input(), wanted, &mut |contents, at, told| gathered.take(contents, at, told))
         .map_err(|error| unread(error, file.path))?;
     Ok(gathered)

@@ -9,7 +9,7 @@ use std::thread::{self, Scope};
 
 use mcap::records::op;
 
-use super::saved::{WithinChunk, each_in_chunk, whole_chunks};
+use super::chunks::{WithinChunk, each_in_chunk, whole_chunks};
 use super::{Trouble, checked};
 
 /// Threads at the most: one that walks through a file has no more to do for several.

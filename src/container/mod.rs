@@ -5,7 +5,10 @@
 //! reserves as much memory as a length in the file claims.
 
 mod ahead;
-mod saved;
+mod chunks;
+mod index;
+mod losses;
+mod salvage;
 mod walk;
 mod zstd;
 
@@ -18,7 +21,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 
 use crate::plain::escaped;
 pub(crate) use ahead::{SplitReader, each_sound_ahead};
-pub(crate) use saved::{LostChunk, each_outside, each_saved};
+pub(crate) use salvage::{LostStretch, Salvaged, each_saved};
 use walk::Walk;
 use zstd::Zstd;
 
@@ -213,6 +216,16 @@ impl<'a> AttachmentRecord<'a> {
         let length = body.u64()?;
         let (data, _) = body.0.split_at_checked(usize::try_from(length).ok()?)?;
         Some(Self { log_time, name, media_type, data })
+    }
+}
+
+impl AttachmentRecord<'_> {
+    /// True where the record ends with it, and its sum, if it has one, is right.
+    fn is_sound(&self, body: &[u8]) -> bool {
+        let Some((summed, sum)) = body.split_last_chunk() else { return false };
+        let sum = u32::from_le_bytes(*sum);
+        let ends = 8 + 8 + 4 + self.name.len() + 4 + self.media_type.len() + 8 + self.data.len();
+        ends == summed.len() && (sum == 0 || crc32fast::hash(summed) == sum)
     }
 }
 

@@ -62,34 +62,94 @@ pub(super) struct Lane {
     pub(super) raw: Vec<u8>,
 }
 
-/// The chunks of a block, one behind the other; `None` where it is none.
-pub(crate) fn unpack(block: &[u8], seats: &[RecordedSeat]) -> Option<Vec<u8>> {
+/// The chunks of a block, one behind the other, with the frames of one lane or of all; `None` where it is none.
+pub(crate) fn unpack(block: &[u8], seats: &[RecordedSeat], only: Option<usize>) -> Option<Vec<u8>> {
     let sent = Sent::decode(block).ok()?;
-    let ticks = usize::try_from(sent.ticks).ok().filter(|ticks| *ticks <= MOST)?;
-    let is_sorted = sent.lanes.is_sorted_by(|one, other| one.lane < other.lane);
-    let readers = sent.lanes.iter().filter(|_| is_sorted).map(|lane| LaneReader::new(lane, seats));
-    let mut lanes = readers.collect::<Option<Vec<_>>>()?;
+    let mut lanes = lanes(&sent, seats, only)?;
     let mut columns = ColumnReaders::new(&sent.tick_columns);
     let mut chunks = Vec::new();
-    for tick in 0..ticks {
-        let [index, deadline, late, missed, film, state, dropped] = columns.next::<OF_TICK>();
-        let head = TickHead {
-            index: index.cast_unsigned(),
-            deadline: MonoTime::from_nanos(deadline.cast_unsigned()),
-            late_ns: late.cast_unsigned().saturating_mul(1_000),
-            missed: missed.cast_unsigned(),
-            film: ShowTime::from_nanos(film),
-            state: *State::ALL.get(usize::try_from(state).ok()?)?,
-        };
+    for tick in 0..ticks(&sent)? {
+        let (head, dropped) = next_head(&mut columns)?;
         let frames: Vec<OwnedFrame> =
             lanes.iter_mut().flat_map(|lane| std::iter::from_fn(|| lane.next(tick, &head))).collect();
         let room = frames.iter().map(|frame| longest_frame(MAX_AXES, frame.datagram.len())).sum();
         let mut writer = ChunkWriter::with_room(room);
         frames.iter().for_each(|frame| writer.frame(&frame.as_sent()));
-        chunks.extend_from_slice(writer.close(&head, u32::try_from(dropped).ok()?)?);
+        chunks.extend_from_slice(writer.close(&head, dropped)?);
     }
-    // What no tick took was of none.
-    lanes.iter().all(|lane| lane.left == 0 && !lane.is_damaged).then_some(chunks)
+    all_taken(&lanes).then_some(chunks)
+}
+
+/// Ticks of a block, and where each seat was sent: all that a measure needs, without a frame made.
+#[derive(Debug)]
+pub(crate) struct BlockMotions {
+    /// Each tick, how many were dropped before it, and where its motions end.
+    pub(super) ticks: Vec<(TickHead, u32, usize)>,
+    /// In the order of the ticks.
+    pub(super) motions: Vec<SeatMotion>,
+}
+
+/// A motion of a seat.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SeatMotion {
+    pub(super) lane: usize,
+    pub(super) handed: Handed,
+    /// True where a tick asked for it.
+    pub(super) is_asked: bool,
+    /// Where to, and its Time; none where its octets are no frame.
+    pub(super) to: Option<(PerAxis<f64>, Timing, u32)>,
+}
+
+impl BlockMotions {
+    /// The ticks.
+    pub(crate) fn heads(&self) -> impl Iterator<Item = &TickHead> {
+        self.ticks.iter().map(|(head, ..)| head)
+    }
+}
+
+/// The motions of a block; `None` where it is none.
+pub(super) fn motions(block: &[u8], seats: &[RecordedSeat]) -> Option<BlockMotions> {
+    let sent = Sent::decode(block).ok()?;
+    let mut lanes = lanes(&sent, seats, None)?;
+    let mut columns = ColumnReaders::new(&sent.tick_columns);
+    let mut block = BlockMotions { ticks: Vec::new(), motions: Vec::new() };
+    for tick in 0..ticks(&sent)? {
+        let (head, dropped) = next_head(&mut columns)?;
+        for lane in &mut lanes {
+            block.motions.extend(std::iter::from_fn(|| lane.next_motion(tick)));
+        }
+        block.ticks.push((head, dropped, block.motions.len()));
+    }
+    all_taken(&lanes).then_some(block)
+}
+
+fn ticks(sent: &Sent) -> Option<usize> {
+    usize::try_from(sent.ticks).ok().filter(|ticks| *ticks <= MOST)
+}
+
+fn lanes<'a>(sent: &'a Sent, seats: &'a [RecordedSeat], only: Option<usize>) -> Option<Vec<LaneReader<'a>>> {
+    let is_sorted = sent.lanes.is_sorted_by(|one, other| one.lane < other.lane);
+    let is_wanted = |lane: &&Lane| is_sorted && only.is_none_or(|only| only == lane.lane as usize);
+    sent.lanes.iter().filter(is_wanted).map(|lane| LaneReader::new(lane, seats)).collect()
+}
+
+/// The next tick, and how many were dropped before it.
+fn next_head(columns: &mut ColumnReaders<'_>) -> Option<(TickHead, u32)> {
+    let [index, deadline, late, missed, film, state, dropped] = columns.next::<OF_TICK>();
+    let head = TickHead {
+        index: index.cast_unsigned(),
+        deadline: MonoTime::from_nanos(deadline.cast_unsigned()),
+        late_ns: late.cast_unsigned().saturating_mul(1_000),
+        missed: missed.cast_unsigned(),
+        film: ShowTime::from_nanos(film),
+        state: *State::ALL.get(usize::try_from(state).ok()?)?,
+    };
+    Some((head, u32::try_from(dropped).ok()?))
+}
+
+/// What no tick took was of none.
+fn all_taken(lanes: &[LaneReader<'_>]) -> bool {
+    lanes.iter().all(|lane| lane.left == 0 && !lane.is_damaged)
 }
 
 /// A frame out of a block.
@@ -140,13 +200,54 @@ impl<'a> LaneReader<'a> {
         })
     }
 
-    /// The next frame, if it is of that tick.
-    fn next(&mut self, tick: usize, head: &TickHead) -> Option<OwnedFrame> {
+    /// The fields of the next frame, if it is of that tick.
+    fn next_fields(&mut self, tick: usize) -> Option<[i64; OF_FRAME]> {
         if self.next.is_none() && self.left > 0 {
             self.next = Some(self.fields.next());
         }
         let fields = self.next.take_if(|fields| usize::try_from(fields[0]).is_ok_and(|of| of <= tick))?;
         self.left -= 1;
+        Some(fields)
+    }
+
+    /// The next motion, if it is of that tick.
+    fn next_motion(&mut self, tick: usize) -> Option<SeatMotion> {
+        let fields = self.next_fields(tick)?;
+        let motion = self.motion(&fields);
+        self.is_damaged |= motion.is_none();
+        motion
+    }
+
+    fn motion(&mut self, fields: &[i64; OF_FRAME]) -> Option<SeatMotion> {
+        let positions: [i64; MAX_AXES] = self.positions.next();
+        let [_, _, handed, slots, _, _, raw, _, absolute, .., time_ms, _, _, axes, _] = *fields;
+        let to = if raw == 0 {
+            matches!(self.seat.frames, FrameKind::Datagram(_)).then_some(())?;
+            let axes = usize::try_from(axes).ok().filter(|axes| *axes <= MAX_AXES)?;
+            let mut pulses = [Pulses(0); MAX_AXES];
+            for (to, at) in pulses.iter_mut().zip(&positions[..axes]) {
+                *to = Pulses(i32::try_from(*at).ok()?);
+            }
+            let timing = if absolute == 0 { Timing::Relative } else { Timing::Absolute };
+            Some((self.seat.measured(&pulses[..axes]), timing, u32::try_from(time_ms).ok()?))
+        } else {
+            let datagram = self.raw(raw)?;
+            self.seat.motion_of(datagram).map(|motion| (motion.places, motion.timing, motion.time_ms))
+        };
+        let handed = *Handed::ALL.get(usize::try_from(handed).ok()?)?;
+        Some(SeatMotion { lane: self.lane, handed, is_asked: slots != 0, to })
+    }
+
+    /// The octets of a frame that its fields do not make; they are 1 and as many as that.
+    fn raw(&mut self, count: i64) -> Option<&'a [u8]> {
+        let (octets, rest) = self.raw.split_at_checked(usize::try_from(count.wrapping_sub(1)).ok()?)?;
+        self.raw = rest;
+        Some(octets)
+    }
+
+    /// The next frame, if it is of that tick.
+    fn next(&mut self, tick: usize, head: &TickHead) -> Option<OwnedFrame> {
+        let fields = self.next_fields(tick)?;
         let frame = self.frame(&fields, head);
         self.is_damaged |= frame.is_none();
         frame
@@ -186,10 +287,7 @@ impl<'a> LaneReader<'a> {
         let positions: [i64; MAX_AXES] = self.positions.next();
         let vibration: [i64; 2 * MAX_AXES] = self.vibration.next();
         if fields[6] != 0 {
-            let (octets, rest) =
-                self.raw.split_at_checked(usize::try_from(fields[6].wrapping_sub(1)).ok()?)?;
-            self.raw = rest;
-            return Some(octets.to_vec());
+            return self.raw(fields[6]).map(<[u8]>::to_vec);
         }
         let FrameKind::Datagram(port) = self.seat.frames else { return None };
         let [frame, absolute, channel, accept, reply, time_ms, outputs, extend, axes, shakes] =

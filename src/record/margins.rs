@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::chunk::{Chunk, Handed};
-use super::seat::{FrameMotion, ReadFrame, RecordedAxis};
+use super::chunk::{Chunk, Handed, SentFrame};
+use super::full::{BlockMotions, SeatMotion};
+use super::seat::{ReadFrame, RecordedAxis};
 use super::{RecordedSeat, TickHead};
 use crate::motion::{MAX_AXES, MeasurePlaces, MeasureTimes, PoseReadings, Reading, Readings, Spacing};
 use crate::plain::escaped;
@@ -118,9 +119,26 @@ impl Margins {
         }
     }
 
+    /// Takes what a tick has of one seat alone.
+    pub(crate) fn take_lane(
+        &mut self,
+        chunk: &Chunk<'_>,
+        (lane, seat): (usize, &RecordedSeat),
+        tell: &mut impl FnMut(usize, usize, Parts),
+    ) {
+        self.begin(chunk);
+        for frame in chunk.frames().filter(|frame| frame.lane == lane) {
+            self.frame(&chunk.head, &seat.read(frame), seat, tell);
+        }
+    }
+
     /// A tick begins. A seat is measured anew behind ticks that are not there, and behind a frame that no tick asked for.
     pub(super) fn begin(&mut self, chunk: &Chunk<'_>) {
-        if chunk.dropped > 0 {
+        self.forget_after(chunk.dropped);
+    }
+
+    fn forget_after(&mut self, dropped: u32) {
+        if dropped > 0 {
             self.lanes.iter_mut().for_each(|lane| lane.last = None);
         }
     }
@@ -133,19 +151,44 @@ impl Margins {
         seat: &RecordedSeat,
         tell: &mut impl FnMut(usize, usize, Parts),
     ) {
-        let frame = &read.frame;
-        let Some(lane) = self.lanes.get_mut(frame.lane) else { return };
-        if frame.handed == Handed::Refused {
+        let to = read.motion.as_ref().map(|motion| (motion.places, motion.timing, motion.time_ms));
+        let SentFrame { lane, handed, asked, .. } = read.frame;
+        self.motion(head, &SeatMotion { lane, handed, is_asked: asked.slots != 0, to }, seat, tell);
+    }
+
+    /// Takes the ticks of a block.
+    pub(super) fn take_motions(&mut self, block: &BlockMotions, seats: &[RecordedSeat]) {
+        let mut from = 0;
+        for (head, dropped, until) in &block.ticks {
+            self.forget_after(*dropped);
+            for motion in &block.motions[from..*until] {
+                if let Some(seat) = seats.get(motion.lane) {
+                    self.motion(head, motion, seat, &mut |_, _, _| ());
+                }
+            }
+            from = *until;
+        }
+    }
+
+    fn motion(
+        &mut self,
+        head: &TickHead,
+        motion: &SeatMotion,
+        seat: &RecordedSeat,
+        tell: &mut impl FnMut(usize, usize, Parts),
+    ) {
+        let Some(lane) = self.lanes.get_mut(motion.lane) else { return };
+        if motion.handed == Handed::Refused {
             return;
         }
-        if frame.asked.slots == 0 {
+        if !motion.is_asked {
             lane.last = None;
             return;
         }
         let is_next =
             |last: MonoTime| head.deadline > last && head.deadline.since(last).as_nanos() < APART_NS.into();
         let goes_on = lane.last.replace(head.deadline).is_some_and(is_next);
-        let Some(FrameMotion { places, timing, time_ms, .. }) = &read.motion else { return };
+        let Some((places, timing, time_ms)) = &motion.to else { return };
         let before = std::mem::replace(&mut lane.time_ms, *time_ms);
         let lasts = if *timing == Timing::Relative { *time_ms } else { time_ms.saturating_sub(before) };
         lane.reached += Duration::from_millis(u64::from(lasts.max(1)));
@@ -157,7 +200,7 @@ impl Margins {
         let shown = lane.places.push(&lane.times, places);
         lane.keep(&shown, now, head.film);
         for (index, axis) in seat.axes().iter().enumerate().take(places.len()) {
-            tell(frame.lane, index, parts(&shown.of(index), now, head.film, axis.limits()));
+            tell(motion.lane, index, parts(&shown.of(index), now, head.film, axis.limits()));
         }
     }
 
@@ -232,7 +275,7 @@ mod tests {
 
     use super::*;
     use crate::motion::{Pulses, SeatType, Slot, Window};
-    use crate::record::chunk::{ChunkWriter, SentFrame};
+    use crate::record::chunk::ChunkWriter;
     use crate::record::{Asked, FrameKind};
     use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, VibrationPort};
 

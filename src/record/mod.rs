@@ -34,6 +34,8 @@ mod reading_tests;
 mod recorder;
 mod recording;
 mod recover;
+#[cfg(test)]
+mod recover_tests;
 mod report;
 mod sample_text;
 mod sampled;
@@ -65,7 +67,7 @@ pub(crate) use margins::{Margin, Margins, Quantity};
 pub(crate) use notes::{
     ActionNote, EventNote, HallNote, LogNote, MarkNote, Note, TimecodeNote, note_in_words,
 };
-pub(crate) use read::{Contents, ReadError, Told, Wanted, WantedSamples, beginning};
+pub(crate) use read::{Contents, ReadError, Told, Wanted, WantedFull, WantedSamples, beginning};
 pub(crate) use reading::{read, read_ahead};
 pub(crate) use recorder::Recorder;
 pub(crate) use recording::{ACKS, About, EntryMaker, Mode, Opening, Recording, SAMPLE_HZ};

@@ -2,10 +2,11 @@
 //! damaged is read, and why there is no more is said. Control thread; takes any bytes without a panic.
 
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::io::{Read, Seek};
 
 use mcap::records::op;
 
+use super::full::BlockMotions;
 use super::judging::Judging;
 use super::margins::Margin;
 use super::recording::VERSION;
@@ -32,6 +33,9 @@ pub(crate) enum ReadError {
     /// It is MCAP, and no recording.
     #[error("is not a recording of kinocue: it has no metadata record \"kinocue\" of kind \"recording\"")]
     Foreign,
+    /// Its messages are not in the order of their times, by which a reader knows where the film is; or no longer, and why not.
+    #[error("{what}, {0}", what = Self::UNSORTED)]
+    Order(&'static str),
     /// It says something of itself that cannot be.
     #[error("its metadata record \"kinocue\": {field}: {why}")]
     Metadata {
@@ -40,6 +44,20 @@ pub(crate) enum ReadError {
         /// What is wrong with it.
         why: String,
     },
+}
+
+impl ReadError {
+    /// What is said of such a file.
+    pub(super) const UNSORTED: &str = "has its records in another order than that of time";
+}
+
+/// What to do about a file that is in another order.
+pub(super) const REMEDY: &str = "which kinocue record recover puts right";
+
+/// True of a message that is so much older than the newest before it that more than its writer's haste is to blame.
+pub(super) const fn is_late(log_time: u64, newest: u64) -> bool {
+    const LATE_NS: u64 = 1_000_000_000;
+    log_time.saturating_add(LATE_NS) < newest
 }
 
 impl From<Trouble> for ReadError {
@@ -61,6 +79,8 @@ pub(crate) enum Told<'a> {
     State(u64),
     /// Whole ticks: chunks, one behind the other.
     Chunks(Vec<u8>),
+    /// The same, only where each seat was sent.
+    Motions(BlockMotions),
     /// Drains of the ack thread: chunks, one behind the other.
     Drains(Vec<u8>),
     /// Anything else, as it stands there: topic and octets.
@@ -112,6 +132,12 @@ impl Contents {
     /// The rate of its ticks, Hz.
     pub(crate) fn rate_hz(&self) -> f64 {
         self.entry("rate_hz").parse().unwrap_or(100.0)
+    }
+
+    /// How long a sample is at the most, s: a tick may come late.
+    pub(crate) fn sample_s(&self) -> f64 {
+        let hz = self.entry("sample_hz").parse().ok().filter(|hz| (1.0..=1000.0).contains(hz));
+        1.5 / hz.unwrap_or(20.0)
     }
 
     /// When that happened of which it is an incident; `None` where it is of something else.
@@ -191,13 +217,26 @@ pub(crate) struct Wanted<'a> {
     pub(crate) seat: Option<&'a str>,
     /// Samples of seats.
     pub(crate) samples: WantedSamples,
-    /// Whole ticks.
-    pub(crate) full: bool,
+    /// Whole ticks, and what the ack thread took.
+    pub(crate) full: WantedFull,
 }
 
 impl Wanted<'_> {
     /// All there is.
-    pub(crate) const ALL: Self = Self { seat: None, samples: WantedSamples::Whole, full: true };
+    pub(crate) const ALL: Self = Self { seat: None, samples: WantedSamples::Whole, full: WantedFull::All };
+}
+
+/// What of whole ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum WantedFull {
+    /// Nothing.
+    None,
+    /// Where each seat was sent.
+    Motions,
+    /// Frames of the wanted seat, or of all.
+    Ticks,
+    /// The same, and what the ack thread took.
+    All,
 }
 
 /// What of samples of seats.
@@ -214,14 +253,15 @@ pub(crate) enum WantedSamples {
 /// The entries of a recording's first metadata record, which stands at its front.
 ///
 /// # Errors
-/// Where it is no recording.
-pub(crate) fn beginning(input: impl Read) -> Result<BTreeMap<String, String>, ReadError> {
+/// Where it is no recording, or one in another order.
+pub(crate) fn beginning(mut input: impl Read + Seek) -> Result<BTreeMap<String, String>, ReadError> {
     /// Records before it at the most.
     const BEFORE: u32 = 100;
-    let (mut contents, mut records) = (Contents::default(), 0);
-    let read = container::each_sound(input, MOST, |opcode, body| {
+    let (mut contents, mut records, mut is_named) = (Contents::default(), 0, false);
+    let read = container::each_sound(&mut input, MOST, |opcode, body| {
         records += 1;
         if let (op::METADATA, Some(("kinocue", entries))) = (opcode, container::metadata(body)) {
+            is_named = true;
             contents.begun(entries)?;
         }
         // That is no fault: there is no need to read on.
@@ -229,7 +269,24 @@ pub(crate) fn beginning(input: impl Read) -> Result<BTreeMap<String, String>, Re
     });
     match read {
         _ if !contents.begin.is_empty() => Ok(contents.begin),
+        Err((_, ReadError::Foreign)) if !is_named && begins_later(input) => Err(ReadError::Order(REMEDY)),
         Err((_, error)) => Err(error),
         Ok(()) => Err(ReadError::Foreign),
     }
+}
+
+/// True of a file that says behind its first records that it is a recording.
+fn begins_later(input: impl Read + Seek) -> bool {
+    let mut is_one = false;
+    let read: Result<_, ReadError> = container::each_saved(input, MOST, |opcode, body| {
+        is_one |= opcode == op::METADATA && is_beginning(body);
+        Ok(())
+    });
+    read.is_ok() && is_one
+}
+
+/// True of the metadata record that a recording begins with.
+pub(super) fn is_beginning(body: &[u8]) -> bool {
+    let of_it = container::metadata(body);
+    of_it.is_some_and(|(name, entries)| name == "kinocue" && entries.get("kind") == Some(&"recording"))
 }

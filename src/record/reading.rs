@@ -10,7 +10,9 @@ use serde_json::Value;
 
 use super::ack_columns;
 use super::full;
-use super::read::{Contents, MOST, ReadError, Told, Wanted, WantedSamples, owned};
+use super::read::{
+    Contents, MOST, REMEDY, ReadError, Told, Wanted, WantedFull, WantedSamples, is_late, owned,
+};
 use super::recording::{ACKS, END, RECOVERED, REPORT, SENT};
 use super::sample_text::seat_sample;
 use super::seat::RecordedSeat;
@@ -71,7 +73,7 @@ struct KnownChannels {
     /// The seat whose samples are wanted; `None` for all.
     seat: Option<String>,
     samples: WantedSamples,
-    full: bool,
+    full: WantedFull,
 }
 
 /// What a message says.
@@ -99,7 +101,8 @@ impl KnownChannels {
         match topic {
             "/tick" => RecordedTopic::Tick,
             "/hall" => RecordedTopic::Hall,
-            SENT | ACKS if !self.full => RecordedTopic::Passed,
+            SENT if self.full == WantedFull::None => RecordedTopic::Passed,
+            ACKS if self.full != WantedFull::All => RecordedTopic::Passed,
             SENT => RecordedTopic::Sent,
             ACKS => RecordedTopic::Acks,
             other => {
@@ -114,6 +117,12 @@ impl KnownChannels {
                 }
             }
         }
+    }
+
+    /// The place of the seat that is wanted; `None` for all.
+    fn lane(&self) -> Option<usize> {
+        let wanted = self.seat.as_deref()?;
+        self.seats.iter().position(|seat| seat.name == wanted)
     }
 
     /// The topic of a channel, and what it is.
@@ -139,8 +148,12 @@ impl KnownChannels {
                 hall["state"].as_u64().map(Told::State).ok_or_else(|| "no state".to_owned())
             }),
             RecordedTopic::Sent => {
-                let chunks = full::unpack(data, &self.seats);
-                chunks.map(Told::Chunks).ok_or_else(|| "not a block of ticks".to_owned())
+                let told = if self.full == WantedFull::Motions {
+                    full::motions(data, &self.seats).map(Told::Motions)
+                } else {
+                    full::unpack(data, &self.seats, self.lane()).map(Told::Chunks)
+                };
+                told.ok_or_else(|| "not a block of ticks".to_owned())
             }
             RecordedTopic::Acks => {
                 ack_columns::unpacked(data).map(Told::Drains).ok_or_else(|| "no drains".to_owned())
@@ -217,7 +230,7 @@ impl<'a> Reading<'a> {
             }
             op::MESSAGE => {
                 if let Some(ReadPart::Message(channel, log_time, message)) = self.known.message(body) {
-                    self.message(channel, log_time, message);
+                    self.message(channel, log_time, message)?;
                 }
             }
             op::ATTACHMENT => {
@@ -233,7 +246,11 @@ impl<'a> Reading<'a> {
         Ok(())
     }
 
-    fn message(&mut self, channel: u16, log_time: u64, message: ReadMessage) {
+    fn message(&mut self, channel: u16, log_time: u64, message: ReadMessage) -> Result<(), ReadError> {
+        let newest = self.contents.span.map_or(0, |(_, newest)| newest);
+        if self.contents.begin.is_empty() || is_late(log_time, newest) {
+            return Err(ReadError::Order(REMEDY));
+        }
         let place = usize::from(channel);
         if self.counts.len() <= place {
             self.counts.resize(place + 1, 0);
@@ -242,7 +259,7 @@ impl<'a> Reading<'a> {
         let Self { contents, known, counts, take } = self;
         let (first, last) = contents.span.unwrap_or((log_time, log_time));
         contents.span = Some((first.min(log_time), last.max(log_time)));
-        let Some((name, _)) = known.channel(channel) else { return };
+        let Some((name, _)) = known.channel(channel) else { return Ok(()) };
         match message {
             ReadMessage::Passed => {}
             ReadMessage::Other(data) => take(contents, contents.instant(log_time), Told::Other(name, &data)),
@@ -253,6 +270,7 @@ impl<'a> Reading<'a> {
                 contents.fault(|| fault);
             }
         }
+        Ok(())
     }
 
     /// Adds the messages of a channel to those of its topic.
@@ -285,8 +303,7 @@ impl SplitReader for Reading<'_> {
     fn take(&mut self, part: ReadPart) -> Result<(), ReadError> {
         match part {
             ReadPart::Message(channel, log_time, message) => self.message(channel, log_time, message),
-            ReadPart::Record(opcode, body) => self.record(opcode, &body)?,
+            ReadPart::Record(opcode, body) => self.record(opcode, &body),
         }
-        Ok(())
     }
 }

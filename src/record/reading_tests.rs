@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::block::Block;
 use super::chunk::{ChunkWriter, Handed, SentFrame};
-use super::full::unpack;
+use super::full::{motions, unpack};
 use super::tests::{MS, about, asked, frame, head, recorded_as, seat, window};
 use super::*;
 use crate::motion::Pulses;
@@ -103,7 +103,7 @@ fn a_file_that_is_no_recording_is_refused() {
     assert!(matches!(read(&b""[..], Wanted::ALL, &mut |_, _, _| ()), Err(ReadError::File(_))));
     let cue = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/cues/storm.mcap")).unwrap();
     assert!(matches!(read(cue.as_slice(), Wanted::ALL, &mut |_, _, _| ()), Err(ReadError::Foreign)));
-    assert!(matches!(beginning(cue.as_slice()), Err(ReadError::Foreign)));
+    assert!(matches!(beginning(Cursor::new(&cue)), Err(ReadError::Foreign)));
 }
 
 #[test]
@@ -223,8 +223,13 @@ proptest! {
         let mut packed = Vec::new();
         each_chunk(&octets, |chunk| packed.extend(block.add(chunk, &seats)));
         packed.extend(block.close());
-        let back: Vec<u8> = packed.iter().flat_map(|(_, block)| unpack(block, &seats).expect("it is ours")).collect();
+        let back: Vec<u8> = packed.iter().flat_map(|(_, block)| unpack(block, &seats, None).expect("it is ours")).collect();
         prop_assert_eq!(told(&back), told(&octets));
+        // What is measured of its motions is what is measured of its frames.
+        let [mut of_frames, mut of_motions] = [(); 2].map(|()| Margins::new(&seats, crate::time::Rate::from_hz(100.0)));
+        each_chunk(&back, |chunk| of_frames.take(chunk, &seats, &mut |_, _, _| ()));
+        packed.iter().for_each(|(_, block)| of_motions.take_motions(&motions(block, &seats).expect("it is ours"), &seats));
+        prop_assert_eq!(of_frames.most(&seats), of_motions.most(&seats));
         let mut places = (Vec::new(), Vec::new());
         let places_of = |chunk: &Chunk<'_>, to: &mut Vec<f64>| chunk.frames().for_each(|one| to.extend_from_slice(&seats[one.lane].asked(&one.asked)));
         each_chunk(&octets, |chunk| places_of(chunk, &mut places.0));
@@ -235,7 +240,7 @@ proptest! {
 
     #[test]
     fn no_octets_are_a_block_that_panics(octets in prop::collection::vec(any::<u8>(), 0..300)) {
-        let _ = unpack(&octets, &[seat()]);
+        let _ = unpack(&octets, &[seat()], None);
     }
 
     #[test]
@@ -251,7 +256,7 @@ proptest! {
         let (_, mut packed) = block.close().unwrap();
         let at = at.index(packed.len());
         packed[at] = octet;
-        let _ = unpack(&packed, &[seat()]);
+        let _ = unpack(&packed, &[seat()], None);
     }
 
     #[test]
@@ -272,7 +277,7 @@ proptest! {
         // Of a chunk that goes on behind the end of the file one tells nothing, the other what was there.
         prop_assert!(one.starts_with(&ahead));
         let _ = summarize(file.as_slice());
-        let _ = beginning(file.as_slice());
+        let _ = beginning(Cursor::new(&file));
         let _ = recover(Cursor::new(file.as_slice()), Cursor::new(Vec::new()));
     }
 }
@@ -298,15 +303,17 @@ fn of_a_file_with_one_chunk_damaged_all_others_are_saved_and_what_is_lost_is_sai
         let mut changed = file.clone();
         changed[place.start + place.len() / 2] ^= 4;
         let (recovered, out) = recover(Cursor::new(&changed), Cursor::new(Vec::new())).unwrap();
-        assert!(recovered.trouble.is_none() && recovered.lost.len() == 1, "{recovered:?}");
-        assert_eq!(recovered.lost[0].span, span);
+        let lost = &recovered.salvaged.lost;
+        assert!(recovered.salvaged.trouble.is_none() && lost.len() == 1, "{recovered:?}");
+        assert_eq!(lost[0].span, (Some(span.0), Some(span.1)));
         let saved = out.into_inner();
         let after = read(saved.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
         let count: u64 = after.messages.values().sum();
         assert!(count < total && count * 4 > total * 3, "{count} of {total}, without {span:?}");
+        assert_eq!(recovered.lost_messages(), Some(total - count));
         assert_eq!((&after.messages, &after.end), (&recovered.messages, &whole.end), "and what is behind it");
         let flaws = after.flaws();
-        assert!(flaws[0].starts_with("recovered from a file that is damaged; lost are "), "{flaws:?}");
+        assert!(flaws[0].starts_with("recovered from a file that is damaged; lost "), "{flaws:?}");
     }
 }
 
@@ -339,7 +346,12 @@ fn a_file_whose_disk_was_full_in_the_middle_of_a_chunk_is_cut_short_and_not_dama
     let contents = read(cut.as_slice(), Wanted::ALL, &mut |_, _, _| ()).unwrap();
     assert_eq!(contents.trouble.map(|trouble| trouble.to_string()).as_deref(), Some("is cut short"));
     let (recovered, _) = recover(Cursor::new(&cut), Cursor::new(Vec::new())).unwrap();
-    assert!(recovered.in_words() == "is cut short" && recovered.messages["/tick"] > 10, "{recovered:?}");
+    let words = recovered.in_words();
+    assert!(
+        words.starts_with("is cut short; lost are messages, how many is not known; what came after "),
+        "{words}"
+    );
+    assert!(recovered.messages["/tick"] > 10 && !recovered.loses_nothing(), "{recovered:?}");
 }
 
 /// Viewers take the least log time of all chunks for that of the file, and a chunk without messages has 0.

@@ -19,6 +19,8 @@ use crate::time::{MonoTime, Rate};
 
 /// The version of topics, messages and metadata.
 pub(super) const VERSION: &str = "2";
+/// What writes files.
+const PROGRAM: &str = concat!("kinocue ", env!("CARGO_PKG_VERSION"));
 /// The topic of whole ticks.
 pub(super) const SENT: &str = "/full/sent";
 /// That of what the ack thread took.
@@ -114,6 +116,20 @@ impl Opening {
         opening
     }
 
+    /// That of a recording which says this of itself, where this program has written it: the numbers of its channels are known then.
+    pub(super) fn of_metadata(metadata: &BTreeMap<String, String>) -> Option<Self> {
+        let entry = |key: &str| metadata.get(key).map(String::as_str);
+        let mode = [Mode::Sampled, Mode::Full].into_iter().find(|mode| entry("mode") == Some(mode.word()))?;
+        let seats: Vec<RecordedSeat> = serde_json::from_str(entry("seats")?).ok()?;
+        let about = About { mode, ..About::of_hall("", Rate::from_hz(100.0), (MonoTime::default(), 0)) };
+        (entry("program") == Some(PROGRAM)).then(|| Self::new(&about, &seats))
+    }
+
+    /// The topics of its channels.
+    pub(super) fn topics(&self) -> impl Iterator<Item = &str> {
+        self.channels.iter().map(|(topic, ..)| topic.as_str())
+    }
+
     /// The same with more topics of JSON, each with its schema; and the channel of the first.
     pub(super) fn with_topics(mut self, topics: &[(&str, Value)]) -> (Self, u16) {
         let first = u16::try_from(self.channels.len()).unwrap_or(u16::MAX);
@@ -125,7 +141,7 @@ impl Opening {
     }
 
     /// Writes all channels with their schemas; gives their numbers.
-    fn declare<W: Write + Seek>(&self, writer: &mut Writer<W>) -> McapResult<Vec<u16>> {
+    pub(super) fn declare<W: Write + Seek>(&self, writer: &mut Writer<W>) -> McapResult<Vec<u16>> {
         let mut channels = Vec::new();
         for (topic, schema, encoding) in &self.channels {
             let schema = match self.schemas.get(*schema) {
@@ -370,7 +386,7 @@ impl<W: Write + Seek> Recording<W> {
 
 /// How files are written.
 pub(super) fn options() -> WriteOptions {
-    let options = WriteOptions::new().library(concat!("kinocue ", env!("CARGO_PKG_VERSION")));
+    let options = WriteOptions::new().library(PROGRAM);
     options.compression(Some(Compression::Lz4))
 }
 
@@ -390,7 +406,7 @@ fn first(about: &About, seats: &[RecordedSeat]) -> BTreeMap<String, String> {
         ("version", VERSION.to_owned()),
         ("kind", "recording".to_owned()),
         ("mode", mode.word().to_owned()),
-        ("program", concat!("kinocue ", env!("CARGO_PKG_VERSION")).to_owned()),
+        ("program", PROGRAM.to_owned()),
         ("hall", hall.clone()),
         ("cue", cue.clone()),
         ("title", title.clone()),

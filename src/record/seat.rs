@@ -230,15 +230,20 @@ impl RecordedSeat {
     }
 
     fn motion(&self, frame: &SentFrame<'_>) -> Option<FrameMotion> {
+        self.motion_of(frame.datagram)
+    }
+
+    /// What the octets of one of its frames say.
+    pub(super) fn motion_of(&self, datagram: &[u8]) -> Option<FrameMotion> {
         match self.frames {
             FrameKind::Datagram(port) => {
-                let request = MotionRequest::parse_as(port, frame.datagram).ok()?;
+                let request = MotionRequest::parse_as(port, datagram).ok()?;
                 let places = self.measured(&request.positions);
                 let MotionRequest { timing, time_ms, .. } = request;
                 Some(FrameMotion { places, timing, time_ms, request: Some(request) })
             }
             FrameKind::Pose => {
-                let pose = LinkPose::parse(frame.datagram.try_into().ok()?);
+                let pose = LinkPose::parse(datagram.try_into().ok()?);
                 let place = |axis: usize| {
                     let RecordedAxis { slot, low, stroke, .. } = self.axes[axis];
                     low + pose.axes[slot] * stroke

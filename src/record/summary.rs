@@ -5,7 +5,7 @@ use std::io::Read;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::read::{Contents, ReadError, Told, Wanted, WantedSamples};
+use super::read::{Contents, ReadError, Told, Wanted, WantedFull, WantedSamples};
 use super::reading::read_ahead;
 use super::{Chunk, Falls, Margin, Margins, TickSample};
 use crate::plain::escaped;
@@ -55,13 +55,14 @@ pub(crate) struct FilmPass {
 }
 
 impl FilmPass {
+    /// What is no seek: a playhead that is led may go back a little.
+    pub(crate) const BACK_S: f64 = 0.25;
+
     /// Adds the show time of a sample that is as long as that, s; where the film has gone back since the one before, that begins the next
     /// pass. The instants are those of both.
     fn take(passes: &mut Vec<Self>, (before, at): (MonoTime, MonoTime), film_s: f64, length_s: f64) {
-        /// What is no seek: a playhead that is led may go back a little.
-        const BACK_S: f64 = 0.25;
         if let Some(pass) = passes.last_mut() {
-            if film_s > pass.until_s - BACK_S {
+            if film_s > pass.until_s - Self::BACK_S {
                 pass.until_s = pass.until_s.max(film_s);
                 pass.end = at;
                 return;
@@ -82,6 +83,31 @@ impl FilmPass {
     /// False of a film that stood.
     pub(crate) fn has_run(&self) -> bool {
         self.until_s > self.from_s
+    }
+}
+
+/// Passes while they are met.
+#[derive(Debug, Default)]
+struct PassReader {
+    passes: Vec<FilmPass>,
+    /// When the film was looked at last, and where it was, s.
+    last: (MonoTime, Option<f64>),
+}
+
+impl PassReader {
+    /// Takes the next show time, s, of a sample or tick that is as long as that, s; true where it is another one.
+    fn take(&mut self, at: MonoTime, film_s: f64, length_s: f64) -> bool {
+        let (before, last_film) = std::mem::replace(&mut self.last, (at, Some(film_s)));
+        if last_film != Some(film_s) && film_s.is_finite() {
+            FilmPass::take(&mut self.passes, (before, at), film_s, length_s);
+            return true;
+        }
+        if let [first] = self.passes.as_mut_slice()
+            && !first.has_run()
+        {
+            first.begin = at;
+        }
+        false
     }
 }
 
@@ -135,8 +161,8 @@ impl Summary {
         self.most.iter().max_by(|one, other| one.part().total_cmp(&other.part()))
     }
 
-    /// Takes a sample; `last` is when the one before was, and its show time.
-    fn tick(&mut self, at: MonoTime, sample: &TickSample, last: &mut (MonoTime, Option<f64>), rate_hz: f64) {
+    /// Takes a sample.
+    fn tick(&mut self, at: MonoTime, sample: &TickSample, passes: &mut PassReader, rate_hz: f64) {
         let film_s = sample.film_s;
         self.ticks += u64::from(sample.ticks);
         self.missed = self.missed.saturating_add(sample.missed);
@@ -144,15 +170,9 @@ impl Summary {
         if sample.late_max_us > self.late_max_us {
             (self.late_max_us, self.late_film_s) = (sample.late_max_us, film_s);
         }
-        let (before, last_film) = std::mem::replace(last, (at, Some(film_s)));
-        if last_film != Some(film_s) && film_s.is_finite() {
+        if passes.take(at, film_s, f64::from(sample.ticks) / rate_hz) {
             let (first, last) = self.film.unwrap_or((film_s, film_s));
             self.film = Some((first.min(film_s), last.max(film_s)));
-            FilmPass::take(&mut self.passes, (before, at), film_s, f64::from(sample.ticks) / rate_hz);
-        } else if let [first] = self.passes.as_mut_slice()
-            && !first.has_run()
-        {
-            first.begin = at;
         }
     }
 
@@ -174,8 +194,8 @@ impl Summary {
 pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadError> {
     let mut summary = Summary::default();
     let mut margins: Option<Margins> = None;
-    let mut last = (MonoTime::default(), None);
-    let wanted = Wanted { samples: WantedSamples::Sums, ..Wanted::ALL };
+    let [mut sampled, mut whole] = [PassReader::default(), PassReader::default()];
+    let wanted = Wanted { samples: WantedSamples::Sums, full: WantedFull::Motions, ..Wanted::ALL };
     let contents = read_ahead(input, wanted, &mut |contents, at, told| {
         if summary.seats.is_empty() {
             let named =
@@ -193,26 +213,31 @@ pub(crate) fn summarize(input: impl Read) -> Result<(Contents, Summary), ReadErr
                     (seat.apart, seat.apart_film_s) = (sample.apart, sample.film_s);
                 }
             }
-            Told::Tick(sample) => summary.tick(at, &sample, &mut last, contents.rate_hz()),
+            Told::Tick(sample) => summary.tick(at, &sample, &mut sampled, contents.rate_hz()),
             Told::State(state) => {
-                summary.happened(contents, at, "/hall", state_word(state), last.1.unwrap_or(0.0));
+                summary.happened(contents, at, "/hall", state_word(state), sampled.last.1.unwrap_or(0.0));
             }
-            Told::Chunks(chunks) => {
+            Told::Motions(block) => {
                 let rate = Rate::from_hz(contents.rate_hz());
+                for head in block.heads() {
+                    whole.take(head.deadline, head.film.as_secs_f64(), 1.0 / rate.hz());
+                }
                 let margins = margins.get_or_insert_with(|| Margins::new(&contents.seats, rate));
-                each_chunk(&chunks, |chunk| margins.take(chunk, &contents.seats, &mut |_, _, _| ()));
+                margins.take_motions(&block, &contents.seats);
             }
             // Positions of the film come all the time.
-            Told::Seat(..) | Told::Drains(_) | Told::Other("/timecode", _) => {}
+            Told::Seat(..) | Told::Chunks(_) | Told::Drains(_) | Told::Other("/timecode", _) => {}
             Told::Other(topic, data) => {
                 if topic == "/mark" {
                     summary.marked = seat_named(contents, data).or(summary.marked);
                 }
-                let film_s = last.1.unwrap_or(0.0);
+                let film_s = sampled.last.1.unwrap_or(0.0);
                 summary.happened(contents, at, topic, &String::from_utf8_lossy(data), film_s);
             }
         }
     })?;
+    // By every tick where the file has them: a sample may be of two passes.
+    summary.passes = if whole.passes.is_empty() { sampled.passes } else { whole.passes };
     summary.most = margins.map_or_else(|| contents.most(), |margins| margins.most(&contents.seats));
     Ok((contents, summary))
 }

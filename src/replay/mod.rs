@@ -94,7 +94,7 @@ impl Replay {
                 self.judge(self.drains.len() > WAITING);
             }
             Told::Seat(lane, sample) => self.bench.on_sample(lane, &sample),
-            Told::Sum(..) | Told::Tick(_) | Told::State(_) | Told::Other(..) => {}
+            Told::Sum(..) | Told::Motions(_) | Told::Tick(_) | Told::State(_) | Told::Other(..) => {}
         }
     }
 

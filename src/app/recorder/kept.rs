@@ -118,7 +118,10 @@ impl Disk {
             return Ok(());
         }
         let free = gib(self.free()?);
-        Err(io::Error::other(format!("{free:.1} GiB are free, and min_free_gib is {}", self.record.min_free_gib)))
+        Err(io::Error::other(format!(
+            "{free:.1} GiB are free, and min_free_gib is {}",
+            self.record.min_free_gib
+        )))
     }
 
     /// That the floor cannot be reached, with what to do.
@@ -282,7 +285,10 @@ mod tests {
         assert_eq!([begin("2035-01-01", true), begin("2061-07-01", true)], [20, 20]);
         assert_eq!(begin("2026-01-21", true), 18);
         let said: String = disk.link.take_said().concat();
-        assert!(said.contains("2026-01-02T10-00-00-show-one.mcap was deleted: older than max_age_days"), "{said}");
+        assert!(
+            said.contains("2026-01-02T10-00-00-show-one.mcap was deleted: older than max_age_days"),
+            "{said}"
+        );
         // It is the second recording of that day.
         fs::write(folder.path().join("2026-01-21T08-00-00-show-one.mcap"), b"").unwrap();
         assert_eq!(begin("2026-01-21", true), 19);

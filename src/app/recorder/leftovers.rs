@@ -13,8 +13,8 @@ use super::link::{RecordLink, RecordPart};
 use crate::app::recording::in_io;
 use crate::container::Trouble;
 use crate::record::{
-    self, Entry, EntryMaker, IncidentCause, Opening, Recording, RecoverError, Wanted, WantedSamples,
-    read_flight,
+    self, Entry, EntryMaker, IncidentCause, Opening, Recording, RecoverError, Wanted, WantedFull,
+    WantedSamples, read_flight,
 };
 use crate::sys::file;
 use crate::time::MonoTime;
@@ -153,7 +153,7 @@ fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
             RecoverError::Write(error) => error,
             RecoverError::Read(error) => io::Error::new(io::ErrorKind::InvalidData, error),
         })?;
-    if let Some(Trouble::Unread(why)) = &recovered.trouble {
+    if let Some(Trouble::Unread(why)) = &recovered.salvaged.trouble {
         return Err(io::Error::other(why.clone()));
     }
     if recovered.messages.is_empty() {
@@ -161,7 +161,7 @@ fn copy(from: &Path, to: &Path, may: &impl Fn() -> bool) -> io::Result<()> {
     }
     out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
     let again = Patient { file: BufReader::new(file::open_ours(to)?), may };
-    let unwanted = Wanted { samples: WantedSamples::None, full: false, ..Wanted::ALL };
+    let unwanted = Wanted { samples: WantedSamples::None, full: WantedFull::None, ..Wanted::ALL };
     let read = record::read(again, unwanted, &mut |_, _, _| ()).map_err(io::Error::other)?;
     if read.trouble.is_some() || read.messages != recovered.messages {
         return Err(io::Error::other("the written file does not read back; the disk may be failing"));

@@ -8,11 +8,12 @@ use anyhow::{Context as _, anyhow};
 
 use super::super::{Exit, Failure, OrExit as _, print};
 use super::{beside, open, unread};
-use crate::record::{self, RecoverError, Wanted, WantedSamples};
+use crate::record::{self, RecoverError, Wanted, WantedFull, WantedSamples};
 
-/// Repairs a recording that was cut short or damaged: writes all its complete messages, with an index, so that any viewer reads it.
+/// Repairs a recording that was cut short, is damaged, or is in another order: writes all its complete messages by time, with an index.
 ///
-/// The new file is read back before it gets its name. The original stays. Exits with 1 if something in the middle is lost; what, is said.
+/// The new file is read back before it gets its name. The original stays. Exits with 1 if anything is lost, and prints how many messages and of
+/// which times.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kinocue record recover ride.part.mcap")]
 pub(in super::super) struct Args {
@@ -49,7 +50,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let count: u64 = recovered.messages.values().sum();
     let (output, file, why) = (output.display(), args.file.display(), recovered.in_words());
     print::tell(&format!("{output}: {count} messages; {file} {why}"));
-    Ok(if recovered.lost.is_empty() { Exit::Done } else { Exit::CheckFailed })
+    Ok(if recovered.loses_nothing() { Exit::Done } else { Exit::CheckFailed })
 }
 
 /// Writes, and reads back what was written.
@@ -65,7 +66,7 @@ fn written(args: &Args, out: File, part: &std::path::Path) -> Result<record::Rec
         return Err(error).or_exit(Exit::BadCue);
     }
     out.into_inner().map_err(|error| error.into_error()).or_exit(Exit::Io)?.sync_all().or_exit(Exit::Io)?;
-    let unwanted = Wanted { samples: WantedSamples::None, full: false, ..Wanted::ALL };
+    let unwanted = Wanted { samples: WantedSamples::None, full: WantedFull::None, ..Wanted::ALL };
     let back = record::read(open(part)?, unwanted, &mut |_, _, _| ()).map_err(|error| unread(error, part))?;
     if back.trouble.is_some() || back.messages != recovered.messages {
         let error =
