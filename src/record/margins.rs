@@ -105,6 +105,7 @@ impl Margins {
     }
 
     /// Takes a tick.
+    #[cfg(test)]
     pub(crate) fn take(
         &mut self,
         chunk: &Chunk<'_>,

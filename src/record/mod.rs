@@ -81,4 +81,4 @@ pub(crate) use summary::{FilmPass, SeatTotals, Summary, each_chunk, state_word, 
 pub use tap::{Tap, tap};
 pub(crate) use tap::{file_octets_a_second, octets_a_second};
 #[cfg(test)]
-pub(crate) use tests::{recorded_as, recorded_falling, recorded_filmed, recorded_measured};
+pub(crate) use tests::{recorded_as, recorded_falling, recorded_filmed, recorded_measured, recorded_of};

@@ -102,7 +102,8 @@ pub(crate) fn recorded_measured(ticks: impl Iterator<Item = (f64, Option<f64>)>)
     recorded_of(Mode::Sampled, ticks, |_| None, |tick| 10 * tick)
 }
 
-fn recorded_of(
+/// The same of all of these.
+pub(crate) fn recorded_of(
     mode: Mode,
     ticks: impl Iterator<Item = (f64, f64, Option<f64>)>,
     standing: impl Fn(u64) -> Option<HealthState>,

@@ -11,7 +11,10 @@ use crate::time::{MonoTime, ShowTime};
 #[derive(Debug, Clone)]
 pub(crate) struct FilmAxis {
     pub(crate) time: TimeAxis,
+    /// What is on it.
     passes: Vec<FilmPass>,
+    /// All passes of the recording, each with its place among these where it is on the axis: what was sent in another is nowhere on it.
+    all: Vec<(FilmPass, Option<usize>)>,
 }
 
 /// An instant that is on an axis.
@@ -48,16 +51,26 @@ impl FilmAxis {
             }
             shown.has_run().then_some(shown)
         };
-        let passes: Vec<FilmPass> = passes.iter().filter(|pass| pass.has_run()).filter_map(shown).collect();
-        let stretches: Vec<_> = passes.iter().map(|pass| (pass.from_s, pass.until_s)).collect();
-        (!passes.is_empty()).then(|| Self { time: TimeAxis::of_passes(&stretches, columns), passes })
+        let (mut on_it, mut all) = (Vec::new(), Vec::new());
+        for pass in passes {
+            let part = Some(pass).filter(|pass| pass.has_run()).and_then(shown);
+            all.push((*pass, part.map(|_| on_it.len())));
+            on_it.extend(part);
+        }
+        let stretches: Vec<_> = on_it.iter().map(|pass| (pass.from_s, pass.until_s)).collect();
+        (!on_it.is_empty()).then(|| Self {
+            time: TimeAxis::of_passes(&stretches, columns),
+            passes: on_it,
+            all,
+        })
     }
 
     /// All of the film between two show times, s, whatever ran.
     pub(crate) fn of_film(from_s: f64, until_s: f64, columns: usize) -> Self {
         let (begin, end) = (MonoTime::default(), MonoTime::from_nanos(u64::MAX));
         let pass = FilmPass { begin, end, from_s, until_s, before_s: 0.0, after_s: 0.0 };
-        Self { time: TimeAxis::of_film(from_s, until_s, columns), passes: vec![pass] }
+        let all = vec![(pass, Some(0))];
+        Self { time: TimeAxis::of_film(from_s, until_s, columns), passes: vec![pass], all }
     }
 
     /// Show time alone, as far as all that is on this axis, in columns as wide: for what is laid over each pass.
@@ -81,22 +94,46 @@ impl FilmAxis {
             && self.passes.last().is_some_and(|pass| at <= pass.end)
     }
 
-    /// Where an instant of that show time, s, is; `None` where it is not on the axis.
-    pub(super) fn moment(&self, at: MonoTime, film_s: f64) -> Option<Moment> {
+    /// Where an instant of that show time, s, is; `None` where it is not on the axis. What is told of the last `length_s` may be of any pass
+    /// that ran in it.
+    pub(super) fn moment(&self, at: MonoTime, film_s: f64, length_s: f64) -> Option<Moment> {
+        let own = self.all.partition_point(|(pass, _)| pass.begin < at).saturating_sub(1);
+        let ended = |index: &usize| at.since(self.all[*index + 1].0.begin).as_secs_f64() <= length_s;
+        let candidates = std::iter::once(own).chain((0..own).rev().take_while(ended));
         let has = |index: &usize| {
-            let FilmPass { from_s, until_s, before_s, after_s, .. } = self.passes[*index];
+            let FilmPass { from_s, until_s, before_s, after_s, .. } = self.all[*index].0;
             from_s - before_s <= film_s && film_s <= until_s + after_s
         };
-        let own = self.passes.partition_point(|pass| pass.begin < at).saturating_sub(1);
-        // A tick of the sample in which the film went back may be of the pass before.
-        let FilmPass { begin, before_s, .. } = self.passes[own];
-        let may_be_before = at.since(begin).as_secs_f64() <= before_s;
-        let before = own.checked_sub(1).filter(|_| may_be_before);
-        let index = [Some(own), before].into_iter().flatten().find(has)?;
-        let FilmPass { from_s, until_s, .. } = self.passes[index];
+        let distance = |index: &usize| self.distance(*index, at, film_s, length_s);
+        // Of those as near as each other the latest.
+        let index = candidates.filter(has).min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
+        let index = self.all[index].1?;
+        let FilmPass { from_s, until_s, before_s, after_s, .. } = self.passes[index];
+        if film_s < from_s - before_s || film_s > until_s + after_s {
+            return None;
+        }
         let (begin_s, pass) =
             self.time.passes().get(index).map_or((from_s, 0), |pass| (pass.at_s, index + 1));
         let at_s = begin_s + film_s.clamp(from_s, until_s) - from_s;
         Some(Moment { film_s, at_s: at_s.clamp(self.time.from_s, self.time.until_s), pass })
+    }
+
+    /// How far a show time is from where the film was in that pass in the last `length_s`, s.
+    fn distance(&self, index: usize, at: MonoTime, film_s: f64, length_s: f64) -> f64 {
+        /// A film that is led may run faster than it was made.
+        const HURRY: f64 = 2.0;
+        let FilmPass { begin, from_s, until_s, before_s, after_s, .. } = self.all[index].0;
+        let (mut low, mut high) = (from_s - before_s, until_s + after_s);
+        let since_begin = at.since(begin).as_secs_f64();
+        if since_begin <= length_s {
+            high = high.min(from_s + HURRY * since_begin);
+        }
+        if index + 1 < self.all.len() {
+            let next = self.all[index + 1].0.begin;
+            if next < at {
+                low = low.max(until_s - FilmPass::BACK_S - HURRY * length_s);
+            }
+        }
+        (low - film_s).max(film_s - high).max(0.0)
     }
 }

@@ -24,6 +24,8 @@ pub(super) struct SeatFlags {
     waiting: Vec<Noted>,
     /// Where on the axis the last tick was that is on it, s.
     last_s: Option<f64>,
+    /// How long a sample is at the most, s.
+    sample_s: f64,
 }
 
 /// What is to be a flag.
@@ -40,13 +42,18 @@ pub(super) struct Noted {
 }
 
 impl SeatFlags {
+    /// None yet, of samples that long.
+    pub(super) fn of_samples(sample_s: f64) -> Self {
+        Self { sample_s, ..Self::default() }
+    }
+
     /// Takes the next sample of the ticks.
     pub(super) fn tick(&mut self, axis: &FilmAxis, at: MonoTime, film_s: f64) {
         self.ticks.push_back((at, film_s));
         if self.ticks.len() > HELD {
             self.ticks.pop_front();
         }
-        if let Some(moment) = axis.moment(at, film_s) {
+        if let Some(moment) = axis.moment(at, film_s, self.sample_s) {
             self.last_s = Some(moment.at_s);
         }
         if !self.waiting.is_empty() {
@@ -76,7 +83,8 @@ impl SeatFlags {
         for Noted { at, film_s, name, is_mark } in all {
             let film_s = film_s.or_else(|| self.film_s(at));
             // What happens once the film is over stands at its end.
-            let moment = film_s.filter(|_| axis.runs(at)).and_then(|film_s| axis.moment(at, film_s));
+            let moment =
+                film_s.filter(|_| axis.runs(at)).and_then(|film_s| axis.moment(at, film_s, self.sample_s));
             match moment.map(|moment| moment.at_s).or(self.last_s) {
                 Some(at_s) => self.flags.push(Flag { at_s, name, is_mark }),
                 None => self.more += 1,

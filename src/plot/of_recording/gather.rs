@@ -103,6 +103,8 @@ pub(crate) struct Gathered {
     pub(super) said: Vec<(MonoTime, String)>,
     /// Ticks are taken from whole ones, and not from samples.
     pub(super) is_whole: bool,
+    /// How long a sample is at the most, s.
+    pub(super) sample_s: f64,
 }
 
 /// What the sentence is made of.
@@ -178,9 +180,10 @@ impl Gathered {
             lanes: ["held", "missed", "lost", "refused", "untaken", "gaps", "out"].map(lane).into(),
             state: None,
             states: Vec::new(),
-            flags: SeatFlags::default(),
+            flags: SeatFlags::of_samples(contents.sample_s()),
             said: Vec::new(),
             is_whole,
+            sample_s: contents.sample_s(),
         }
     }
 
@@ -205,8 +208,9 @@ impl Gathered {
         }
     }
 
-    fn place(&self, at: MonoTime, film_s: f64) -> Option<(usize, Moment)> {
-        let moment = self.look.axis.moment(at, film_s)?;
+    /// The column of what is told of the last `length_s`.
+    fn place(&self, at: MonoTime, film_s: f64, length_s: f64) -> Option<(usize, Moment)> {
+        let moment = self.look.axis.moment(at, film_s, length_s)?;
         Some((self.look.axis.time.column(moment.at_s)?, moment))
     }
 
@@ -229,7 +233,7 @@ impl Gathered {
     }
 
     fn seat(&mut self, at: MonoTime, sample: &SeatSample) {
-        let Some((column, moment)) = self.place(at, sample.film_s) else { return };
+        let Some((column, moment)) = self.place(at, sample.film_s, self.sample_s) else { return };
         let falls = self.falls.count;
         self.falls.take(at, &sample.sum());
         self.on(OUT, column, self.falls.count - falls);
@@ -270,7 +274,7 @@ impl Gathered {
 
     fn tick(&mut self, at: MonoTime, sample: &TickSample) {
         self.flags.tick(&self.look.axis, at, sample.film_s);
-        let Some((column, moment)) = self.place(at, sample.film_s) else { return };
+        let Some((column, moment)) = self.place(at, sample.film_s, self.sample_s) else { return };
         if let Some(word) = self.state {
             let columns = self.look.axis.time.columns;
             let known = self.states.iter().position(|(one, _)| *one == word);
@@ -317,13 +321,11 @@ impl Gathered {
             let film_s = chunk.head.film.as_secs_f64();
             let at = chunk.head.deadline;
             if let Some(margins) = &mut margins {
-                margins.take(chunk, &contents.seats, &mut |of, axis, parts| {
-                    if of == lane {
-                        self.parts_of(at, axis, parts);
-                    }
+                margins.take_lane(chunk, (lane, seat), &mut |_, axis, parts| {
+                    self.parts_of((at, film_s), axis, parts);
                 });
             }
-            let Some((column, moment)) = self.place(at, film_s) else { return };
+            let Some((column, moment)) = self.place(at, film_s, 0.0) else { return };
             self.late(at, column, moment, micros(chunk.head.late_ns));
             for frame in chunk.frames().filter(|frame| frame.lane == lane) {
                 let is_taken = frame.handed.is_taken();
@@ -346,9 +348,12 @@ impl Gathered {
         self.margins = margins;
     }
 
-    fn parts_of(&mut self, at: MonoTime, axis: usize, parts: [(ShowTime, f64); 3]) {
+    /// What a tick showed of an axis, each as a part of its limit and of a show time a little before: where the film went back meanwhile
+    /// that of the tick itself.
+    fn parts_of(&mut self, (at, film_s): (MonoTime, f64), axis: usize, parts: [(ShowTime, f64); 3]) {
         for (order, (film, part)) in parts.into_iter().enumerate() {
-            if let Some((column, moment)) = self.place(at, film.as_secs_f64()) {
+            let before = self.place(at, film.as_secs_f64(), 0.0);
+            if let Some((column, moment)) = before.or_else(|| self.place(at, film_s, 0.0)) {
                 let place = |index| if index == order { 100.0 * part } else { f64::NAN };
                 self.parts.take(column, (0..3).map(place));
                 if part > self.most[axis][order].0 {

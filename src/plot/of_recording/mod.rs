@@ -92,6 +92,8 @@ fn bin_name(end: f64) -> String {
 }
 
 #[cfg(test)]
+mod held_against_frames;
+#[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
@@ -110,7 +112,7 @@ mod tests {
         drawn_of(mode, &recorded_as(mode, ticks), columns)
     }
 
-    fn drawn_of(mode: Mode, file: &[u8], columns: usize) -> Picture {
+    pub(super) fn drawn_of(mode: Mode, file: &[u8], columns: usize) -> Picture {
         drawn_with(mode, file, columns, |_| Vec::new())
     }
 
@@ -250,7 +252,7 @@ mod tests {
         let mut ramps = super::gather::LevelRamps::default();
         // Down to a half, up again before it rests, and a little down.
         for (tick, level) in (0_u32..).zip([1.0, 0.8, 0.6, 0.5, 0.7, 0.9, 0.9, 0.85]) {
-            let moment = axis.moment(crate::time::MonoTime::default(), f64::from(tick)).unwrap();
+            let moment = axis.moment(crate::time::MonoTime::default(), f64::from(tick), 0.0).unwrap();
             ramps.take(level, moment);
         }
         let (from, to, at) = ramps.most.unwrap();

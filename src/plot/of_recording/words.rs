@@ -88,7 +88,7 @@ fn fallen(gathered: &Gathered) -> Option<String> {
     let SeatFall { still, out, standing, back, moved } = gathered.falls.first?;
     let axis = &gathered.look.axis;
     let place = |(at, film_s): FilmInstant| {
-        let moment = axis.moment(at, film_s);
+        let moment = axis.moment(at, film_s, gathered.sample_s);
         moment.map_or_else(|| ShowTime::from_secs_f64(film_s).to_string(), |moment| moment.to_string())
     };
     let stood = match (still.map(place), moved.map(place)) {
