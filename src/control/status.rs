@@ -206,7 +206,7 @@ pub struct RecordStatus {
     pub(crate) more_marks: u64,
     /// How often something could not be written.
     pub(crate) errors: u64,
-    /// What is wrong, and what to do, by what it is of: `show`, `incident`, `flight`, `earlier`; empty if all is well.
+    /// What is wrong, and what to do, by what it is of: `show`, `incident`, `flight`, `earlier`, `room`; empty if all is well.
     pub(crate) troubles: BTreeMap<String, String>,
 }
 

@@ -35,7 +35,7 @@ function mark(button) {
 export function showRecordings(status, link) {
   if (!status?.record) return;
   const { recording, flight_s: flight, troubles } = status.record;
-  const trouble = troubles.show;
+  const trouble = troubles.show ?? troubles.room;
   badge('record-badge', trouble ? words('badge.not-recorded') : recording ? words('badge.recording') : '', trouble ? 'weak' : 'calm', trouble ?? '');
   setProperty(byId('mark'), 'disabled', link !== 'live' || (flight === 0 && !recording));
   readList(status.record.last);
