@@ -6,7 +6,7 @@ use assert_cmd::Command;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use kinocue::harness::control::model::{Ending, FrameCounts, Percentiles};
-use kinocue::harness::journal::{Action, FilmProof, Journal, Limits, Outcome, ShowRecord};
+use kinocue::harness::journal::{Action, FilmProof, Journal, Limits, Outcome, SeatOut, ShowRecord};
 use serde_json::Value;
 
 const LIMITS: Limits = Limits { max_size: 1 << 20, max_total: 1 << 24, max_age_days: 400 };
@@ -49,6 +49,7 @@ fn show(start: &str, cue: &str, title: &str, end: Option<(&str, Ending)>) -> Sho
             end: end.to_owned(),
             result,
             events: vec!["A2 was lost at 00:12.000".to_owned()],
+            seats_out: Vec::new(),
             ticks: 1000,
             missed_ticks: 1,
             frames: FrameCounts {
@@ -109,7 +110,7 @@ fn a_day_is_a_table_with_a_line_for_all_together() {
     assert!(run.stdout.contains("ride: A2 was lost at 00:12.000"), "{}", run.stdout);
     let film = "ride: followed the film by ltc:alsa:hw:2,0, artnet:10.0.0.20, at the most 1.25 ms from it, the source changed once\n";
     assert!(run.stdout.contains(film) && !run.stdout.contains("storm: followed"), "{}", run.stdout);
-    let totals = "3 shows on 2026-11-21: 1 completed, 1 stopped, 1 interrupted; 00:10:30 in all; 8000 frames sent, 7995 \
+    let totals = "3 shows on 2026-11-21 (UTC+01:00): 1 completed, 1 stopped, 1 interrupted; 00:10:30 in all; 8000 frames sent, 7995 \
                   acked, 0 refused, 2 lost";
     assert_eq!(run.stdout.lines().last(), Some(totals));
     let run = report(&["--from", "2026-11-01", "--to", "2026-11-20", "--dir", dir.path().to_str().unwrap()]);
@@ -130,6 +131,47 @@ fn what_was_asked_is_shown_without_what_a_terminal_obeys() {
         run.stdout
     );
     assert!(!run.stdout.contains('\u{1b}'));
+}
+
+#[test]
+fn a_day_of_twelve_shows_in_which_every_seat_fell_out_twice_is_a_few_lines_a_show_and_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let now = "2026-11-21T08:00:00Z".parse::<Timestamp>().expect("RFC 3339").to_zoned(TimeZone::UTC);
+    let mut journal = Journal::open(dir.path(), LIMITS, &now);
+    let seats: Vec<String> =
+        "ABCDEFGH".chars().flat_map(|row| (1..=8).map(move |seat| format!("{row}{seat}"))).collect();
+    for hour in 9..21 {
+        let at = |minute: u32| format!("2026-11-21T{hour:02}:{minute:02}:00.000+01:00");
+        let mut show = show(&at(0), "storm", "Storm", Some((at(10).as_str(), Ending::Completed)));
+        (show.seats_total, show.seats_available) = (64, 64);
+        let outcome = show.outcome.as_mut().unwrap();
+        let clock = |minute: u32| format!("{hour:02}:{minute:02}:00");
+        // As an older version wrote them, one by one.
+        let one_by_one = seats.iter().map(|seat| format!("{} {seat} lost: no answer", clock(3)));
+        let usual =
+            ["playing: go by ann", "parking: the cue is over"].map(|text| format!("{} {text}", clock(1)));
+        let odd = [format!("{} paused: by ann", clock(5)), format!("{} playing: resume by ann", clock(6))];
+        outcome.events = usual.into_iter().chain(one_by_one).chain(odd).collect();
+        let out = seats.iter().zip(1..).map(|(seat, s)| SeatOut {
+            seat: seat.clone(),
+            times: 2,
+            out_s: f64::from(s),
+        });
+        outcome.seats_out = out.collect();
+        journal.begin(&show);
+        journal.show(&show);
+    }
+    drop(journal);
+    let run = report(&["--day", "2026-11-21", "--dir", dir.path().to_str().unwrap()]);
+    assert!(run.stdout.lines().count() <= 5 + 12 * 3, "{}", run.stdout);
+    let row = run.stdout.lines().find(|line| line.starts_with(" 2026-11-21 09:00:00")).unwrap();
+    assert!(row.contains("64/64") && row.contains("64, 00:01:04"), "{row}");
+    let fallen = "2026-11-21 09:00:00 storm: out: H8 64.0 s in 2 falls, H7 63.0 s in 2 falls, ";
+    assert!(run.stdout.contains(fallen) && run.stdout.contains(", and 58 more\n"), "{}", run.stdout);
+    assert!(run.stdout.contains("storm: 09:05:00 paused: by ann\n"), "{}", run.stdout);
+    let json = report(&["--day", "2026-11-21", "--json", "--dir", dir.path().to_str().unwrap()]);
+    let json: Value = serde_json::from_str(&json.stdout).unwrap();
+    assert_eq!(json["shows"][11]["outcome"]["seats_out"].as_array().unwrap().len(), 64);
 }
 
 #[test]

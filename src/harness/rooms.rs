@@ -53,7 +53,7 @@ pub mod health {
     pub use crate::health::{Groups, HealthTable, Notice};
 }
 pub mod journal {
-    pub use crate::journal::{Action, FilmProof, Journal, Limits, Outcome, ShowRecord};
+    pub use crate::journal::{Action, FilmProof, Journal, Limits, Outcome, SeatOut, ShowRecord};
 }
 pub mod latency {
     pub use crate::latency::{Percentiles, read};

@@ -30,7 +30,7 @@ mod writer;
 
 pub(crate) use age::too_old;
 pub(crate) use fold::{FoldedAction, Folds};
-pub use record::{Action, FilmProof, Outcome, ShowRecord};
+pub use record::{Action, FilmProof, Outcome, SeatOut, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
 pub(crate) use report::{
     JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report, report_of,

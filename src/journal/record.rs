@@ -119,8 +119,12 @@ pub struct Outcome {
     pub end: String,
     /// How.
     pub result: Ending,
-    /// Faults, seats that fell out and other events, in words, in order, each with its time of the day; at most 100 are kept.
+    /// Faults, seats that fell out and other events, in words, in order, each with its time of the day; seats of one second and one cause are
+    /// one event; at most 100 are kept.
     pub events: Vec<String>,
+    /// The seats that did not take part all the time although they were enabled.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seats_out: Vec<SeatOut>,
     /// Ticks that sent.
     pub ticks: u64,
     /// Ticks slept through.
@@ -137,6 +141,17 @@ pub struct Outcome {
     /// The film that led it; null where the show was its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<FilmProof>,
+}
+
+/// A controller that fell out of a show.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SeatOut {
+    /// Its name.
+    pub seat: String,
+    /// How often it fell out.
+    pub times: u32,
+    /// How long it was out, all together, s.
+    pub out_s: f64,
 }
 
 /// By which clock the seats followed a film, and how well.

@@ -60,6 +60,7 @@ fn outcome(end: &str, result: Ending) -> Outcome {
         end: end.to_owned(),
         result,
         events: vec!["A2 lost".to_owned()],
+        seats_out: Vec::new(),
         ticks: 1000,
         missed_ticks: 1,
         frames: FrameCounts { sent: 4000, asked: 4000, acked: 3990, refused: 1, lost: 9, withdrawn: 0 },

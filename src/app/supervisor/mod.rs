@@ -9,6 +9,7 @@ mod begin;
 mod belts;
 mod coded;
 mod commands;
+mod fallen;
 mod features;
 mod figures;
 mod film;

@@ -1,11 +1,12 @@
 //! ShowRecords for the journal: commands with their operators, and shows.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use jiff::Zoned;
 
 use super::act::{Act, Feature, ShowBegun, SupervisorEvent};
+use super::fallen::ShowEvents;
 use super::hall::{Counted, HallContext};
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::app::recorder::RecordAsk;
@@ -38,9 +39,7 @@ pub(super) struct ShowRecords {
 struct OpenShow {
     record: ShowRecord,
     before: Counted,
-    events: Vec<String>,
-    /// The seats that are on and do not move, by lane.
-    still: BTreeSet<usize>,
+    events: ShowEvents,
     /// The film that leads it, if one does, and how often another source had taken over before.
     film: Option<(FilmProof, u64)>,
     /// How it ended; none while it goes on.
@@ -106,22 +105,7 @@ impl ShowRecords {
     /// Notes something that happens while a show is under way.
     pub(super) fn event(&mut self, event: String) {
         if let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) {
-            open.events.push(format!("{} {event}", Zoned::now().strftime("%H:%M:%S")));
-        }
-    }
-
-    /// Notes which seats fall out of a show and come back, by name.
-    fn note_seats(&mut self, table: &[Row], hall: &HallContext) {
-        for (lane, (row, controller)) in table.iter().zip(&hall.config.controllers).enumerate() {
-            let Some(open) = self.open.as_mut() else { return };
-            let (is_on, Row { standing, why, .. }) = (hall.settings.is_on(lane), row);
-            let (is_still, name) = (is_on && !standing.may_move(), &controller.name);
-            let has_changed = if is_still { open.still.insert(lane) } else { open.still.remove(&lane) };
-            match (has_changed, is_still) {
-                (true, true) => self.event(format!("{name} {standing}: {why}")),
-                (true, false) if is_on => self.event(format!("{name} is back")),
-                _ => {}
-            }
+            open.events.note(event);
         }
     }
 
@@ -193,14 +177,8 @@ impl ShowRecords {
         hall.live.take_film_error_most_s(); // that of the show before
         let switches = |table: &SharedTable| (FilmProof::default(), table.read().switches);
         let film = cued.film.and(hall.film.as_ref()).map(switches);
-        self.open = Some(Box::new(OpenShow {
-            record,
-            before,
-            events: Vec::new(),
-            still: BTreeSet::new(),
-            film,
-            over: None,
-        }));
+        self.open =
+            Some(Box::new(OpenShow { record, before, events: ShowEvents::default(), film, over: None }));
     }
 
     /// Notes who leads, and how far the seats are from the film, while a show follows it.
@@ -237,16 +215,18 @@ impl ShowRecords {
     pub(super) fn close(&mut self, hall: &HallContext) {
         let Some(open) = self.open.take() else { return };
         let OpenShow { mut record, before, events, film, over, .. } = *open;
-        let Some(ShowOver { cause, end, ticks, missed, .. }) = over else { return };
+        let Some(ShowOver { cause, end, ticks, missed, at }) = over else { return };
         let now = hall.live.table();
         let frames =
             |table: &[Row]| table.iter().map(|row| FrameCounts::from(&row.counts)).sum::<FrameCounts>();
         let failed = |table: &[Row]| table.iter().map(|row| row.counts.send_failed).sum::<u64>();
         let after = hall.live.times();
+        let (events, seats_out) = events.told(at, hall);
         record.outcome = Some(Outcome {
             end,
             result: ending(cause),
             events,
+            seats_out,
             ticks,
             missed_ticks: missed,
             frames: frames(&now).since(frames(&before.table)),
@@ -272,7 +252,9 @@ impl Feature for ShowRecords {
             SupervisorEvent::Begun(begun) => self.begin(begun, hall),
             SupervisorEvent::Round(table) => {
                 self.follow(hall);
-                self.note_seats(table, hall);
+                if let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) {
+                    open.events.note_seats(table, hall);
+                }
                 self.settle(table, hall);
             }
             _ => {}
@@ -316,7 +298,6 @@ mod tests {
     use super::*;
     use crate::app::supervisor::testing::{hall, row, told};
     use crate::film::chase::ParkCause;
-    use crate::health::HealthState;
     use crate::journal::Limits;
 
     #[test]
@@ -349,26 +330,6 @@ mod tests {
             told(&mut records, &SupervisorEvent::Round(&[row]), &hall);
             assert_eq!(records.open.is_none(), settled, "{asked} open, {later:?} after the end");
         }
-    }
-
-    #[test]
-    fn a_show_names_the_seats_that_fall_out_of_it_and_come_back_each_with_its_time() {
-        let folder = tempfile::tempdir().unwrap();
-        let limits = Limits { max_size: 1 << 20, max_total: 1 << 20, max_age_days: 1 };
-        let mut records = ShowRecords::new(Journal::open(folder.path(), limits, &Zoned::now()));
-        let hall = hall(State::Armed, "one");
-        let counted = hall.count();
-        let begun = ShowBegun { who: "anna".to_owned(), surface: Surface::Http, counted, place: None };
-        told(&mut records, &SupervisorEvent::Begun(&begun), &hall);
-        for standing in [HealthState::Ok, HealthState::Lost, HealthState::Lost, HealthState::Rejoining] {
-            let rows = [row(hall.now), Row { standing, ..row(hall.now) }];
-            told(&mut records, &SupervisorEvent::Round(&rows), &hall);
-        }
-        let events = &records.open.as_ref().unwrap().events;
-        let said: Vec<&str> = events.iter().map(|event| event.split_once(' ').unwrap().1).collect();
-        assert_eq!(said, ["B1 lost: it answers", "B1 is back"]);
-        let clock = events[0].split_once(' ').unwrap().0;
-        assert!(clock.parse::<jiff::civil::Time>().is_ok(), "{clock}");
     }
 
     #[test]

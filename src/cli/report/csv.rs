@@ -7,7 +7,8 @@ use crate::plain::escaped;
 const SHOWS: &str = "start,end,took_s,result,hall,cue,sha256,title,playlist,entry,level,vibration,trim_ms,effects_off,\
     seats_total,seats_available,operator,scheduled,out_of_hours,ticks,missed_ticks,sent,asked,acked,refused,lost,\
     send_failed,lateness_p50_us,lateness_p99_us,lateness_max_us,ack_p50_us,ack_p99_us,ack_max_us,events,\
-    film_sources,film_switches,film_error_max_ms,withdrawn";
+    film_sources,film_switches,film_error_max_ms,withdrawn,\
+    seats_out,seats_out_max_s";
 
 /// One record a show; what is not known is empty.
 pub(super) fn shows(report: &JournalReport) -> String {
@@ -66,6 +67,9 @@ fn show(show: &ReportShown) -> Vec<String> {
     cells.push(film.map_or_else(String::new, |film| film.switches.to_string()));
     cells.push(number(film.and_then(|film| film.greatest_error_ms)));
     cells.push(outcome.map_or_else(String::new, |outcome| outcome.frames.withdrawn.to_string()));
+    let out = outcome.map(|outcome| &outcome.seats_out);
+    cells.push(out.map_or_else(String::new, |out| out.len().to_string()));
+    cells.push(number(out.map(|out| out.iter().map(|seat| seat.out_s).fold(0.0, f64::max))));
     cells
 }
 

@@ -4,7 +4,30 @@ use comfy_table::CellAlignment;
 
 use crate::cli::table;
 use crate::control::model::FrameCounts;
-use crate::journal::{FilmProof, JournalReport, ReportShown, Totals};
+use crate::journal::{FilmProof, JournalReport, ReportShown, SeatOut, Totals};
+
+/// Seats that a line names, and events of a show that have a line each.
+const NAMED: usize = 6;
+const EVENTS: usize = 3;
+/// States that every show goes through.
+const USUAL: [&str; 4] = ["joining", "playing", "parking", "parked"];
+/// Words that an event of the hall begins with.
+const STATES: [&str; 14] = [
+    "boot",
+    "recovering",
+    "parked",
+    "homing",
+    "armed",
+    "waiting",
+    "joining",
+    "playing",
+    "holding",
+    "paused",
+    "parking",
+    "stopping",
+    "stopped",
+    "fault",
+];
 
 /// One row a show, and a line for all together.
 pub(super) fn shows(report: &JournalReport) -> String {
@@ -14,8 +37,8 @@ pub(super) fn shows(report: &JournalReport) -> String {
     }
     let mut table = table::ruled();
     table.set_header([
-        "start", "cue", "result", "took", "level", "seats", "sent", "acked", "refused", "lost", "missed",
-        "late p99", "ack p99", "by",
+        "start", "cue", "result", "took", "level", "seats", "out", "sent", "acked", "refused", "lost",
+        "missed", "late p99", "ack p99", "by",
     ]);
     report.shows.iter().for_each(|one| {
         table.add_row(show(one));
@@ -23,7 +46,7 @@ pub(super) fn shows(report: &JournalReport) -> String {
     table
         .column_iter_mut()
         .skip(3)
-        .take(10)
+        .take(11)
         .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     let events: String = report.shows.iter().map(events).collect();
     let blank = if events.is_empty() { "" } else { "\n" };
@@ -47,10 +70,19 @@ pub(super) fn actions(report: &JournalReport) -> String {
 
 fn days(report: &JournalReport) -> String {
     if report.from == report.to {
-        format!("on {}", report.from)
+        format!("on {}{}", report.from, zone(report))
     } else {
-        format!("from {} to {}", report.from, report.to)
+        format!("from {} to {}{}", report.from, report.to, zone(report))
     }
+}
+
+/// The zone of the times, which is that of the server: the offsets that the stamps have.
+fn zone(report: &JournalReport) -> String {
+    let stamps = report.shows.iter().map(|show| &show.record.start);
+    let stamps = stamps.chain(report.actions.iter().map(|action| &action.at));
+    let mut zones: Vec<&str> = stamps.filter_map(|stamp| stamp.get(23..)).collect();
+    zones.dedup();
+    if zones.is_empty() { String::new() } else { format!(" (UTC{})", safe(&zones.join(", then "))) }
 }
 
 fn show(show: &ReportShown) -> Vec<String> {
@@ -64,9 +96,9 @@ fn show(show: &ReportShown) -> Vec<String> {
         format!("{}/{}", record.seats_available, record.seats_total),
     ];
     match &record.outcome {
-        None => row.resize(13, String::new()),
+        None => row.resize(14, String::new()),
         Some(one) => {
-            row.extend([one.frames.sent.to_string(), acked(one.frames)]);
+            row.extend([out(&one.seats_out), one.frames.sent.to_string(), acked(one.frames)]);
             row.extend(
                 [one.frames.refused, one.frames.lost, one.missed_ticks].map(|count| count.to_string()),
             );
@@ -79,15 +111,64 @@ fn show(show: &ReportShown) -> Vec<String> {
     row
 }
 
-/// What happened in a show, under its start, and first how it followed its film.
+/// How many seats fell out, and the longest time that one of them was out.
+fn out(seats: &[SeatOut]) -> String {
+    let longest = seats.iter().map(|seat| seat.out_s).fold(0.0, f64::max);
+    if seats.is_empty() { "0".to_owned() } else { format!("{}, {}", seats.len(), span(longest.ceil())) }
+}
+
+/// What is worth reading of a show, under its start: how it followed its film, its seats, and the first of all else.
 fn events(show: &ReportShown) -> String {
-    let outcome = show.record.outcome.as_ref();
-    let film = outcome.and_then(|outcome| outcome.film.as_ref()).map(film);
-    let events = outcome.iter().flat_map(|outcome| &outcome.events).cloned();
-    film.into_iter()
-        .chain(events)
+    let Some(outcome) = &show.record.outcome else { return String::new() };
+    let fallen = (!outcome.seats_out.is_empty()).then(|| fallen(&outcome.seats_out));
+    // Where seats are told of in figures, their events are left to --json.
+    let is_seat = |event: &&String| !outcome.seats_out.is_empty() && !is_of_hall(event);
+    let mut events: Vec<&String> =
+        outcome.events.iter().filter(|event| !is_usual(event) && !is_seat(event)).collect();
+    let more = events.len().saturating_sub(EVENTS);
+    events.truncate(EVENTS);
+    let rest = (more > 0).then(|| format!("and {more} more (--json has all)"));
+    outcome
+        .film
+        .as_ref()
+        .map(film)
+        .into_iter()
+        .chain(fallen)
+        .chain(events.into_iter().cloned())
+        .chain(rest)
         .map(|event| format!("{} {}: {}\n", short(&show.record.start), safe(&show.record.cue), safe(&event)))
         .collect()
+}
+
+/// The seats that fell out, longest first.
+fn fallen(seats: &[SeatOut]) -> String {
+    let mut seats: Vec<&SeatOut> = seats.iter().collect();
+    seats.sort_by(|one, other| other.out_s.total_cmp(&one.out_s));
+    let one = |seat: &&SeatOut| {
+        let often = if seat.times > 1 { format!(" in {} falls", seat.times) } else { String::new() };
+        format!("{} {:.1} s{often}", seat.seat, seat.out_s)
+    };
+    let named: Vec<String> = seats.iter().take(NAMED).map(one).collect();
+    let more = seats.len().saturating_sub(NAMED);
+    let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+    format!("out: {}{more}", named.join(", "))
+}
+
+/// The words of an event behind its time of the day.
+fn text_of(event: &str) -> &str {
+    event.split_once(' ').filter(|(at, _)| at.len() == 8).map_or(event, |(_, text)| text)
+}
+
+/// An event of the hall begins with its state.
+fn is_of_hall(event: &str) -> bool {
+    let state = text_of(event).split_once(':').map_or("", |(state, _)| state);
+    STATES.contains(&state)
+}
+
+/// What happens in each show.
+fn is_usual(event: &str) -> bool {
+    let text = text_of(event);
+    USUAL.iter().any(|usual| text.strip_prefix(usual).is_some_and(|rest| rest.starts_with(':')))
 }
 
 /// By which source a show followed its film, and how well.
