@@ -100,7 +100,7 @@ pub(super) fn report(file: &str, figures: &[AxisFigures]) -> Vec<AxisReport> {
 }
 
 fn room(lowest: &Figure, highest: &Figure, axis: &AxisGeometry) -> f64 {
-    (lowest.value - axis.low).min(axis.high - highest.value) / axis.stroke()
+    axis.room(lowest.value).min(axis.room(highest.value))
 }
 
 /// The proved axes of the cue in `file`.
@@ -151,8 +151,7 @@ fn position_row(name: String, proof: &AxisProof) -> [String; 7] {
     let lowest = proof.lowest_shaken.filter(|shaken| shaken.value < proof.lowest.value);
     let highest = proof.highest_shaken.filter(|shaken| shaken.value > proof.highest.value);
     let (low, high) = (lowest.unwrap_or(proof.lowest), highest.unwrap_or(proof.highest));
-    let near = if low.value - axis.low < axis.high - high.value { low } else { high };
-    let left = proof.position_margin();
+    let (left, near) = proof.nearest();
     [
         name,
         "position".to_owned(),

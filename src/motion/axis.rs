@@ -8,6 +8,8 @@ use super::{PulseRange, Pulses};
 const FACTORY_RPM: u32 = 3_000;
 /// Free fall, mm/s².
 const FREE_FALL_MM_S2: f64 = 9_806.65;
+/// What arithmetic alone may put a place past an end, parts of the range.
+const INSIDE: f64 = 1e-6;
 /// How fast an axis parks, mm/s: slowly enough for whoever is getting off.
 const PARK_VELOCITY_MM_S: f64 = 50.0;
 /// How fast a rotary axis parks, deg/s: at half a metre from the middle not twice as fast as a cylinder.
@@ -106,6 +108,18 @@ impl AxisGeometry {
     #[must_use]
     pub fn stroke(&self) -> f64 {
         self.high - self.low
+    }
+
+    /// What a place leaves to the nearer end of the range, a part of that; below 0 outside. The end at which the axis parks is no limit to
+    /// what stays inside: every cue begins there.
+    #[must_use]
+    pub(crate) fn room(&self, place: f64) -> f64 {
+        let ends = [(0.0, place - self.low), (1.0, self.high - place)];
+        let left = ends.map(|(end, left)| {
+            let is_park = (self.park - end).abs() < f64::EPSILON && left > -INSIDE * self.stroke();
+            if is_park { 1.0 } else { left / self.stroke() }
+        });
+        left[0].min(left[1])
     }
 
     /// How long it takes to park from where that is farthest, seconds.

@@ -47,28 +47,20 @@ impl AxisProof {
         ]
     }
 
-    /// How far what is sent stays from the nearer end of the stroke, vibration on top, as a part of the stroke; below 0
-    /// past it.
+    /// What is sent leaves so much of the stroke to its nearer end, vibration on top ([`AxisGeometry::room`]); below 0 past it.
     #[must_use]
     pub(crate) fn position_margin(&self) -> f64 {
-        self.position_margin_at().0
+        self.nearest().0
     }
 
-    /// The same, and where that is.
+    /// Where that is, with what it leaves.
     #[must_use]
-    pub(crate) fn position_margin_at(&self) -> (f64, ShowTime) {
+    pub(crate) fn nearest(&self) -> (f64, Figure) {
         let axis = self.on.geometry();
-        let below = |figure: &Figure| ((figure.value - axis.low) / axis.stroke(), figure.at);
-        let above = |figure: &Figure| ((axis.high - figure.value) / axis.stroke(), figure.at);
-        let shaken = self.lowest_shaken.iter().map(below).chain(self.highest_shaken.iter().map(above));
-        shaken.fold(
-            if below(&self.lowest).0 <= above(&self.highest).0 {
-                below(&self.lowest)
-            } else {
-                above(&self.highest)
-            },
-            |least, one| if one.0 < least.0 { one } else { least },
-        )
+        let shaken = self.lowest_shaken.into_iter().chain(self.highest_shaken);
+        let all =
+            [self.lowest, self.highest].into_iter().chain(shaken).map(|one| (axis.room(one.value), one));
+        all.fold((f64::INFINITY, self.lowest), |least, one| if one.0 < least.0 { one } else { least })
     }
 }
 

@@ -27,8 +27,8 @@ fn of_axis(axis: &AxisProof) -> Vec<MarginStatus> {
         };
         margin(of, worst.margin(), worst.at.as_secs_f64())
     });
-    let (part, at) = axis.position_margin_at();
-    [margin(MarginOf::Stroke, part, at.as_secs_f64())].into_iter().chain(limited).collect()
+    let (part, nearest) = axis.nearest();
+    [margin(MarginOf::Stroke, part, nearest.at.as_secs_f64())].into_iter().chain(limited).collect()
 }
 
 #[cfg(test)]
@@ -44,5 +44,7 @@ mod tests {
             .margins;
         assert_eq!(margins.iter().map(|one| one.of).collect::<Vec<_>>(), MarginOf::ALL);
         assert!(margins.iter().all(|one| (0.0..=1.0).contains(&one.part) && one.axis > 0), "{margins:?}");
+        // It begins at park, at one end of the stroke, which is no use of the stroke.
+        assert!(margins[0].part > 0.1, "{margins:?}");
     }
 }
