@@ -14,6 +14,8 @@ use axum::http::HeaderValue;
 use axum::http::header::{CONTENT_DISPOSITION, CONTENT_LENGTH, CONTENT_TYPE, HeaderName};
 use axum::response::{IntoResponse as _, Response};
 use hyper::body::Bytes;
+use jiff::civil::DateTime;
+use jiff::tz::TimeZone;
 use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc;
 use tokio::time::timeout;
@@ -26,7 +28,7 @@ use super::problem::bad_value;
 use super::shared::{Shared, StillAsked, turn};
 use crate::control::model::Ending;
 use crate::control::{Code, Command, Problem, is_recording};
-use crate::journal::{Outcome, ShowRecord};
+use crate::journal::{Outcome, ShowRecord, stamp};
 use crate::library::RecordingPicture;
 use crate::record::closing_of;
 use crate::sys::file;
@@ -46,6 +48,8 @@ const READING: Duration = Duration::from_secs(30);
 pub(super) struct RecordingInfo {
     /// The name of its file: when it was begun, `show`, `test`, `homing` or `incident`, and what it is of.
     name: String,
+    /// When it was begun, RFC 3339; null where its name does not say.
+    begun: Option<String>,
     /// How large it is, bytes.
     bytes: u64,
     /// When it was closed, unix seconds.
@@ -208,7 +212,7 @@ fn list(dir: &Path) -> Vec<RecordingInfo> {
         let name = entry.file_name().into_string().ok().filter(|name| is_recording(name))?;
         let about = entry.metadata().ok().filter(fs::Metadata::is_file)?;
         let closed = about.modified().ok()?.duration_since(UNIX_EPOCH).ok()?.as_secs();
-        Some(RecordingInfo { name, bytes: about.len(), closed, outcome: None })
+        Some(RecordingInfo { begun: begun(&name), name, bytes: about.len(), closed, outcome: None })
     };
     // Where there is no folder nothing was recorded.
     let mut all: Vec<_> = fs::read_dir(dir).into_iter().flatten().flatten().filter_map(info).collect();
@@ -218,6 +222,12 @@ fn list(dir: &Path) -> Vec<RecordingInfo> {
         one.outcome = outcome(&dir.join(&one.name));
     }
     all
+}
+
+/// When a file was begun, which its name has in the zone of the server.
+fn begun(name: &str) -> Option<String> {
+    let at = DateTime::strptime("%Y-%m-%dT%H-%M-%S", name.get(..19)?).ok()?;
+    Some(stamp(&at.to_zoned(TimeZone::system()).ok()?))
 }
 
 /// The names of all recordings that are whole, newest first.

@@ -34,6 +34,9 @@ pub struct Status {
     pub format: u32,
     /// The name of the hall.
     pub hall: String,
+    /// The zone in which people read the times of the hall: that of its playlist, else that of the server. A name of the IANA database, or an
+    /// offset as `+01:00` where it has none.
+    pub timezone: String,
     /// The version of the program.
     pub version: String,
     /// Seconds since the program started.
@@ -255,7 +258,7 @@ pub struct PlaylistStatus {
     pub(crate) entries: Vec<EntryStatus>,
     /// Which entry is loaded, counted from 0.
     pub(crate) current: usize,
-    /// When the next one starts by itself, RFC 3339; null if none does.
+    /// When the next one starts by itself, RFC 3339 with the offset of the hall's zone; null if none does.
     pub(crate) next_start: Option<String>,
 }
 
@@ -279,8 +282,10 @@ pub(crate) struct EntryStatus {
     pub(crate) movie: Option<String>,
     /// What follows its end: `hold` (a person goes on) or `go`.
     pub(crate) then: Then,
-    /// The time of day at which it starts, HH:MM or HH:MM:SS; null if a person starts it.
+    /// The time of day at which it starts, HH:MM or HH:MM:SS, in the zone of the hall; null if a person starts it.
     pub(crate) at: Option<String>,
+    /// Seconds until that is next; null if a person starts it.
+    pub(crate) starts_in_s: Option<f64>,
     /// What whoever runs the show is told of it; null if the playlist says nothing.
     pub(crate) note: Option<String>,
 }

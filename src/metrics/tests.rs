@@ -120,6 +120,7 @@ fn playing() -> Status {
         arm_homes: false,
         may_clear: false,
         since_s: 5.0,
+        timezone: "UTC".to_owned(),
         lapses_s: None,
         moving: true,
         job: None,

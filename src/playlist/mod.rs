@@ -13,7 +13,7 @@ mod shelf;
 mod tests;
 
 pub(crate) use brought::{WishedText, theirs};
-pub(crate) use schedule::{Schedule, next_start};
+pub(crate) use schedule::{Schedule, local, next_start, start_after};
 pub(crate) use shelf::PlaylistInfo;
 pub use shelf::Shelf;
 

@@ -45,15 +45,21 @@ impl Schedule {
 /// The entry, counted from 0, that starts next after `now`, and when. Of two at once the first of the list.
 #[must_use]
 pub(crate) fn next_start(playlist: &Playlist, now: &Zoned) -> Option<(usize, Zoned)> {
+    let starts =
+        (0..playlist.entries.len()).filter_map(|entry| Some((entry, start_after(playlist, entry, now)?)));
+    starts.min_by(|(_, a), (_, b)| a.timestamp().cmp(&b.timestamp()))
+}
+
+/// When an entry starts next after `now`; `None` if a person starts it.
+#[must_use]
+pub(crate) fn start_after(playlist: &Playlist, entry: usize, now: &Zoned) -> Option<Zoned> {
+    let at = playlist.entries.get(entry)?.at.as_ref()?;
     let now = local(playlist, now);
     let today = now.date();
-    let starts = timed(playlist).filter_map(|(index, at)| {
-        // Today's may be past, and a date may have none: the last of the calendar.
-        let mut days = (0_i32..=7)
-            .filter_map(|ahead| start_on(at, today.checked_add(ahead.days()).ok()?, now.time_zone()));
-        days.find(|start| *start > now).map(|start| (index, start))
-    });
-    starts.min_by(|(_, a), (_, b)| a.timestamp().cmp(&b.timestamp()))
+    // Today's may be past, and a date may have none: the last of the calendar.
+    let mut days =
+        (0_i32..=7).filter_map(|ahead| start_on(at, today.checked_add(ahead.days()).ok()?, now.time_zone()));
+    days.find(|start| *start > now)
 }
 
 /// The entry, counted from 0, whose start came after `previous` and at or before `now`, no longer than [`LATEST`] before it.
@@ -86,7 +92,7 @@ fn timed(playlist: &Playlist) -> impl Iterator<Item = (usize, &At)> {
 }
 
 /// `now` in the zone of the playlist.
-fn local(playlist: &Playlist, now: &Zoned) -> Zoned {
+pub(crate) fn local(playlist: &Playlist, now: &Zoned) -> Zoned {
     playlist.timezone.as_ref().map_or_else(|| now.clone(), |zone| now.with_time_zone(zone.clone()))
 }
 

@@ -57,6 +57,13 @@ pub(crate) fn local_now() -> Zoned {
     now.to_zoned(TimeZone::system())
 }
 
+/// The zone of a time as people know it: its name in the IANA database, or its offset where it has none.
+#[must_use]
+pub(crate) fn zone_name(at: &Zoned) -> String {
+    let name = at.time_zone().iana_name().filter(|name| *name != "Etc/Unknown");
+    name.map_or_else(|| at.strftime("%:z").to_string(), str::to_owned)
+}
+
 /// Processor time that the calling thread has used so far, in user code and in the kernel.
 #[must_use]
 pub fn thread_cpu_time() -> Duration {

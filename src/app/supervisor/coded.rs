@@ -11,6 +11,10 @@ words! {
         GoFrom = "go-or-from",
         /// Arm, and it can go from there.
         ArmFrom = "arm-or-from",
+        /// Park: which seats are not at park.
+        ParkFirst = "park-first",
+        /// Enable and park them: which are out, and not at park.
+        EnableFirst = "enable-first",
         /// What preflight found is corrected first.
         Correct = "correct-findings",
     }
@@ -41,6 +45,10 @@ words! {
         LeftShaking = "left-shaking",
         /// None takes part.
         NoSeat = "no-seat",
+        /// How many fell silent at one instant, which are all.
+        AllSilent = "all-silent",
+        /// It is not, though the hall is parked or armed.
+        NotAtPark = "not-at-park",
         /// Preflight was not run.
         PreflightNever = "preflight-never",
         /// It failed.
@@ -105,6 +113,12 @@ words! {
         LeftOn = "left-on",
         /// Enable seats.
         NoSeat = "no-seat",
+        /// Look at what all seats have in common.
+        AllSilent = "all-silent",
+        /// Park it.
+        ParkIt = "park-it",
+        /// Enable it, and park it.
+        EnableIt = "enable-it",
         /// Run preflight.
         Preflight = "preflight",
         /// Correct what it found.
@@ -253,7 +267,10 @@ mod tests {
         RemedyCode::ALL.iter().for_each(|code| add("remedy", code.word(), 0));
         for code in WarningCode::ALL {
             let values = match code {
-                WarningCode::AnotherMaster | WarningCode::BeltOpen | WarningCode::LeftOn => 1,
+                WarningCode::AnotherMaster
+                | WarningCode::BeltOpen
+                | WarningCode::LeftOn
+                | WarningCode::AllSilent => 1,
                 WarningCode::SeatOut => 2,
                 WarningCode::SeatOutWhy => 3,
                 _ => 0,

@@ -48,6 +48,8 @@ pub(super) struct HallContext {
     pub(super) aside: Option<SetAside>,
     /// Where the film was when the seats left the cue.
     pub(super) left_at: Option<ShowTime>,
+    /// Where the film was when the seats last left the cue, until they are parked.
+    pub(super) halted_at: Option<ShowTime>,
     /// Why the last show ended.
     pub(super) ended: Cause,
     /// What is heard of the film, if one leads shows.
@@ -146,6 +148,7 @@ impl HallContext {
             cued: None,
             aside: None,
             left_at: None,
+            halted_at: None,
             ended: Cause::Started,
             film: None,
             player: None,
@@ -260,7 +263,7 @@ impl HallContext {
                 return Undo::Change(ShowChange::Settings(Box::new(before)));
             }
             ShowChange::Cue(cued, settings) => {
-                self.cued = Some(*cued);
+                (self.cued, self.halted_at) = (Some(*cued), None);
                 self.settings = settings.map_or_else(|| self.settings.clone(), |settings| *settings);
                 return Undo::Unload;
             }
@@ -320,8 +323,13 @@ impl HallContext {
     /// The hall goes from one state to another: where the film is when the seats leave the cue is where a show may go on.
     pub(super) fn note_place(&mut self, from: State, to: State) {
         let is_led = self.cued.as_ref().is_some_and(ProvedShow::is_led_elsewhere);
-        if rides(from) && !rides(to) && !is_led && !self.mirror.cause.completes() {
-            self.left_at = Some(self.live.show());
+        if rides(from) && !rides(to) {
+            self.halted_at = Some(self.live.show());
+            self.left_at =
+                self.halted_at.filter(|_| !is_led && !self.mirror.cause.completes()).or(self.left_at);
+        }
+        if to == State::Parked {
+            self.halted_at = None;
         }
     }
 
@@ -336,7 +344,7 @@ impl HallContext {
 
     /// A show begins: where the one before was left is forgotten.
     pub(super) fn forget_place(&mut self) {
-        self.left_at = None;
+        (self.left_at, self.halted_at) = (None, None);
         if let Some(cued) = &mut self.cued {
             cued.left_at = None;
         }

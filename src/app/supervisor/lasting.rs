@@ -89,8 +89,7 @@ impl Lasting {
     }
 
     /// What is worth a word of it.
-    pub(super) fn warnings(&self, hall: &HallContext) -> Vec<Warning> {
-        let now = Zoned::now();
+    pub(super) fn warnings(&self, hall: &HallContext, now: &Zoned) -> Vec<Warning> {
         let note = |id: RemedyCode, controller, text, remedy: &str| Warning {
             id: id.to_string(),
             severity: Severity::Info,
@@ -107,12 +106,16 @@ impl Lasting {
             let coded = Coded::new(code.word(), [&out.at, &out.who].into_iter().chain(&out.why).cloned());
             notes.extend(hall.names_of(group).map(|name| Warning {
                 coded: Some(coded.clone()),
-                ..note(RemedyCode::SeatOut, Some(name.to_owned()), out.words(&now), remedy)
+                ..note(RemedyCode::SeatOut, Some(name.to_owned()), out.words(now), remedy)
             }));
         }
         notes.extend(self.came_back.as_ref().map(|words| {
             let remedy = "change what should be different today";
-            note(RemedyCode::Kept, None, format!("restored from before the start: {words}"), remedy)
+            let coded = Some(Coded::new(WarningCode::Kept.word(), []));
+            Warning {
+                coded,
+                ..note(RemedyCode::Kept, None, format!("restored from before the start: {words}"), remedy)
+            }
         }));
         notes
     }

@@ -9,7 +9,7 @@ use crate::control::{Code, EntryStatus, PlaylistStatus, Problem};
 use crate::film::chase::PRE_ROLL;
 use crate::journal::{PlaylistPlace, stamp};
 use crate::library::{IdError, Library};
-use crate::playlist::{Entry, Playlist, PlaylistId, Schedule, Shelf, next_start};
+use crate::playlist::{Entry, Playlist, PlaylistId, Schedule, Shelf, local, next_start, start_after};
 use crate::time::ShowTime;
 
 /// The id of a playlist as somebody asks for it.
@@ -111,22 +111,27 @@ impl List {
 
     /// As surfaces show it.
     pub(super) fn status(&self, now: &Zoned) -> PlaylistStatus {
-        let entry = |(entry, (title, length_s)): (&Entry, &(Option<String>, f64))| EntryStatus {
-            cue: entry.cue.to_string(),
-            title: title.clone(),
-            length_s: *length_s,
-            preset: entry.preset.clone(),
-            level: entry.level,
-            trim_ms: entry.trim_ms,
-            movie: entry.film.movie.clone(),
-            then: entry.then,
-            at: entry.at.as_ref().map(|at| at.time.to_string()),
-            note: entry.note.clone(),
+        let wait = |place: usize| {
+            start_after(&self.playlist, place, now).map(|start| until(&start, now).as_secs_f64())
         };
+        let entry =
+            |(place, (entry, (title, length_s))): (usize, (&Entry, &(Option<String>, f64)))| EntryStatus {
+                cue: entry.cue.to_string(),
+                title: title.clone(),
+                length_s: *length_s,
+                preset: entry.preset.clone(),
+                level: entry.level,
+                trim_ms: entry.trim_ms,
+                movie: entry.film.movie.clone(),
+                then: entry.then,
+                at: entry.at.as_ref().map(|at| at.time.to_string()),
+                starts_in_s: wait(place),
+                note: entry.note.clone(),
+            };
         PlaylistStatus {
             id: self.id.clone(),
             title: self.playlist.title.clone(),
-            entries: self.playlist.entries.iter().zip(&self.cues).map(entry).collect(),
+            entries: self.playlist.entries.iter().zip(&self.cues).enumerate().map(entry).collect(),
             current: self.current,
             next_start: next_start(&self.playlist, now).map(|(_, start)| stamp(&start)),
         }
@@ -135,6 +140,15 @@ impl List {
     /// How long it is until an entry starts by its time.
     pub(super) fn starts_in(&self, wall: &Zoned) -> Option<Duration> {
         let (_, start) = next_start(&self.playlist, wall)?;
-        Some(start.timestamp().duration_since(wall.timestamp()).unsigned_abs())
+        Some(until(&start, wall))
     }
+
+    /// An instant in the zone of the playlist.
+    pub(super) fn local(&self, at: &Zoned) -> Zoned {
+        local(&self.playlist, at)
+    }
+}
+
+fn until(start: &Zoned, now: &Zoned) -> Duration {
+    start.timestamp().duration_since(now.timestamp()).unsigned_abs()
 }

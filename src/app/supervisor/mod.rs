@@ -5,6 +5,7 @@
 //! What it knows is owned by features, which are told what happens and say what is to be done (`act`); the loop here does it.
 
 mod act;
+mod away;
 mod begin;
 mod belts;
 mod coded;

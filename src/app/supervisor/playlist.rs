@@ -159,6 +159,12 @@ impl Onward {
             .is_some_and(|list| list.current == entry && cue == Some(&*list.entry().cue.to_string()))
     }
 
+    /// The wall clock in the zone of the hall: that of its playlist, else that of the server.
+    pub(super) fn local_now(&self) -> Zoned {
+        let now = Zoned::now();
+        self.list.as_ref().map_or_else(|| now.clone(), |list| list.local(&now))
+    }
+
     /// Where the playlist is, where what is loaded is of it.
     pub(super) fn place(&self, hall: &HallContext) -> Option<PlaylistPlace> {
         let list = self.list.as_ref().filter(|list| self.is_entry(list.current, hall));

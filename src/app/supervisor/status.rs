@@ -11,7 +11,7 @@ use super::readiness::CORRECT;
 use super::seat_places::SeatPlaces;
 use super::show::ProvedShow;
 use super::standing::standing_words;
-use super::{belts, film};
+use super::{away, belts, film};
 use crate::app::buttons::PadTable;
 use crate::app::notify::NotifyTable;
 use crate::app::{broadcasts, links};
@@ -21,10 +21,9 @@ use crate::control::{
     Coded, ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, RecordStatus, Status,
     Times, Warning,
 };
-use crate::drive::link::AT_PARK;
-use crate::motion::AxisGeometry;
 use crate::rt::Row;
 use crate::state::{Next, PlayMode, State};
+use crate::sys::clock::zone_name;
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker;
 
@@ -76,11 +75,14 @@ impl StatusParts<'_> {
             _ if moving => live.show(),
             // What was taken over is where its film is by now.
             Some(GoesOn::At(film)) => film,
-            _ => cued.start,
+            _ => hall.halted_at.unwrap_or(cued.start),
         };
-        let (next, next_coded) = belts::next_action(hall, table).unwrap_or_else(|| self.next());
+        let (next, next_coded) = (belts::next_action(hall, table))
+            .or_else(|| away::next_action(hall, table))
+            .unwrap_or_else(|| self.next());
         Status {
             hall: hall.config.show.name.clone(),
+            timezone: zone_name(&self.local_now()),
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             uptime_s: now.since(began).as_secs_f64(),
@@ -145,10 +147,7 @@ impl StatusParts<'_> {
             return format!("{cause}; no seat takes part");
         }
         if hall.mirror.state == State::Parked {
-            let away: Vec<String> = hall.lanes_on().filter_map(|lane| off_park(hall, table, lane)).collect();
-            let more = if away.len() > FEW { " ..." } else { "" };
-            let named = away.iter().take(FEW).map(String::as_str).collect::<Vec<_>>().join(", ");
-            return if away.is_empty() { cause } else { format!("{cause}; not at park: {named}{more}") };
+            return away::words(hall, table).map_or(cause.clone(), |away| format!("{cause}; {away}"));
         }
         let stays = |&lane: &usize| table.get(lane).is_some_and(|row| !row.standing.may_move());
         let word = |lane: usize| format!("{} {}", hall.config.controllers[lane].name, table[lane].standing);
@@ -185,6 +184,10 @@ impl StatusParts<'_> {
         }
     }
 
+    fn local_now(&self) -> Zoned {
+        self.features.onward.local_now()
+    }
+
     fn controllers(&self, table: &[Row]) -> Vec<ControllerStatus> {
         let config = &self.hall.config;
         let present = config.controllers.iter().enumerate();
@@ -211,7 +214,7 @@ impl StatusParts<'_> {
             enabled: hall.settings.is_on(index),
             health: row.map_or(Health::Unknown, |row| row.standing.into()),
             why: match hall.settings.out.get(hall.settings.group(index)) {
-                Some(out) => format!("{}; {why}", out.words(&Zoned::now())),
+                Some(out) => format!("{}; {why}", out.words(&self.local_now())),
                 None => why,
             },
             why_coded,
@@ -237,17 +240,6 @@ impl StatusParts<'_> {
             ..nameplate(controller)
         }
     }
-}
-
-/// Where the seat of a lane was read whose drives or controller tell that it is not at park.
-fn off_park(hall: &HallContext, table: &[Row], lane: usize) -> Option<String> {
-    let (controller, row) = (&hall.config.controllers[lane], table.get(lane)?);
-    let SeatPlaces { positions_mm, measured, .. } = SeatPlaces::of(controller, &row.state);
-    let read = positions_mm.filter(|_| measured.is_some() && row.homed == Some(true))?;
-    let mut axes = controller.seat.own().iter().zip(read).enumerate();
-    let is_off = |axis: &AxisGeometry, at: f64| (at - axis.place(axis.park)).abs() > AT_PARK * axis.stroke();
-    let (index, (axis, at)) = axes.find(|(_, (axis, at))| is_off(axis, *at))?;
-    Some(format!("{} (axis {} at {at:.1} {})", controller.name, index + 1, axis.unit.name()))
 }
 
 /// What a controller is, and nothing of how it is.

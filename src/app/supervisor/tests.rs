@@ -448,13 +448,16 @@ fn stopped_in_its_midst() -> Rig {
     let mut rig = Rig::playing();
     let show = ShowTime::from_millis(2_500);
     rig.supervisor.hall.live.on_show(show);
+    let place = |rig: &Rig| rig.supervisor.status().show.unwrap().position_s;
     rig.ask(Command::Stop).unwrap();
     rig.tell(Event::AtRest);
+    assert_eq!((rig.state(), place(&rig)), (State::Stopped, 2.5), "where the film stopped");
     rig.ask(Command::Clear).unwrap();
     rig.tell(Event::PositionsRead);
+    assert_eq!((rig.state(), place(&rig)), (State::Recovering, 2.5));
     rig.ask(Command::Park).unwrap();
     rig.tell(Event::Parked);
-    assert_eq!(rig.state(), State::Parked);
+    assert_eq!((rig.state(), place(&rig)), (State::Parked, 0.0));
     rig
 }
 

@@ -7,7 +7,7 @@ use super::notes::NoteBoard;
 use super::readiness::CORRECT;
 use super::standing::standing_words;
 use super::status::StatusParts;
-use super::{belts, player, recorded};
+use super::{away, belts, player, recorded};
 use crate::app::notify::NotifyTable;
 use crate::app::pair::PairWatch;
 use crate::app::{broadcasts, links};
@@ -16,9 +16,19 @@ use crate::control::{Coded, Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
 use crate::state::{Next, State};
+use crate::time::MonoTime;
 
 /// In a new state all controllers have this long to be looked at before one that was not is worth a word.
 const FIRST_LOOK: Duration = Duration::from_secs(1);
+
+/// Seats that were last heard within so long of each other fell silent at one instant: while nothing moves each is asked twice a second.
+const AT_ONCE: Duration = Duration::from_secs(2);
+
+/// One that answers, though not as it should, was heard within less.
+const SILENT: Duration = Duration::from_millis(500);
+
+/// Of fewer each is named.
+const LEAST_AT_ONCE: usize = 3;
 
 /// What nobody asks for is ended by itself within less.
 const LEFT_ON: Duration = Duration::from_secs(3);
@@ -47,8 +57,11 @@ impl StatusParts<'_> {
         settings_file: Option<String>,
     ) -> Vec<Warning> {
         let Self { hall, features, .. } = *self;
-        let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
-        warnings.extend(self.of_nobody(table));
+        let mut warnings: Vec<Warning> = match self.of_all(table) {
+            Some(all) => vec![all],
+            None => self.of_controllers(table).chain(self.of_nobody(table)).collect(),
+        };
+        warnings.extend(away::warnings(hall, table));
         warnings.extend(self.of_left_on(table));
         warnings.extend(self.of_strangers());
         warnings.extend(belts::warnings(hall, table));
@@ -75,7 +88,7 @@ impl StatusParts<'_> {
             ))
         });
         warnings.extend(untold);
-        warnings.extend(features.lasting.warnings(hall));
+        warnings.extend(features.lasting.warnings(hall, &features.onward.local_now()));
         let troubles = self.record.troubles.iter();
         warnings.extend(troubles.map(|(of, trouble)| in_two(&format!("record-{of}"), trouble)));
         warnings.extend(
@@ -104,6 +117,24 @@ impl StatusParts<'_> {
     /// Whether the hall came to its state a moment ago: who is looked for may not have answered yet.
     fn has_begun(&self) -> bool {
         self.hall.now.since(self.hall.mirror.since) < FIRST_LOOK
+    }
+
+    /// All seats that take part fell silent at one instant: the cause is one, and none of them.
+    fn of_all(&self, table: &[Row]) -> Option<Warning> {
+        let on = || table.iter().enumerate().filter(|(lane, _)| self.hall.settings.is_on(*lane));
+        let count = on().count();
+        let is_one = on().all(|(_, row)| row.standing == HealthState::Lost)
+            && are_silent_at_once(on().map(|(_, row)| row.state.heard_at), self.hall.now);
+        (count >= LEAST_AT_ONCE && is_one).then(|| Warning {
+            id: WarningCode::AllSilent.to_string(),
+            severity: Severity::Error,
+            coded: Some(Coded::new(WarningCode::AllSilent.word(), [count.to_string()])),
+            remedy_code: Some(RemedyCode::AllSilent.to_string()),
+            controller: None,
+            text: format!("all {count} seats fell silent at one instant"),
+            remedy: "check the network switch and its power, and the network cable of this machine"
+                .to_owned(),
+        })
     }
 
     /// A hall may play and park with all its seats out; what its state says is true of none of them then. All others say that seats are
@@ -272,6 +303,12 @@ impl StatusParts<'_> {
     }
 }
 
+/// True if all were heard once, last at one instant, and not since.
+fn are_silent_at_once(heard: impl Iterator<Item = Option<MonoTime>> + Clone, now: MonoTime) -> bool {
+    let (first, last) = (heard.clone().min().flatten(), heard.max().flatten());
+    first.zip(last).is_some_and(|(first, last)| last.since(first) <= AT_ONCE && now.since(last) > SILENT)
+}
+
 /// Of a cue that nothing leads, in a hall whose film others show.
 const NO_FILM: &str = "the cue that is loaded follows no film, and starts at once when it is let go: [sync] has no start; \
                        set start in [sync], or film in its entry of the playlist";
@@ -285,5 +322,25 @@ fn in_two(id: &str, trouble: &str) -> Warning {
         text: text.to_owned(),
         remedy: remedy.to_owned(),
         ..Warning::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seats_that_were_last_heard_within_two_seconds_fell_silent_at_one_instant() {
+        let at = |ms: u64| Some(MonoTime::from_nanos(ms * 1_000_000));
+        for (heard, now, at_once) in [
+            ([at(1_000), at(1_400), at(3_000)], 4_000, true),
+            ([at(1_000), at(1_400), at(3_001)], 4_000, false),
+            ([at(1_000), at(1_400), at(3_000)], 3_500, false),
+            ([at(1_000), None, at(1_000)], 4_000, false),
+            ([None; 3], 4_000, false),
+        ] {
+            let now = MonoTime::from_nanos(now * 1_000_000);
+            assert_eq!(are_silent_at_once(heard.into_iter(), now), at_once, "{heard:?}");
+        }
     }
 }

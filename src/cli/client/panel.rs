@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::view::{percent, time, us};
+use super::view::{next_start, percent, time, us};
 use crate::control::{ControllerStatus, Health, ShowStatus, Status, Warning};
 use crate::plain;
 
@@ -53,6 +53,7 @@ fn text(status: &Status) -> String {
         status.show.as_ref().map_or_else(|| "nothing is loaded".to_owned(), film),
         status.mix(),
     ];
+    lines.extend(next_start(status).map(|at| format!("starts by itself at {at}")));
     if let Some(test) = status.test.as_ref().filter(|test| test.running) {
         lines.push(format!("test: {} ({} of {})", test.step, test.done, test.total));
     }

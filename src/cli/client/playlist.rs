@@ -4,10 +4,10 @@ use serde_json::json;
 
 use super::known::{KnownKind, names};
 use super::server::ServerArgs;
-use super::view::{percent, time};
+use super::view::{next_start, percent, time};
 use crate::cli::table::table;
 use crate::cli::{Exit, Failure, print};
-use crate::control::{EntryStatus, PlaylistStatus};
+use crate::control::{EntryStatus, PlaylistStatus, Status};
 
 /// The commands that choose what is played.
 #[derive(Debug, clap::Subcommand)]
@@ -79,7 +79,7 @@ pub(super) fn run(command: &PlaylistCommand) -> Result<Exit, Failure> {
         PlaylistCommand::Playlist(PlaylistArgs { id, server, .. }) => {
             let status = server.put("/api/v1/playlist", &json!({ "id": id }))?;
             if let Some(playlist) = status.playlist.as_ref().filter(|_| !server.json) {
-                print::out(&entries(playlist))?;
+                print::out(&entries(playlist, &status))?;
             }
             Ok(server.tell(&status))
         }
@@ -93,10 +93,10 @@ fn show(server: &ServerArgs) -> Result<Exit, Failure> {
     let reply = server.get("/api/v1/status")?;
     let status = super::reply::status(&reply)?;
     if server.json {
-        let status: serde_json::Value = serde_json::from_str(&reply.text).unwrap_or_default();
-        print::json(&status["playlist"])?;
+        let whole: serde_json::Value = serde_json::from_str(&reply.text).unwrap_or_default();
+        print::json(&whole["playlist"])?;
     } else if let Some(playlist) = &status.playlist {
-        print::out(&entries(playlist))?;
+        print::out(&entries(playlist, &status))?;
     } else {
         let ids = names(KnownKind::Playlists, server)?;
         let there_are = if ids.is_empty() { "none".to_owned() } else { ids.join(", ") };
@@ -108,7 +108,7 @@ fn show(server: &ServerArgs) -> Result<Exit, Failure> {
 }
 
 /// The entries, the one that is loaded marked.
-fn entries(playlist: &PlaylistStatus) -> String {
+fn entries(playlist: &PlaylistStatus, status: &Status) -> String {
     let row = |(place, entry): (usize, &EntryStatus)| {
         let mark = if place == playlist.current { ">" } else { "" };
         let or = |text: Option<String>, otherwise: &str| text.unwrap_or_else(|| otherwise.to_owned());
@@ -124,9 +124,9 @@ fn entries(playlist: &PlaylistStatus) -> String {
         ]
     };
     let header = ["", "cue", "title", "length", "level", "trim", "then", "starts at"];
-    let PlaylistStatus { id, title, entries, next_start, .. } = playlist;
+    let PlaylistStatus { id, title, entries, .. } = playlist;
     let next =
-        next_start.as_ref().map_or_else(String::new, |at| format!("; the next starts by itself at {at}"));
+        next_start(status).map_or_else(String::new, |at| format!("; the next starts by itself at {at}"));
     let notes = entries
         .iter()
         .zip(1..)

@@ -2,7 +2,7 @@
 
 use super::reply;
 use super::server::ServerArgs;
-use super::view::{percent, time, us};
+use super::view::{next_start, percent, time, us};
 use crate::cli::table::table;
 use crate::cli::{Exit, Failure, print};
 use crate::control::{ControllerStatus, FilmStatus, Percentiles, PlaylistStatus, ShowStatus, Status, Times};
@@ -53,7 +53,7 @@ fn block(status: &Status) -> Vec<(&'static str, String)> {
     lines.push(("next", status.next.clone()));
     lines.push(("show", status.show.as_ref().map_or_else(|| "nothing is loaded".to_owned(), show)));
     lines.extend(status.film.as_ref().map(|one| ("film", film(one))));
-    lines.extend(status.playlist.as_ref().map(|list| ("playlist", playlist(list))));
+    lines.extend(status.playlist.as_ref().map(|list| ("playlist", playlist(list, status))));
     lines.push(("levels", status.mix()));
     if !status.presets.is_empty() {
         lines.push(("presets", status.presets.join(", ")));
@@ -85,8 +85,9 @@ fn film(film: &FilmStatus) -> String {
     format!("{state}{at}{by}: {cause}; next: {next}{leads}")
 }
 
-fn playlist(list: &PlaylistStatus) -> String {
-    let next = list.next_start.as_ref().map_or_else(String::new, |at| format!(", the next starts at {at}"));
+fn playlist(list: &PlaylistStatus, status: &Status) -> String {
+    let next =
+        next_start(status).map_or_else(String::new, |at| format!(", the next starts by itself at {at}"));
     format!("{}, entry {} of {}{next}", list.id, list.current + 1, list.entries.len())
 }
 

@@ -1,6 +1,7 @@
 //! The daemon's status in lines for people.
 
 use crate::control::{ControllerStatus, HallFacts, Health, Levels, Status, Warning};
+use crate::state::State;
 use crate::time::ShowTime;
 
 impl HallFacts {
@@ -72,6 +73,31 @@ impl Warning {
     }
 }
 
+/// When an entry of the playlist starts by itself next, in how long, and what has to be true for it; none if none does.
+pub(super) fn next_start(status: &Status) -> Option<String> {
+    let list = status.playlist.as_ref()?;
+    let at = list.next_start.as_ref()?.get(..19)?.replace('T', " ");
+    let wait = list.entries.iter().filter_map(|entry| entry.starts_in_s).fold(f64::INFINITY, f64::min);
+    let only = match status.lapses_s {
+        _ if status.state != State::Armed => ", if armed".to_owned(),
+        Some(lapses) if lapses < wait => {
+            format!("; arming lapses before that, in {}: arm again", lasting(lapses))
+        }
+        _ => String::new(),
+    };
+    Some(format!("{at} {}, in {}{only}", status.timezone, lasting(wait)))
+}
+
+/// How long, as people say it: `40 s`, `12 min`, `3 h 5 min`.
+fn lasting(seconds: f64) -> String {
+    let minutes = (seconds / 60.0).floor();
+    match seconds {
+        s if s < 120.0 => format!("{:.0} s", s.floor()),
+        s if s < 7_200.0 => format!("{minutes:.0} min"),
+        _ => format!("{:.0} h {:.0} min", (minutes / 60.0).floor(), minutes % 60.0),
+    }
+}
+
 /// A position as a person writes it.
 pub(super) fn time(seconds: f64) -> String {
     ShowTime::from_secs_f64(seconds).to_string()
@@ -101,6 +127,24 @@ mod tests {
         let status: Status = serde_json::from_str(STATUS).unwrap();
         assert_eq!(status.line(), "playing: go by anna; next: pause or stop; at 01:10.120 of 03:20.000");
         assert_eq!(status.mix(), "motion 60 %, vibration 100 %, row A 50 %, water off, trim +80 ms");
+    }
+
+    #[test]
+    fn a_start_has_its_zone_a_countdown_and_what_is_in_its_way() {
+        let told = |state: &str, lapses: &str| {
+            let json = format!(
+                r#"{{"state":"{state}","timezone":"Europe/Berlin","lapses_s":{lapses},"playlist":{{"id":"day",
+                    "next_start":"2026-11-21T19:13:00.000+01:00",
+                    "entries":[{{"cue":"a"}},{{"cue":"b","starts_in_s":9000.0}},{{"cue":"c","starts_in_s":4000.0}}]}}}}"#
+            );
+            next_start(&serde_json::from_str(&json).unwrap()).unwrap()
+        };
+        assert_eq!(told("parked", "null"), "2026-11-21 19:13:00 Europe/Berlin, in 66 min, if armed");
+        assert_eq!(told("armed", "4100"), "2026-11-21 19:13:00 Europe/Berlin, in 66 min");
+        let lapses =
+            "2026-11-21 19:13:00 Europe/Berlin, in 66 min; arming lapses before that, in 90 s: arm again";
+        assert_eq!(told("armed", "90.5"), lapses);
+        assert_eq!(lasting(9_000.0), "2 h 30 min");
     }
 
     #[test]

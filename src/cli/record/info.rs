@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::super::{Exit, Failure, print};
-use super::{open, shown, unread, wall};
+use super::{open, shown, unread, wall, wall_in_zone};
 use crate::record::{Contents, Margin, Quantity, Summary, note_in_words, summarize};
 use crate::time::ShowTime;
 
@@ -117,7 +117,7 @@ fn text(name: &str, contents: &Contents, summary: &Summary) -> String {
     }
     if let Some((first, last)) = contents.span {
         let length = ShowTime::from_nanos((last - first).cast_signed());
-        line(format_args!("  time      {} to {}, {length}", wall(first), wall(last)));
+        line(format_args!("  time      {} to {}, {length}", wall(first), wall_in_zone(last)));
     }
     if let Some((from, until)) = summary.film {
         line(format_args!("  film      {} to {}", film(from), film(until)));

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use serde::Serialize;
 
 use super::super::{Exit, Failure, OrExit as _, print};
-use super::{open, shown, wall};
+use super::{open, shown, wall_in_zone};
 use crate::record::{beginning, closing_of};
 
 /// Lists the recordings in a folder, oldest first.
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         writeln!(
             out,
             "{}  {:>8.1} MB  {mode:<8}{hall}  {cue}{part}{marks}  {file}{open}",
-            wall(*wall_ns),
+            wall_in_zone(*wall_ns),
             megabytes(*bytes)
         )
         .expect("a String takes all text");

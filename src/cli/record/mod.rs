@@ -5,8 +5,8 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use jiff::Timestamp;
 use jiff::tz::TimeZone;
+use jiff::{Timestamp, Zoned};
 
 use super::client::{ServerArgs, dump_record as dump};
 use super::{Exit, Failure, OrExit as _, names, print};
@@ -80,8 +80,16 @@ pub(super) fn tell_flaws(path: &Path, flaws: &[String]) -> Exit {
 
 /// A wall time as people here read it.
 pub(super) fn wall(ns: u64) -> String {
-    let at = Timestamp::from_nanosecond(ns.into()).unwrap_or_default().to_zoned(TimeZone::system());
-    at.strftime("%F %T").to_string()
+    here(ns).strftime("%F %T").to_string()
+}
+
+/// The same with its zone.
+pub(super) fn wall_in_zone(ns: u64) -> String {
+    here(ns).strftime("%F %T %:z").to_string()
+}
+
+fn here(ns: u64) -> Zoned {
+    Timestamp::from_nanosecond(ns.into()).unwrap_or_default().to_zoned(TimeZone::system())
 }
 
 /// The text of a file's entry, as it can be shown.

@@ -63,3 +63,37 @@ fn what_is_said_of_a_configuration_that_was_not_taken_is_over_once_another_one_i
     rig = Rig::starting(carryover);
     assert_eq!(says(&rig), 0);
 }
+
+#[test]
+fn parked_is_not_said_of_a_seat_that_stands_up_and_what_is_next_brings_it_down() {
+    let mut rig = Rig::parked();
+    let now = rig.supervisor.hall.now;
+    rig.supervisor.hall.mirror.since = MonoTime::default();
+    let stands = |pulses: i32| {
+        let mut row = row(now);
+        row.state.measured = Some(Heard { value: PerAxis::new(&[Pulses(pulses); 3]), at: now });
+        row
+    };
+    let said = |rig: &Rig, table: &[Row]| {
+        let Supervisor { hall, features, ports, .. } = &rig.supervisor;
+        let record = hall.recorder.status_at(hall.now);
+        let status = StatusParts { hall, features, record: &record, began: ports.began };
+        let warnings = warned(rig, table).into_iter().filter(|one| one.id == "not-at-park");
+        let warnings: Vec<_> =
+            warnings.map(|one| (one.controller.unwrap(), one.remedy_code.unwrap())).collect();
+        (status.status(table, Vec::new()).next_coded.code, warnings)
+    };
+    let home = said(&rig, &[stands(0), stands(0)]);
+    assert_eq!(home.1, []);
+    let up = said(&rig, &[stands(0), stands(180_000)]);
+    assert_eq!(up, ("park-first".to_owned(), vec![("B1".to_owned(), "park-it".to_owned())]));
+    rig.ask(out("B1")).unwrap();
+    let out = said(&rig, &[stands(0), stands(180_000)]);
+    assert_eq!(
+        out,
+        ("enable-first".to_owned(), vec![("B1".to_owned(), "enable-it".to_owned())]),
+        "whoever sits there sits high"
+    );
+    rig.supervisor.hall.mirror.state = State::Playing(PlayMode::Following);
+    assert_eq!(said(&rig, &[stands(0), stands(180_000)]).1, []);
+}
