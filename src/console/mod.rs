@@ -80,6 +80,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/said.js" JS,
     "js/seats.js" JS,
     "js/sources.js" JS,
+    "js/starts.js" JS,
     "js/state.js" JS,
     "js/stop.js" JS,
     "js/stream.js" JS,
@@ -92,6 +93,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/warnings.js" JS,
     "js/who.js" JS,
     "js/words.js" JS,
+    "js/zone.js" JS,
 );
 
 /// What others wrote, with its licence (`vendor/README.md`).

@@ -138,6 +138,12 @@ impl Browser {
         );
     }
 
+    /// Has the page think that it is in that time zone.
+    pub(crate) fn live_in(&self, zone: &str) {
+        let command = json!({"cmd": "Emulation.setTimezoneOverride", "params": {"timezoneId": zone}});
+        self.command("/goog/cdp/execute", &command);
+    }
+
     /// What a script returns.
     pub(crate) fn eval(&self, script: &str) -> Value {
         self.command("/execute/sync", &json!({"script": script, "args": []}))

@@ -14,6 +14,8 @@ use crate::serving::{self, Serving};
 
 /// What lets the page in; an engineer's, who alone may arm over TCP.
 pub(crate) const TOKEN: &str = "booth-token";
+/// One of somebody else, who may only look.
+pub(crate) const VISITOR: &str = "visitor-token";
 /// Controllers in each row.
 const SEATS: usize = 2;
 
@@ -156,11 +158,10 @@ fn swell() -> String {
 }
 
 fn write_api(config: &mut String, open_role: &str) {
-    let sha256: String = Sha256::digest(TOKEN).iter().map(|byte| format!("{byte:02x}")).collect();
-    write!(
-        config,
-        "[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"{open_role}\"\n\n\
-         [[api.token]]\nname = \"booth\"\nrole = \"engineer\"\nsha256 = \"{sha256}\"\n\n"
-    )
-    .expect("memory");
+    write!(config, "[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"{open_role}\"\n\n").expect("memory");
+    for (name, role, token) in [("booth", "engineer", TOKEN), ("visitor", "view", VISITOR)] {
+        let sha256: String = Sha256::digest(token).iter().map(|byte| format!("{byte:02x}")).collect();
+        write!(config, "[[api.token]]\nname = \"{name}\"\nrole = \"{role}\"\nsha256 = \"{sha256}\"\n\n")
+            .expect("memory");
+    }
 }

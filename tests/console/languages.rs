@@ -1,11 +1,8 @@
 //! The page in other languages: chosen by the browser or by a person, by the codes of what the hall says, and still one that fits.
 
-use serde_json::json;
-
 use crate::browser::Browser;
 use crate::hall::{Hall, TOKEN};
-use crate::page::{LARGE, out_of_reach, pretend};
-use crate::{arm, go};
+use crate::page::pretend;
 
 /// Opens the page in a browser that asks for these languages.
 fn enter(browser: &Browser, hall: &Hall, languages: &[&str]) {
@@ -46,38 +43,5 @@ fn the_page_speaks_as_the_browser_asks_and_as_a_person_chooses_and_says_what_has
     browser.reads("warnings", "It is full");
     browser.reads("warnings", "Serielle Verbindung: no port");
     browser.reads("warnings-title", "2 Warnungen");
-    assert_eq!(browser.complaints(), Vec::<String>::new());
-}
-
-#[test]
-fn in_the_longest_words_everything_that_is_pressed_in_play_is_in_view_and_no_word_leaves_its_button() {
-    let Some(browser) = Browser::start() else { return };
-    let hall = Hall::open();
-    enter(&browser, &hall, &["en"]);
-    browser.reads("state", "parked");
-    arm(&browser);
-    go(&browser);
-    let always = "#state, #in-play, #position, #remaining, #seek, #mark, #gravest, .transport button, #stop";
-    for (language, playing) in [("de", "läuft"), ("fr", "en cours"), ("es", "en marcha"), ("ja", "再生中")]
-    {
-        browser.eval(&format!("localStorage.setItem('kinocue-language', '{language}'); location.reload()"));
-        browser.reads("state", playing);
-        pretend(&browser, LARGE);
-        browser.wait("document.querySelectorAll('.field').length === 64");
-        for (size, wanted) in [((1280, 800), ", .field"), ((1024, 768), ", .field"), ((390, 844), "")] {
-            assert_eq!(
-                out_of_reach(&browser, size, &format!("{always}{wanted}")),
-                json!([]),
-                "{language} {size:?}"
-            );
-            browser.shot(&format!("90-{language}-{}", size.0));
-            let cut = browser.eval(
-                "return [...document.querySelectorAll('button, .state-word, .in-play')]
-                   .filter((one) => one.checkVisibility() && one.scrollWidth > one.clientWidth + 1)
-                   .map((one) => one.id || one.textContent);",
-            );
-            assert_eq!(cut, json!([]), "{language} {size:?}");
-        }
-    }
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }

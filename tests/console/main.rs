@@ -12,11 +12,14 @@ mod serving;
 
 mod browser;
 mod hall;
+mod instants;
 mod languages;
+mod layout;
 mod page;
 mod show_mode;
 mod tabs;
 mod timeline;
+mod token;
 
 use std::path::Path;
 use std::time::Duration;
@@ -138,8 +141,10 @@ fn a_seat_is_taken_out_with_a_reason_and_a_stopped_show_goes_on_where_it_was_lef
     browser.wait("/^00:0[3-9]/.test(document.getElementById('position').textContent)");
     browser.touch("#stop");
     browser.reads("state", "stopped");
+    browser.wait("/^00:(0[3-9]|[1-5])/.test(document.getElementById('position').textContent)"); // where the film stopped
     browser.press("#clear");
     browser.reads("next", "park, or home");
+    browser.wait("/^00:(0[3-9]|[1-5])/.test(document.getElementById('position').textContent)");
     browser.press("#park");
     browser.reads("state", "parked");
     browser.press("#arm");

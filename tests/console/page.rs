@@ -311,3 +311,51 @@ fn the_headline_is_the_worst_that_is_true_of_the_seats_and_what_is_next_deals_wi
     browser.wait(&format!("{worst} === ''"));
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
+
+#[test]
+fn seats_that_all_fell_silent_at_one_instant_have_one_cause_and_one_button() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    pretend(
+        &browser,
+        "status.state = 'parked'; status.may_clear = false; status.next = 'arm'; status.next_coded = { code: 'arm', of: [] };
+         status.controllers.forEach((one) => { one.health = 'lost'; });
+         status.warnings = [{ id: 'all-silent', severity: 'error', controller: null, text: 'all 4 seats fell silent at one instant',
+           coded: { code: 'all-silent', of: ['4'] }, remedy: 'check the network switch', remedy_code: 'all-silent' }];",
+    );
+    browser.reads("next", "check the network switch and the cable of this machine: all 4 seats");
+    browser.reads("gravest", "all 4 seats fell silent at one instant");
+    assert_eq!(browser.eval("return document.querySelectorAll('#warnings .warning').length"), json!(1));
+    assert_eq!(browser.eval("return document.querySelectorAll('#next-actions button').length"), json!(1));
+    browser.shot("86-all-silent");
+    browser.press("#next-actions [data-do=disable-all]");
+    browser.reads("next-actions", "sure?");
+    browser.wait("(window.allPressed ??= performance.now()) + 400 < performance.now()");
+    browser.press("#next-actions [data-do=disable-all]");
+    browser.wait("document.querySelectorAll('.disabled-seat').length === 4");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn parked_is_not_all_where_a_seat_stands_up_and_park_is_next() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    pretend(
+        &browser,
+        "status.state = 'parked'; status.may_clear = false; status.next = 'park: B1 not at park'; status.next_coded = { code: 'park-first', of: ['B1'] };
+         status.warnings = [{ id: 'not-at-park', severity: 'error', controller: 'B1', text: 'not at park', coded: { code: 'not-at-park', of: [] },
+           remedy: 'park it', remedy_code: 'park-it' }];",
+    );
+    browser.reads("state", "parked, not all");
+    browser.reads("cause", "B1: not at park");
+    browser.reads("next", "park: B1");
+    browser.wait("document.documentElement.dataset.worst === 'bad'");
+    browser.wait("document.querySelector('#park[data-next=true]:enabled') !== null");
+    // Whoever is taken out there stays up there.
+    let out = "return [...document.querySelectorAll('#warnings button, #next-actions button')].some((one) => /disable/i.test(one.textContent))";
+    assert_eq!(browser.eval(out), json!(false));
+    browser.shot("87-parked-not-all");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}

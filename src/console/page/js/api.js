@@ -80,11 +80,15 @@ export async function whyNoStop(patience) {
     return null;
   } catch (error) {
     // With a token that is no more, whoever needs none may stop all the same.
-    return error.status > 0 && token() && await isKnownWithout(patience) ? null : error;
+    return error.status > 0 && token() && await isKnown(null, patience) ? null : error;
   }
 }
 
-const isKnownWithout = (patience) => fetch(`${ROOT}who`, { cache: 'no-store', credentials: 'omit', redirect: 'error', signal: AbortSignal.timeout(patience) }).then(({ ok }) => ok, () => false);
+/** Whether the server knows whoever shows that token, or none. */
+export function isKnown(shown, patience = PATIENCE_MS) {
+  const asked = { cache: 'no-store', credentials: 'omit', redirect: 'error', signal: AbortSignal.timeout(patience), headers: shown === null ? {} : { Authorization: `Bearer ${shown}` } };
+  return fetch(`${ROOT}who`, asked).then(({ ok }) => ok, () => false);
+}
 
 function send(method, path, body, repeatOf, patience) {
   const more = {

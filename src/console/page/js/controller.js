@@ -2,7 +2,7 @@
 
 import { byId, make, setProperty, setText } from './dom.js';
 import { change } from './api.js';
-import { ask, onPress, onTwoPresses } from './press.js';
+import { ask, onPress, onTwoPresses, say } from './press.js';
 import { hall } from './state.js';
 import { healthOf, mark } from './marks.js';
 import { makePose, showPose } from './pose.js';
@@ -107,6 +107,24 @@ const takeOut = (button, which, body = {}) => ask(button, words('seat.disable', 
 /** Has a button that stands apart from its seat disable that, upon a second press. */
 export function disable(button, which) {
   onTwoPresses(button, { asks: words('sure'), label: () => button, action: () => takeOut(button, which) });
+  return button;
+}
+
+/** The same for several: one button, one after the other. */
+export function disableAll(button, names) {
+  const action = async () => {
+    const all = { n: names.length };
+    let done = 0;
+    const each = async () => {
+      for (const name of names) {
+        await change('POST', `controllers/${encodeURIComponent(name)}/disable`);
+        done += 1;
+      }
+    };
+    await ask(button, words('seat.disable-all', all), each, { long: true });
+    if (done < names.length) say(button, words('seat.disabled-of', { ...all, done }), true);
+  };
+  onTwoPresses(button, { asks: words('sure'), label: () => button, action });
   return button;
 }
 

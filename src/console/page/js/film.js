@@ -6,7 +6,8 @@ import { change } from './api.js';
 import { ask, onPress, say } from './press.js';
 import { keepInView, onView, startTimeline, view } from './timeline.js';
 import { hall } from './state.js';
-import { clock, number, percent, timeOfDay } from './words.js';
+import { clock, number, percent } from './words.js';
+import { atIn, nextStart } from './starts.js';
 import { said, words } from './language.js';
 
 const ON = ['waiting', 'joining', 'playing', 'holding', 'paused'];
@@ -73,16 +74,18 @@ function titleOf(show, state) {
 }
 
 /** The entry of the playlist that comes next, and when. */
-function nextOf({ playlist, show, state }) {
+function nextOf(status) {
+  const { playlist, show, state } = status;
   if (!playlist) return '';
-  const { entries, current, next_start: start } = playlist;
+  const { entries, current } = playlist;
   const isLoaded = show?.cue === entries[current]?.cue;
-  if (isLoaded && !ON.includes(state)) return start ? words(state === 'armed' ? 'film.starts' : 'film.starts-if-armed', { at: timeOfDay(start).slice(0, 5) }) : '';
+  const start = nextStart(status);
+  if (isLoaded && !ON.includes(state)) return start ? words(start.armed && !start.lapsing ? 'film.starts' : 'film.starts-if-armed', { at: start.at }) : '';
   const next = entries[current + 1];
   if (!next) return isLoaded ? words('film.last') : '';
   const title = next.title ?? next.cue;
   const how = entries[current].then === 'go' ? 'film.then-itself' : next.at ? 'film.then-at' : 'film.then-go';
-  return words(how, { title, at: next.at });
+  return words(how, { title, at: next.at && atIn(next.at, next.starts_in_s) });
 }
 
 function showBar(show, maySeek) {

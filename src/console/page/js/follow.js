@@ -4,7 +4,7 @@
 import { byId, onChange, setAttribute, setProperty, setText } from './dom.js';
 import { addError, resizeErrors } from './error.js';
 import { badge } from './headline.js';
-import { filmLook, mark } from './marks.js';
+import { filmLook, filmStateOf, mark } from './marks.js';
 import { showSources } from './sources.js';
 import { linkState } from './state.js';
 import { clock, sentence, signed, span } from './words.js';
@@ -23,13 +23,16 @@ export function startFollow() {
 export function showFollow(status, link) {
   const film = status?.film ?? null;
   setProperty(byId('follow-panel'), 'hidden', film === null);
-  showBadge(film);
+  showBadge(status);
   if (film === null) return;
+  // A cue that does not follow it needs no more of it than that.
+  byId('follow-panel').toggleAttribute('data-aside', status.show !== null && !film.leads);
   showTimecode(film);
-  const look = filmLook(film.state);
+  const state = filmStateOf(status);
+  const look = filmLook(state);
   setProperty(byId('follow-state'), 'className', `follow-state look-${look.look}`);
   showMark(look.mark);
-  setText(byId('follow-word'), filmName(film.state));
+  setText(byId('follow-word'), filmName(state));
   setText(byId('follow-source'), film.source === null ? words('follow.no-source') : words('follow.by', { source: film.source }));
   setText(byId('follow-cause'), sentence(causeOf(film)));
   setText(byId('follow-next'), sentence(filmNext(film)));
@@ -44,9 +47,11 @@ const causeOf = ({ source, sources, cause }) => sources.length === 0 ? cause : f
 const showMark = onChange((name) => byId('follow-mark').replaceChildren(mark(name)));
 
 /** In view wherever the page is scrolled to. */
-function showBadge(film) {
+function showBadge(status) {
+  const film = status?.film ?? null;
   if (film === null) return badge('follow-badge', '', 'away');
-  const { state, source, error_ms: error } = film;
+  const { source, error_ms: error } = film;
+  const state = filmStateOf(status);
   const parts = [words('follow.badge', { state: filmName(state) }), source && source.split(':')[0], error !== null && signed(Number(error.toFixed(1)) || 0)];
   badge('follow-badge', parts.filter(Boolean).join(', '), filmLook(state).look, causeOf(film));
 }

@@ -1,15 +1,17 @@
 // The state of the hall in large words, with its cause and the next action; how many seats take part; what is not as usual; the link.
 
 import { sentAt } from './clock.js';
-import { byId, setAttribute, setProperty, setText } from './dom.js';
+import { byId, setAttribute, setProperty, setStyle, setText } from './dom.js';
 import { channelAnswers } from './channel.js';
 import { seatsInPlay, worstOf } from './seats.js';
 import { hasSpoken, needsToken, refusal, silence } from './stream.js';
-import { linkState } from './state.js';
+import { hall, linkState } from './state.js';
 import { askForToken } from './token.js';
 import { words } from './language.js';
-import { causeOf, nextOf, stateName } from './said.js';
-import { lasting, number, percent, sentence, signed, timeOfDay } from './words.js';
+import { causeOf, nextOf, stateName, textOf } from './said.js';
+import { nextStart } from './starts.js';
+import { lasting, number, percent, sentence, signed } from './words.js';
+import { timeOfDay, zone, zoneName } from './zone.js';
 
 const BLINK_MS = 250;
 /** Seats that are named. */
@@ -20,9 +22,16 @@ let spoken = '';
 export function startHeadline() {
   byId('log-in').addEventListener('click', () => askForToken({ pressed: true }));
   setInterval(() => {
-    setText(byId('clock'), new Date(sentAt()).toLocaleTimeString('en-GB'));
+    showClock();
     if (linkState() === 'lost') showLink('lost');
   }, BLINK_MS);
+}
+
+/** In the zone of the hall, which is known with its first status. */
+function showClock() {
+  setText(byId('clock'), hall() ? timeOfDay(sentAt()) : '');
+  setText(byId('zone'), hall() ? zoneName() : '');
+  setProperty(byId('zone'), 'title', zone());
 }
 
 /** Shows the state, or that it is not known. */
@@ -50,16 +59,17 @@ function showStatus(status, link) {
   setText(byId('version'), words('page.version', { version: status.version, time: lasting(status.uptime_s) }));
   const seats = seatsInPlay(status.controllers);
   const worst = worstOf(status);
-  const state = worst?.none ? words('in-play.none', { state: stateName(status.state) }) : stateName(status.state);
+  const state = stateOf(status.state, worst);
   const next = nextAfter(worst, status);
   setAttribute(document.documentElement, 'data-worst', worst?.look ?? '');
   setText(byId('state'), link === 'live' ? state : `${state}?`);
-  setText(byId('cause'), sentence(causeOf(status)));
+  setStyle(byId('state'), '--chars', String(widthOf(state)));
+  setText(byId('cause'), sentence(worst?.away ? whoStandsUp(status) : causeOf(status)));
   setText(byId('since'), times(status));
   setText(byId('next'), sentence(next));
   showInPlay(seats);
-  const start = status.state === 'armed' ? status.playlist?.next_start : null;
-  badge('starts', start ? words('badge.starts', { at: timeOfDay(start) }) : '', 'weak', words('badge.starts.why'));
+  const start = nextStart(status);
+  badge('starts', start?.lapsing ?? (start?.armed ? words('badge.starts', { at: start.at }) : ''), 'weak', words(start?.lapsing ? 'start.lapses.why' : 'badge.starts.why'));
   badge('realtime', status.realtime.refusals.length > 0 ? words('badge.not-real-time') : '', 'weak', status.realtime.refusals.join('; '));
   const { text, planned } = settings(status);
   badge('settings-badge', text, planned ? 'calm' : 'weak', words(planned ? 'badge.planned' : 'badge.not-planned'));
@@ -71,12 +81,30 @@ function showStatus(status, link) {
   }
 }
 
+/** How wide a word is, in letters; those of Chinese and Japanese are half as wide again. */
+const widthOf = (word) => [...word].reduce((sum, letter) => sum + (letter > '\u2e80' ? 1.5 : 1), 0);
+
+/** The state of the hall, and that it is not true of the seats. */
+function stateOf(state, worst) {
+  const word = stateName(state);
+  if (worst?.none) return words('in-play.none', { state: word });
+  return worst?.away ? words('in-play.away', { state: word }) : word;
+}
+
+/** Of a hall that is parked but for these it is no cause that all are. */
+function whoStandsUp({ warnings }) {
+  const up = warnings.filter(({ id }) => id === 'not-at-park');
+  return words('pair', { of: few(up.map(({ controller }) => controller)), text: textOf(up[0]) });
+}
+
+const few = (names) => names.slice(0, NAMED).join(', ') + (names.length > NAMED ? ` ${words('and-more', { n: names.length - NAMED })}` : '');
+
 /** What a person does next: first about seats that are out, where nothing moves or the film leads none. */
 function nextAfter(worst, status) {
   if (worst?.none) return words('next.no-seat');
-  if (worst === null || !['parked', 'armed'].includes(status.state)) return nextOf(status);
-  const more = worst.names.length > NAMED ? ` ${words('and-more', { n: worst.names.length - NAMED })}` : '';
-  return words('next.seats-out', { seats: worst.names.slice(0, NAMED).join(', ') + more, next: nextOf(status) });
+  if (!worst?.names.length || worst.away || !['parked', 'armed'].includes(status.state)) return nextOf(status);
+  if (worst.all) return words('next.all-silent', { n: worst.names.length, next: nextOf(status) });
+  return words('next.seats-out', { seats: few(worst.names), next: nextOf(status) });
 }
 
 function times(status) {

@@ -4,12 +4,13 @@ import { byId, make, onChange, setProperty, setText } from './dom.js';
 import { get } from './api.js';
 import { showPicture } from './picture.js';
 import { endingName } from './said.js';
-import { clock, dayOf, percent, timeOfDay, whole } from './words.js';
+import { clock, percent, whole } from './words.js';
+import { dayAndTime } from './zone.js';
 import { said, words } from './language.js';
 
 /** Reads the shows anew when one begins or ends, and when another recording is whole. */
 export function showHistory(status, link) {
-  if (status && link === 'live') read([status.state, status.record?.last]);
+  if (status && link === 'live') read([status.state, status.record?.last, status.timezone]);
 }
 
 const read = onChange(() => {
@@ -23,7 +24,7 @@ function show(shows) {
 }
 
 function line({ start, cue, title, result, lost, missed_ticks: missed, recorded }) {
-  const when = `${dayOf(start.slice(0, 10))} ${timeOfDay(start)}`;
+  const when = dayAndTime(start);
   const { clamps = 0, marks = 0, nearest = null, name = null } = recorded ?? {};
   const figures = [
     lost > 0 && words('recordings.lost', { n: whole(lost) }),

@@ -13,6 +13,9 @@ const NO_ROW = '';
 /** Names of rows up to so long stand beside their seats, longer ones above them; longer names of seats need wider fields. */
 const SHORT_ROW = 2;
 const SHORT_SEAT = 6;
+/** How tall a line of fields is, and how much of the window they may take. */
+const LINE_PX = 52;
+const MOST_OF_HEIGHT = 0.6;
 let by = 'health';
 let drawn = '';
 let fields = new Map();
@@ -28,6 +31,15 @@ export function startMap() {
     if (hall()) showMap(hall());
   });
   showLegend();
+  new ResizeObserver(fit).observe(byId('map'));
+  addEventListener('resize', fit);
+}
+
+/** Fields are as large as a finger where they all have room in most of the height; else each is a mark. */
+function fit() {
+  const perLine = Math.max(Math.floor(byId('map').clientWidth / (innerWidth > 700 ? 59 : 78)), 1);
+  const lines = rows.reduce((sum, seats) => sum + Math.ceil(seats.length / perLine), 0);
+  byId('map').classList.toggle('compact', lines * LINE_PX > innerHeight * MOST_OF_HEIGHT);
 }
 
 /** Shows every controller. */
@@ -60,6 +72,7 @@ function layOut(controllers) {
     return make('div', { className: row.length > SHORT_ROW ? 'map-row long' : 'map-row' }, make('span', { className: 'row-name', 'aria-hidden': 'true' }, row), line);
   });
   byId('map').replaceChildren(...lines);
+  fit();
 }
 
 function makeField({ name }) {

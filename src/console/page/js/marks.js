@@ -41,6 +41,9 @@ const FILM = {
   lost: { look: 'bad', mark: 'cross' },
 };
 
+/** One that nobody follows at present cannot be lost: it is as good as over. */
+export const filmStateOf = ({ state, film }) => (film.state === 'lost' && ['parking', 'parked'].includes(state) ? 'absent' : film.state);
+
 /** How a film or a source of one is shown. */
 export const filmLook = (state) => FILM[state] ?? FILM.absent;
 

@@ -4,7 +4,8 @@ import { byId, make, onChange, setProperty, setText } from './dom.js';
 import { change, get } from './api.js';
 import { ask, onPress, say } from './press.js';
 import { onToken } from './token.js';
-import { clock, percent, signed, timeOfDay } from './words.js';
+import { atIn, nextStart } from './starts.js';
+import { clock, percent, sentence, signed } from './words.js';
 import { words } from './language.js';
 
 let cues = [];
@@ -73,15 +74,22 @@ function showCueNote() {
 export function showPlaylist(status) {
   if (!status) return;
   const { playlist } = status;
-  const next = playlist?.next_start ? words('playlist.starts', { at: timeOfDay(playlist.next_start) }) : words('playlist.no-start');
-  setText(byId('playlist-head'), playlist ? `${playlist.title}. ${next}` : words('playlist.none'));
+  const start = nextStart(status);
+  const next = start?.lapsing ?? (start ? words('playlist.starts', { at: start.at }) : words('playlist.no-start'));
+  setText(byId('playlist-head'), playlist ? `${playlist.title}. ${sentence(next)}` : words('playlist.none'));
   setProperty(byId('playlist-drop'), 'disabled', !playlist);
   const loaded = playlist?.entries[playlist.current];
   const note = loaded && loaded.cue === status.show?.cue ? loaded.note : null;
   setProperty(byId('entry-note'), 'hidden', !note);
   setText(byId('entry-note'), note ?? '');
   setProperty(byId('entry-note'), 'title', note ?? '');
-  showEntries(playlist ? { entries: playlist.entries, current: playlist.current, cue: status.show?.cue } : { entries: [], current: -1 });
+  // Their countdowns change in place: a button made anew would go from under a finger.
+  const still = playlist?.entries.map((entry) => ({ ...entry, starts_in_s: null }));
+  showEntries(playlist ? { entries: still, current: playlist.current, cue: status.show?.cue } : { entries: [], current: -1 });
+  for (const [index, place] of byId('entries').querySelectorAll('.starts-at').entries()) {
+    const { at, starts_in_s: wait } = playlist.entries.filter((entry) => entry.at)[index];
+    setText(place, words('entry.at', { at: atIn(at, wait) }));
+  }
 }
 
 // Another cue may have been loaded by hand since.
@@ -94,13 +102,13 @@ function entryLine(entry, index, isLoaded) {
   const title = entry.title ?? entry.cue;
   const facts = [
     clock(entry.length_s, 0),
-    entry.at && words('entry.at', { at: entry.at }),
     entry.preset,
     entry.level !== null && words('entry.level', { level: percent(entry.level) }),
     entry.trim_ms !== null && words('trim.to', { trim: signed(entry.trim_ms) }),
     words(entry.then === 'go' ? 'entry.then-itself' : 'entry.then-go'),
   ].filter(Boolean);
   const told = make('span', { className: 'entry-words' }, make('b', {}, title), make('span', { className: 'quiet' }, facts.join(', ')));
+  if (entry.at) told.append(make('span', { className: 'starts-at' }));
   if (entry.note) told.append(make('span', { className: 'note-words' }, entry.note));
   if (isLoaded) {
     return make('li', { className: 'entry current', 'aria-current': 'true' }, told, make('span', { className: 'loaded' }, words('entry.loaded')));

@@ -7,7 +7,8 @@ import { ask, onPress } from './press.js';
 import { hall } from './state.js';
 import { showPicture } from './picture.js';
 import { endingName } from './said.js';
-import { clock, dayOf, number, whole } from './words.js';
+import { clock, number, whole } from './words.js';
+import { dayAndTime } from './zone.js';
 import { words } from './language.js';
 
 const SHOWN = 20;
@@ -38,7 +39,7 @@ export function showRecordings(status, link) {
   const trouble = troubles.show ?? troubles.room;
   badge('record-badge', trouble ? words('badge.not-recorded') : recording ? words('badge.recording') : '', trouble ? 'weak' : 'calm', trouble ?? '');
   setProperty(byId('mark'), 'disabled', link !== 'live' || (flight === 0 && !recording));
-  readList(status.record.last);
+  readList([status.record.last, status.timezone]);
 }
 
 /** Reads the list anew whenever another file is whole. */
@@ -48,7 +49,7 @@ const readList = onChange(() => {
 
 function showList(list) {
   const lines = list.slice(0, SHOWN).map((recording) => {
-    const { when, kind, what } = parts(recording.name);
+    const { when, kind, what } = parts(recording);
     const look = make('button', { type: 'button', 'aria-label': words('picture.of', { kind, what, when }) }, words('picture'));
     look.addEventListener('click', () => showPicture(recording.name, `${kind} ${what}, ${when}`));
     const cells = [when, words('pair', { of: kind, text: what }), outcome(recording), look].map((cell) => make('td', {}, cell));
@@ -67,9 +68,9 @@ function outcome({ bytes, result, lost, missed_ticks: missed }) {
 }
 
 /** 2026-01-31T19-00-00-show-coaster.mcap. */
-function parts(name) {
-  const [, day, time, kind, what] = name.match(/^(\d{4}-\d\d-\d\d)T(\d\d-\d\d-\d\d)-([a-z]+)-(.*)\.mcap$/) ?? [null, '', '', '', name];
-  const when = day && `${dayOf(day)} ${time.replaceAll('-', ':')}`;
+function parts({ name, begun }) {
+  const [, kind, what] = name.match(/^\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d-([a-z]+)-(.*)\.mcap$/) ?? [null, '', name];
+  const when = begun === null ? '' : dayAndTime(begun);
   return { when, kind: KINDS.includes(kind) ? words(`recordings.${kind}`) : kind, what };
 }
 

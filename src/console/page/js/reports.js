@@ -6,7 +6,8 @@ import { ask, onPress } from './press.js';
 import { SEVERITIES, alike } from './warnings.js';
 import { mark } from './marks.js';
 import { remedyOf, textOf } from './said.js';
-import { lasting, sentence, timeOfDay } from './words.js';
+import { lasting, sentence } from './words.js';
+import { timeOfDay } from './zone.js';
 import { words } from './language.js';
 
 /** Makes preflight run. */
@@ -21,7 +22,7 @@ export const runPreflight = (button) => ask(button, words('preflight.title'), ()
 export function showReports(status) {
   if (!status) return;
   showPreflight(status);
-  showJournal(status.journal);
+  showJournal({ journal: status.journal, zone: status.timezone });
 }
 
 function showPreflight({ preflight, controllers }) {
@@ -55,7 +56,7 @@ function whose(controllers, all) {
   return controllers.length === all && all > 1 ? words('preflight.all', { n: all }) : controllers.join(', ');
 }
 
-const showJournal = onChange((journal) => {
+const showJournal = onChange(({ journal }) => {
   const lines = journal.map(({ at, who, what, result, times }) => {
     const came = result === 'done' ? words('journal.done') : result;
     const line = row([timeOfDay(at), who, what, times > 1 ? words('journal.times', { came, n: times }) : came]);

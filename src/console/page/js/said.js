@@ -1,7 +1,8 @@
 // What the hall says, in the language of the page: by its codes where there are any, else as it came.
 
 import { said, words } from './language.js';
-import { dayOf, timeOfDay } from './words.js';
+import { sentAt } from './clock.js';
+import { dayAndTime, isOneDay, timeOfDay } from './zone.js';
 
 const OF_CONTROLLER = 'controller-';
 
@@ -54,7 +55,6 @@ export const remedyOf = ({ remedy, remedy_code: code }) => said('remedy', { code
 
 /** A time as people say it: of today without its day. */
 function moment(value) {
-  const [, day, minutes] = /^(\d{4}-\d\d-\d\d)T(\d\d:\d\d)/.exec(value) ?? [];
-  if (!day) return value;
-  return day === new Date().toLocaleDateString('sv') ? minutes : `${dayOf(day)} ${minutes}`;
+  if (!/^\d{4}-\d\d-\d\dT\d\d:\d\d/.test(value)) return value;
+  return (isOneDay(value, sentAt()) ? timeOfDay(value) : dayAndTime(value)).slice(0, -3);
 }

@@ -22,13 +22,19 @@ export function seatsInPlay(controllers) {
   return { playing, all: seats.size, failed };
 }
 
+/** Whether all fell silent at one instant, which is one cause and no seat's. */
+export const isAllSilent = ({ warnings }) => warnings.some(({ id }) => id === 'all-silent');
+
 /**
  * The worst that is true of the seats, by its look, with the names of those that are out; null where it is as the state says. `none` where the
- * film leads no seat.
+ * film leads no seat, `away` where one is not at park though the hall is.
  */
-export function worstOf({ state, controllers }) {
+export function worstOf(status) {
+  const { state, controllers, warnings } = status;
   const none = LEADING.has(state) && seatsInPlay(controllers).playing === 0;
   const names = controllers.filter(isOut).map(({ name }) => name);
-  if (none) return { look: 'bad', none, names };
-  return OF_ALL.has(state) && names.length > 0 ? { look: names.length === controllers.length ? 'bad' : 'weak', none, names } : null;
+  const away = warnings.some(({ id }) => id === 'not-at-park');
+  const worst = { none, away, names, all: isAllSilent(status) };
+  if (none || away) return { ...worst, look: 'bad' };
+  return OF_ALL.has(state) && names.length > 0 ? { ...worst, look: names.length === controllers.length ? 'bad' : 'weak' } : null;
 }

@@ -107,7 +107,7 @@ function drawAll() {
   const whole = isWhole();
   setProperty(byId('zoomed'), 'hidden', whole);
   if (!whole) setText(byId('zoomed-words'), words('timeline.shown', { from: clock(shown[0]), to: clock(shown[1]) }));
-  setStyle(byId('lanes').parentElement, '--tall', `${whole ? 56 : Math.max(56, axes.length * TALL + MOST_EFFECTS * EFFECT)}px`);
+  setStyle(byId('lanes').parentElement, '--lanes', `${whole ? 0 : axes.length * TALL + MOST_EFFECTS * EFFECT}px`);
   const canvas = byId('lanes');
   const scale = window.devicePixelRatio;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];

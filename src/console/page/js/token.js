@@ -8,6 +8,7 @@ const KEY = 'kinocue-token';
 const IN_LINK = /^#token=([\w.~-]{1,256})$/;
 const given = [];
 let left = false;
+let offered = null;
 
 /** The token; null where none was given. */
 export const token = () => sessionStorage.getItem(KEY);
@@ -27,15 +28,35 @@ export function askForToken({ pressed, shown = token() }) {
 /** The server knows who asks, and they may not. */
 export const askForAnother = () => open('token.more');
 
-/** Takes the token of the link that led here; says whether there was one. */
+/** Keeps the token of the link that led here apart until the server is known to know it; says whether there was one. */
 function takeFromLink() {
   const found = IN_LINK.exec(location.hash);
   if (!found) return false;
   history.replaceState(history.state, '', location.pathname + location.search);
-  // One that serves is kept: no page of others may break the STOP of this one by a link.
-  if (token() && byId('token').hidden) return false;
-  sessionStorage.setItem(KEY, found[1]);
+  // One that serves is kept until another one is known to serve: no page of others may break the STOP of this one by a link.
+  if (token() && byId('token').hidden) offered = found[1] === token() ? null : found[1];
+  else sessionStorage.setItem(KEY, found[1]);
   return true;
+}
+
+/** The other token that a link brought, once; null where it brought none. */
+export function takeOffered() {
+  const taken = offered;
+  offered = null;
+  return taken;
+}
+
+/** Uses a token from now on; none where it is null. */
+export function useToken(text) {
+  if (text === null) sessionStorage.removeItem(KEY);
+  else sessionStorage.setItem(KEY, text);
+  used();
+}
+
+function used() {
+  byId('token').hidden = true;
+  left = false;
+  for (const listener of given) listener();
 }
 
 // Before anything is asked: whoever asks imports this.
@@ -53,21 +74,18 @@ function open(why) {
 /** Makes the dialog work. */
 export function startToken() {
   const form = byId('token');
-  const use = () => {
-    form.hidden = true;
-    left = false;
-    for (const listener of given) listener();
-  };
   form.addEventListener('submit', (event) => {
     event.preventDefault();
     const text = byId('token-text');
-    sessionStorage.setItem(KEY, text.value.trim());
+    const typed = text.value.trim();
     text.value = '';
-    use();
+    useToken(typed);
   });
   byId('token-leave').addEventListener('click', () => {
     form.hidden = true;
     left = true;
   });
-  addEventListener('hashchange', () => takeFromLink() && use());
+  byId('token-other').addEventListener('click', () => open('token.any'));
+  byId('token-out').addEventListener('click', () => useToken(null));
+  addEventListener('hashchange', () => takeFromLink() && used());
 }

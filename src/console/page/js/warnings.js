@@ -2,8 +2,9 @@
 
 import { byId, make, onChange, setProperty, setText } from './dom.js';
 import { mark } from './marks.js';
+import { isOut } from './seats.js';
 import { hall } from './state.js';
-import { disable, select } from './controller.js';
+import { disable, disableAll, select } from './controller.js';
 import { counted, words } from './language.js';
 import { remedyOf, textOf } from './said.js';
 import { sentence, whole } from './words.js';
@@ -40,7 +41,7 @@ export function showWarnings(status) {
   setProperty(byId('warnings-more'), 'hidden', told.length <= FIRST);
   setText(byId('warnings-more'), words(all ? 'warnings.fewer' : 'warnings.more', { n: told.length - FIRST }));
   const shown = all ? told : told.slice(0, FIRST);
-  layOut(shown.map(({ id, severity, controllers: [first] }) => ({ id, severity, first })));
+  layOut(shown.map(({ id, severity, controllers }) => ({ id, severity, controllers: id === 'all-silent' ? outOf(hall()) : controllers, whole: id === 'all-silent' })));
   for (const [index, warning] of shown.entries()) {
     setText(lines[index].text, ` ${matter(warning)}`);
     setText(lines[index].remedy, sentence(remedyOf(warning)));
@@ -92,7 +93,18 @@ const layOut = onChange((warnings) => {
   byId('warnings').replaceChildren(...lines.map(({ item }) => item));
 });
 
-function line({ severity, first }) {
+/** Takes out the one that it is about, or all of them at once. */
+function out(controllers) {
+  const [first, ...more] = controllers;
+  const button = (text) => make('button', { type: 'button' }, text);
+  if (more.length === 0) return disable(button(words('seat.disable', { which: first })), first);
+  return disableAll(button(words('seat.disable-all', { n: controllers.length })), controllers);
+}
+
+const outOf = ({ controllers }) => controllers.filter(isOut).map(({ name }) => name);
+
+function line({ id, severity, controllers, whole }) {
+  const [first] = whole ? [] : controllers;
   const look = SEVERITIES[severity] ?? SEVERITIES.warning;
   const text = make('span');
   const remedy = make('span');
@@ -104,7 +116,8 @@ function line({ severity, first }) {
     const button = make('button', { type: 'button' }, words('warnings.show', { which: first }));
     button.addEventListener('click', () => select(first));
     item.append(button);
-    if (severity === 'error') item.append(disable(make('button', { type: 'button' }, words('seat.disable', { which: first })), first));
   }
+  // Whoever stands up is brought down, not left there.
+  if (severity === 'error' && id !== 'not-at-park' && controllers.length > 0) item.append(out(controllers));
   return { item, text, remedy };
 }

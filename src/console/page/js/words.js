@@ -71,12 +71,6 @@ export function ackRate(rate) {
 /** A whole number in groups of three. */
 export const whole = (figure) => number(figure);
 
-/** A time of day of an RFC 3339 time, in the zone it was written in. */
-export const timeOfDay = (rfc3339) => /T(\d\d:\d\d:\d\d)/.exec(rfc3339)?.[1] ?? rfc3339;
-
-/** A day of `2026-01-31`, short. */
-export const dayOf = (date) => new Intl.DateTimeFormat(spoken(), { dateStyle: 'short', timeZone: 'UTC' }).format(new Date(`${date}T00:00Z`));
-
 /** What the bits of a word stand for: X01, X04; `none` where no bit is set. */
 export function bits(word, letter) {
   if (word === null || word === undefined) return words('figure.unknown');
