@@ -84,8 +84,7 @@ impl ArtNetReader {
             self.garbage += 1;
             return;
         };
-        if let Some(media) = self.labels.media(at, label, 0, Some(labels)) {
-            out(Observation::new(at, FilmWord::Position(media)));
-        }
+        let media = self.labels.media(at, label, 0, Some(labels));
+        out(Observation::new(at, media.map_or(FilmWord::Unplaced, FilmWord::Position)));
     }
 }

@@ -4,6 +4,8 @@
 #[cfg(test)]
 mod tests;
 
+use std::time::Duration;
+
 use super::labels::LabelClock;
 use super::observation::{FilmWord, Observation};
 use super::timecode::{FrameRate, Label, Timecode};
@@ -18,6 +20,12 @@ const REALTIME: u8 = 0xf8;
 const LONGEST: usize = 9;
 /// Deviation of the instant of a quarter frame, seconds.
 const SIGMA_S: f64 = 0.000_5;
+/// A full message that names a place so near to the quarter frames, frames, is one of a machine that runs, or stops there: a whole set is two
+/// to four frames old, and more where quarter frames come by the block of sound.
+const NEAR: i64 = 10;
+/// So many reads after one that brought several quarter frames others may: what a player sends by the block of sound comes by turns in ones
+/// and twos.
+const BY_BLOCK: u32 = 200;
 /// Quarter frames of a label, and the frames that pass with them.
 const QUARTERS: u8 = 8;
 const FRAMES_OF_A_SET: i64 = 2;
@@ -107,6 +115,11 @@ pub(crate) struct MtcReader {
     whole: Option<(Label, u8, bool)>,
     /// The label that the set under way has to have, once two agreed.
     expected: Option<(Label, u8)>,
+    /// The newest quarter frame that nothing was made of yet: its label, if that is known, the rate bits of that, and which it is.
+    newest: Option<Option<(Label, u8, u8)>>,
+    /// How many came at this instant, and for how many reads more each is late by up to a quarter frame.
+    at_once: u32,
+    by_block: u32,
 }
 
 impl MtcReader {
@@ -120,6 +133,9 @@ impl MtcReader {
             set: QuarterSet::default(),
             whole: None,
             expected: None,
+            newest: None,
+            at_once: 0,
+            by_block: 0,
         }
     }
 
@@ -128,8 +144,15 @@ impl MtcReader {
         &self.labels
     }
 
-    /// Takes a byte that came at an instant.
-    pub(crate) fn hear(&mut self, byte: u8, at: MonoTime, out: &mut impl FnMut(Observation)) {
+    /// Takes bytes that came at an instant.
+    pub(crate) fn hear(&mut self, bytes: &[u8], at: MonoTime, out: &mut impl FnMut(Observation)) {
+        for byte in bytes {
+            self.hear_byte(*byte, at, out);
+        }
+        self.place(at, out);
+    }
+
+    fn hear_byte(&mut self, byte: u8, at: MonoTime, out: &mut impl FnMut(Observation)) {
         match byte {
             // Clocks of other machines come at any time, within a message too, and end none.
             REALTIME.. => {}
@@ -143,7 +166,7 @@ impl MtcReader {
             _ if self.status == QUARTER => {
                 // A quarter frame has no running status: what follows it belongs to nothing.
                 self.status = 0;
-                self.on_quarter(byte, at, out);
+                self.on_quarter(byte);
             }
             _ if self.status == EXCLUSIVE => {
                 if let Some(place) = self.data.get_mut(self.length) {
@@ -155,7 +178,7 @@ impl MtcReader {
         }
     }
 
-    fn on_quarter(&mut self, data: u8, at: MonoTime, out: &mut impl FnMut(Observation)) {
+    fn on_quarter(&mut self, data: u8) {
         let is_whole = self.set.push(data);
         let (piece, backwards) = (self.set.newest, self.set.backwards);
         let is_first = piece == if backwards { QUARTERS - 1 } else { 0 };
@@ -172,12 +195,8 @@ impl MtcReader {
         let fits =
             |(label, bits): &(Label, u8)| pieces(*label, *bits)[usize::from(piece)] & 0xf == data & 0xf;
         self.expected = self.expected.filter(|expected| self.set.run > 0 && fits(expected));
-        if let Some((label, bits)) = self.expected {
-            let quarters = i64::from(piece);
-            if let Some(media) = self.labels.media(at, label, quarters, Some(rate_bits(bits).0)) {
-                out(Observation::new(at, FilmWord::Position(media)));
-            }
-        }
+        self.newest = Some(self.expected.map(|(label, bits)| (label, bits, piece)));
+        self.at_once += 1;
         if is_whole {
             let (label, bits) = self.set.label();
             let step = if backwards { -FRAMES_OF_A_SET } else { FRAMES_OF_A_SET };
@@ -190,14 +209,42 @@ impl MtcReader {
         }
     }
 
+    /// Says where the film is by the newest quarter frame. Players that send all of a block of sound at once are late with the others.
+    fn place(&mut self, at: MonoTime, out: &mut impl FnMut(Observation)) {
+        let Some(newest) = self.newest.take() else { return };
+        let by_block = if self.at_once > 1 { BY_BLOCK } else { self.by_block.saturating_sub(1) };
+        (self.by_block, self.at_once) = (by_block, 0);
+        let media = newest.and_then(|(label, bits, piece)| {
+            self.labels.media(at, label, i64::from(piece), Some(rate_bits(bits).0))
+        });
+        let word = media.map_or(FilmWord::Unplaced, FilmWord::Position);
+        let quarter =
+            newest.map(|(_, bits, _)| Duration::from_secs_f64(0.25 / rate_of(bits).frames_per_second()));
+        let bound = quarter.filter(|_| by_block > 0).unwrap_or_default() / 2;
+        out(Observation { at, bound, word });
+    }
+
+    /// Whether quarter frames have come up to about that label.
+    fn runs_at(&self, label: Label, bits: u8) -> bool {
+        let Some((whole, its, true)) = self.whole else { return false };
+        let code = |label| Timecode::of(label, rate_of(bits));
+        let apart = code(label).ok().zip(code(whole).ok()).map(|(here, there)| here.since(there));
+        rate_bits(its) == rate_bits(bits) && apart.is_some_and(|frames| frames.abs() <= NEAR)
+    }
+
     /// A message for all: where a machine was wound to, or what it is told.
     fn on_exclusive(&mut self, at: MonoTime, out: &mut impl FnMut(Observation)) {
+        self.place(at, out);
         let data = self.data;
         let word = match (self.length, data) {
             // Full message: somebody was wound there, and stands.
             (8, [0x7f, _, 0x01, 0x01, hours, minutes, seconds, frames, ..]) => {
                 let (labels, drops) = rate_bits(hours >> 5);
                 let label = Label { hours: hours & 0x1f, minutes, seconds, frames, drops };
+                // Some machines send one each second while they run.
+                if self.runs_at(label, hours >> 5) {
+                    return out(Observation::new(at, FilmWord::MayStop));
+                }
                 // It was wound: sets from before say nothing of the next.
                 self.whole = None;
                 out(Observation::new(at, FilmWord::Stop));
@@ -214,11 +261,11 @@ impl MtcReader {
 
 /// The label so many frames on, by the rate that the bits name; `None` if there is no such label.
 fn stepped(label: Label, bits: u8, frames: i64) -> Option<Label> {
-    let rate = match rate_bits(bits) {
-        (24, _) => FrameRate::F24,
-        (25, _) => FrameRate::F25,
-        (_, true) => FrameRate::F29_97Drop,
-        (_, false) => FrameRate::F30,
-    };
-    Timecode::of(label, rate).ok().map(|label| label.plus(frames).label())
+    Timecode::of(label, rate_of(bits)).ok().map(|label| label.plus(frames).label())
+}
+
+/// A rate that has such labels.
+const fn rate_of(bits: u8) -> FrameRate {
+    let (labels, drops) = rate_bits(bits);
+    FrameRate::whole(labels, drops)
 }

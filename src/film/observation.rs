@@ -26,8 +26,12 @@ impl Observation {
 pub(crate) enum FilmWord {
     /// The film is there.
     Position(ShowTime),
+    /// Timecode comes that cannot be placed: its frame rate is not known, or nothing has confirmed its label.
+    Unplaced,
     /// It was stopped.
     Stop,
+    /// A machine has named the place that it runs through: where it has stopped, no position follows.
+    MayStop,
     /// It runs again.
     Play,
     /// It is being wound: what is said of positions means nothing until [`FilmWord::Landed`].

@@ -133,6 +133,8 @@ impl Faulty {
             FilmWord::Silence,
             FilmWord::Dirt,
             FilmWord::Gone,
+            FilmWord::Unplaced,
+            FilmWord::MayStop,
         ];
         luck.is(0.25).then(|| Observation::new(mono(t), words[luck.below(words.len())]))
     }

@@ -49,6 +49,16 @@ impl FrameRate {
         }
     }
 
+    /// The one of so many labels a second that keeps to the clock.
+    pub(crate) const fn whole(labels: u32, drops: bool) -> Self {
+        match (labels, drops) {
+            (24, _) => Self::F24,
+            (25, _) => Self::F25,
+            (_, true) => Self::F29_97Drop,
+            (_, false) => Self::F30,
+        }
+    }
+
     /// True if labels are left out to keep to the clock.
     pub(crate) const fn drops(self) -> bool {
         matches!(self, Self::F29_97Drop)
@@ -184,6 +194,10 @@ pub(crate) enum TimecodeError {
     Drops { label: Label, rate: FrameRate },
     #[error("a second ends with frame {last}, so there are {} frames a second; {rate} is configured", last + 1)]
     SecondEnds { last: u8, rate: FrameRate },
+    #[error(
+        "its frame rate cannot be found by how its labels come; give it as --film-fps, or as film_fps in [sync]"
+    )]
+    Unfound,
     #[error("the source says that it has {said} frames a second; {rate} is configured")]
     Says { said: u32, rate: FrameRate },
 }

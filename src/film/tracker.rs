@@ -112,6 +112,12 @@ pub(crate) struct SourceTracker {
     /// And that as a multiple of it.
     freewheel: f64,
     polled: MonoTime,
+    /// How far off the instant of the newest position may be.
+    bound: Duration,
+    /// When timecode came last that could not be placed.
+    unplaced: Option<MonoTime>,
+    /// Since when it may have been stopped, with no position from then on.
+    may_stop: Option<MonoTime>,
     counts: TrackerCounts,
 }
 
@@ -165,6 +171,9 @@ impl SourceTracker {
             patience: traits.silent_for,
             freewheel: 1.0,
             polled: now,
+            bound: Duration::ZERO,
+            unplaced: None,
+            may_stop: None,
             counts: TrackerCounts::default(),
         }
     }
@@ -205,10 +214,11 @@ impl SourceTracker {
         let at = told.at;
         match told.word {
             FilmWord::Position(media) => self.on_position(told, media),
-            FilmWord::Stop => {
-                self.recent.clear();
-                self.on_sign(SourceSign::Stop, at);
+            FilmWord::Unplaced => self.on_unplaced(at),
+            FilmWord::MayStop if self.runs() => {
+                self.may_stop.get_or_insert(at);
             }
+            FilmWord::Stop | FilmWord::MayStop => self.on_stop(at),
             // Said of a film that seats follow it is nothing new, and its place is not to be found again.
             FilmWord::Play if self.state.may_lead() => {}
             FilmWord::Play => {
@@ -288,6 +298,7 @@ impl SourceTracker {
             self.counts.rejected += 1;
             return;
         }
+        (self.may_stop, self.bound) = (None, told.bound);
         if self.is_repeated(at, media) {
             return;
         }

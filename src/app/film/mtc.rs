@@ -44,11 +44,9 @@ struct MtcTaker {
 
 impl LineTaker for MtcTaker {
     fn take(&mut self, bytes: &[u8], at: MonoTime) -> io::Result<()> {
-        for byte in bytes {
-            self.reader.hear(*byte, at, &mut |what| {
-                self.told.tell(what);
-            });
-        }
+        self.reader.hear(bytes, at, &mut |what| {
+            self.told.tell(what);
+        });
         self.told.note(|notes| notes.label(self.reader.labels()));
         Ok(())
     }

@@ -80,9 +80,7 @@ impl LtcReader {
         if let Some(rate) = self.labels.rate() {
             self.decoder.set_rate(rate);
         }
-        if let Some(media) = media {
-            out(Observation::new(at, FilmWord::Position(media)));
-        }
+        out(Observation::new(at, media.map_or(FilmWord::Unplaced, FilmWord::Position)));
     }
 
     /// Says once that the line carries no frames, and whether it carries anything.

@@ -302,8 +302,9 @@ fn through_a_pipe_that_is_late_the_film_is_known_within_half_a_millisecond() {
 fn a_line_that_falls_silent_says_so_once_and_a_rate_that_nobody_configured_is_found() {
     for sent in [FrameRate::F24, FrameRate::F23_976, FrameRate::F29_97Drop] {
         let (told, film) = piped(4.0, None, sent, 3.0);
-        let words: Vec<&Observation> =
-            told.iter().filter(|told| !matches!(told.word, FilmWord::Position(_))).collect();
+        let is_of_frames =
+            |told: &&Observation| matches!(told.word, FilmWord::Position(_) | FilmWord::Unplaced);
+        let words: Vec<&Observation> = told.iter().filter(|told| !is_of_frames(told)).collect();
         assert!(matches!(words[..], [Observation { word: FilmWord::Silence, .. }]), "{words:?}");
         let silent = words[0].at.since(mono(3.0)).as_secs_f64();
         assert!(silent < 0.035, "{sent}: after {silent} s");
@@ -353,7 +354,7 @@ fn noise_on_the_line_is_dirt() {
             (0..480).map(|_| if n < 100 { generator.sample() } else { luck.bits() as i16 }).collect();
         reader.hear(&block, mono(f64::from(n) * 0.01), &mut |heard| words.push(heard.word));
     }
-    words.retain(|word| !matches!(word, FilmWord::Position(_)));
+    words.retain(|word| !matches!(word, FilmWord::Position(_) | FilmWord::Unplaced));
     assert_eq!(words, [FilmWord::Dirt]);
 }
 

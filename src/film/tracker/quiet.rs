@@ -20,7 +20,13 @@ impl SourceTracker {
         // From poll to poll, so that it never goes back: a sample that ends the gap is older than the poll before it.
         let passed = now.since(std::mem::replace(&mut self.polled, now));
         self.counts.freewheel += if self.state == FilmState::Freewheeling { passed } else { Duration::ZERO };
+        if self.may_stop.is_some_and(|since| now.since(since) > MISSING) {
+            self.on_stop(now);
+        }
         let quiet = self.newest.map_or_else(|| now.since(self.since), |newest| now.since(newest.at));
+        let is_sought = matches!(self.state, FilmState::Acquiring | FilmState::Unusable);
+        let unplaced = self.unplaced.filter(|_| is_sought).map_or(Duration::MAX, |at| now.since(at));
+        let quiet = quiet.min(unplaced);
         let period = self.newest.map_or(Duration::ZERO, |newest| newest.period);
         if quiet > MISSING.max(MISSING_PERIODS * period) {
             self.on_sign(SourceSign::Miss, now);
@@ -47,6 +53,25 @@ impl SourceTracker {
         self.is_known = false;
         self.begin_anew();
         self.on_sign(SourceSign::Doubt, at);
+    }
+
+    /// Timecode came that tells no place: somebody is there, and has to be found.
+    pub(super) fn on_unplaced(&mut self, at: MonoTime) {
+        self.unplaced = Some(at);
+        // Of a film that nobody follows yet this is as good a sign that it runs as a place.
+        self.may_stop = self.may_stop.filter(|_| self.state.may_lead());
+        self.on_sign(SourceSign::Sample, at);
+    }
+
+    /// True unless it stands, or nobody knows that it does anything.
+    pub(super) const fn runs(&self) -> bool {
+        !matches!(self.state, FilmState::Stopped | FilmState::Ended | FilmState::Absent | FilmState::Lost)
+    }
+
+    pub(super) fn on_stop(&mut self, at: MonoTime) {
+        self.may_stop = None;
+        self.recent.clear();
+        self.on_sign(SourceSign::Stop, at);
     }
 
     /// The line is there and carries no timecode.

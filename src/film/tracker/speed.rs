@@ -8,7 +8,9 @@ use crate::time::MonoTime;
 impl SourceTracker {
     /// The speed of the newest positions. Half a window is soon of one speed; a whole one tells smaller differences.
     fn speeds(&self) -> [Option<Speed>; 2] {
-        let least = self.traits.sigma_s;
+        // What comes by the block of sound is late now more, now less, in rows that look like another speed.
+        let bound_s = if self.traits.late_only { self.bound.as_secs_f64() } else { 0.0 };
+        let least = self.traits.sigma_s.max(bound_s);
         let sigma = self.estimate.as_ref().map_or(least, Estimate::noise_s);
         let (short, span) = (self.window() / 2, self.span());
         [short, self.window()].map(|window| self.recent.speed(window, span, sigma, least))

@@ -47,7 +47,7 @@ pub(super) fn ltc(octets: &[u8]) {
 pub(super) fn mtc(octets: &[u8]) {
     let mut reader = MtcReader::new(Some(FrameRate::F25), Label::default());
     in_pieces(octets, |piece, now, out| {
-        piece.iter().for_each(|octet| reader.hear(*octet, now, &mut |heard| out(heard)));
+        reader.hear(piece, now, &mut |heard| out(heard));
     });
 }
 
