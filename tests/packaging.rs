@@ -158,6 +158,19 @@ fn the_units_let_nothing_run_with_rights() {
 }
 
 #[test]
+fn no_unit_is_given_up_however_often_it_fails_and_none_is_started_again_without_a_pause() {
+    for name in ["kinocue", "kinocue-sync", "kinocue-buttons", "kinocue-link", "kinocue-desk"] {
+        let unit = text(&format!("systemd/{name}.service"));
+        let head = unit.split("[Service]").next().unwrap();
+        assert!(head.lines().any(|line| line == "StartLimitIntervalSec=0"), "{name}");
+        assert!(unit.lines().any(|line| line == "Restart=on-failure"), "{name}");
+        let pause = unit.lines().find_map(|line| line.strip_prefix("RestartSec=")?.strip_suffix('s'));
+        let pause: f64 = pause.and_then(|seconds| seconds.parse().ok()).unwrap_or_default();
+        assert!((1.0..=5.0).contains(&pause), "{name}: {pause} s");
+    }
+}
+
+#[test]
 fn no_unit_lets_a_program_be_made_in_memory_where_no_mount_forbids_it_to_run() {
     let folder = std::fs::read_dir("systemd").unwrap().map(|entry| entry.unwrap().path());
     let units: Vec<_> =

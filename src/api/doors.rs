@@ -14,6 +14,7 @@ use super::problem::render;
 use super::tries::Tries;
 use super::{ApiError, gate, ports, serve};
 use crate::config;
+use crate::control::AwaitedPorts;
 use crate::log::Log;
 
 /// What is asked of whoever comes.
@@ -41,7 +42,8 @@ pub(crate) fn serve_behind_doors(
     let router = router.layer(from_fn_with_state(doors, pass));
     let (alive, _) = mpsc::channel(1); // nobody waits for the last of them
     let served = serve::ServedHall { router, closing, alive, log };
-    serve::tcp(listeners, &served).map_err(ApiError::System)?;
+    let served_at = addresses.iter().copied().zip(listeners.into_iter().map(Some)).collect();
+    serve::tcp(served_at, &served, &AwaitedPorts::default());
     Ok(addresses)
 }
 

@@ -19,10 +19,11 @@ use tokio::runtime::{self, Runtime};
 use tokio::sync::{mpsc, watch};
 
 use crate::config;
-use crate::control::Handle;
+use crate::control::{AwaitedPorts, Handle};
 use crate::library::Library;
 use crate::log::Log;
 use crate::playlist::Shelf;
+use crate::sys::listen;
 
 mod access;
 mod asker;
@@ -153,7 +154,7 @@ pub enum ApiError {
         path: PathBuf,
     },
     /// A TCP port cannot be had.
-    #[error("cannot listen on {address}; does another program use it?")]
+    #[error("{address} cannot be had for the API: {source}")]
     Port {
         /// Which.
         address: SocketAddr,
@@ -196,22 +197,27 @@ impl Running {
     }
 }
 
-/// Serves the API on a thread of its own. When this returns, all sockets take connections.
+/// Serves the API on a thread of its own. When this returns, all sockets take connections, but for TCP ports that cannot be had yet.
 ///
 /// # Errors
-/// [`ApiError`] where a socket or a port cannot be had; nothing is served then.
+/// [`ApiError`] where a socket cannot be had; nothing is served then.
 pub fn start(setup: Setup) -> Result<Running, ApiError> {
-    start_with(setup, None)
+    start_with(setup, None, &AwaitedPorts::default())
 }
 
-/// The same for a hall that belongs to a fleet, with the socket of whoever carries its letters.
+/// The same for a hall that belongs to a fleet, with the socket of whoever carries its letters. TCP ports that cannot be had yet are noted in
+/// `awaited`, and served once they can.
 ///
 /// # Errors
 /// As [`start`].
-pub(crate) fn start_with(setup: Setup, fleet: Option<(&config::Fleet, &Path)>) -> Result<Running, ApiError> {
+pub(crate) fn start_with(
+    setup: Setup,
+    fleet: Option<(&config::Fleet, &Path)>,
+    awaited: &AwaitedPorts,
+) -> Result<Running, ApiError> {
     let (local, file) = socket::unix(&setup.socket)?;
     let of_fleet = fleet.map(|(_, socket)| socket::unix(socket)).transpose()?;
-    let (tcp, addresses) = ports(&setup.config.listen)?;
+    let (tcp, addresses) = ports_so_far(&setup.config.listen, awaited);
     let (closing, closed) = watch::channel(false);
     let (router, document) = routes::routes();
     let access = Access::new(&setup.config, &addresses);
@@ -228,7 +234,7 @@ pub(crate) fn start_with(setup: Setup, fleet: Option<(&config::Fleet, &Path)>) -
         .max_blocking_threads(BLOCKING)
         .build()
         .map_err(ApiError::System)?;
-    let sockets = ApiSockets { local: (local, file), fleet: of_fleet, tcp, log };
+    let sockets = ApiSockets { local: (local, file), fleet: of_fleet, tcp, awaited: awaited.clone(), log };
     let thread = Builder::new()
         .name(THREAD.to_owned())
         .spawn(move || run(runtime, sockets, shared, [router, fleet_router]));
@@ -279,13 +285,17 @@ type FileListener = (std::os::unix::net::UnixListener, SocketFile);
 struct ApiSockets {
     local: FileListener,
     fleet: Option<FileListener>,
-    tcp: Vec<TcpListener>,
+    tcp: Vec<TcpPort>,
+    awaited: AwaitedPorts,
     log: Log,
 }
 
+/// A TCP port by its address; without a socket where it cannot be had yet.
+type TcpPort = (SocketAddr, Option<TcpListener>);
+
 /// Serves until the server ends.
 fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, [router, of_fleet]: [axum::Router; 2]) {
-    let ApiSockets { local: (local, _file), fleet, tcp, log } = sockets;
+    let ApiSockets { local: (local, _file), fleet, tcp, awaited, log } = sockets;
     let (fleet, _fleet_file) = fleet.unzip();
     let mut closing = shared.closing.clone();
     let (alive, mut all_gone) = mpsc::channel(1);
@@ -296,7 +306,7 @@ fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, [router, of_f
     let of_user = move |uid| Peer::Socket(of_desk.name(uid).into());
     runtime.block_on(async move {
         tokio::spawn(Pulse::follow(Arc::clone(&shared)));
-        serve::tcp(tcp, &hall).expect("the runtime has just been made, and takes sockets");
+        serve::tcp(tcp, &hall, &awaited);
         let taken =
             |listener| tokio::net::UnixListener::from_std(listener).expect("the runtime takes sockets");
         if let Some(fleet) = fleet {
@@ -311,6 +321,22 @@ fn run(runtime: Runtime, sockets: ApiSockets, shared: Arc<Shared>, [router, of_f
     runtime.shutdown_timeout(LAST_WORDS);
 }
 
+/// What a port is called that is awaited.
+fn named(address: SocketAddr) -> String {
+    format!("api {address}")
+}
+
+/// Listens on those that can be had, and says where that is, and will be.
+fn ports_so_far(addresses: &[SocketAddr], awaited: &AwaitedPorts) -> (Vec<TcpPort>, Vec<SocketAddr>) {
+    let open = |&address: &SocketAddr| (address, awaited.try_open(&named(address), || port(address)));
+    let ports: Vec<TcpPort> = addresses.iter().map(open).collect();
+    let bound = |(address, listener): &TcpPort| {
+        listener.as_ref().and_then(|listener| listener.local_addr().ok()).unwrap_or(*address)
+    };
+    let addresses = ports.iter().map(bound).collect();
+    (ports, addresses)
+}
+
 /// Listens on all of them, and says where that is, with the ports that the system chose.
 fn ports(addresses: &[SocketAddr]) -> Result<(Vec<TcpListener>, Vec<SocketAddr>), ApiError> {
     let listeners = addresses.iter().map(|&address| port(address)).collect::<Result<Vec<_>, _>>()?;
@@ -319,8 +345,5 @@ fn ports(addresses: &[SocketAddr]) -> Result<(Vec<TcpListener>, Vec<SocketAddr>)
 }
 
 fn port(address: SocketAddr) -> Result<TcpListener, ApiError> {
-    let failed = |source| ApiError::Port { address, source };
-    let listener = TcpListener::bind(address).map_err(failed)?;
-    listener.set_nonblocking(true).map_err(failed)?;
-    Ok(listener)
+    listen::tcp(address).map_err(|source| ApiError::Port { address, source })
 }

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::future::poll_fn;
 use std::io;
-use std::net::{self, IpAddr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
@@ -19,7 +19,8 @@ use tokio::sync::{mpsc, watch};
 
 use super::guarded::Guarded;
 use super::peer::Peer;
-use crate::control::{Place, Places};
+use super::{TcpPort, named};
+use crate::control::{AwaitedPorts, Place, Places};
 use crate::log::{Line, Log, Priority};
 
 /// Connections over TCP.
@@ -80,16 +81,20 @@ pub(super) async fn local(
     accept_each(hall.closing.clone(), |context| listener.poll_accept(context), on).await;
 }
 
-/// Has the runtime that calls serve these TCP ports until the server ends.
-///
-/// # Errors
-/// Where the runtime does not take one.
-pub(super) fn tcp(listeners: Vec<net::TcpListener>, hall: &ServedHall) -> io::Result<()> {
+/// Has the runtime that calls serve these TCP ports until the server ends, each as soon as it can be had.
+pub(super) fn tcp(ports: Vec<TcpPort>, hall: &ServedHall, awaited: &AwaitedPorts) {
     let places = Places::new(TCP);
-    for listener in listeners {
-        tokio::spawn(port(TcpListener::from_std(listener)?, places.clone(), hall.clone()));
+    for (address, listener) in ports {
+        let (places, hall, awaited) = (places.clone(), hall.clone(), awaited.clone());
+        tokio::spawn(async move {
+            let taken = |listener| TcpListener::from_std(listener).expect("the runtime takes sockets");
+            let opened = match listener {
+                Some(listener) => listener,
+                None => awaited.open(&named(address), || super::port(address)).await,
+            };
+            port(taken(opened), places, hall).await;
+        });
     }
-    Ok(())
 }
 
 async fn port(listener: TcpListener, places: Places, hall: ServedHall) {

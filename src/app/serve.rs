@@ -79,15 +79,6 @@ pub(crate) enum ServeError {
     /// The library cannot be opened.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// A file of its own cannot be written or removed.
-    #[error("{}: {cause}; give the service a folder it may write to (StateDirectory= in the unit, or --state)", path.display())]
-    File {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        #[source]
-        cause: io::Error,
-    },
     /// Cues and playlists are in one folder.
     #[error("{}: {ONE_FOLDER}, by playlists of [library]", .0.display())]
     OneFolder(PathBuf),
@@ -106,37 +97,38 @@ pub(crate) enum ServeError {
 
 /// The mark that a daemon leaves before its first tick, and an orderly end takes away.
 #[derive(Debug)]
-struct Mark(PathBuf);
+struct Mark {
+    folder: PathBuf,
+    file: PathBuf,
+}
 
 impl Mark {
     /// The one in that folder, which is made where it is missing.
-    fn of(folder: &Path) -> Result<Self, ServeError> {
-        let mark = Self(folder.join("running"));
-        fs::create_dir_all(folder).map_err(|cause| mark.failed(cause))?;
-        Ok(mark)
+    fn of(folder: &Path) -> Self {
+        let _ = fs::create_dir_all(folder); // where it cannot be, no mark can be left
+        Self { folder: folder.to_owned(), file: folder.join("running") }
     }
 
-    /// True if the daemon before left it and did not take it away.
-    fn is_there(&self) -> Result<bool, ServeError> {
-        self.0.try_exists().map_err(|cause| self.failed(cause))
+    /// True if the daemon before left it and did not take it away, or may have wanted to in a folder that takes no file.
+    fn is_there(&self) -> bool {
+        let is_closed = rustix::fs::access(&self.folder, rustix::fs::Access::WRITE_OK).is_err();
+        is_closed || self.file.try_exists().unwrap_or(true)
     }
 
-    fn leave(&self) -> Result<(), ServeError> {
+    /// Leaves it; says what comes of it where it cannot be left.
+    fn leave(&self) -> Option<String> {
         // Without a word in it, so that a full disk keeps no hall shut.
-        create_ours(&self.0).map_err(|cause| self.failed(cause))?;
-        Ok(())
+        let cause = create_ours(&self.file).err()?;
+        Some(format!(
+            "{} takes no file: {cause}; what is set and loaded is lost with a restart, which is taken for one after a crash: give the \
+             service a folder it may write to (StateDirectory= in the unit, or --state)",
+            self.folder.display()
+        ))
     }
 
-    /// Takes it away, where it was left.
-    fn take_away(&self) -> Result<(), ServeError> {
-        match fs::remove_file(&self.0) {
-            Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(self.failed(cause)),
-            _ => Ok(()),
-        }
-    }
-
-    fn failed(&self, cause: io::Error) -> ServeError {
-        ServeError::File { path: self.0.clone(), cause }
+    /// Takes it away, where it was left. Where it stays, the next start is taken for one after a crash.
+    fn take_away(&self) {
+        let _ = fs::remove_file(&self.file);
     }
 }
 
@@ -189,12 +181,12 @@ impl Served {
 /// # Panics
 /// If one of its threads panicked.
 pub(crate) fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
-    let mark = Mark::of(&parts.places.state)?;
-    let crashed = mark.is_there()?;
+    let mark = Mark::of(&parts.places.state);
+    let crashed = mark.is_there();
     let served = serve_halls(parts, &mark, crashed, up);
     // An end with an error is none in the middle of a motion; what crashed before still has.
     if served.is_ok() || !crashed {
-        mark.take_away()?;
+        mark.take_away();
     }
     served
 }
@@ -237,12 +229,14 @@ fn serve_halls(
         player: None,
         osc: surfaces.osc_counts(),
         buttons: surfaces.pads(),
+        awaited: surfaces.awaited(),
         recorder: RecordLink::default(),
         pair: pair.as_ref().map(Pair::watch),
     };
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
-    mark.leave()?;
+    ports.carryover.tell(mark.leave());
+    ports.carryover.tell(library.trouble());
     up(handle, surfaces.addresses());
     let mut feeder = pair.as_mut().and_then(Pair::take_feeder);
     let served = loop {
@@ -316,21 +310,21 @@ impl Opening<'_> {
         numbers: &Numbers,
         film: &mut HallFilm,
     ) -> Result<Runtime, ServeError> {
-        let mut runtime = self.open(config, ended, numbers, film)?;
+        let mut runtime = self.open(config, (ended, true), numbers, film)?;
         let others = if self.pair.is_some() { runtime.find_other_masters() } else { Vec::new() };
         let names: Vec<_> = others.iter().map(|(lane, _)| config.controllers[*lane].name.as_str()).collect();
         if names.is_empty() { Ok(runtime) } else { Err(ServeError::OtherMaster(names.join(", "))) }
     }
 
-    /// Opens the hall, and reads what tells of its film.
+    /// Opens the hall, and reads what tells of its film; says how it ended before, and whether addresses may come later.
     fn open(
         &self,
         config: &Arc<Config>,
-        ended: LedBefore,
+        (before, may_come): (LedBefore, bool),
         numbers: &Numbers,
         film: &mut HallFilm,
     ) -> Result<Runtime, RuntimeError> {
-        let purpose = Purpose::Hall { before: ended };
+        let purpose = Purpose::Hall { before, may_come };
         let lead = self.pair.map(Pair::lead);
         let runtime = Runtime::open(Arc::clone(config), purpose, numbers, self.calls, lead)?;
         if let Some(pair) = self.pair {
@@ -349,8 +343,9 @@ impl Opening<'_> {
         carryover: &mut Carryover,
         film: &mut HallFilm,
     ) -> Result<(Runtime, Arc<Config>), RuntimeError> {
-        // The seats are parked or at rest, so nothing tells of a crash.
-        match self.open(&next, LedBefore::Ended, numbers, film) {
+        // The seats are parked or at rest, so nothing tells of a crash. An address that is new, and not here, is a mistake.
+        let is_new = next.show.bind != before.show.bind;
+        match self.open(&next, (LedBefore::Ended, !is_new), numbers, film) {
             Ok(runtime) => {
                 carryover.forget_refusals();
                 if let Some(Err(error)) = self.pair.map(|pair| pair.set_config(self.config)) {
@@ -361,7 +356,7 @@ impl Opening<'_> {
             }
             Err(error) => {
                 carryover.refuse(&error.to_string());
-                Ok((self.open(&before, LedBefore::Ended, numbers, film)?, before))
+                Ok((self.open(&before, (LedBefore::Ended, true), numbers, film)?, before))
             }
         }
     }

@@ -11,13 +11,13 @@ use tokio::sync::watch;
 
 use super::buttons::{Buttons, PadTable};
 use crate::api::{self, ApiError, Pages, ServingThread, StopSocket, fleet_stop_socket, stop_socket};
-use crate::config::Config;
-use crate::control::Handle;
+use crate::config::{Config, OscPort, TextPort};
+use crate::control::{AwaitedPorts, Handle};
 use crate::library::Library;
 use crate::log::{Line, Log, Priority};
-use crate::osc::{self, Counts, Osc, OscError};
+use crate::osc::{self, Counts};
 use crate::playlist::Shelf;
-use crate::text_port::{self, Text, TextError};
+use crate::text_port;
 
 /// Where the sockets of this machine are.
 #[derive(Debug, Clone)]
@@ -40,12 +40,6 @@ pub(crate) enum SurfaceError {
     /// The API, or the stop socket.
     #[error(transparent)]
     Api(#[from] ApiError),
-    /// The port for OSC.
-    #[error(transparent)]
-    Osc(#[from] OscError),
-    /// The port for text.
-    #[error(transparent)]
-    Text(#[from] TextError),
     /// There is no thread for a pad.
     #[error("the system refused a thread for [buttons]")]
     Buttons(#[source] io::Error),
@@ -60,6 +54,7 @@ pub(crate) struct Surfaces {
     // The stop goes last.
     ports: Option<ServingThread>,
     osc: Option<Arc<Counts>>,
+    awaited: AwaitedPorts,
     buttons: Buttons,
     api: api::Running,
     fleet_stop: Option<StopSocket>,
@@ -67,10 +62,10 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    /// Opens them; the stop first.
+    /// Opens them; the stop first. Ports on the network that cannot be had yet are opened once they can.
     ///
     /// # Errors
-    /// Why one of them does not open.
+    /// Why a socket of this machine does not open.
     pub(crate) fn open(
         config: &Config,
         sockets: &Sockets,
@@ -97,14 +92,16 @@ impl Surfaces {
             pages,
             log: log.clone(),
         };
-        let api = api::start_with(setup, config.fleet.as_ref().map(|fleet| (fleet, &*sockets.fleet)))?;
-        let osc = config.osc.as_ref().map(|osc| osc::open(osc, handle.clone())).transpose()?;
-        let text = config.text.as_ref().map(|text| text_port::open(text, handle.clone())).transpose()?;
-        let counts = osc.as_ref().map(Osc::counts);
-        let ports =
-            if osc.is_some() || text.is_some() { Some(show_control(osc, text, log.clone())?) } else { None };
+        let awaited = AwaitedPorts::default();
+        let fleet = config.fleet.as_ref().map(|fleet| (fleet, &*sockets.fleet));
+        let api = api::start_with(setup, fleet, &awaited)?;
+        let counts = config.osc.as_ref().map(|_| Arc::<Counts>::default());
+        let osc = config.osc.clone().zip(counts.clone());
+        let is_wanted = osc.is_some() || config.text.is_some();
+        let gear = Gear { osc, text: config.text.clone(), handle: handle.clone(), awaited: awaited.clone() };
+        let ports = is_wanted.then(|| show_control(gear, log.clone())).transpose()?;
         let buttons = Buttons::read(config, handle, log).map_err(SurfaceError::Buttons)?;
-        Ok(Self { ports, osc: counts, buttons, api, fleet_stop, stop })
+        Ok(Self { ports, osc: counts, awaited, buttons, api, fleet_stop, stop })
     }
 
     /// Where the API listens over TCP.
@@ -124,6 +121,11 @@ impl Surfaces {
         self.osc.clone()
     }
 
+    /// The ports that cannot be had yet.
+    pub(crate) fn awaited(&self) -> AwaitedPorts {
+        self.awaited.clone()
+    }
+
     /// How the pads are, if there are any.
     pub(crate) fn pads(&self) -> Option<PadTable> {
         self.buttons.table()
@@ -140,11 +142,27 @@ impl Surfaces {
     }
 }
 
-/// The ports for show control, on a thread of their own.
-fn show_control(osc: Option<Osc>, text: Option<Text>, log: Log) -> Result<ServingThread, SurfaceError> {
+/// The ports of show-control gear.
+struct Gear {
+    osc: Option<(OscPort, Arc<Counts>)>,
+    text: Option<TextPort>,
+    handle: Handle,
+    awaited: AwaitedPorts,
+}
+
+/// Serves them on a thread of their own.
+fn show_control(gear: Gear, log: Log) -> Result<ServingThread, SurfaceError> {
     let (closing, mut closed) = watch::channel(false);
     let runtime =
         runtime::Builder::new_current_thread().enable_all().build().map_err(SurfaceError::System)?;
+    let Gear { osc, text, handle, awaited } = gear;
+    let (of_osc, of_text) = (handle.clone(), handle);
+    let open_osc = move |(config, counts): &(OscPort, Arc<Counts>)| {
+        osc::open(config, of_osc.clone(), Arc::clone(counts))
+    };
+    let open_text = move |config: &TextPort| text_port::open(config, of_text.clone());
+    let osc_now = osc.as_ref().and_then(|osc| awaited.try_open("osc", || open_osc(osc)));
+    let text_now = text.as_ref().and_then(|text| awaited.try_open("text", || open_text(text)));
     let run = move || {
         runtime.block_on(async move {
             let fail = |what: &str, error: io::Error| {
@@ -152,20 +170,22 @@ fn show_control(osc: Option<Osc>, text: Option<Text>, log: Log) -> Result<Servin
                 log.say(Line::new(Priority::Error, "port", text));
             };
             let osc = async {
-                if let Some(Err(error)) = match osc {
-                    Some(osc) => Some(osc.serve().await),
-                    None => None,
-                } {
-                    fail("OSC", error);
-                }
+                let Some(osc) = osc else { return };
+                let opened = match osc_now {
+                    Some(opened) => opened,
+                    None => awaited.open("osc", || open_osc(&osc)).await,
+                };
+                let Err(error) = opened.serve().await;
+                fail("OSC", error);
             };
             let text = async {
-                if let Some(Err(error)) = match text {
-                    Some(text) => Some(text.serve().await),
-                    None => None,
-                } {
-                    fail("text", error);
-                }
+                let Some(text) = text else { return };
+                let opened = match text_now {
+                    Some(opened) => opened,
+                    None => awaited.open("text", || open_text(&text)).await,
+                };
+                let Err(error) = opened.serve().await;
+                fail("text", error);
             };
             tokio::select! {
                 _ = closed.wait_for(|closing| *closing) => {}

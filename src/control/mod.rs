@@ -3,6 +3,7 @@
 //! touches the tick thread but by [`Handle::stop`], which sets a flag that is read every tick.
 
 mod ask;
+mod awaited;
 mod broadcasts;
 mod clock;
 mod handle;
@@ -19,6 +20,7 @@ pub use crate::config::Role;
 pub(crate) use ask::Levels;
 pub use ask::StartOrder;
 pub use ask::{Command, LevelsChange};
+pub(crate) use awaited::AwaitedPorts;
 pub(crate) use broadcasts::BroadcastStatus;
 pub(crate) use clock::{ClockReading, SharedClock};
 pub(crate) use handle::{Asked, asked_at, overtaken};

@@ -163,20 +163,25 @@ struct Cue {
 }
 
 impl Library {
-    /// Opens the library in `dir`, which is made where it is missing, and removes what uploads left there in a crash.
+    /// Opens the library in `dir`, which is made where it is missing, and removes what uploads left there in a crash. A folder that cannot
+    /// be made, read or written is no reason to play nothing: [`Library::trouble`] has it.
     ///
     /// # Errors
-    /// [`LibraryError`] where the folder cannot be made, read or written.
+    /// [`LibraryError`] where something else than a folder is there.
     pub fn open(dir: &Path, hall: Hall) -> Result<Self, LibraryError> {
         let open = || -> io::Result<(Index, Brought)> {
             fs::create_dir_all(dir)?;
             let folder = Folder::open(dir)?;
             for name in folder.names()?.iter().filter(|name| name.starts_with(upload::UNFINISHED)) {
-                folder.remove_abandoned(name)?;
+                let _ = folder.remove_abandoned(name); // where nothing can be removed, nothing is uploaded either
             }
             Ok((Index::read(&folder), Brought::read(&folder)))
         };
-        let (index, brought) = open().map_err(|source| LibraryError { path: dir.to_owned(), source })?;
+        let is_other = fs::metadata(dir).is_ok_and(|found| !found.is_dir());
+        let (index, brought) = match open() {
+            Err(source) if is_other => return Err(LibraryError { path: dir.to_owned(), source }),
+            opened => opened.unwrap_or_default(),
+        };
         let inner = Inner {
             dir: dir.to_owned(),
             hall,
@@ -189,6 +194,18 @@ impl Library {
             curves: Mutex::new(Vec::new()),
         };
         Ok(Self { inner: Arc::new(inner) })
+    }
+
+    /// Why it takes no cues, or has none, and what to do; `None` where it can be read and written.
+    #[must_use]
+    pub fn trouble(&self) -> Option<String> {
+        let dir = &self.inner.dir;
+        let written = rustix::fs::access(dir, rustix::fs::Access::WRITE_OK).map_err(io::Error::from);
+        let cause = Folder::open(dir).and_then(|_| written).err()?;
+        let dir = dir.display();
+        Some(format!(
+            "the cue library {dir} takes no cues, and may have none: {cause}; set another in [show] library, or make it writable"
+        ))
     }
 
     /// All cues by their ids, with what is known of them; reads none of them. Empty where the folder cannot be read.

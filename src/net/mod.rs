@@ -10,6 +10,7 @@ mod error;
 mod lead;
 mod network;
 mod open;
+mod reach;
 mod ready;
 mod recv;
 mod route;
@@ -21,11 +22,12 @@ mod way;
 
 use std::net::SocketAddrV4;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use socket2::Socket;
 
 use crate::time::MonoTime;
+use reach::Reach;
 use ready::Ready;
 
 pub(crate) use cost::SendCost;
@@ -50,6 +52,8 @@ pub struct Ports {
     ready: Ready,
     /// Nothing that came before this can be read.
     quiet: MonoTime,
+    /// What looks for ways to controllers that are silent; `None` where all had to be there from the beginning.
+    reach: Option<Reach>,
 }
 
 /// A network that is sent to as a whole.
@@ -69,6 +73,9 @@ pub(crate) struct Whole {
 struct Lane {
     socket: Socket,
     refusals: AtomicU64,
+    /// Where there is no way to the controller yet, so that its socket is not connected: nothing is sent by it, and whoever it hears is a
+    /// stranger.
+    away: AtomicBool,
 }
 
 impl Ports {
@@ -81,7 +88,7 @@ impl Ports {
     /// [`NetError::Twice`] and [`NetError::NotUnicast`] for peers that cannot have a socket of their own;
     /// [`NetError::Refused`] where the system refuses, even if another program has the port.
     pub fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Self, NetError> {
-        Self::open_with(bind, peers, None)
+        Self::open_with(bind, peers, None, false)
     }
 
     /// The same, with a socket that sends to all of a network at its broadcast address, and hears nothing: whoever answers does so to the
@@ -91,12 +98,18 @@ impl Ports {
     /// As [`Ports::open`]; [`NetError::NoBroadcast`] and [`NetError::OffTheWire`] where a broadcast would not go to the controllers of the
     /// network and no farther; [`NetError::OtherWay`] where it would leave from another address than what goes to a controller alone:
     /// its reply would not be taken for that controller's.
+    ///
+    /// Where `may_come` says so neither the local address nor a way to any controller has to be there yet: what is missing is looked for
+    /// again and again as long as the sockets live. That of a network that is sent to as a whole has to be.
     pub(crate) fn open_with(
         bind: SocketAddrV4,
         peers: &[SocketAddrV4],
         whole: Option<&Whole>,
+        may_come: bool,
     ) -> Result<Self, NetError> {
-        open::open(bind, peers, whole)
+        let ports = open::open(bind, peers, whole, may_come)?;
+        let reach = may_come.then(|| Reach::new(*ports.local.ip(), peers, ports.quiet));
+        Ok(Self { reach, ..ports })
     }
 
     /// The local address, with the port that was taken.
@@ -110,6 +123,6 @@ impl Ports {
     pub fn split(self) -> (Sender, Receiver) {
         let lanes: Arc<[Lane]> = self.lanes.into();
         let sender = Sender::new(Arc::clone(&lanes), self.whole.map(Arc::new));
-        (sender, Receiver::new(lanes, self.stray, self.ready, self.quiet))
+        (sender, Receiver::new(lanes, self.stray, self.ready, (self.quiet, self.reach)))
     }
 }

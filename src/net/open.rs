@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 use std::io;
-use std::net::{SocketAddr, SocketAddrV4};
+use std::net::SocketAddrV4;
 use std::os::fd::AsFd;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use socket2::{Domain, Protocol, Socket, Type};
 
@@ -13,6 +13,7 @@ use super::way::way;
 use super::{Lane, NetError, Ports, Whole};
 use crate::sys::batch::{Batch, stamp_arrivals};
 use crate::sys::clock::Monotonic;
+use crate::sys::listen;
 use crate::time::Clock;
 
 /// Bytes of replies that may wait in a socket; the kernel cuts it to what it allows. Generous, so that an ack thread
@@ -28,16 +29,17 @@ pub(super) fn open(
     bind: SocketAddrV4,
     peers: &[SocketAddrV4],
     network: Option<&Whole>,
+    may_come: bool,
 ) -> Result<Ports, NetError> {
     check(peers)?;
     let at_bind = |cause| NetError::refused("bind UDP address", bind, cause);
-    let stray = socket().map_err(at_bind)?;
+    let stray = socket(may_come).map_err(at_bind)?;
     stray.bind(&bind.into()).map_err(at_bind)?;
     let local = local_address(&stray).map_err(at_bind)?;
     stray.set_reuse_address(true).map_err(at_bind)?;
     stamp_arrivals(&stray).map_err(at_bind)?;
 
-    let lanes = peers.iter().map(|&peer| lane(local, peer)).collect::<Result<Vec<_>, _>>()?;
+    let lanes = peers.iter().map(|&peer| lane(local, peer, may_come)).collect::<Result<Vec<_>, _>>()?;
     let whole = network.map(|network| whole(local, network, peers, &lanes)).transpose()?;
 
     for socket in lanes.iter().chain(&whole).map(|lane| &lane.socket).chain([&stray]) {
@@ -49,7 +51,7 @@ pub(super) fn open(
         quiet(&mut batch, socket);
     }
     let ready = Ready::of(lanes.iter().map(|lane| &lane.socket).chain([&stray])).map_err(at_bind)?;
-    Ok(Ports { local, lanes, whole, stray, ready, quiet: quiet_from })
+    Ok(Ports { local, lanes, whole, stray, ready, quiet: quiet_from, reach: None })
 }
 
 fn check(peers: &[SocketAddrV4]) -> Result<(), NetError> {
@@ -66,18 +68,36 @@ fn check(peers: &[SocketAddrV4]) -> Result<(), NetError> {
     Ok(())
 }
 
-fn socket() -> io::Result<Socket> {
+/// A socket, whose address may come later.
+fn socket(may_come: bool) -> io::Result<Socket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
     socket.set_nonblocking(true)?;
+    socket.set_freebind_v4(may_come)?;
     Ok(socket)
 }
 
-fn local_address(socket: &Socket) -> io::Result<SocketAddrV4> {
+pub(super) fn local_address(socket: &Socket) -> io::Result<SocketAddrV4> {
     socket.local_addr()?.as_socket_ipv4().ok_or_else(|| io::ErrorKind::AddrNotAvailable.into())
 }
 
-fn lane(local: SocketAddrV4, peer: SocketAddrV4) -> Result<Lane, NetError> {
-    connected(local, peer, "reach the controller", |_| Ok(()))
+/// The socket of a controller; where the way to it may come, it is there without.
+fn lane(local: SocketAddrV4, peer: SocketAddrV4, may_come: bool) -> Result<Lane, NetError> {
+    let lane = bound(local, may_come, |_| Ok(()))?;
+    match lane.connect(peer) {
+        Err(cause) if may_come && is_missing(&cause, local) => lane.away.store(true, Ordering::Relaxed),
+        connected => connected.map_err(|cause| NetError::refused("reach the controller", peer, cause))?,
+    }
+    Ok(lane)
+}
+
+/// True if there is no way because an address or a network of this machine is not there, which may change by itself.
+fn is_missing(cause: &io::Error, local: SocketAddrV4) -> bool {
+    match cause.raw_os_error() {
+        Some(libc::ENETUNREACH | libc::EHOSTUNREACH | libc::ENETDOWN | libc::EADDRNOTAVAIL) => true,
+        // From an address that is here, it is one that never leads there.
+        Some(libc::EINVAL) => !listen::is_here((*local.ip()).into()),
+        _ => false,
+    }
 }
 
 /// The socket of a network that is sent to as a whole. What it sends has to go to where its controllers are, and nowhere else: no router
@@ -95,7 +115,8 @@ fn whole(
         return Err(NetError::NoBroadcast(*address));
     }
     let set = |socket: &Socket| socket.set_broadcast(true).and_then(|()| socket.set_ttl_v4(1));
-    let whole = connected(local, *address, "broadcast to", set)?;
+    let whole = bound(local, false, set)?;
+    whole.connect(*address).map_err(at)?;
     let from = *local_address(&whole.socket).map_err(at)?.ip();
     for member in members {
         let to_one = way(*local.ip(), *peers[*member].ip()).map_err(at)?;
@@ -110,19 +131,16 @@ fn whole(
     Ok(whole)
 }
 
-fn connected(
+fn bound(
     local: SocketAddrV4,
-    peer: SocketAddrV4,
-    attempt: &'static str,
+    may_come: bool,
     set: impl Fn(&Socket) -> io::Result<()>,
 ) -> Result<Lane, NetError> {
     let at_bind = |cause| NetError::refused("bind UDP address", local, cause);
-    let socket = socket().map_err(at_bind)?;
+    let socket = socket(may_come).map_err(at_bind)?;
     prepare(&socket).and_then(|()| set(&socket)).map_err(at_bind)?;
     socket.bind(&local.into()).map_err(at_bind)?;
-    let connected = socket.connect(&SocketAddr::V4(peer).into());
-    connected.map_err(|cause| NetError::refused(attempt, peer, cause))?;
-    Ok(Lane { socket, refusals: AtomicU64::new(0) })
+    Ok(Lane { socket, refusals: AtomicU64::new(0), away: AtomicBool::new(false) })
 }
 
 fn prepare(socket: &Socket) -> io::Result<()> {
@@ -135,7 +153,7 @@ fn prepare(socket: &Socket) -> io::Result<()> {
 }
 
 /// Reads away what came while the socket was bound but not yet connected: anyone could have sent that.
-fn quiet(batch: &mut Batch, socket: impl AsFd) {
+pub(super) fn quiet(batch: &mut Batch, socket: impl AsFd) {
     for _ in 0..QUIET_BATCHES {
         // Any other error is an earlier datagram's, and gone once read.
         if batch.receive(socket.as_fd()).is_err_and(|e| e.kind() == io::ErrorKind::WouldBlock) {

@@ -11,7 +11,7 @@ use std::time::Duration;
 use socket2::Socket;
 
 use super::ready::Ready;
-use super::{Lane, Network};
+use super::{Lane, Network, Reach};
 use crate::sys::batch::{Batch, SLOTS};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock, MonoTime};
@@ -48,6 +48,7 @@ struct Sockets {
     batch: Batch,
     /// Per socket, the strangers' last: an instant before it was last found empty. What is read next came after.
     emptied: Box<[MonoTime]>,
+    reach: Option<Reach>,
 }
 
 impl fmt::Debug for Sockets {
@@ -58,9 +59,14 @@ impl fmt::Debug for Sockets {
 
 impl Receiver {
     /// Sockets from which nothing that came before `quiet` can be read any more.
-    pub(super) fn new(lanes: Arc<[Lane]>, stray: Socket, ready: Ready, quiet: MonoTime) -> Self {
+    pub(super) fn new(
+        lanes: Arc<[Lane]>,
+        stray: Socket,
+        ready: Ready,
+        (quiet, reach): (MonoTime, Option<Reach>),
+    ) -> Self {
         let emptied = vec![quiet; lanes.len() + 1].into_boxed_slice();
-        Self(Way::Kernel(Box::new(Sockets { lanes, stray, ready, batch: Batch::new(), emptied })))
+        Self(Way::Kernel(Box::new(Sockets { lanes, stray, ready, batch: Batch::new(), emptied, reach })))
     }
 
     pub(super) const fn over(network: Arc<dyn Network>) -> Self {
@@ -113,6 +119,9 @@ impl Sockets {
                 self.emptied[index] = began;
             }
         }
+        if let Some(reach) = &mut self.reach {
+            reach.look(&self.lanes, &mut self.batch, &mut self.emptied, began);
+        }
         began
     }
 
@@ -142,7 +151,11 @@ impl Sockets {
             now = Monotonic.now();
             for datagram in self.batch.datagrams() {
                 let at = received_at(datagram.stamp_ns, wall_ns, now, self.emptied[index]);
+                let lane = lane.filter(|lane| !lane.away.load(Ordering::Relaxed));
                 let origin = lane.map_or(Origin::Stranger(datagram.from), |_| Origin::Controller(index));
+                if let (Some(_), Some(reach)) = (lane, &mut self.reach) {
+                    reach.hears(index, now);
+                }
                 on(origin, datagram.bytes, at);
             }
             if count < SLOTS {

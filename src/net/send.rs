@@ -157,6 +157,9 @@ impl Sender {
     }
 
     fn send_by(&self, lane: &Lane, datagram: &[u8]) -> Delivery {
+        if lane.away.load(Ordering::Acquire) {
+            return failed(Errno::NETUNREACH);
+        }
         match lane.send(datagram) {
             Ok(()) => Delivery::Sent,
             Err(Errno::CONNREFUSED) if self.is_over() => Delivery::Failed(SendFault::NOT_LEADING),

@@ -233,7 +233,7 @@ fn one_datagram_reaches_all_of_a_network_from_where_its_controllers_answer_to_an
     let port = any.local_addr().unwrap().port();
     let at = |ip: [u8; 4]| SocketAddrV4::new(ip.into(), port);
     let whole = |address, bits| Whole { address, bits, lanes: vec![0] };
-    let open = |peer, whole: Whole| Ports::open_with(LOOPBACK, &[peer], Some(&whole));
+    let open = |peer, whole: Whole| Ports::open_with(LOOPBACK, &[peer], Some(&whole), false);
     let all = at([127, 255, 255, 255]);
     let (sender, receiver) = {
         let ports = open(at([127, 0, 0, 2]), whole(all, 8)).unwrap();

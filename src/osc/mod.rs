@@ -22,18 +22,19 @@ mod subscribers;
 mod tests;
 
 use std::io;
-use std::net::{SocketAddrV4, UdpSocket};
+use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 
 pub(crate) use counts::Counts;
 
 use crate::config::OscPort;
 use crate::control::Handle;
+use crate::sys::listen;
 use port::OscPortState;
 
 /// Why the port cannot be opened.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot listen for OSC at {address}; name an address of this machine and a free port in [osc]")]
+#[error("{address} cannot be had for OSC: {cause}")]
 #[non_exhaustive]
 pub(crate) struct OscError {
     /// Where it was to listen.
@@ -52,15 +53,14 @@ pub(crate) struct Osc {
     counts: Arc<Counts>,
 }
 
-/// Opens the port that the configuration names.
+/// Opens the port that the configuration names; its address may come later. What comes is counted.
 ///
 /// # Errors
 /// [`OscError`] where the system does not give it.
-pub(crate) fn open(config: &OscPort, hall: Handle) -> Result<Osc, OscError> {
+pub(crate) fn open(config: &OscPort, hall: Handle, counts: Arc<Counts>) -> Result<Osc, OscError> {
     let refused = |cause| OscError { address: config.listen, cause };
-    let socket = UdpSocket::bind(config.listen).map_err(refused)?;
-    socket.set_nonblocking(true).map_err(refused)?;
-    Ok(Osc { socket, config: config.clone(), hall, counts: Arc::new(Counts::default()) })
+    let socket = listen::udp(SocketAddr::V4(config.listen)).map_err(refused)?;
+    Ok(Osc { socket, config: config.clone(), hall, counts })
 }
 
 impl Osc {
@@ -69,14 +69,8 @@ impl Osc {
     /// # Errors
     /// If the system does not say.
     #[cfg(test)]
-    pub(crate) fn address(&self) -> io::Result<std::net::SocketAddr> {
+    pub(crate) fn address(&self) -> io::Result<SocketAddr> {
         self.socket.local_addr()
-    }
-
-    /// What has come so far, for whoever counts.
-    #[must_use]
-    pub(crate) fn counts(&self) -> Arc<Counts> {
-        Arc::clone(&self.counts)
     }
 
     /// Serves the port until its future is dropped. To be awaited within a tokio runtime with time and network.

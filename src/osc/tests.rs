@@ -43,8 +43,9 @@ impl Stage {
             sources: sources.to_vec(),
             allow: GearWord::ALL.map(|(_, word)| word).to_vec(),
         };
-        let osc = open(&config, hall).unwrap();
-        let (port, counts) = (osc.address().unwrap(), osc.counts());
+        let counts = Arc::<Counts>::default();
+        let osc = open(&config, hall, Arc::clone(&counts)).unwrap();
+        let port = osc.address().unwrap();
         let runtime = Builder::new_current_thread().enable_all().build().unwrap();
         std::thread::spawn(move || runtime.block_on(osc.serve())); // as long as the tests run
         let gear = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();

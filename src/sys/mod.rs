@@ -12,6 +12,7 @@ pub(crate) mod evdev;
 pub(crate) mod file;
 pub(crate) mod folder;
 pub(crate) mod humble;
+pub(crate) mod listen;
 pub(crate) mod lock;
 pub(crate) mod machine;
 pub(crate) mod own_folder;

@@ -27,6 +27,7 @@ use tokio::task::JoinSet;
 
 use crate::config::TextPort;
 use crate::control::{Handle, Places, Role, Surface, Who};
+use crate::sys::listen;
 use talk::TextTalk;
 
 /// Connections at the most; of more the one that was silent longest goes, before all one that never asked anything.
@@ -38,7 +39,7 @@ const BREATH: Duration = Duration::from_millis(100);
 
 /// Why the port cannot be opened.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot listen for text at {address}; name an address of this machine and a free port in [text]")]
+#[error("{address} cannot be had for text: {cause}")]
 #[non_exhaustive]
 pub(crate) struct TextError {
     /// Where it was to listen.
@@ -57,14 +58,13 @@ pub(crate) struct Text {
     idle: Duration,
 }
 
-/// Opens the port that the configuration names.
+/// Opens the port that the configuration names; its address may come later.
 ///
 /// # Errors
 /// [`TextError`] where the system does not give it.
 pub(crate) fn open(config: &TextPort, hall: Handle) -> Result<Text, TextError> {
     let refused = |cause| TextError { address: config.listen, cause };
-    let listener = TcpListener::bind(config.listen).map_err(refused)?;
-    listener.set_nonblocking(true).map_err(refused)?;
+    let listener = listen::tcp(SocketAddr::V4(config.listen)).map_err(refused)?;
     Ok(Text { listener, config: config.clone(), hall, idle: IDLE })
 }
 

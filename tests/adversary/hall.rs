@@ -98,7 +98,7 @@ pub(crate) fn open<T>(
     let halves = over(Arc::new(ether.clone()));
     let mut runtime = Runtime::over(
         Arc::clone(&book.config),
-        Purpose::Hall { before },
+        Purpose::Hall { before, may_come: false },
         numbers,
         &Default::default(),
         halves,

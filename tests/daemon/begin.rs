@@ -1,9 +1,11 @@
 //! How it starts, and when it does not.
 
 use std::fs;
+use std::process::Command;
 
 use crate::hall::Hall;
-use crate::process::{Run, kinocue};
+use crate::process::{Guarded, Run, kinocue};
+use crate::serving::Serving;
 
 /// A daemon that is to end by itself.
 fn serve(hall: &Hall, socket: &str) -> Run {
@@ -142,4 +144,68 @@ fn a_configuration_that_is_missing_and_a_library_that_is_none_are_named() {
     let run = serve(&hall, "control.sock");
     assert_eq!(run.code, Some(66), "{run:?}");
     assert!(run.stderr.contains("hall.toml"), "{run:?}");
+}
+
+/// A hall whose folders cannot be had plays, says so, and begins the next time as after a crash: no mark could be left.
+#[track_caller]
+fn plays_without_its_folders(hall: &Hall, folder: &str) {
+    let told = hall.comes_to("recovering");
+    let notes = told["warnings"].to_string();
+    assert!(notes.contains(&format!("{folder} takes no file")), "{notes}");
+    hall.done(&["park"]);
+    hall.comes_to("parked");
+    hall.play("ride");
+    let over = hall.comes_to("parked");
+    assert_eq!(over["state"], "parked");
+    let warned = hall.wait(|status| {
+        status["warnings"].as_array().is_some_and(|all| all.iter().any(|one| one["id"] == "settings"))
+    });
+    assert!(warned["warnings"].to_string().contains("settings"), "{warned}");
+}
+
+#[test]
+fn a_state_folder_that_is_not_there_keeps_no_hall_shut() {
+    let mut hall = Hall::closed(&[], |config| config);
+    // The volume is not mounted that it is on.
+    std::os::unix::fs::symlink(hall.path("volume/state"), hall.path("state")).unwrap();
+    hall.serve();
+    plays_without_its_folders(&hall, hall.path("state").to_str().unwrap());
+    hall.kill();
+    fs::create_dir_all(hall.path("volume/state")).unwrap();
+    hall.serve();
+    let parked = hall.comes_to("parked");
+    assert!(!parked["warnings"].to_string().contains("takes no file"), "{parked}");
+    hall.end();
+}
+
+#[test]
+fn a_state_folder_that_is_read_only_keeps_no_hall_shut() {
+    let mut hall = Hall::closed(&[], |config| config);
+    fs::create_dir(hall.path("state")).unwrap();
+    let script = "mount --bind \"$1\" \"$1\" && mount -o remount,bind,ro \"$1\" && shift && exec \"$@\"";
+    let folder = hall.path("state");
+    let start = |args: &[&str]| {
+        let mut command = Command::new("unshare");
+        command.args(["--map-root-user", "--mount", "sh", "-c", script, "sh"]).arg(&folder);
+        Guarded::start_command(command.arg(env!("CARGO_BIN_EXE_kinocue")).args(args))
+    };
+    let serving = Serving::start_by(hall.folder(), start);
+    hall.serves_by(serving);
+    plays_without_its_folders(&hall, folder.to_str().unwrap());
+    hall.end();
+}
+
+#[test]
+fn a_library_that_is_not_there_keeps_no_hall_shut_and_is_named() {
+    let mut hall = Hall::closed(&[], |config| config);
+    fs::rename(hall.path("cues"), hall.path("aside")).unwrap();
+    std::os::unix::fs::symlink(hall.path("volume/cues"), hall.path("cues")).unwrap();
+    hall.serve();
+    let told = hall.comes_to("parked");
+    assert!(told["warnings"].to_string().contains("the cue library"), "{told}");
+    fs::create_dir(hall.path("volume")).unwrap();
+    fs::rename(hall.path("aside"), hall.path("volume/cues")).unwrap();
+    hall.play("ride");
+    hall.comes_to("parked");
+    hall.end();
 }

@@ -59,9 +59,21 @@ pub(crate) struct Hall {
     /// The machine of the controllers.
     pub(crate) far: Machine,
     axes: usize,
+    seats: [[u8; 4]; 2],
     sims: [Option<Sim>; 2],
     serving: Option<Serving>,
     _turn: Turn,
+}
+
+/// Where a hall is, and what of that is there when its service starts.
+pub(crate) struct Place<'p> {
+    /// Where its frames come from.
+    pub(crate) bind: &'p str,
+    pub(crate) seats: [[u8; 4]; 2],
+    /// Gives the machine of the service its addresses.
+    pub(crate) lay: &'p str,
+    /// Tables of its configuration, in place of its API.
+    pub(crate) more: &'p str,
 }
 
 /// A `kinocue sim` at work.
@@ -87,36 +99,50 @@ impl Hall {
 
     /// The same with seats of so many axes, three of which move; the service started by a program with those arguments.
     pub(crate) fn open_with(axes: usize, by: &[&str]) -> Option<Self> {
+        let at =
+            Place { bind: "10.77.0.1", seats: SEATS, lay: "ip address add 10.77.0.1/24 dev show", more: "" };
+        let hall = Self::open_at(axes, by, &at)?;
+        hall.comes_to("parked");
+        Some(hall)
+    }
+
+    /// The same at those addresses; it serves, and has found whatever it finds.
+    pub(crate) fn open_at(axes: usize, by: &[&str], at: &Place<'_>) -> Option<Self> {
         let turn = if by.is_empty() { Turn::beside() } else { Turn::alone() };
         let show = Machine::first()?;
         let far = show.beside();
         let pid = far.pid();
         show.run(&format!(
-            "ip link add show type veth peer name far\nip link set far netns {pid}\nip address add 10.77.0.1/24 dev show\nip link set show up"
+            "ip link add show type veth peer name far\nip link set far netns {pid}\nip link set show up\n{}",
+            at.lay
         ));
-        far.run(
-            "ip address add 10.77.0.2/24 dev far\nip address add 10.77.0.3/24 dev far\nip link set far up",
-        );
+        for [a, b, c, d] in at.seats {
+            far.run(&format!("ip address add {a}.{b}.{c}.{d}/24 dev far\nip link set far up"));
+        }
         let dir = tempfile::tempdir().expect("a folder");
-        let mut hall = Self { dir, show, far, axes, sims: [None, None], serving: None, _turn: turn };
+        let seats = at.seats;
+        let mut hall = Self { dir, show, far, axes, seats, sims: [None, None], serving: None, _turn: turn };
         (0..2).for_each(|seat| hall.switch_on(seat));
-        hall.configure();
+        hall.configure(at);
         let enter = [hall.show.enter(), by.iter().map(|&word| word.to_owned()).collect()].concat();
         hall.serve_by(&enter);
-        hall.comes_to("parked");
         Some(hall)
     }
 
-    fn configure(&self) {
+    fn configure(&self, at: &Place<'_>) {
         let each = |one: &str| vec![one; self.axes].join(", ");
         let (park, neutral) = (format!("park = [{}]", each("0.0")), format!("neutral = [{}]", each("0.5")));
         let mut config = serving::hall(self.dir.path())
-            .replace("bind = \"127.0.0.1:0\"", &format!("bind = \"10.77.0.1:{FRAME_PORT}\""))
+            .replace("bind = \"127.0.0.1:0\"", &format!("bind = \"{}:{FRAME_PORT}\"", at.bind))
             .replace("axes = 3", &format!("axes = {}", self.axes))
             .replace("park = [0.0, 0.0, 0.0]", &park)
             .replace("neutral = [0.5, 0.5, 0.5]", &neutral);
-        serving::write_row(&mut config, "A", &SEATS.map(|[a, b, c, d]| format!("{a}.{b}.{c}.{d}:{PORT}")));
-        config += "[api]\nlisten = [\"127.0.0.1:8480\"]\n";
+        serving::write_row(
+            &mut config,
+            "A",
+            &self.seats.map(|[a, b, c, d]| format!("{a}.{b}.{c}.{d}:{PORT}")),
+        );
+        config += if at.more.is_empty() { "[api]\nlisten = [\"127.0.0.1:8480\"]\n" } else { at.more };
         for folder in ["cues", "playlists"] {
             fs::create_dir(self.path(folder)).expect("a folder");
         }
@@ -134,11 +160,11 @@ impl Hall {
     pub(crate) fn simulate(&self, machine: &Machine, seat: usize, files: &str) -> Sim {
         let name = |what: &str| self.path(&format!("{what}{files}")).to_str().expect("text").to_owned();
         let (control, log, axes) = (name("sim.sock"), name("frames.csv"), self.axes.to_string());
-        let [a, b, c, d] = SEATS[seat];
+        let [a, b, c, d] = self.seats[seat];
         let listen = format!("{a}.{b}.{c}.{d}:{PORT}");
         let mut args = vec!["sim", "--allow-lan", "--safe", "--listen", &listen, "--axes", &axes];
         args.extend(["--control", &control, "--log", &log]);
-        let host = (0x20..).zip(SHOW).map(|(register, octet)| format!("{register:x}={octet}"));
+        let host = (0x20..).zip([a, b, c, 1]).map(|(register, octet)| format!("{register:x}={octet}"));
         let host: Vec<String> = host.collect();
         args.extend(host.iter().flat_map(|one| ["--pa", one]));
         let mut guarded = Guarded::start_by(&machine.enter(), &args);
@@ -156,7 +182,9 @@ impl Hall {
 
     fn serve_by(&mut self, enter: &[String]) {
         self.serving = Some(Serving::start_by(self.dir.path(), |args| Guarded::start_by(enter, args)));
-        let begun = |line: &str| ["parked: ", "recovering: "].iter().any(|state| line.contains(state));
+        let begun = |line: &str| {
+            ["parked: ", "recovering: ", "no-seat", "yet"].iter().any(|state| line.contains(state))
+        };
         self.serving().heard(|line| begun(line).then_some(()));
     }
 

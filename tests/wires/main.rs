@@ -18,5 +18,6 @@ mod broadcast;
 mod cable;
 mod forger;
 mod hall;
+mod late;
 mod machine;
 mod net;

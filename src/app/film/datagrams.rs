@@ -10,6 +10,7 @@ use socket2::{Domain, Socket, Type};
 use super::WordSink;
 use crate::sys::batch::{Batch, stamp_arrivals};
 use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::sys::listen;
 use crate::time::{Clock as _, MonoTime};
 
 /// How often it is looked whether anybody still listens.
@@ -22,6 +23,7 @@ pub(super) fn open(bind: SocketAddrV4) -> io::Result<Socket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, None)?;
     socket.set_reuse_address(true)?;
     socket.set_nonblocking(true)?;
+    listen::free(&socket, (*bind.ip()).into())?; // its address may come later
     socket.bind(&bind.into())?;
     stamp_arrivals(&socket)?;
     Ok(socket)

@@ -22,6 +22,7 @@ use crate::film::message::{FilmPosition, PositionReader};
 use crate::film::source::{FilmArgs, NamedSender};
 use crate::json;
 use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::sys::listen;
 use crate::time::Clock as _;
 
 /// Where positions are put.
@@ -94,7 +95,8 @@ pub(super) fn osc_position(bytes: &[u8]) -> Option<FilmPosition> {
 /// Begins to hear positions by HTTP.
 pub(super) fn hear_http(sender: &NamedSender, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let listener = runtime.block_on(TcpListener::bind(sender.bind)).map_err(at_bind(sender))?;
+    let listener = listen::tcp(sender.bind.into()).map_err(at_bind(sender))?;
+    let listener = runtime.block_on(async { TcpListener::from_std(listener) }).map_err(at_bind(sender))?;
     let access = Access::without_pages();
     let door = Door { reader: Mutex::new(PositionReader::new(args.begin())), told, access };
     let named = sender.from;

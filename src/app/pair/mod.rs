@@ -33,6 +33,7 @@ use crate::rt::Live;
 use crate::sd::WatchdogThread;
 use crate::sys::clock::Monotonic;
 use crate::sys::file::{random, read, secret};
+use crate::sys::listen;
 use crate::sys::lock::lock;
 use crate::time::{Clock as _, MonoTime};
 use crate::wire::FrameNo;
@@ -279,10 +280,22 @@ fn key(path: &Path) -> Result<PairKey, PairError> {
     PairKey::parse(&text).ok_or_else(|| PairError::Key(none()))
 }
 
-/// Which machine of the pair this is, by its addresses: the sockets of that one, and the other one.
+/// Which machine of the pair this is, by its addresses, of which one has to be here: the sockets of that one, and the other one.
 fn find_machine(pair: &PairConfig) -> Result<(usize, Vec<UdpSocket>), PairError> {
     let bind = |machine: usize| -> io::Result<Vec<UdpSocket>> {
-        pair.machines[machine].addresses.iter().map(UdpSocket::bind).collect()
+        let addresses = &pair.machines[machine].addresses;
+        let is_missing = |error: &io::Error| error.kind() == io::ErrorKind::AddrNotAvailable;
+        let here: Vec<_> = addresses.iter().map(UdpSocket::bind).collect();
+        let none_is = here.iter().all(|bound| bound.as_ref().is_err_and(is_missing));
+        let bound = here.into_iter().zip(addresses).map(|(bound, address)| match bound {
+            // That of another network comes later.
+            Err(error) if is_missing(&error) && !none_is => {
+                let socket = listen::udp((*address).into())?;
+                socket.set_nonblocking(false).map(|()| socket)
+            }
+            bound => bound,
+        });
+        bound.collect()
     };
     match (bind(0), bind(1)) {
         (Ok(sockets), Err(_)) => Ok((0, sockets)),

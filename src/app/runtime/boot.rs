@@ -12,8 +12,9 @@ use crate::sys::clock::Monotonic;
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
-/// Binds the frame port.
-pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> {
+/// Binds the frame port; where `may_come` says so its address, and ways to controllers, may come later. What is broadcast has to leave from
+/// where its controllers answer to: there all of it has to be known.
+pub(super) fn bind(config: &Config, may_come: bool) -> Result<(Sender, Receiver), RuntimeError> {
     let stations = config.stations();
     let peers: Vec<_> = stations.iter().map(|one| one.connection.address).collect();
     let whole = |one: &BroadcastNetwork| Whole {
@@ -22,7 +23,9 @@ pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> 
         lanes: (0..peers.len()).filter(|lane| one.network.holds(*peers[*lane].ip())).collect(),
     };
     let whole = config.broadcast.as_ref().map(whole);
-    Ok(Ports::open_with(config.show.bind, &peers, whole.as_ref()).map_err(RuntimeError::Net)?.split())
+    let may_come = may_come && whole.is_none();
+    let ports = Ports::open_with(config.show.bind, &peers, whole.as_ref(), may_come);
+    Ok(ports.map_err(RuntimeError::Net)?.split())
 }
 
 /// What to do where frames to the controllers take too much of the time between ticks. Where that cannot be measured nothing is said.

@@ -77,6 +77,8 @@ pub enum Purpose {
     Hall {
         /// How it ended before.
         before: LedBefore,
+        /// True if addresses and networks of this machine may come after it has opened.
+        may_come: bool,
     },
     /// One show. All axes are taken to be homed, and a script finds out where they are.
     Play {
@@ -99,6 +101,10 @@ pub struct LeadingFilm {
 impl Purpose {
     const fn is_silent(&self) -> bool {
         matches!(self, Self::Play { silent: true, .. })
+    }
+
+    const fn may_come(&self) -> bool {
+        matches!(self, Self::Hall { may_come: true, .. })
     }
 }
 
@@ -178,7 +184,7 @@ impl Runtime {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
         let ports = links::open(&config, &purpose)?;
-        let (sender, receiver) = boot::bind(&config)?;
+        let (sender, receiver) = boot::bind(&config, purpose.may_come())?;
         let halves = (sender.led_by(lead), receiver);
         let crowding = boot::crowding(&config);
         let mut runtime = Self::over_all(config, purpose, numbers, calls, halves, ports)?;
@@ -230,7 +236,7 @@ impl Runtime {
         let watch =
             |health| Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, live_end);
         let (engine, watch, film) = match purpose {
-            Purpose::Hall { before } => {
+            Purpose::Hall { before, .. } => {
                 let desk = Arc::clone(&desk);
                 let standby = Standby::new(&config.controllers, line_end, desk, orders_end, before);
                 (engine.unknown(), watch(health.of_a_hall()).of_a_hall(standby), None)

@@ -31,6 +31,8 @@ words! {
         Beside = "beside",
         /// Its drives are not where they were led.
         OffCourse = "off-course",
+        /// No way leads to it.
+        NoRoute = "no-route",
     }
 }
 
@@ -79,6 +81,10 @@ words! {
         Link = "link",
         /// Of a pad.
         Buttons = "buttons",
+        /// An address of this machine that is not there.
+        Address = "address",
+        /// A port that cannot be had.
+        Port = "port",
         /// Of the other show machine, and of the engine by which it would take over.
         Pair = "pair",
         /// Of alarms that nobody was told.
@@ -119,6 +125,8 @@ words! {
         ParkIt = "park-it",
         /// Enable it, and park it.
         EnableIt = "enable-it",
+        /// Look for the network.
+        NoRoute = "no-route",
         /// Run preflight.
         Preflight = "preflight",
         /// Correct what it found.

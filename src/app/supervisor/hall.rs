@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::hall_settings::HallSettings;
+use super::reach::Reach;
 use super::show::{LeftAt, ProvedShow};
 use super::state_mirror::StateMirror;
 use crate::app::buttons::PadTable;
@@ -16,7 +17,7 @@ use crate::app::player::PlayerLink;
 use crate::app::recorder::RecordLink;
 use crate::app::runtime::RuntimeHandle;
 use crate::config::Config;
-use crate::control::{Code, Problem, SharedClock};
+use crate::control::{AwaitedPorts, Code, Problem, SharedClock};
 use crate::engine::Unplanned;
 use crate::health::Groups;
 use crate::osc::Counts;
@@ -60,6 +61,10 @@ pub(super) struct HallContext {
     pub(super) osc: Option<Arc<Counts>>,
     /// How the pads are, if there are any.
     pub(super) buttons: Option<PadTable>,
+    /// The ports that cannot be had yet.
+    pub(super) awaited: AwaitedPorts,
+    /// Addresses and ways that this machine has not yet.
+    pub(super) reach: Reach,
     /// The other show machine, where there is one.
     pub(super) pair: Option<PairWatch>,
     /// How the ways to tell alarms are, if there are any.
@@ -154,6 +159,8 @@ impl HallContext {
             player: None,
             osc: None,
             buttons: None,
+            awaited: AwaitedPorts::default(),
+            reach: Reach::default(),
             pair: None,
             notify: None,
             recorder: RecordLink::default(),

@@ -29,6 +29,7 @@ mod player;
 mod playlist;
 mod preflighted;
 mod procedures;
+mod reach;
 mod readiness;
 mod record;
 mod recorded;
@@ -70,7 +71,9 @@ use super::recorder::RecordLink;
 use super::runtime::{RuntimeEnd, RuntimeHandle};
 use crate::config::Config;
 use crate::control::model::Ending;
-use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, StatusSource, Surface, Who};
+use crate::control::{
+    Asked, AwaitedPorts, Command, Desired, Inbox, Problem, Role, Status, StatusSource, Surface, Who,
+};
 use crate::journal::Journal;
 use crate::library::Library;
 use crate::osc::Counts;
@@ -123,6 +126,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) osc: Option<Arc<Counts>>,
     /// How the pads are, where there are any.
     pub(crate) buttons: Option<PadTable>,
+    /// The ports that cannot be had yet.
+    pub(crate) awaited: AwaitedPorts,
     /// The way to the recorder.
     pub(crate) recorder: RecordLink,
     /// The other show machine, where there is one.
@@ -185,6 +190,7 @@ impl Supervisor {
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
         (hall.buttons, hall.recorder) = (ports.buttons.clone(), ports.recorder.clone());
         (hall.pair, hall.notify) = (ports.pair.clone(), ports.service_log.notify_table());
+        hall.awaited = ports.awaited.clone();
         hall.clock = ports.source.clock();
         let tools = Tools {
             config: Arc::clone(&hall.config),
@@ -345,7 +351,9 @@ impl Supervisor {
             return;
         }
         self.told = now;
-        let acts = self.features.on(&SupervisorEvent::Round(&self.hall.live.table()), &self.hall);
+        let table = self.hall.live.table();
+        self.hall.reach.look(&self.hall.config, &table, now);
+        let acts = self.features.on(&SupervisorEvent::Round(&table), &self.hall);
         // Also where there are none: at the end of each the tick thread is told of readiness that it was not told.
         self.procedures.add(acts);
         let log = &self.ports.service_log;

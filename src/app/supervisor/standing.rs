@@ -9,11 +9,17 @@ use crate::health::Why;
 const OFF_COURSE: &str = "its drives are not where they were led: something blocks or pushes them, their load is too much for the motors, \
                           or what was sent to them was damaged on the way";
 
+/// Of one to which no way leads.
+const NO_ROUTE: &str = "this machine has no way to it yet: no network of its leads there";
+
 /// Why a controller stands so. Of a rigid seat all controllers stand as one of them does: that one is named.
 pub(super) fn standing_words(hall: &HallContext, index: usize, why: Why) -> (String, Coded) {
     let whose = why.controller().unwrap_or(index);
     let of = hall.config.controllers.get(whose);
     let (words, coded) = match why {
+        Why::NotSeenYet if hall.reach.is_unreached(whose) => {
+            (NO_ROUTE.to_owned(), Coded::new(StandingCode::NoRoute.word(), []))
+        }
         // Drives have neither a PA96 nor filters.
         Why::Astray(_) if of.is_some_and(|one| one.drives().is_some()) => {
             (OFF_COURSE.to_owned(), Coded::new(StandingCode::OffCourse.word(), []))

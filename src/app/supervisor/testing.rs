@@ -443,6 +443,7 @@ fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, Supe
             film: None,
             player: None,
             osc: None,
+            awaited: crate::control::AwaitedPorts::default(),
             buttons: None,
             pair: None,
             recorder: crate::app::recorder::RecordLink::default(),

@@ -76,6 +76,8 @@ impl StatusParts<'_> {
         warnings.extend(failed.map(|trouble| in_two(WarningCode::Playlist.word(), trouble)));
         warnings
             .extend(links::troubles(&hall.links).map(|trouble| in_two(WarningCode::Link.word(), &trouble)));
+        warnings.extend(hall.reach.trouble().map(|trouble| in_two(WarningCode::Address.word(), &trouble)));
+        warnings.extend(hall.awaited.trouble().map(|trouble| in_two(WarningCode::Port.word(), &trouble)));
         warnings.extend(hall.buttons.iter().flat_map(|pads| pads.warnings(WarningCode::Buttons.word())));
         let of_broadcasts = broadcasts::troubles(&hall.config.controllers, &hall.live);
         warnings.extend(of_broadcasts.iter().map(|trouble| in_two(WarningCode::Broadcast.word(), trouble)));
@@ -181,6 +183,9 @@ impl StatusParts<'_> {
                 _ => Severity::Error,
             };
             let (code, remedy) = match row.why.next() {
+                _ if row.why == Why::NotSeenYet && hall.reach.is_unreached(lane) => {
+                    (RemedyCode::NoRoute.to_string(), NO_ROUTE_NEXT)
+                }
                 Some(remedy) => (row.why.code().to_owned(), remedy),
                 None => (row.standing.to_string(), row.standing.next()),
             };
@@ -308,6 +313,10 @@ fn are_silent_at_once(heard: impl Iterator<Item = Option<MonoTime>> + Clone, now
     let (first, last) = (heard.clone().min().flatten(), heard.max().flatten());
     first.zip(last).is_some_and(|(first, last)| last.since(first) <= AT_ONCE && now.since(last) > SILENT)
 }
+
+/// Of a controller to which no way leads.
+const NO_ROUTE_NEXT: &str =
+    "check switch, cable and address of this machine there; the seat rejoins by itself once it is reached";
 
 /// Of a cue that nothing leads, in a hall whose film others show.
 const NO_FILM: &str = "the cue that is loaded follows no film, and starts at once when it is let go: [sync] has no start; \
