@@ -29,7 +29,7 @@ use crate::config::{Config, ONE_FOLDER};
 use crate::control::model::Ending;
 use crate::control::{Handle, Status, handle};
 use crate::health::Why;
-use crate::journal::{Journal, Limits};
+use crate::journal::{Journal, Limits, Sealer};
 use crate::library::{self, Library, LibraryError};
 use crate::log::{Line, Log, Priority};
 use crate::rt::Calls;
@@ -233,7 +233,13 @@ fn serve_halls(
         recorder: RecordLink::default(),
         pair: pair.as_ref().map(Pair::watch),
     };
-    let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
+    let sealer = Sealer::of(&places.state).map_err(|why| {
+        ports
+            .carryover
+            .tell(Some(format!("what is played is written without seals, and proves nothing: {why}")));
+    });
+    let limits = Limits::from(&config.log);
+    let mut journal = Journal::open_with(&config.log.dir, limits, &Zoned::now(), sealer.ok());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
     ports.carryover.tell(mark.leave());
     ports.carryover.tell(library.trouble());

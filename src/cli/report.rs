@@ -7,7 +7,7 @@ use jiff::civil::Date;
 
 use super::{Exit, Failure, OrExit as _, load, places, print};
 use crate::config::journal_in;
-use crate::journal::{self, JournalError, JournalReport, ReportBounds};
+use crate::journal::{self, JournalError, JournalKeys, JournalReport, ReportBounds};
 use crate::sys::clock::local_now;
 
 mod csv;
@@ -19,7 +19,7 @@ mod table;
 ///
 /// Reads the journal that `kinocue serve` writes, even while the service runs. A show that neither
 /// ended nor is still running is reported as interrupted. Truncated journal lines are skipped with a
-/// note.
+/// note. Lines that are missing, altered or put in are named and do not count.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -28,7 +28,7 @@ Examples:
   kinocue report --from 2026-11-01 --to 2026-11-30 --csv > november.csv
   kinocue report --day today --actions
 
-Exit codes: 0 shown, even if nothing was played, 66 there is no journal, 77 no permission to read it")]
+Exit codes: 0 shown, even if nothing was played, 1 lines are missing, or not the hall's, 66 there is no journal, 77 no permission to read it")]
 pub(super) struct Args {
     /// The day: today, yesterday, or a date as 2026-11-21 [default: today].
     #[arg(long, value_name = "DAY", value_parser = parse_day, conflicts_with_all = ["from", "to"])]
@@ -45,6 +45,12 @@ pub(super) struct Args {
     /// The configuration that names the folder.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// Count only lines that this key has sealed, or one that it signed; may be given again [default: that of the first line].
+    #[arg(long, value_name = "KEY", value_parser = parse_key)]
+    key: Vec<String>,
+    /// Print the public keys whose lines count, for the desk of a fleet, and nothing else.
+    #[arg(long, conflicts_with_all = ["actions", "csv", "json"])]
+    keys: bool,
     /// Show the commands with their issuers and results, instead of the shows.
     #[arg(long)]
     actions: bool,
@@ -93,9 +99,13 @@ pub(super) fn shows_table(report: &JournalReport) -> String {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (from, to) = days(args, local_now().date())?;
     let dir = folder(args)?;
-    let report = journal::report(&dir, from, to, ReportBounds::ALL)
+    let keys = JournalKeys::any_of(args.key.iter().cloned());
+    let report = journal::report_by(&dir, (from, to), ReportBounds::ALL, keys)
         .map_err(|error| Failure { exit: exit(&error), error: error.into() })?;
-    if args.json {
+    if args.keys {
+        report.keys.iter().try_for_each(|key| print::out(&format!("{key}\n")))?;
+        tell_notes(&report);
+    } else if args.json {
         print::json(&report)?;
     } else if args.csv {
         print::data(&if args.actions { csv::actions(&report) } else { csv::shows(&report) })?;
@@ -104,7 +114,12 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::out(&if args.actions { table::actions(&report) } else { table::shows(&report) })?;
         tell_notes(&report);
     }
-    Ok(Exit::Done)
+    Ok(if report.faults.is_empty() { Exit::Done } else { Exit::CheckFailed })
+}
+
+fn parse_key(text: &str) -> Result<String, String> {
+    let remedy = "a key of a journal begins with M; `kinocue report --keys` prints it in the hall";
+    if journal::is_journal_key(text) { Ok(text.to_owned()) } else { Err(remedy.to_owned()) }
 }
 
 fn days(args: &Args, today: Date) -> Result<(Date, Date), Failure> {
@@ -137,7 +152,7 @@ fn exit(error: &JournalError) -> Exit {
 }
 
 fn tell_notes(report: &JournalReport) {
-    report.notes.iter().for_each(|note| print::tell(note));
+    report.remarks().for_each(|note| print::tell(&note));
 }
 
 #[cfg(test)]

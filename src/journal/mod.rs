@@ -10,32 +10,40 @@
 //!   line of its own, and whoever reads passes the cut one over with a note.
 //! - **On the disk**: the begin and the end of a show are synced before the next line is written; commands are left to
 //!   the kernel, so that a power cut may lose the last half minute of it, and a crash of the program nothing.
+//! - **Seals**: each line has the number of its place in the chain of its kind, the hash of the line before, and a signature by the key of
+//!   the service, so that what is taken out, put in or altered is found (docs/proof-of-play.md).
 //! - **Trouble**: a line that cannot be written is lost and counted, the cause is reported once, and the next line that can be
 //!   written is preceded by how many were lost. Nothing waits, and nothing of the show depends on it.
 //!
 //! One folder belongs to one hall.
 
 mod age;
+mod chain;
 mod files;
 mod fold;
 mod read;
 mod record;
 mod report;
+mod seal;
 mod tail;
 #[cfg(test)]
 mod tests;
+mod told;
 #[cfg(feature = "harness")]
 mod tried;
 mod writer;
 
 pub(crate) use age::too_old;
+pub(crate) use chain::{ChainFindings, JournalKeys};
 pub(crate) use fold::{FoldedAction, Folds};
 pub use record::{Action, FilmProof, Outcome, SeatOut, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
 pub(crate) use report::{
-    JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report, report_of,
+    JournalError, JournalReport, ReportBounds, ReportShown, ShowResult, Totals, report, report_by, report_of,
 };
+pub(crate) use seal::{KEY, Sealer, is_journal_key, new_journal_key};
 pub(crate) use tail::{JournalPart, LONGEST_TOLD, TOLD_AT_ONCE, TOLD_FILES, Told, tail};
+pub(crate) use told::check_told;
 #[cfg(feature = "harness")]
 pub(crate) use tried::try_file;
 
@@ -102,13 +110,25 @@ impl Journal {
     /// what is wrong shows in [`Journal::trouble`].
     #[must_use]
     pub fn open(dir: &Path, limits: Limits, now: &Zoned) -> Self {
-        Self::open_by(dir, limits, now, machine::clock_is_synchronised)
+        Self::open_with(dir, limits, now, None)
     }
 
-    fn open_by(dir: &Path, limits: Limits, now: &Zoned, is_synchronised: fn() -> bool) -> Self {
+    /// The same with lines that are sealed.
+    #[must_use]
+    pub(crate) fn open_with(dir: &Path, limits: Limits, now: &Zoned, sealer: Option<Sealer>) -> Self {
+        Self::open_by(dir, limits, now, sealer, machine::clock_is_synchronised)
+    }
+
+    fn open_by(
+        dir: &Path,
+        limits: Limits,
+        now: &Zoned,
+        sealer: Option<Sealer>,
+        is_synchronised: fn() -> bool,
+    ) -> Self {
         let standing = Arc::new(Standing::default());
         let (to, entries) = mpsc::sync_channel::<QueuedLine>(WAITING);
-        let mut writer = Writer::new(dir, limits, is_synchronised);
+        let mut writer = Writer::new(dir, limits, sealer, is_synchronised);
         let of_thread = Arc::clone(&standing);
         let write = move || entries.iter().for_each(|entry| of_thread.write(&mut writer, &entry));
         let thread = thread::Builder::new().name("journal".to_owned()).spawn(write);

@@ -179,6 +179,8 @@ pub(super) enum Line {
     Show(Box<ShowRecord>),
     /// So many lines could not be written before this one, since the program started.
     Lost { at: String, lines: u64 },
+    /// Lines are sealed with another key from here on, whose public half this is.
+    Key { at: String, new: String },
 }
 
 impl Line {
@@ -193,7 +195,7 @@ impl Line {
     /// When it happened.
     pub(super) fn at(&self) -> &str {
         match self {
-            Self::Start { at, .. } | Self::Lost { at, .. } => at,
+            Self::Start { at, .. } | Self::Lost { at, .. } | Self::Key { at, .. } => at,
             Self::Action(action) => &action.at,
             Self::Begin(show) | Self::Show(show) => {
                 show.outcome.as_ref().map_or(&show.start, |outcome| &outcome.end)

@@ -10,8 +10,10 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use super::chain::{Chain, ChainFindings, JournalKeys};
+use super::files::FileKind;
 use super::record::{Action, Line, ShowRecord, day_of};
-use super::{files, read};
+use super::{files, read, seal};
 use crate::control::model::{Ending, FrameCounts, words};
 use crate::control::{Code, Problem};
 use crate::sys::folder::Folder;
@@ -45,6 +47,15 @@ pub(crate) struct JournalError {
     pub(crate) source: io::Error,
 }
 
+impl JournalReport {
+    /// All that a reader should know beside the shows, in words.
+    pub(crate) fn remarks(&self) -> impl Iterator<Item = String> {
+        let unsealed = (self.unsealed > 0)
+            .then(|| format!("{} lines were written without a seal: nothing proves by whom", self.unsealed));
+        self.notes.iter().cloned().chain(unsealed).chain(self.faults.iter().cloned())
+    }
+}
+
 impl From<JournalError> for Problem {
     fn from(error: JournalError) -> Self {
         Self::new(Code::File, error.to_string(), "check the folder of the journal and its disk")
@@ -66,6 +77,13 @@ pub(crate) struct JournalReport {
     pub(crate) actions: Vec<Action>,
     /// What a reader should know of the journal itself: lines that were cut short or lost.
     pub(crate) notes: Vec<String>,
+    /// Lines that are missing, and such as nobody of the hall wrote, which do not count. Where there are none, what is reported is what was
+    /// written.
+    pub(crate) faults: Vec<String>,
+    /// Lines that were written before there were seals, and count: nothing proves by whom they were.
+    pub(crate) unsealed: u64,
+    /// The public keys that have sealed the lines which count.
+    pub(crate) keys: Vec<String>,
 }
 
 /// One show.
@@ -129,6 +147,19 @@ pub(crate) fn report(
     to: Date,
     most: ReportBounds,
 ) -> Result<JournalReport, JournalError> {
+    report_by(dir, (from, to), most, JournalKeys::default())
+}
+
+/// The same of lines that one of these keys has sealed.
+///
+/// # Errors
+/// As [`report`].
+pub(crate) fn report_by(
+    dir: &Path,
+    (from, to): (Date, Date),
+    most: ReportBounds,
+    mut keys: JournalKeys,
+) -> Result<JournalReport, JournalError> {
     let mut days = Days::new(from, to, most);
     let mut gather = || -> io::Result<bool> {
         let folder = Folder::open(dir)?;
@@ -136,8 +167,22 @@ pub(crate) fn report(
         let first = from.yesterday().unwrap_or(from);
         let until = to.checked_add(LONGEST_SHOW.days()).unwrap_or(Date::MAX);
         let mut notes = Vec::new();
-        for file in files::all(&folder)?.into_iter().filter(|file| (first..=until).contains(&file.day)) {
-            read::each(&folder, file, &mut notes, |line| days.take(line))?;
+        let all = files::all(&folder)?;
+        for kind in FileKind::ALL {
+            let files = || all.iter().filter(|file| file.kind == kind);
+            let before = files().rfind(|file| file.day < first);
+            let before = before.map(|file| seal::last_of(&folder, *file)).transpose()?.flatten();
+            let mut chain = Chain::new(kind, keys.clone(), before);
+            for file in files().filter(|file| (first..=until).contains(&file.day)) {
+                read::each(&folder, *file, &mut notes, |json, line, place| {
+                    let counts = chain.take(json, line.as_ref(), place);
+                    line.filter(|_| counts).into_iter().for_each(|line| days.take(line));
+                })?;
+            }
+            let findings = chain.close();
+            // Only what is about shows says that there is a new key.
+            keys.learn(&findings.keys);
+            days.find(findings);
         }
         days.note(notes);
         Ok(folder.is_claimed())
@@ -146,14 +191,16 @@ pub(crate) fn report(
     Ok(days.report(runs))
 }
 
-/// The same of what the journals of a hall told elsewhere, each in its order: where it has two show machines, the start of one ends what the
-/// other one played. What is no line is noted.
+/// The same of what the journals of a hall told elsewhere, each in its order, and of what was found of their chains: where it has two show
+/// machines, the start of one ends what the other one played. What is no line is noted.
 pub(crate) fn report_of(
     journals: impl IntoIterator<Item = Vec<Value>>,
+    found: ChainFindings,
     from: Date,
     to: Date,
 ) -> JournalReport {
     let mut days = Days::new(from, to, ReportBounds::ALL);
+    days.find(found);
     let mut read = |line| match serde_json::from_value(line) {
         Ok(line) => Some(line),
         Err(error) => {
@@ -182,6 +229,7 @@ pub(super) struct Days {
     /// What was left out: shows, and what was asked.
     more: (usize, usize),
     notes: Vec<String>,
+    found: ChainFindings,
 }
 
 /// A show, and whether its begin was followed by a start of the program.
@@ -193,7 +241,13 @@ struct Open {
 impl Days {
     pub(super) fn new(from: Date, to: Date, most: ReportBounds) -> Self {
         let (shows, actions) = (VecDeque::new(), VecDeque::new());
-        Self { from, to, most, shows, actions, more: (0, 0), notes: Vec::new() }
+        let (notes, found) = (Vec::new(), ChainFindings::default());
+        Self { from, to, most, shows, actions, more: (0, 0), notes, found }
+    }
+
+    /// What became of a chain.
+    pub(super) fn find(&mut self, findings: ChainFindings) {
+        self.found.add(findings);
     }
 
     /// What a reader should know of the journal itself.
@@ -233,23 +287,41 @@ impl Days {
     }
 
     pub(super) fn report(self, runs: bool) -> JournalReport {
-        let Self { from, to, shows, actions, more: left_out, mut notes, .. } = self;
+        let Self { from, to, shows, actions, more: left_out, mut notes, found, .. } = self;
         let last = shows.len();
         let shows: Vec<_> = shows
             .into_iter()
             .enumerate()
             .map(|(index, open)| open.shown(runs && index + 1 == last))
             .collect();
-        let more = notes.len().saturating_sub(MOST_NOTES);
-        notes.truncate(MOST_NOTES);
-        notes.extend((more > 0).then(|| format!("and {more} more")));
+        bound(&mut notes);
         for (more, what) in [(left_out.0, "shows"), (left_out.1, "commands")] {
             let words = format!("{more} earlier {what} are left out; `kinocue report` has them");
             notes.extend((more > 0).then_some(words));
         }
         let (totals, actions) = (Totals::of(&shows), actions.into());
-        JournalReport { from: from.to_string(), to: to.to_string(), shows, totals, actions, notes }
+        let (mut faults, unsealed) = (found.faults, found.unsealed);
+        bound(&mut faults);
+        let keys = found.keys.into_iter().collect();
+        JournalReport {
+            from: from.to_string(),
+            to: to.to_string(),
+            shows,
+            totals,
+            actions,
+            notes,
+            faults,
+            unsealed,
+            keys,
+        }
     }
+}
+
+/// Leaves as many notes as a person reads.
+fn bound(notes: &mut Vec<String>) {
+    let more = notes.len().saturating_sub(MOST_NOTES);
+    notes.truncate(MOST_NOTES);
+    notes.extend((more > 0).then(|| format!("and {more} more")));
 }
 
 /// Leaves the newest of them; says how many went.

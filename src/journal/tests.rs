@@ -12,9 +12,9 @@ use super::report::ShowResult;
 use super::*;
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 
-const LIMITS: Limits = Limits { max_size: 1 << 20, max_total: 1 << 24, max_age_days: 400 };
+pub(super) const LIMITS: Limits = Limits { max_size: 1 << 20, max_total: 1 << 24, max_age_days: 400 };
 
-fn zoned(time: &str) -> Zoned {
+pub(super) fn zoned(time: &str) -> Zoned {
     time.parse::<Timestamp>().unwrap().to_zoned(TimeZone::UTC)
 }
 
@@ -22,7 +22,7 @@ fn day(text: &str) -> Date {
     text.parse().unwrap()
 }
 
-fn action(at: &str, what: &str) -> Action {
+pub(super) fn action(at: &str, what: &str) -> Action {
     let [at, what] = [at, what].map(str::to_owned);
     Action {
         at,
@@ -75,7 +75,7 @@ fn outcome(end: &str, result: Ending) -> Outcome {
     }
 }
 
-fn ended(start: &str, end: &str, result: Ending) -> ShowRecord {
+pub(super) fn ended(start: &str, end: &str, result: Ending) -> ShowRecord {
     ShowRecord { outcome: Some(outcome(end, result)), ..record(start) }
 }
 
@@ -129,7 +129,7 @@ fn of_two_machines_the_start_of_one_ends_what_the_other_one_played_in_whatever_o
     let told = |journal: &[Line]| journal.iter().map(|line| serde_json::to_value(line).unwrap()).collect();
     for journals in [[&first, &second], [&second, &first]] {
         let date = day("2026-11-21");
-        let report = report_of(journals.map(|journal| told(journal)), date, date);
+        let report = report_of(journals.map(|journal| told(journal)), ChainFindings::default(), date, date);
         let shows: Vec<_> =
             report.shows.iter().map(|show| (show.record.start.as_str(), show.result)).collect();
         assert_eq!(shows, [(START, ShowResult::Interrupted), (later, ShowResult::Running)]);
@@ -236,7 +236,7 @@ fn files_go_by_age() {
     let dir = tempfile::tempdir().unwrap();
     for today in ["2026-11-18", "2026-11-19", "2026-11-21"] {
         let limits = Limits { max_age_days: 2, ..LIMITS };
-        drop(Journal::open_by(dir.path(), limits, &zoned(&format!("{today}T08:00:00Z")), || true));
+        drop(Journal::open_by(dir.path(), limits, &zoned(&format!("{today}T08:00:00Z")), None, || true));
     }
     let names: Vec<_> = files(dir.path()).iter().map(|file| file.file_name().unwrap().to_owned()).collect();
     assert_eq!(names, ["kinocue-2026-11-19-000.jsonl", "kinocue-2026-11-21-000.jsonl"]);
@@ -248,7 +248,7 @@ fn nothing_goes_by_age_while_the_clock_may_be_wrong_or_has_leapt_and_what_goes_i
     let limits = Limits { max_age_days: 10, ..LIMITS };
     let open = |of: Date, is_synchronised: fn() -> bool| {
         let now = of.to_zoned(TimeZone::UTC).unwrap();
-        let mut journal = Journal::open_by(dir.path(), limits, &now, is_synchronised);
+        let mut journal = Journal::open_by(dir.path(), limits, &now, None, is_synchronised);
         journal.note(&action(&format!("{of}T09:00:00.000+00:00"), "pause"));
         let standing = Arc::clone(&journal.standing);
         drop(journal);

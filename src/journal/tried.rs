@@ -1,7 +1,12 @@
 //! What any octets come to where they stand in a file of the journal. For tests and fuzzing.
 
 use jiff::civil::Date;
+use serde_json::Value;
 
+use super::chain::{Chain, JournalKeys};
+use super::files::FileKind;
+use super::read::LinePlace;
+use super::record::Line;
 use super::report::{Days, MOST_NOTES, ReportBounds};
 use super::{JournalPart, read, tail};
 
@@ -12,11 +17,16 @@ const IN_MEMORY: &str = "octets in memory can be read";
 pub(crate) fn try_file(octets: &[u8]) {
     let mut days = Days::new(Date::MIN, Date::MAX, ReportBounds { shows: 3, actions: 3 });
     let (mut notes, mut lines) = (Vec::new(), 0);
-    let mut take = |line| {
-        lines += 1;
-        days.take(line);
+    let mut chain = Chain::new(FileKind::Shows, JournalKeys::default(), None);
+    let mut take = |json: &Value, line: Option<Line>, place: &LinePlace| {
+        let counts = chain.take(json, line.as_ref(), place);
+        if let Some(line) = line.filter(|_| counts) {
+            lines += 1;
+            days.take(line);
+        }
     };
-    read::each_in(octets, NAME, &mut notes, &mut take).expect(IN_MEMORY);
+    read::each_in(octets, (NAME, Date::constant(2026, 11, 20)), &mut notes, &mut take).expect(IN_MEMORY);
+    chain.close();
     assert!(lines + notes.len() <= octets.len());
     days.note(notes);
     let report = days.report(true);

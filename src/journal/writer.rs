@@ -9,6 +9,8 @@ use jiff::civil::Date;
 
 use super::Limits;
 use super::files::{self, FileId, FileKind, RemovedFile};
+use super::record::Line;
+use super::seal::Sealer;
 use crate::sys::folder::{Folder, Stamp};
 
 /// A line on its way to the disk.
@@ -33,6 +35,7 @@ pub(super) struct Writer {
     limits: Limits,
     /// Kept open, so that others see that somebody writes here.
     folder: Option<Folder>,
+    sealer: Option<Sealer>,
     /// For each kind.
     current: [Option<Current>; 2],
     /// True while the clock is known to be right.
@@ -54,11 +57,17 @@ struct Current {
 }
 
 impl Writer {
-    pub(super) fn new(dir: &Path, limits: Limits, is_synchronised: fn() -> bool) -> Self {
+    pub(super) fn new(
+        dir: &Path,
+        limits: Limits,
+        sealer: Option<Sealer>,
+        is_synchronised: fn() -> bool,
+    ) -> Self {
         Self {
             dir: dir.to_owned(),
             limits,
             folder: None,
+            sealer,
             current: [None, None],
             is_synchronised,
             gone: Vec::new(),
@@ -67,7 +76,10 @@ impl Writer {
 
     /// Writes a line. After an error everything is opened anew the next time.
     pub(super) fn append(&mut self, entry: &QueuedLine) -> io::Result<()> {
-        self.try_append(entry).inspect_err(|_| self.current[entry.kind as usize] = None)
+        self.try_append(entry).inspect_err(|_| {
+            self.current[entry.kind as usize] = None;
+            self.sealer.iter_mut().for_each(|sealer| sealer.forget(entry.kind));
+        })
     }
 
     fn try_append(&mut self, entry: &QueuedLine) -> io::Result<()> {
@@ -80,6 +92,33 @@ impl Writer {
         };
         folder.claim(); // a report may have been looking at it the last time
         let folder = self.folder.insert(folder);
+        if let Some(sealer) = &mut self.sealer {
+            if entry.kind == FileKind::Shows && sealer.has_new_key(folder) {
+                let line = Line::Key { at: entry.at.clone(), new: sealer.public_key() };
+                let text = serde_json::to_vec(&line).map_err(io::Error::other)?;
+                self.append_sealed(&QueuedLine { text, sync: true, ..entry.clone() }, true)?;
+            }
+            return self.append_sealed(entry, false);
+        }
+        self.put(entry)
+    }
+
+    /// Seals a line, and writes it; `is_change` if it says that the key is a new one.
+    fn append_sealed(&mut self, entry: &QueuedLine, is_change: bool) -> io::Result<()> {
+        let sealed = self
+            .sealer
+            .as_mut()
+            .zip(self.folder.as_ref())
+            .and_then(|(sealer, folder)| sealer.seal(folder, (entry.kind, is_change), &entry.text));
+        let (text, tip) = sealed.ok_or_else(|| io::Error::other("a line cannot be sealed"))?;
+        self.put(&QueuedLine { text, ..entry.clone() })?;
+        self.sealer.iter_mut().for_each(|sealer| sealer.advance(entry.kind, is_change, tip.clone()));
+        Ok(())
+    }
+
+    /// Puts a line as it is at the end of the file that it belongs to.
+    fn put(&mut self, entry: &QueuedLine) -> io::Result<()> {
+        let Some(folder) = &self.folder else { return Err(io::ErrorKind::NotFound.into()) };
         let fits = |current: &Current| {
             let grown = current.size + entry.text.len() as u64;
             current.id.day == entry.day && (grown <= self.limits.max_size || current.size == 0)

@@ -145,3 +145,32 @@ fn go_waits_for_an_open_belt_and_the_status_says_whose() {
     hall.done(&["go"]);
     hall.comes_to("parked");
 }
+
+#[test]
+fn a_journal_that_is_whole_is_reported_with_0_over_a_restart_and_one_that_was_changed_with_1() {
+    let mut hall = Hall::open();
+    hall.play("ride");
+    hall.comes_to("parked");
+    hall.close();
+    hall.serve();
+    hall.comes_to("parked");
+    let folder = hall.path("log").to_str().unwrap().to_owned();
+    let report = || hall.run(&["report", "--from", "2000-01-01", "--dir", &folder]);
+    let whole = report();
+    assert_eq!((whole.code, whole.stderr.as_str()), (Some(0), ""), "{whole:?}");
+    let keys = hall.run(&["report", "--from", "2000-01-01", "--dir", &folder, "--keys"]);
+    assert!(
+        keys.code == Some(0) && keys.stdout.starts_with('M') && keys.stdout.lines().count() == 1,
+        "{keys:?}"
+    );
+    let of_shows = |entry: &std::fs::DirEntry| !entry.file_name().to_str().unwrap().contains("asked");
+    let entries = std::fs::read_dir(&folder).unwrap().flatten();
+    let file = entries.into_iter().find(of_shows).unwrap().path();
+    let text = std::fs::read_to_string(&file).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.remove(1);
+    std::fs::write(&file, lines.join("\n") + "\n").unwrap();
+    let cut = report();
+    assert!(cut.code == Some(1) && cut.stderr.contains("line 2 is missing"), "{cut:?}");
+    hall.end();
+}

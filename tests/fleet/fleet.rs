@@ -159,7 +159,12 @@ impl Engine {
     pub(crate) fn hall_with(&self, name: &str, allow: &str, change: impl FnOnce(String) -> String) -> Hall {
         let table = fs::read_to_string(self.path(&format!("fleet/{name}/kinocue-fleet.toml"))).unwrap();
         let table = table.replace("allow = []", &format!("allow = {allow}"));
-        Hall::open_with(|config| change(config) + &table)
+        let mut hall = Hall::closed(&[], |config| change(config) + &table);
+        fs::create_dir_all(hall.path("state")).unwrap();
+        fs::copy(self.path(&format!("fleet/{name}/journal.nk")), hall.path("state/journal.nk")).unwrap();
+        hall.serve();
+        hall.comes_to("parked");
+        hall
     }
 
     /// Has a member, by the folder of its settings, reach the engine at another address.

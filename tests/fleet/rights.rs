@@ -360,6 +360,52 @@ fn what_is_no_record_keeps_no_later_show_from_the_log_and_each_show_is_reported_
 }
 
 #[test]
+fn the_key_of_a_link_invents_no_show_and_replaces_none_and_a_hall_whose_key_nobody_knows_proves_nothing() {
+    let Some(engine) = Engine::start("h1") else { return };
+    let hall = engine.hall("h1", "[]");
+    let link = engine.link("h1", &hall);
+    engine.hears_all();
+    hall.play("night");
+    hall.done(&["park"]);
+    hall.comes_to("parked");
+    engine.wait(|_| engine.desk(&["report"]).stdout.matches(" night ").count() == 1);
+    let run = engine.desk(&["report"]);
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{run:?}");
+
+    drop(link);
+    let log = engine.log("h1");
+    let begin = log.iter().find(|record| record["record"]["kind"] == "begin").unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let mut thief = runtime.block_on(Member::connect(&engine, "h1/fleet.nk", "_INBOX_hall.berlin.h1"));
+    for (n, change) in (log.len() as u64 + 1..).zip(["invented", "replaced", "bare"]) {
+        let mut forged = begin.clone();
+        (forged["n"], forged["record"]["cue"]) = (n.into(), change.into());
+        forged["line"] = n.into();
+        match change {
+            "bare" => drop(forged["record"].as_object_mut().unwrap().remove("seal")),
+            "invented" => {
+                forged["record"]["start"] =
+                    begin["record"]["start"].as_str().unwrap().replace("T", "T0").into()
+            }
+            _ => {}
+        }
+        assert!(runtime.block_on(thief.may_publish_text("kc.log.berlin.h1", &forged.to_string())));
+    }
+    let run = engine.desk(&["report"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert_eq!(run.stdout.matches(" night ").count(), 1, "{run:?}");
+    assert!(!["invented", "replaced", "bare"].iter().any(|cue| run.stdout.contains(cue)), "{run:?}");
+    assert!(run.stderr.contains("altered, or put in") && run.stderr.contains("without a seal"), "{run:?}");
+
+    let desk = engine.path("fleet/office/desk.toml");
+    let text = fs::read_to_string(&desk).unwrap();
+    let kept: Vec<&str> = text.lines().filter(|line| !line.starts_with("\"berlin.h1\" = [")).collect();
+    fs::write(&desk, kept.join("\n")).unwrap();
+    let run = engine.desk(&["report"]);
+    assert!(run.code == Some(1) && run.stderr.contains("the desk knows no key of this hall"), "{run:?}");
+}
+
+#[test]
 fn over_a_network_the_engine_is_known_by_its_certificate_and_nobody_speaks_to_another_or_in_the_open() {
     let Some(engine) = Engine::start_over_tls("h1") else { return };
     let hall = engine.hall("h1", "[]");

@@ -19,6 +19,7 @@ use super::init::{Plan, make};
 use crate::cli::play::leave_on_signals;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::FleetWord;
+use crate::journal::KEY;
 use crate::sys::clock::Monotonic;
 use crate::sys::own_folder::OwnFolder;
 use crate::time::Clock as _;
@@ -172,6 +173,7 @@ fn start_hall(
     let path = |name: &str| own.join(name);
     fs::create_dir_all(path("state/cues")).or_exit(Exit::Io)?;
     fs::write(path("state/cues/bench-ride.csv"), CUE).or_exit(Exit::Io)?;
+    fs::copy(fleet.join(hall).join(KEY), path("state").join(KEY)).or_exit(Exit::Io)?;
     let table = fs::read_to_string(fleet.join(hall).join("kinocue-fleet.toml")).or_exit(Exit::Io)?;
     let config = config(hall).context("no ports for seats").or_system()? + &table;
     fs::write(path("hall.toml"), config).or_exit(Exit::Io)?;

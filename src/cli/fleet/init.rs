@@ -13,6 +13,7 @@ use super::settings::is_loopback;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::is_fleet_id;
 use crate::fleet::{self, CUES, DOMAIN, HAVE, LOG, SEEN, WANT, new_letter_key};
+use crate::journal::{self, new_journal_key};
 
 /// Makes keys and configurations of a fleet in a new folder.
 ///
@@ -107,9 +108,13 @@ pub(super) fn make(plan: &Plan<'_>, folder: &Path) -> Result<(), Failure> {
         let ca = if scheme == "tls" { "ca = \"fleet-ca.pem\"\n" } else { "" };
         format!("engine = [\"{scheme}://{}\"]\nseed = \"{seed}\"\n{ca}", plan.engine)
     };
+    let mut journals =
+        String::from("[journals]                     # who seals what halls tell of their shows\n");
     for (hall, pair) in &halls {
         let of_hall = folder.join(hall);
         put(&of_hall.join("fleet.nk"), &seed(pair)?, 0o600)?;
+        let keys = journal_keys(&of_hall, plan.pairs.contains(hall))?;
+        let _ = writeln!(journals, "\"{}.{hall}\" = [{keys}]", plan.site); // a String takes it
         let settings = format!("{}site = \"{}\"\nhall = \"{hall}\"\n", access("fleet.nk"), plan.site);
         put(&of_hall.join("fleet.toml"), &settings, 0o644)?;
         put(&of_hall.join("kinocue-fleet.toml"), &hall_table(plan, hall, &letters), 0o644)?;
@@ -124,11 +129,27 @@ pub(super) fn make(plan: &Plan<'_>, folder: &Path) -> Result<(), Failure> {
         "\n# Halls that start together, as `kinocue fleet start --group house`:\n# [groups]\n# house = [{names}]\n"
     );
     let settings = format!(
-        "{}letters = \"{LETTERS}\"\nname = \"{}\"\nhalls = [{names}]\n{groups}",
+        "{}letters = \"{LETTERS}\"\nname = \"{}\"\nhalls = [{names}]\n{groups}\n{journals}",
         access("desk.nk"),
         plan.desk
     );
     put(&of_desk.join("desk.toml"), &(settings + PAGE), 0o644)
+}
+
+/// Makes the key that seals the journal of a hall, or of each of its two machines; gives their public halves.
+fn journal_keys(of_hall: &Path, is_pair: bool) -> Result<String, Failure> {
+    let files = if is_pair {
+        vec![journal::KEY.to_owned(), format!("second-{}", journal::KEY)]
+    } else {
+        vec![journal::KEY.to_owned()]
+    };
+    let mut keys = Vec::new();
+    for file in files {
+        let pair = new_journal_key();
+        put(&of_hall.join(file), &seed(&pair)?, 0o600)?;
+        keys.push(format!("\"{}\"", pair.public_key()));
+    }
+    Ok(keys.join(", "))
 }
 
 /// What the settings of a desk say of its page.
@@ -266,7 +287,7 @@ fn next_steps(plan: &Plan<'_>, folder: &Path, is_alone: bool) -> String {
         "made {folder}: keys of {} halls of {site} and of the desk {}\n\n\
          1. The engine: {folder}/nats-server.conf to its machine (Debian: nats-server), then nats-server -c nats-server.conf\n\
          2. Each hall, as {hall}: {folder}/{hall}/kinocue-fleet.toml into its kinocue.toml; fleet.toml and fleet.nk to /etc/kinocue;\n   \
-         systemctl restart kinocue; systemctl enable --now kinocue-link\n\
+         journal.nk to /var/lib/kinocue, of kinocue and of mode 0600; systemctl restart kinocue; systemctl enable --now kinocue-link\n\
          3. The desk: {folder}/{}/desk.toml, desk.nk and {LETTERS} to /etc/kinocue; kinocue fleet status\n",
         plan.halls.len(),
         plan.desk,

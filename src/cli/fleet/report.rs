@@ -14,7 +14,7 @@ use super::{DeskArgs, engine, settings};
 use crate::cli::report::{Day, parse_day, shows_table};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::fleet::{self, LogRecord};
-use crate::journal::{JournalReport, report_of};
+use crate::journal::{ChainFindings, JournalKeys, JournalReport, check_told, report_of};
 use crate::json;
 use crate::sys::clock::local_now;
 
@@ -27,13 +27,17 @@ const PATIENCE: Duration = Duration::from_secs(10);
 const TEXT: usize = 480;
 const ITEMS: usize = 256;
 
+/// Of a hall whose key the desk does not know.
+const UNPROVED: &str = "the desk knows no key of this hall, so that nothing proves who wrote these lines; add what `kinocue report --keys` \
+                        prints in the hall to [journals] in desk.toml";
+
 /// Reports what all halls of a desk played on a day.
 ///
 /// A hall tells each show once, also what it played while it was cut off. Where it is not heard now, later shows may be missing: `kinocue fleet
 /// status` says so, and `kinocue report` in the hall has all.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 shown, 1 records of a hall are missing, 69 the engine does not answer, or not all of it comes"
+    after_help = "Exit codes: 0 shown, 1 records of a hall are missing, or it is not proved that they are its own, 69 the engine does not answer, or not all of it comes"
 )]
 pub(super) struct Args {
     #[command(flatten)]
@@ -73,20 +77,22 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     for hall in settings.halls {
         told.entry(hall).or_default();
     }
-    let is_whole = told.values().all(|hall| hall.missing.is_empty());
+    let reports: BTreeMap<_, _> =
+        told.iter().map(|(hall, told)| (hall, told.report(settings.journals.get(hall), day))).collect();
+    let is_whole = told.values().all(|hall| hall.missing.is_empty())
+        && reports.values().all(|report| report.faults.is_empty());
     if args.records {
         let of_hall = |told: &ToldByHall| told.records.values().flatten().cloned().collect::<Vec<_>>();
         let records: BTreeMap<_, _> = told.iter().map(|(hall, told)| (hall, of_hall(told))).collect();
         print::json(&records)?;
         return Ok(if is_whole { Exit::Done } else { Exit::CheckFailed });
     }
-    let reports: BTreeMap<_, _> = told.into_iter().map(|(hall, told)| (hall, told.report(day))).collect();
     if args.json {
         print::json(&reports)?;
     } else {
         for (hall, report) in &reports {
             print::out(&format!("{hall}\n{}\n", shows_table(report)))?;
-            report.notes.iter().for_each(|note| print::tell(&format!("{hall}: {note}")));
+            report.remarks().for_each(|note| print::tell(&format!("{hall}: {note}")));
         }
     }
     Ok(if is_whole { Exit::Done } else { Exit::CheckFailed })
@@ -156,15 +162,27 @@ impl ToldByHall {
         }
     }
 
-    fn report(mut self, day: Date) -> JournalReport {
-        // As the hall itself reads them: what was told again, of days before, is not behind what was told first.
-        let file_of = |record: &LogRecord| record.part.file.clone();
-        self.records.values_mut().for_each(|records| records.sort_by_cached_key(file_of));
-        let lines = |records: Vec<LogRecord>| {
-            records.into_iter().map(|record| json::clipped(record.part.record, TEXT, ITEMS)).collect()
-        };
-        let mut report = report_of(self.records.into_values().map(lines), day, day);
-        report.notes.extend(self.missing);
+    /// What the hall played, by the lines that a key which the desk knows has sealed.
+    fn report(&self, keys: Option<&Vec<String>>, day: Date) -> JournalReport {
+        let counts = keys.map_or_else(JournalKeys::default, |keys| JournalKeys::only(keys.iter().cloned()));
+        let (mut found, mut journals) = (ChainFindings::default(), Vec::new());
+        for records in self.records.values() {
+            // As the hall itself reads them: what was told again, of days before, is not behind what was told first.
+            let parts = records.iter().map(|record| record.part.clone()).collect();
+            let (lines, of_journal) = check_told(parts, &counts);
+            found.add(of_journal);
+            journals.push(lines.into_iter().map(|line| json::clipped(line, TEXT, ITEMS)).collect());
+        }
+        let unknown = found.keys.iter().filter(|key| keys.is_none_or(|keys| !keys.contains(key))).cloned();
+        let unknown: Vec<String> = unknown.collect();
+        let is_unproved = keys.is_none() && !self.records.is_empty();
+        let mut report = report_of(journals, found, day, day);
+        report.faults.extend(is_unproved.then(|| UNPROVED.to_owned()));
+        report.notes.extend(unknown.into_iter().map(|key| match keys {
+            Some(_) => format!("it seals with a new key, which the one before has signed: add {key} to [journals] in desk.toml"),
+            None => format!("its lines are sealed by {key}"),
+        }));
+        report.notes.extend(self.missing.iter().cloned());
         report
     }
 }
@@ -201,7 +219,7 @@ mod tests {
             let record = json!({ "n": n, "told": {}, "file": file, "line": line, "record": record });
             told.take("kc.log.berlin.h1", record.to_string().as_bytes());
         }
-        let shows = told.report(jiff::civil::date(2026, 11, 21)).shows;
+        let shows = told.report(None, jiff::civil::date(2026, 11, 21)).shows;
         assert_eq!(shows.iter().map(|show| show.result).collect::<Vec<_>>(), [ShowResult::Running]);
     }
 

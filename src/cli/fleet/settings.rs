@@ -10,6 +10,7 @@ use toml::de::DeTable;
 
 use crate::cli::{Exit, Failure, OrExit as _};
 use crate::config::{self, Entry, Faults, Section, is_fleet_id};
+use crate::journal::is_journal_key;
 use crate::sys;
 use crate::sys::file::secret;
 
@@ -49,6 +50,8 @@ pub(super) struct DeskSettings {
     pub(super) halls: Vec<String>,
     /// Those that are started together, by the name of the group.
     pub(super) groups: BTreeMap<String, Vec<String>>,
+    /// The public keys that seal the journal of each hall; where it has two show machines, of both.
+    pub(super) journals: BTreeMap<String, Vec<String>>,
     /// Where its page is served, and to whom.
     pub(super) api: Option<config::Api>,
     /// Where the consoles of halls are.
@@ -76,11 +79,21 @@ pub(super) fn desk(path: &Path) -> Result<DeskSettings, Failure> {
         let halls = section.get("halls").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
         let halls = halls.into_iter().filter_map(|entry| member(entry, section.faults)).collect();
         let groups = groups(section);
+        let journals = journals(section);
         let api = section.get("api").and_then(|entry| config::api(entry, section.faults));
         let consoles =
             section.get("consoles").map(|entry| consoles(entry, section.faults)).unwrap_or_default();
         section.require(&["name", "halls"]);
-        Some(DeskSettings { access: access?, letters: letters?, name: name?, halls, groups, api, consoles })
+        Some(DeskSettings {
+            access: access?,
+            letters: letters?,
+            name: name?,
+            halls,
+            groups,
+            journals,
+            api,
+            consoles,
+        })
     })
 }
 
@@ -103,6 +116,31 @@ fn groups(section: &mut Section<'_, '_, '_>) -> BTreeMap<String, Vec<String>> {
         groups.insert(name.get_ref().to_string(), halls);
     }
     groups
+}
+
+/// `"berlin.h1" = ["M…"]`, in any number.
+fn journals(section: &mut Section<'_, '_, '_>) -> BTreeMap<String, Vec<String>> {
+    let Some(table) = section.get("journals").and_then(|entry| entry.table(section.faults)) else {
+        return BTreeMap::new();
+    };
+    let mut journals = BTreeMap::new();
+    for (name, value) in table {
+        let entry = Entry::new(name.get_ref(), value);
+        let keys = entry.array(section.faults).unwrap_or_default();
+        let mut known = Vec::new();
+        for key in keys {
+            match key.text(section.faults) {
+                Some(public) if is_journal_key(public) => known.push(public.to_owned()),
+                Some(_) => key.fault(
+                    section.faults,
+                    "a key of a journal begins with M; `kinocue report --keys` prints it in the hall",
+                ),
+                None => {}
+            }
+        }
+        journals.insert(name.get_ref().to_string(), known);
+    }
+    journals
 }
 
 fn read<T>(path: &Path, take: impl FnOnce(&mut Section<'_, '_, '_>) -> Option<T>) -> Result<T, Failure> {
