@@ -211,9 +211,8 @@ fn round(links: &[Link], hall: Hall) -> Round {
             places.look(&mut engine, &mail, at, true);
             let Step::Send = engine.tick(0, target) else { unreachable!("the ride is longer") };
             for (index, lane) in lanes.iter_mut().enumerate() {
-                let beat = places.admit(index, &mut engine, at).expect("every lane takes part");
-                let pose = engine.lane(index).pose();
-                let (stamped, bytes) = lane.encode(&beat, pose, engine.lane(index).mix(), &mut buf);
+                let (beat, pose) = places.admit(index, &mut engine, at).expect("every lane takes part");
+                let (stamped, bytes) = lane.encode(&beat, &pose, engine.lane(index).mix(), &mut buf);
                 // What is on the network is sent below.
                 if index >= stations {
                     outlets.send(index, bytes, at);
@@ -222,7 +221,7 @@ fn round(links: &[Link], hall: Hall) -> Round {
                 let taken = Taken {
                     frame: stamped.frame,
                     asked: true,
-                    pose,
+                    pose: &pose,
                     lasts_ms: beat.lasts_ms,
                     at_most_ms: beat.lasts_ms,
                     shakes: stamped.shakes,

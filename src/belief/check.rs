@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use super::{Belief, Known, Taken, slots_in};
+use super::{Belief, Known, QUIET, SETTLE, Taken, slots_in};
 use crate::motion::{MAX_AXES, Pose};
 use crate::time::MonoTime;
 
 impl Belief {
     /// True if a frame to `pose`, to be reached in so many milliseconds, keeps the greatest speed of every axis from wherever
-    /// it may be, and its controller is not known to read frames otherwise. Losses shorter than [`super::GAP`] are left out: while acks come, an axis is where its last frame leads.
+    /// it may be, and its controller is not known to read frames otherwise. While acks come, an axis is where its last frame leads;
+    /// [`Belief::lead`] takes into account what is acked too late, where each frame asks for an ack.
     #[must_use]
     pub(crate) fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
         let time = f64::from(lasts_ms);
@@ -37,7 +38,7 @@ impl Belief {
     }
 
     /// True if a seat may be at any place that its open frames lead through, not at the last alone.
-    fn may_be_anywhere_between(&self, now: MonoTime) -> bool {
+    pub(super) fn may_be_anywhere_between(&self, now: MonoTime) -> bool {
         self.gap || self.is_quiet(now)
     }
 
@@ -69,6 +70,7 @@ impl Belief {
         // What was refused before it is missing as well, until it is acked. One of these may have been to ask: whoever took this frame has to ack
         // a later one all the sooner.
         let (since, asked_then) = self.refused.take().unwrap_or((at, false));
+        self.open.push(frame, at, self.spans.last(), (pose, lasts_ms));
         self.spans.push(frame, asked || asked_then, pose, since);
         if !matches!(self.known, Known::Commanded(_)) {
             self.known = Known::Commanded(at);
@@ -84,5 +86,22 @@ impl Belief {
     /// Notes that a frame was not sent.
     pub(crate) const fn withheld(&mut self) {
         self.tally.withheld += 1;
+    }
+
+    /// When the seat has executed all that the controller was sent.
+    pub(super) fn executed_until(&self) -> MonoTime {
+        self.busy_until + self.lead
+    }
+
+    /// Whether its seat may still be on its way to where the last frame leads: what is read until then says nothing of where it rests.
+    #[must_use]
+    pub(crate) fn is_under_way(&self, now: MonoTime) -> bool {
+        now < self.executed_until() + SETTLE
+    }
+
+    /// Whether no frame has been under way for so long that the next is the first of a motion.
+    #[must_use]
+    pub(crate) fn is_quiet(&self, now: MonoTime) -> bool {
+        now > self.executed_until() + QUIET.max(2 * self.period)
     }
 }

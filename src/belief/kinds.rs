@@ -26,6 +26,8 @@ pub(crate) enum Known {
 pub(crate) struct Tally {
     /// Frames that were not sent, because from somewhere that the seat may be they would have been too fast.
     pub(crate) withheld: u64,
+    /// Frames that fell short of their pose, or took longer than a tick, as those before them might not have arrived.
+    pub(crate) held_back: u64,
     /// Gaps in which it was not known which frames arrive.
     pub(crate) gaps: u64,
     /// Frames that reached a controller which was still busy with the one before, by the sum of their Times.

@@ -10,6 +10,8 @@ mod check;
 mod evidence;
 mod history;
 mod kinds;
+mod loss;
+mod open;
 mod shaking;
 mod span;
 #[cfg(test)]
@@ -22,6 +24,9 @@ pub use evidence::{EvidenceTable, LaneEvidence, Reading};
 use history::History;
 pub use kinds::Taken;
 pub(crate) use kinds::{Fall, Found, Known, Tally};
+use loss::HeldBack;
+pub(crate) use loss::{Lead, Wish};
+use open::OpenFrames;
 use shaking::Shaking;
 use span::Spans;
 
@@ -84,6 +89,8 @@ impl KnownPose {
 pub(crate) struct Belief {
     /// Strokes that each slot may move in a millisecond; without bound where the seat has no such axis.
     speed: Pose,
+    /// Its greatest acceleration, strokes per second squared.
+    acceleration: Pose,
     /// How far apart two places are the same, strokes.
     near: Pose,
     /// The slots that the seat has, a bit each.
@@ -94,6 +101,12 @@ pub(crate) struct Belief {
     foreign: bool,
     known: Known,
     spans: Spans,
+    open: OpenFrames,
+    held_back: HeldBack,
+    /// All that arrived before then was told.
+    told: MonoTime,
+    /// How long before it was looked at that was.
+    untold: Duration,
     history: History,
     acked: Option<FrameNo>,
     shaking: Shaking,
@@ -122,20 +135,26 @@ impl Belief {
     /// that is 0.
     #[must_use]
     pub(crate) fn new(window: &Window, period: Duration, ack_every: u32) -> Self {
-        let (mut speed, mut near) = ([f64::INFINITY; MAX_AXES], [f64::INFINITY; MAX_AXES]);
+        let [mut speed, mut near, mut acceleration] = [[f64::INFINITY; MAX_AXES]; 3];
         for (index, slot) in window.slots().iter().enumerate().filter(|(_, slot)| slot.is_own) {
             speed[index] = ROUNDING * slot.limits.velocity * 1e-3;
+            acceleration[index] = slot.limits.acceleration;
             let of_a_frame = NEAR_SHARE * slot.limits.velocity * period.as_secs_f64();
             near[index] = NEAR.min(of_a_frame).max(NEAR_PULSES / slot.stroke_pulses);
         }
         Self {
             speed,
+            acceleration,
             near,
             own: window.own(),
             within: 0,
             foreign: false,
             known: Known::Nothing,
             spans: Spans::over(GAP + window.acked_after()),
+            open: OpenFrames::none(),
+            held_back: HeldBack::not(),
+            told: MonoTime::default(),
+            untold: Duration::ZERO,
             history: History::at([0.0; MAX_AXES]),
             acked: None,
             shaking: Shaking::default(),
@@ -175,10 +194,12 @@ impl Belief {
     /// Takes up what the ack thread has seen so far; all that arrived before `told` is in it.
     pub(crate) fn look(&mut self, evidence: LaneEvidence<'_>, told: MonoTime, now: MonoTime) -> Found {
         self.foreign = evidence.is_foreign();
+        (self.told, self.untold) = (told, now.since(told));
         if let Some(acked) = evidence.acked()
             && self.acked.is_none_or(|before| acked.since(before) > 0)
         {
             self.acked = Some(acked);
+            self.time_ack(now);
             self.spans.confirm(acked);
             self.shaking.on_ack(acked);
         }
@@ -241,7 +262,7 @@ impl Belief {
         let mut pose = *self.spans.last();
         slots_in(told).for_each(|slot| pose[slot] = reading.pose[slot]);
         self.within = told | if agrees { self.within } else { 0 };
-        self.spans.restart_at(pose);
+        self.restart_at(pose);
         self.sways = if sways { reading.sways } else { 0.0 };
         self.known = Known::Measured(reading.at, reading.by);
         self.gap &= self.within != self.own || sways;
@@ -270,18 +291,9 @@ impl Belief {
         }
         (self.within, self.known) = (0, Known::Contradicted(now));
         // However many acks come yet, it is not where they say; nor at rest where it stands between two frames of its queue.
-        self.spans.restart_at(*self.spans.last());
+        self.restart_at(*self.spans.last());
         self.busy_until = self.busy_until.max(self.busy_at_most);
         Found::Astray
-    }
-
-    /// That the ack thread is slow is no gap at first: what an ack may still be read for is not missing.
-    fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
-        let refused = self.refused.is_some_and(|(since, _)| now.since(since) > GAP);
-        let later = self.acked_after;
-        let is_missed = |since| told.since(since) > GAP + later || now.since(since) > GAP_UNTOLD + later;
-        let unheard = || self.spans.waiting_since(self.acked, self.period).is_some_and(is_missed);
-        refused || (self.asks() && unheard())
     }
 
     /// The pose in which the seat is known to be at rest at `now`; none where an axis of it may be elsewhere, or where that was
@@ -377,27 +389,10 @@ impl Belief {
         !self.lead.is_zero()
     }
 
-    /// When the seat has executed all that the controller was sent.
-    fn executed_until(&self) -> MonoTime {
-        self.busy_until + self.lead
-    }
-
-    /// Whether its seat may still be on its way to where the last frame leads: what is read until then says nothing of where it rests.
-    #[must_use]
-    pub(crate) fn is_under_way(&self, now: MonoTime) -> bool {
-        now < self.executed_until() + SETTLE
-    }
-
-    /// Whether no frame has been under way for so long that the next is the first of a motion.
-    #[must_use]
-    pub(crate) fn is_quiet(&self, now: MonoTime) -> bool {
-        now > self.executed_until() + QUIET.max(2 * self.period)
-    }
-
     /// The seat may have been moved unseen: what was known of it is known no more.
     pub(crate) fn forget(&mut self) {
         (self.known, self.within, self.sways) = (Known::Nothing, 0, 0.0);
-        self.spans.restart_at(*self.spans.last());
+        self.restart_at(*self.spans.last());
     }
 }
 

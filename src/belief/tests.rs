@@ -1,3 +1,5 @@
+mod loss;
+
 use super::*;
 use crate::motion::{SeatType, Slot};
 

@@ -7,7 +7,7 @@ use super::fader::Fader;
 use super::mix::Mix;
 use super::phase::hold_frames;
 use super::trail::Trail;
-use crate::belief::KnownPose;
+use crate::belief::{KnownPose, Wish};
 use crate::limiter::{Admitted, Counts, Limiter, Provenance};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::Course;
@@ -15,6 +15,9 @@ use crate::time::{Rate, ShowTime};
 
 /// One that falls out is read at rest after a second or two, if it answers at all.
 const AWAITED_FOR: Duration = Duration::from_secs(3);
+
+/// Over how long the speed shows of one that was led elsewhere, seconds: longer than it is looked back.
+const LED_S: f64 = 0.5;
 
 // Chosen: gone within a quarter of a second of whoever turns it off, and not at one blow.
 /// How quickly the level of vibration changes, per second.
@@ -142,6 +145,11 @@ impl LaneMotion {
         self.is_there() && self.ahead == 0
     }
 
+    /// Its frame takes so many ticks, this one included.
+    pub(super) const fn stretch(&mut self, ticks: u32) {
+        self.ahead = ticks;
+    }
+
     /// Whether it is wanted, and neither out nor on its way there.
     #[must_use]
     pub(crate) const fn is_in(&self) -> bool {
@@ -158,6 +166,24 @@ impl LaneMotion {
     #[must_use]
     pub const fn pose(&self) -> &Pose {
         self.trail.pose()
+    }
+
+    /// How it is to move from the pose sent last on.
+    #[must_use]
+    pub(crate) fn wish(&self) -> Wish {
+        let states = self.trail.states();
+        Wish {
+            before: *self.trail.before(),
+            pose: *self.pose(),
+            velocity: states.map(|state| state.velocity),
+            acceleration: states.map(|state| state.acceleration),
+        }
+    }
+
+    /// Its frames led it there, at that speed, and not where it was asked to be.
+    pub(super) fn led_instead(&mut self, pose: &Pose, speed: &Pose) {
+        self.trail.rest(std::array::from_fn(|slot| pose[slot] - speed[slot] * LED_S));
+        self.trail.push(Duration::from_secs_f64(LED_S), *pose);
     }
 
     /// The present level of its motion, 0 to 1.

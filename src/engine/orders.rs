@@ -85,6 +85,21 @@ impl Engine {
         self.stamps.break_off();
     }
 
+    /// The Time of so many ticks, this one included, ms.
+    pub(crate) fn span_ms(&self, ticks: u32) -> u32 {
+        self.show.rate.span_ms(self.playhead.frames() - 1, ticks)
+    }
+
+    /// The frame that leaves for a lane takes so many ticks, this one included: until they are over no other leaves.
+    pub(crate) fn stretch(&mut self, lane: usize, ticks: u32) {
+        self.lanes.all[lane].stretch(ticks);
+    }
+
+    /// The frames of a lane led it there, at that speed, strokes a second, and not where its poses are.
+    pub(crate) fn led_instead(&mut self, lane: usize, (pose, speed): &(Pose, Pose)) {
+        self.lanes.all[lane].led_instead(pose, speed);
+    }
+
     /// Sets the pose of a lane that is blind one step further towards its rest, `farthest` being how far each slot may be from
     /// its present one. Says how long that takes, `longest_ms` at the most; none where nothing goes to the lane any more.
     pub(crate) fn slow_down(&mut self, lane: usize, longest_ms: u32, farthest: &Pose) -> Option<u32> {

@@ -47,6 +47,11 @@ impl Trail {
         &self.poses[self.newest]
     }
 
+    /// The one before it.
+    pub(super) const fn before(&self) -> &Pose {
+        &self.poses[(self.newest + KEPT - 1) % KEPT]
+    }
+
     /// How each slot moves as it reaches that pose: the cubic through four poses, right at its end.
     pub(super) fn states(&self) -> [AxisState; MAX_AXES] {
         let apart = self.apart();

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use super::mail::{Mail, Sent};
-use crate::belief::{Belief, Fall, Found, Known, KnownPose, Taken, Tally};
+use crate::belief::{Belief, Fall, Found, Known, KnownPose, Lead, Taken, Tally};
 use crate::drive::Lane;
 use crate::engine::{Beat, Engine, LaneOrder, PlayProgress};
 use crate::motion::Pose;
@@ -49,6 +49,14 @@ struct Place {
     belief: Belief,
     /// The longest Time that its controller executes as it is, ms (PA0b).
     longest_ms: u32,
+}
+
+impl Place {
+    /// An absolute Time takes the longer the more of the frames before it are lost: by itself it keeps the greatest speed.
+    #[inline]
+    fn is_plain(&self, beat: &Beat, at: MonoTime) -> bool {
+        self.belief.is_sure() || beat.timing == Timing::Absolute || !self.belief.may_hold_back(at)
+    }
 }
 
 impl Places {
@@ -96,7 +104,11 @@ impl Places {
                 Found::Gap if self.lanes[lane].belief.is_led_ahead() => {
                     engine.order(lane, LaneOrder::FallOut(Fall::Gap));
                 }
-                Found::Gap => engine.order(lane, LaneOrder::GoBlind),
+                Found::Gap => {
+                    let elsewhere = self.lanes[lane].belief.led_elsewhere();
+                    elsewhere.iter().for_each(|led| engine.led_instead(lane, led));
+                    engine.order(lane, LaneOrder::GoBlind);
+                }
                 Found::Astray => engine.order(lane, LaneOrder::FallOut(Fall::Astray)),
             }
             let Place { belief, .. } = &self.lanes[lane];
@@ -237,23 +249,57 @@ impl Places {
         self.lanes[lane].belief.look(evidence, told, now)
     }
 
-    /// Whether this tick's frame of a lane may leave, and what it says of time. Where it would be too fast from somewhere that
+    /// This tick's frame of a lane: what it says, and where it leads. Where it would be too fast from somewhere that
     /// the seat may be, the lane is held: nothing is sent to it, and it is looked at. One that is blind gets a frame of its own.
     #[inline]
     #[must_use]
-    pub fn admit(&mut self, lane: usize, engine: &mut Engine, at: MonoTime) -> Option<Beat> {
+    pub fn admit(&mut self, lane: usize, engine: &mut Engine, at: MonoTime) -> Option<(Beat, Pose)> {
         let beat = if engine.lane(lane).is_blind() {
             self.slow_down(lane, engine, at)?
         } else {
-            *engine.beat_of(lane)
+            let beat = *engine.beat_of(lane);
+            if !self.lanes[lane].is_plain(&beat, at) {
+                return self.hold_back(lane, engine, &beat, at);
+            }
+            beat
         };
-        let belief = &mut self.lanes[lane].belief;
-        if belief.allows(engine.lane(lane).pose(), beat.lasts_ms, at) {
-            return Some(beat);
+        let (belief, pose) = (&self.lanes[lane].belief, *engine.lane(lane).pose());
+        if belief.allows(&pose, beat.lasts_ms, at) {
+            return Some((beat, pose));
         }
-        belief.withheld();
-        engine.order(lane, LaneOrder::FallOut(Fall::Gap));
+        self.withhold(lane, engine);
         None
+    }
+
+    /// Whether the seat of a lane is where it was asked to be, and its next frame begins there.
+    #[must_use]
+    pub(super) fn is_plain(&self, lane: usize, beat: &Beat, at: MonoTime) -> bool {
+        self.lanes[lane].is_plain(beat, at)
+    }
+
+    /// The frame of a lane whose last frames may not have arrived.
+    #[cold]
+    fn hold_back(
+        &mut self,
+        lane: usize,
+        engine: &mut Engine,
+        beat: &Beat,
+        at: MonoTime,
+    ) -> Option<(Beat, Pose)> {
+        let Place { belief, longest_ms } = &mut self.lanes[lane];
+        let lead = belief.lead(&engine.lane(lane).wish(), *longest_ms, |ticks| engine.span_ms(ticks));
+        let allowed = lead.filter(|lead| belief.allows(&lead.to, lead.lasts_ms, at));
+        let Some(Lead { to, lasts_ms, ticks }) = allowed else {
+            self.withhold(lane, engine);
+            return None;
+        };
+        engine.stretch(lane, ticks);
+        Some((Beat { time_ms: lasts_ms, lasts_ms, ..*beat }, to))
+    }
+
+    fn withhold(&mut self, lane: usize, engine: &mut Engine) {
+        self.lanes[lane].belief.withheld();
+        engine.order(lane, LaneOrder::FallOut(Fall::Gap));
     }
 
     #[cold]

@@ -57,14 +57,14 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
             return;
         }
         let at = clock.now();
-        let Some(beat) = places.admit(index, engine, at) else { return };
-        let (motion, pose) = (engine.lane(index), engine.lane(index).pose());
-        let (stamped, datagram) = lanes[index].encode(&beat, pose, motion.mix(), buf);
+        let Some((beat, pose)) = places.admit(index, engine, at) else { return };
+        let motion = engine.lane(index);
+        let (stamped, datagram) = lanes[index].encode(&beat, &pose, motion.mix(), buf);
         first.get_or_insert(at);
         let (lasts_ms, at_most_ms) = (beat.lasts_ms, beat.at_most_ms());
         let (slots, level) = (lanes[index].window.slots().len(), motion.level());
         sink.asked(Asked { pose: *motion.asked(), slots, level, clamps: motion.clamps().clamps });
-        let sent = Outgoing { index, stamped, pose, lasts_ms, at_most_ms, at };
+        let sent = Outgoing { index, stamped, pose: &pose, lasts_ms, at_most_ms, at };
         sent.hand_over(datagram, places, mail, *sink);
         mail.clamps(index, motion.clamps().clamps);
     }
@@ -104,6 +104,9 @@ impl<C: Clock, S: FrameSink> Sending<'_, C, S> {
         }
         let (mut number, mut skips): (Option<FrameNo>, bool) = (None, false);
         for lane in &one.lanes {
+            if !places.is_plain(*lane, engine.beat_of(*lane), at) {
+                return Err(Apart::Differs(*lane));
+            }
             if !places.belief(*lane).allows(engine.lane(*lane).pose(), engine.beat_of(*lane).lasts_ms, at) {
                 return Err(Apart::Out(*lane));
             }

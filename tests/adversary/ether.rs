@@ -13,6 +13,13 @@ use super::master::{Master, UNKNOWN};
 use super::seat::{Arrival, MS, REGISTERS, Seat, Settings};
 use super::words::{self, Heard};
 
+/// The way that a datagram goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Way {
+    There,
+    Back,
+}
+
 /// What befalls the datagrams of a seat for a while.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Weather {
@@ -38,6 +45,12 @@ pub(crate) enum Weather {
     Echo(u64),
     /// The kernel takes none.
     Refused,
+    /// The first so many of each row of frames of motion that go there, or of their replies, do not arrive.
+    Pattern { way: Way, lost: u64, of: u64 },
+    /// None of those of the first so many milliseconds of each row of them.
+    Bursts { way: Way, lost_ms: u64, of_ms: u64 },
+    /// All that goes there, and all that comes back, takes so many milliseconds more.
+    Far { there: u64, back: u64 },
     /// Frames of motion do not arrive whose Time is longer than so many milliseconds.
     Slow(u32),
 }
@@ -66,6 +79,8 @@ pub(crate) struct Line {
     back: VecDeque<Packet>,
     /// Frames of motion that the kernel took.
     pub(crate) frames: u64,
+    /// Replies to such.
+    replies: u64,
     /// When the newest was to be sent; and the first of those since the last that will arrive.
     pub(crate) newest: u64,
     lost_since: Option<u64>,
@@ -146,6 +161,7 @@ impl Ether {
             there: VecDeque::new(),
             back: VecDeque::new(),
             frames: 0,
+            replies: 0,
             newest: 0,
             lost_since: None,
             master: None,
@@ -311,7 +327,30 @@ impl Line {
         insert(&mut self.back, Packet { at, sent: at, lost_since: at, asked: false, octets });
     }
 
+    /// Whether the pattern of the weather loses the one of that number that goes that way.
+    fn is_of_pattern(&self, now: u64, on: Way, number: u64) -> bool {
+        let is_lost = |what: &Weather| match what {
+            Weather::Pattern { way, lost, of } => *way == on && number % of < *lost,
+            Weather::Bursts { way, lost_ms, of_ms } => *way == on && now / MS % of_ms < *lost_ms,
+            _ => false,
+        };
+        self.until(now, is_lost).is_some()
+    }
+
+    /// How much longer what goes there takes, and what comes back, ns.
+    fn far(&self, now: u64) -> [u64; 2] {
+        match self.until(now, |what| matches!(what, Weather::Far { .. })) {
+            Some((_, Weather::Far { there, back })) => [there * MS, back * MS],
+            _ => [0; 2],
+        }
+    }
+
     fn answer(&mut self, octets: Vec<u8>, at: u64, dice: &mut Dice) {
+        let moves = matches!(octets[4], 0x13 | 0x14);
+        self.replies += u64::from(moves);
+        if moves && self.is_of_pattern(at, Way::Back, self.replies) {
+            return;
+        }
         if !matches!(octets[4], 0x13 | 0x14 | 0x18 | 0x19) {
             self.said.drain(..self.said.len().saturating_sub(KEPT));
             self.said.push_back((at, octets.clone()));
@@ -322,7 +361,7 @@ impl Line {
             return;
         }
         let held = self.is(at, Weather::HeldBack).map_or(0, |until| until - at);
-        let arrives = at + flight(dice) + held;
+        let arrives = at + flight(dice) + held + self.far(at)[1];
         if let Some((_, Weather::Echo(ms))) = self.until(at, |what| matches!(what, Weather::Echo(_))) {
             if dice.one_in(3) {
                 let later = arrives + dice.range(0, ms * MS);
@@ -360,6 +399,7 @@ impl Line {
         let thin = self.until(now, |what| matches!(what, Weather::Thin(_)));
         let lost = matches!(thin, Some((_, Weather::Thin(times))) if dice.one_in(times));
         let slow = self.until(now, |what| matches!(what, Weather::Slow(_)));
+        let lost = lost || (moves && self.is_of_pattern(now, Way::There, self.frames));
         let lost = lost || matches!(slow, Some((_, Weather::Slow(ms))) if words::takes_longer(octets, ms));
         if lost || self.is(now, Weather::Lost).is_some() || self.is(now, Weather::Cut).is_some() {
             return Delivery::Sent;
@@ -369,7 +409,7 @@ impl Line {
         }
         let octets = octets.to_vec();
         let held = self.is(now, Weather::Held).map_or(0, |until| until - now);
-        let mut at = now + flight(dice) + held;
+        let mut at = now + flight(dice) + held + self.far(now)[0];
         if let Some((_, Weather::Late(ms))) = self.until(now, |what| matches!(what, Weather::Late(_))) {
             at += dice.range(0, ms * MS);
         }

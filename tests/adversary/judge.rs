@@ -5,6 +5,9 @@ use std::fmt;
 /// Losses, repeats and changes of order within this long are what README admits: what was to take so long is made up for in
 /// one frame.
 const ADMITTED_MS: f64 = 50.0;
+/// How much faster than its type allows a seat may be that did not get some of its frames, or whose acks did not come, where each frame asks
+/// for one and says itself how long it takes.
+pub(crate) const FASTEST: f64 = 1.25;
 /// Replies are read so often.
 const UNREAD_MS: f64 = 5.0;
 /// How much faster than its type allows a seat may be: roundings of pulses and milliseconds.

@@ -39,6 +39,7 @@ mod ether;
 mod fresh;
 mod hall;
 mod judge;
+mod losses;
 mod master;
 mod named;
 mod odd;

@@ -4,10 +4,12 @@
 
 use std::collections::VecDeque;
 
-use super::judge::{Breach, Executed, How, OUTSIDE_MM, PULSES_PER_MM, admitted_ms, read_before_ns};
+use super::judge::{Breach, Executed, FASTEST, How, OUTSIDE_MM, PULSES_PER_MM, admitted_ms, read_before_ns};
 use super::words::{self, Frame, Heard};
 
 pub(crate) const MS: u64 = 1_000_000;
+/// Frames of one ride are not farther apart, unless the seat was lost.
+const LOST: u64 = 300 * MS;
 /// More than so many waiting are gone through in haste, where PA06 says so.
 const PATIENT: usize = 2;
 /// Commands that find room.
@@ -82,6 +84,8 @@ struct Command {
     lost_since: u64,
     asked: bool,
     number: u32,
+    /// Whether its Time is its own, whatever came before it.
+    relative: bool,
     /// Whether another master sent it.
     foreign: bool,
 }
@@ -171,6 +175,8 @@ pub(crate) struct Seat {
     pub(crate) hurried: u32,
     pub(crate) waited_ns: u64,
     pub(crate) fastest: f64,
+    /// How often frames stopped and went on.
+    pub(crate) stops: u32,
     /// Its outputs, and whether it vibrates: as the last frame or register that it heard had them.
     pub(crate) outputs: u16,
     pub(crate) shakes: bool,
@@ -215,6 +221,7 @@ impl Seat {
             hurried: 0,
             waited_ns: 0,
             fastest: 0.0,
+            stops: 0,
             outputs: 0,
             shakes: false,
             shake: [(0, 0); 6],
@@ -427,8 +434,18 @@ impl Seat {
 
     /// How long that took, as far as README admits it, which the command makes up for: the frames that were lost since the newest, and
     /// those by which an older one takes the seat back that the network repeats; or the first of a motion. While the program stands
-    /// still it sends none that could be lost.
+    /// still it sends none that could be lost. A frame of several ticks makes up for as many, and for a quarter of its Time.
     fn makes_up_ms(&self, command: &Command) -> f64 {
+        let is_lossy = self.last_of_motion(command).map_or(command.lost_since < command.sent_ns, |last| {
+            last.number.wrapping_add(1) != command.number
+        });
+        let held_back = command.relative && self.settings.asks_ms <= self.settings.period_ms && is_lossy;
+        let takes_ms = if held_back { FASTEST * command.time_ns as f64 / MS as f64 } else { 0.0 };
+        self.apart_ms(command).max(takes_ms)
+    }
+
+    /// How long what is lost took, or repeated, as far as that is admitted.
+    fn apart_ms(&self, command: &Command) -> f64 {
         let (period_ms, admitted_ms) = (self.settings.period_ms, self.admitted_ms(command));
         let repeated_ms = ADMITTED as f64 / MS as f64;
         let frames = |one: u32, other: u32| f64::from(one.abs_diff(other)) * period_ms;
@@ -438,7 +455,12 @@ impl Seat {
         {
             // The last one may have taken longer than others.
             let longer_ms = if command.number < number { time_ms - period_ms } else { 0.0 };
-            let apart_ms = frames(number, command.number);
+            // Frames that take several ticks are as far apart; those of a blind lane take longer than any of these.
+            let takes_ms = command.time_ns as f64 / MS as f64;
+            let is_repeated = number != newest || command.number < number;
+            let ticks =
+                if is_repeated && takes_ms <= repeated_ms { (takes_ms / period_ms).max(1.0) } else { 1.0 };
+            let apart_ms = frames(number, command.number) * ticks;
             return apart_ms + longer_ms.clamp(0.0, (repeated_ms - apart_ms).max(0.0));
         }
         let apart_ms = (command.sent_ns - command.lost_since) as f64 / MS as f64 + period_ms;
@@ -569,6 +591,7 @@ impl Seat {
         if let Some((came, sent_before)) = self.came.replace((at, sent)) {
             // Whoever had given it up tries once more.
             self.astray &= at < came + LED;
+            self.stops += u32::from(at > came + LOST);
             let closer = (sent as f64 - sent_before as f64) - (at as f64 - came as f64);
             if closer.abs() > 0.4 * self.settings.period_ms * MS as f64 {
                 (self.bunched_until, self.heaped) = (at + BUNCHED, true);
@@ -602,6 +625,7 @@ impl Seat {
             lost_since,
             asked,
             number,
+            relative: !frame.absolute,
             foreign,
         });
         if self.moving.is_none() {
