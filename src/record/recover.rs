@@ -132,7 +132,8 @@ pub(crate) fn recover<W: Write + Seek>(
         return Err(ReadError::Foreign.into());
     }
     let recovered = Recovered { messages: copy.messages, salvaged, nameless: copy.nameless, is_sorted };
-    let is_whole = recovered.loses_nothing() && recovered.salvaged.trouble.is_none() && is_sorted;
+    // Of a file that was only in another order the copy lacks nothing.
+    let is_whole = recovered.loses_nothing() && recovered.salvaged.trouble.is_none();
     let why = if is_whole { String::new() } else { recovered.in_words() };
     let metadata = [("why".to_owned(), why)].into();
     copy.writer.write_metadata(&Metadata { name: RECOVERED.to_owned(), metadata })?;
