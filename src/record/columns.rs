@@ -133,6 +133,14 @@ impl<'a> ColumnReaders<'a> {
         )
     }
 
+    /// The next of each column that is wanted, by its place; of a column it has to be wanted each time, or never.
+    pub(super) fn next_of<const N: usize>(&mut self, wanted: [bool; N]) -> [i64; N] {
+        let mut row = [0; N];
+        let columns = row.iter_mut().zip(&mut self.0).zip(wanted).filter(|(_, is_wanted)| *is_wanted);
+        columns.for_each(|((to, column), _)| *to = column.next());
+        row
+    }
+
     /// The next of each column; 0 of those that are not there.
     pub(super) fn next<const N: usize>(&mut self) -> [i64; N] {
         let mut row = [0; N];

@@ -20,6 +20,17 @@ const OF_TICK: usize = 7;
 /// Numbers of a frame, in the order of `FrameFields`.
 pub(super) const OF_FRAME: usize = 17;
 
+/// The numbers of a frame that a motion is made of: tick, what the kernel said, axes asked for, octets in `raw`, absolute Time, Time, positions.
+const OF_MOTION: [bool; OF_FRAME] = {
+    let mut wanted = [false; OF_FRAME];
+    let mut at = [0, 2, 3, 6, 8, 12, 15].as_slice();
+    while let [first, rest @ ..] = at {
+        wanted[*first] = true;
+        at = rest;
+    }
+    wanted
+};
+
 /// Half a second of ticks: `kinocue.Sent`.
 #[derive(Clone, PartialEq, prost::Message)]
 pub(super) struct Sent {
@@ -201,9 +212,9 @@ impl<'a> LaneReader<'a> {
     }
 
     /// The fields of the next frame, if it is of that tick.
-    fn next_fields(&mut self, tick: usize) -> Option<[i64; OF_FRAME]> {
+    fn next_fields(&mut self, tick: usize, wanted: [bool; OF_FRAME]) -> Option<[i64; OF_FRAME]> {
         if self.next.is_none() && self.left > 0 {
-            self.next = Some(self.fields.next());
+            self.next = Some(self.fields.next_of(wanted));
         }
         let fields = self.next.take_if(|fields| usize::try_from(fields[0]).is_ok_and(|of| of <= tick))?;
         self.left -= 1;
@@ -212,7 +223,7 @@ impl<'a> LaneReader<'a> {
 
     /// The next motion, if it is of that tick.
     fn next_motion(&mut self, tick: usize) -> Option<SeatMotion> {
-        let fields = self.next_fields(tick)?;
+        let fields = self.next_fields(tick, OF_MOTION)?;
         let motion = self.motion(&fields);
         self.is_damaged |= motion.is_none();
         motion
@@ -247,7 +258,7 @@ impl<'a> LaneReader<'a> {
 
     /// The next frame, if it is of that tick.
     fn next(&mut self, tick: usize, head: &TickHead) -> Option<OwnedFrame> {
-        let fields = self.next_fields(tick)?;
+        let fields = self.next_fields(tick, [true; OF_FRAME])?;
         let frame = self.frame(&fields, head);
         self.is_damaged |= frame.is_none();
         frame
