@@ -10,7 +10,6 @@ mod begin;
 mod belts;
 mod coded;
 mod commands;
-mod fallen;
 mod features;
 mod figures;
 mod film;

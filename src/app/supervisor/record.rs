@@ -1,12 +1,14 @@
 //! ShowRecords for the journal: commands with their operators, and shows.
 
+mod fallen;
+
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use jiff::Zoned;
 
+use self::fallen::ShowEvents;
 use super::act::{Act, Feature, ShowBegun, SupervisorEvent};
-use super::fallen::ShowEvents;
 use super::hall::{Counted, HallContext};
 use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::app::recorder::RecordAsk;

@@ -77,9 +77,7 @@ impl StatusParts<'_> {
             Some(GoesOn::At(film)) => film,
             _ => hall.halted_at.unwrap_or(cued.start),
         };
-        let (next, next_coded) = (belts::next_action(hall, table))
-            .or_else(|| away::next_action(hall, table))
-            .unwrap_or_else(|| self.next());
+        let (next, next_coded) = self.next(table);
         Status {
             hall: hall.config.show.name.clone(),
             timezone: zone_name(&self.local_now()),
@@ -160,8 +158,14 @@ impl StatusParts<'_> {
         format!("{cause}, with {} of {on} seats: {}{more}", on - stay.len(), stay[..named].join(", "))
     }
 
-    /// What a person does next; where a show was left in its midst, also how it goes on from there.
-    fn next(&self) -> (String, Coded) {
+    /// What a person does next: first about belts and seats.
+    fn next(&self, table: &[Row]) -> (String, Coded) {
+        let of_seats = belts::next_action(self.hall, table).or_else(|| away::next_action(self.hall, table));
+        of_seats.unwrap_or_else(|| self.next_of_show())
+    }
+
+    /// The same of the show; where it was left in its midst, also how it goes on from there.
+    fn next_of_show(&self) -> (String, Coded) {
         let next = match self.hall.mirror.next {
             // What the state machine does not know of.
             Next::Resume if self.hall.has_taken_over() && self.hall.goes_on().is_none() => Next::ParkOrHome,

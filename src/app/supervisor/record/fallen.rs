@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use jiff::Zoned;
 
-use super::hall::HallContext;
+use crate::app::supervisor::hall::HallContext;
 use crate::journal::SeatOut;
 use crate::rt::Row;
 use crate::time::MonoTime;
