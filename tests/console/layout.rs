@@ -90,6 +90,26 @@ fn in_every_language_at_every_size_with_any_number_of_seats_out_nothing_is_clipp
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
+#[test]
+fn before_a_show_too_whatever_is_next_stop_and_all_buttons_are_in_reach_at_every_size() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    for (language, parked) in [("en", "parked"), ("de", "geparkt"), ("es", "en reposo"), ("fr", "au repos")] {
+        browser.eval(&format!("localStorage.setItem('kinocue-language', '{language}'); location.reload()"));
+        browser.reads("state", parked);
+        pretend(&browser, &format!("{} Object.assign(status, {{ state: 'parked', show: null }});", hall_with(1)));
+        browser.wait("document.querySelectorAll('#next-actions button').length === 1");
+        for (size, _) in SIZES {
+            let always = "#state, #position, #next-actions button, .transport button, #stop, #stop-note";
+            assert_eq!(out_of_reach(&browser, size, always), json!([]), "{language} {size:?}");
+            assert_eq!(browser.eval(MEASURE)[0], json!([]), "{language} {size:?}");
+            browser.shot(&format!("94-parked-{language}-{}x{}", size.0, size.1));
+        }
+    }
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
 /// How many fields there are, and how many of them can be pressed.
 fn fields(browser: &Browser) -> Value {
     browser.eval(MEASURE)[1].clone()
