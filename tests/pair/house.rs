@@ -81,9 +81,10 @@ impl House {
         engine.start();
         let table = fs::read_to_string(engine.folder.join("h1/kinocue-fleet.toml")).unwrap();
         let table = table.replace("allow = []", "allow = [\"preflight\"]");
-        let shows = [(a, "a"), (b, "b")].map(|(machine, name)| {
+        let shows = [(a, "a", "journal.nk"), (b, "b", "second-journal.nk")].map(|(machine, name, key)| {
             let folder = dir.path().join(name);
             furnish(&folder, &table);
+            fs::copy(engine.folder.join("h1").join(key), folder.join("state/journal.nk")).unwrap();
             Show { machine, folder, serving: None, link: None, mover: None }
         });
         let mut house = Self { dir, shows, seats, sims: Vec::new(), engine, _turn: turn };
