@@ -233,16 +233,9 @@ fn serve_halls(
         recorder: RecordLink::default(),
         pair: pair.as_ref().map(Pair::watch),
     };
-    let sealer = Sealer::of(&places.state).map_err(|why| {
-        ports
-            .carryover
-            .tell(Some(format!("what is played is written without seals, and proves nothing: {why}")));
-    });
-    let limits = Limits::from(&config.log);
-    let mut journal = Journal::open_with(&config.log.dir, limits, &Zoned::now(), sealer.ok());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
     ports.carryover.tell(mark.leave());
-    ports.carryover.tell(library.trouble());
+    let mut journal = open_journal(&config, &places.state, &library, &mut ports.carryover);
     up(handle, surfaces.addresses());
     let mut feeder = pair.as_mut().and_then(Pair::take_feeder);
     let served = loop {
@@ -264,6 +257,16 @@ fn serve_halls(
     surfaces.close();
     log.close();
     Ok(served)
+}
+
+/// The journal of a hall, sealed with the key of its state folder. Where that, or the library, cannot be had, a person is told.
+fn open_journal(config: &Config, state: &Path, library: &Library, carryover: &mut Carryover) -> Journal {
+    carryover.tell(library.trouble());
+    let unsealed = |why| {
+        carryover.tell(Some(format!("what is played is written without seals, and proves nothing: {why}")))
+    };
+    let sealer = Sealer::of(state).map_err(unsealed).ok();
+    Journal::open_with(&config.log.dir, Limits::from(&config.log), &Zoned::now(), sealer)
 }
 
 /// The library of a hall, and the folder of its playlists beside it, which is another one, by whatever way both are named.

@@ -112,11 +112,11 @@ impl Chain {
                     .push(format!("{}: altered, or put in: its seal is not of what it says", place.words));
                 false
             }
-            Sealed::Yes(seal, hash) => self.take_sealed(seal, hash, line, place),
+            Sealed::Yes(seal, hash) => self.counts_sealed(seal, hash, line, place),
         }
     }
 
-    fn take_sealed(&mut self, seal: Seal, hash: String, line: Option<&Line>, place: &LinePlace) -> bool {
+    fn counts_sealed(&mut self, seal: Seal, hash: String, line: Option<&Line>, place: &LinePlace) -> bool {
         if self.keys.known.is_empty() {
             self.keys.known.insert(seal.key.clone());
         }

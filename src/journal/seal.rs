@@ -1,9 +1,9 @@
 //! Seals of lines: each has the number of its line in the chain of its kind, the hash of the line before it, and a signature of both and
 //! of what the line says. Who has not the key of the service makes no line that passes for one of its.
 
-use std::fs::{self, OpenOptions};
+use std::fs::{self, Permissions};
 use std::io::{self, Write as _};
-use std::os::unix::fs::{FileExt as _, OpenOptionsExt as _};
+use std::os::unix::fs::{FileExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
@@ -15,7 +15,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::files::{self, FileId, FileKind};
 use super::read::MAX_LINE;
-use crate::sys::file::secret;
+use crate::sys::file::{create_ours, read, secret, write_ours};
 use crate::sys::folder::{Folder, Stamp};
 
 /// The file of the key in the state folder, and that of the one before it, for as long as that has not signed the new one.
@@ -23,8 +23,9 @@ pub(crate) const KEY: &str = "journal.nk";
 const OLD_KEY: &str = "journal.old.nk";
 /// How far the chains have come, beside the key: a journal that is lost, or cut short, does not begin them anew.
 const TIPS: &str = "journal.tips";
-/// The longest file of a key.
+/// The longest file of a key, and of the tips.
 const LONGEST: u64 = 256;
+const LONGEST_TIPS: u64 = 4_096;
 /// The beginning of all that is signed: a signature that was made for another purpose seals no line.
 const DOMAIN: &str = "kinocue journal 1";
 /// What the seal of a line is called there.
@@ -181,15 +182,8 @@ impl Sealer {
     pub(super) fn advance(&mut self, kind: FileKind, is_change: bool, tip: Tip) {
         self.tips[kind as usize] = Some(tip);
         let text = serde_json::to_vec(&self.tips).unwrap_or_default();
-        // In one write and in its place: whatever is cut off of it, the journal itself says the rest.
-        let file = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .mode(0o600)
-            .open(self.folder.join(TIPS));
-        let _ =
-            file.and_then(|file| file.write_all_at(&text, 0).and_then(|()| file.set_len(text.len() as u64)));
+        // Whatever is cut off of it, the journal itself says the rest.
+        let _ = write_ours(&self.folder.join(TIPS), text);
         if is_change && self.old.take().is_some() {
             let _ = fs::remove_file(self.folder.join(OLD_KEY));
         }
@@ -204,7 +198,7 @@ impl Sealer {
     fn tip(&mut self, journal: &Folder, kind: FileKind) -> &Tip {
         let folder = &self.folder;
         self.tips[kind as usize].get_or_insert_with(|| {
-            let told = fs::read(folder.join(TIPS)).unwrap_or_default();
+            let told = read(&folder.join(TIPS), LONGEST_TIPS).unwrap_or_default();
             let told: [Option<Tip>; 2] = serde_json::from_slice(&told).unwrap_or_default();
             let there = newest(journal, kind).unwrap_or_default();
             let told = told.into_iter().nth(kind as usize).flatten();
@@ -229,7 +223,9 @@ fn read_key(path: &Path) -> Result<Option<KeyPair>, String> {
 fn make_key(path: &Path) -> io::Result<KeyPair> {
     let pair = new_journal_key();
     let seed = pair.seed().map_err(io::Error::other)?;
-    let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)?;
+    let mut file = create_ours(path)?;
+    // Before anything is in it.
+    file.set_permissions(Permissions::from_mode(0o600))?;
     file.write_all(format!("{seed}\n").as_bytes())?;
     file.sync_all()?;
     Ok(pair)

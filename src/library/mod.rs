@@ -198,10 +198,10 @@ impl Library {
 
     /// Why it takes no cues, or has none, and what to do; `None` where it can be read and written.
     #[must_use]
-    pub fn trouble(&self) -> Option<String> {
+    pub(crate) fn trouble(&self) -> Option<String> {
         let dir = &self.inner.dir;
-        let written = rustix::fs::access(dir, rustix::fs::Access::WRITE_OK).map_err(io::Error::from);
-        let cause = Folder::open(dir).and_then(|_| written).err()?;
+        let written = || rustix::fs::access(dir, rustix::fs::Access::WRITE_OK);
+        let cause = Folder::open(dir).and_then(|_| Ok(written()?)).err()?;
         let dir = dir.display();
         Some(format!(
             "the cue library {dir} takes no cues, and may have none: {cause}; set another in [show] library, or make it writable"

@@ -189,8 +189,7 @@ impl Supervisor {
         (hall.film, hall.player, hall.osc) = (ports.film.clone(), ports.player.clone(), ports.osc.clone());
         (hall.buttons, hall.recorder) = (ports.buttons.clone(), ports.recorder.clone());
         (hall.pair, hall.notify) = (ports.pair.clone(), ports.service_log.notify_table());
-        hall.awaited = ports.awaited.clone();
-        hall.clock = ports.source.clock();
+        (hall.clock, hall.awaited) = (ports.source.clock(), ports.awaited.clone());
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,

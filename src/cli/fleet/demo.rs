@@ -16,10 +16,13 @@ use anyhow::{Context as _, anyhow};
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::init::{Plan, make};
+use super::made::put;
+use super::settings::LONGEST;
 use crate::cli::play::leave_on_signals;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::FleetWord;
 use crate::journal::KEY;
+use crate::sys;
 use crate::sys::clock::Monotonic;
 use crate::sys::own_folder::OwnFolder;
 use crate::time::Clock as _;
@@ -173,7 +176,8 @@ fn start_hall(
     let path = |name: &str| own.join(name);
     fs::create_dir_all(path("state/cues")).or_exit(Exit::Io)?;
     fs::write(path("state/cues/bench-ride.csv"), CUE).or_exit(Exit::Io)?;
-    fs::copy(fleet.join(hall).join(KEY), path("state").join(KEY)).or_exit(Exit::Io)?;
+    let seed = sys::file::text(&fleet.join(hall).join(KEY), LONGEST).or_exit(Exit::Io)?;
+    put(&path("state").join(KEY), &seed, 0o600)?;
     let table = fs::read_to_string(fleet.join(hall).join("kinocue-fleet.toml")).or_exit(Exit::Io)?;
     let config = config(hall).context("no ports for seats").or_system()? + &table;
     fs::write(path("hall.toml"), config).or_exit(Exit::Io)?;
