@@ -2,11 +2,37 @@
 
 use mcap::records::op;
 
-use super::salvage::{LostStretch, Salvaged};
 use super::{Trouble, message};
 
 /// Stretches that are kept account of.
 const MOST: usize = 10_000;
+
+/// A stretch of a file of which nothing can be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LostStretch {
+    /// Octets of the file.
+    pub(crate) octets: u64,
+    /// Log times between which its messages are, ns since 1970: those of the index, or else of the messages before and behind it. `None` where
+    /// nothing bounds them.
+    pub(crate) span: (Option<u64>, Option<u64>),
+    /// Messages in it, where the file counts them elsewhere.
+    pub(crate) messages: Option<u64>,
+    /// Why.
+    pub(crate) trouble: Trouble,
+}
+
+/// What was wrong with a file, and what is lost of it.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct Salvaged {
+    /// What is wrong with the file beside that.
+    pub(crate) trouble: Option<Trouble>,
+    /// What cannot be read, in the order of the file; the first of it.
+    pub(crate) lost: Vec<LostStretch>,
+    /// Stretches beyond these.
+    pub(crate) more: u64,
+    /// Messages that are lost in all, where the file says so.
+    pub(crate) messages: Option<u64>,
+}
 
 /// What is lost so far.
 #[derive(Debug, Default)]

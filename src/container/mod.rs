@@ -21,7 +21,8 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 
 use crate::plain::escaped;
 pub(crate) use ahead::{SplitReader, each_sound_ahead};
-pub(crate) use salvage::{LostStretch, Salvaged, each_saved};
+pub(crate) use losses::{LostStretch, Salvaged};
+pub(crate) use salvage::each_saved;
 use walk::Walk;
 use zstd::Zstd;
 

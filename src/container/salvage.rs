@@ -7,7 +7,7 @@ use mcap::records::op;
 
 use super::chunks::{WithinChunk, each_in_chunk};
 use super::index::{self, EndIndex, FileEnd, HEAD, octets};
-use super::losses::Losses;
+use super::losses::{Losses, Salvaged};
 use super::{
     AttachmentRecord, ChannelRecord, MAGIC, MAX_RECORD, RecordBody, Trouble, message, metadata, schema_of,
 };
@@ -18,33 +18,6 @@ const WINDOW: u64 = 256 * 1024;
 const FAR_NS: u64 = 30 * 86_400 * 1_000_000_000;
 /// Octets of a chunk up to the name of its compression, with the record's head.
 const CHUNK_FRONT: usize = 9 + 32;
-
-/// A stretch of a file of which nothing can be read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct LostStretch {
-    /// Octets of the file.
-    pub(crate) octets: u64,
-    /// Log times between which its messages are, ns since 1970: those of the index, or else of the messages before and behind it. `None` where
-    /// nothing bounds them.
-    pub(crate) span: (Option<u64>, Option<u64>),
-    /// Messages in it, where the file counts them elsewhere.
-    pub(crate) messages: Option<u64>,
-    /// Why.
-    pub(crate) trouble: Trouble,
-}
-
-/// What was wrong with a file, and what is lost of it.
-#[derive(Debug, Default, PartialEq, Eq)]
-pub(crate) struct Salvaged {
-    /// What is wrong with the file beside that.
-    pub(crate) trouble: Option<Trouble>,
-    /// What cannot be read, in the order of the file; the first of it.
-    pub(crate) lost: Vec<LostStretch>,
-    /// Stretches beyond these.
-    pub(crate) more: u64,
-    /// Messages that are lost in all, where the file says so.
-    pub(crate) messages: Option<u64>,
-}
 
 /// Hands every record that is whole to `take`: first the schemas and channels of the index, if that is whole, then those in front of it.
 ///
