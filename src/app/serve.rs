@@ -17,7 +17,7 @@ use signal_hook::flag;
 
 use super::film::HallFilm;
 use super::notify::AlarmTeller;
-use super::pair::{Pair, TookOver, is_alone};
+use super::pair::{Pair, TookOver, forget_pair};
 use super::recorder::{HallRecorder, RecordLink, RecordPlaces};
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
@@ -210,11 +210,9 @@ fn serve_halls(
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let record_places = places.of_recordings(&config);
-    let dir = record_places.recordings.clone();
-    let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), dir, pages, &log)?;
-    if pair.is_none() {
-        is_alone(&places.sockets.fleet);
-    }
+    let surfaces =
+        Surfaces::open(&config, &places.sockets, &handle, library.clone(), &record_places, pages, &log)?;
+    forget_pair(pair.as_ref(), &places.sockets.fleet);
     let alarms = AlarmTeller::start(&config, &log).map_err(ServeError::System)?;
     let mut ports = SupervisorPorts {
         inbox,

@@ -10,6 +10,7 @@ use tokio::runtime;
 use tokio::sync::watch;
 
 use super::buttons::{Buttons, PadTable};
+use super::recorder::RecordPlaces;
 use crate::api::{self, ApiError, Pages, ServingThread, StopSocket, fleet_stop_socket, stop_socket};
 use crate::config::{Config, OscPort, TextPort};
 use crate::control::{AwaitedPorts, Handle};
@@ -71,7 +72,7 @@ impl Surfaces {
         sockets: &Sockets,
         handle: &Handle,
         library: Library,
-        recordings: PathBuf,
+        places: &RecordPlaces,
         pages: Pages,
         log: &Log,
     ) -> Result<Self, SurfaceError> {
@@ -88,7 +89,7 @@ impl Surfaces {
             library,
             playlists: Shelf::new(&config.playlists()),
             journal: config.log.dir.clone(),
-            recordings,
+            recordings: places.recordings.clone(),
             pages,
             log: log.clone(),
         };

@@ -20,7 +20,7 @@ use std::thread::Builder;
 
 use sha2::{Digest as _, Sha256};
 
-pub(crate) use stand_by::{PairPlaces, StoodBy, is_alone, stand_by};
+pub(crate) use stand_by::{PairPlaces, StoodBy, forget_pair, stand_by};
 
 use super::runtime::Numbers;
 use crate::api::ApiError;

@@ -111,8 +111,8 @@ pub(crate) fn stand_by(
 }
 
 /// Removes what tells the link that this is one of two machines, where it was and is not any more: the sockets of a program that has ended.
-pub(crate) fn is_alone(fleet: &Path) {
-    for name in [LEASE, JOURNAL] {
+pub(crate) fn forget_pair(pair: Option<&Pair>, fleet: &Path) {
+    for name in [LEASE, JOURNAL].iter().filter(|_| pair.is_none()) {
         let _ = fs::remove_file(fleet.with_file_name(name)); // mostly there is none
     }
 }

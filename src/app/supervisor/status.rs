@@ -71,12 +71,6 @@ impl StatusParts<'_> {
         let times = live.times();
         let moving = mirror.state.may_send_motion();
         let preflighted = &features.readiness.preflighted;
-        let position = |cued: &ProvedShow| match hall.goes_on() {
-            _ if moving => live.show(),
-            // What was taken over is where its film is by now.
-            Some(GoesOn::At(film)) => film,
-            _ => hall.halted_at.unwrap_or(cued.start),
-        };
         let (next, next_coded) = self.next(table);
         Status {
             hall: hall.config.show.name.clone(),
@@ -95,7 +89,7 @@ impl StatusParts<'_> {
             lapses_s: mirror.lapses(now),
             moving,
             job: hall.job.or_else(|| hall.aside.is_some().then_some("test")).map(str::to_owned),
-            show: hall.cued.as_ref().map(|cued| cued.status(position(cued), now)),
+            show: hall.cued.as_ref().map(|cued| cued.status(place(hall, cued), now)),
             playlist: features.onward.list.as_ref().map(|list| list.status(&Zoned::now())),
             film: hall.film.as_ref().map(|table| film::status(&table.read(), hall)),
             osc: hall.osc.as_ref().map(|counts| counts.by_word()),
@@ -286,4 +280,14 @@ fn counted(times: &tracker::Histogram) -> Times {
     let sum_s = times.mean() * times.len() as f64 / 1e9;
     let histogram = Histogram { bounds_us: BOUNDS_US.to_vec(), counts, sum_s };
     Times { percentiles: Percentiles::of(times), histogram }
+}
+
+/// Where in its cue a show is.
+fn place(hall: &HallContext, cued: &ProvedShow) -> ShowTime {
+    match hall.goes_on() {
+        _ if hall.mirror.state.may_send_motion() => hall.live.show(),
+        // What was taken over is where its film is by now.
+        Some(GoesOn::At(film)) => film,
+        _ => hall.halted_at.unwrap_or(cued.start),
+    }
 }
