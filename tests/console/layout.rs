@@ -100,7 +100,10 @@ fn before_a_show_too_whatever_is_next_stop_and_all_buttons_are_in_reach_at_every
     for (language, parked) in [("en", "parked"), ("de", "geparkt"), ("es", "en reposo"), ("fr", "au repos")] {
         browser.eval(&format!("localStorage.setItem('kinocue-language', '{language}'); location.reload()"));
         browser.reads("state", parked);
-        pretend(&browser, &format!("{} Object.assign(status, {{ state: 'parked', show: null }});", hall_with(1)));
+        pretend(
+            &browser,
+            &format!("{} Object.assign(status, {{ state: 'parked', show: null }});", hall_with(1)),
+        );
         browser.wait("document.querySelectorAll('#next-actions button').length === 1");
         for (size, _) in SIZES {
             let always = "#state, #position, #next-actions button, .transport button, #stop, #stop-note";
