@@ -31,7 +31,7 @@ const ROWS: &[Row] = &[
     // Nine more with fleets, whose commands have a link, a key and an order of their own.
     // Twenty more with cues from a desk, starts at an instant, the page of halls and a second show machine: commands have settings, answers and states of their own.
     // Four more with playlists and deletion by a fleet.
-    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 149.0, 30.0),
+    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 150.0, 30.0),
     ("uses of one type name", counts::uses_of_one_type_name, Less, 5.0, 2.0),
     // One left is the stop, which is a flag by design: whoever asks for it waits for nobody. Of the nine before, four were no
     // such flags, but said that something was due, or took a pose; they are named so now.
@@ -55,7 +55,7 @@ const ROWS: &[Row] = &[
     // 39 more with what came to fleets, pairs and the doors of the fuzzer in one day; not taken apart yet.
     // Ten more with what a fleet brings and drops, and pulls; not taken apart yet.
     // Six more with one datagram for many seats, most of them lists of fields.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 198.0, 43.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 201.0, 43.0),
     // Three more, likewise; one more with what a fleet drops beside what it brings.
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 13.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
@@ -102,7 +102,9 @@ const ROWS: &[Row] = &[
     // 78 more: what found no room before the end of a recording, and daemons and halls that give no answer.
     // 2,330 more: what is on at a controller, two sources of a place, a channel for pages, keys and beats that cannot be replayed, one way
     // to open files, spreadsheets, kinds of files, and all commands of a drive by name.
-    ("lines of code", counts::lines_of_code, Less, 107_940.0, 39_800.0),
+    // 2,710 more: every frame held against all places that open ones leave, the chain of the journal, files that are damaged or in another
+    // order, a start without all networks, and what the page says of zones, falls and layouts.
+    ("lines of code", counts::lines_of_code, Less, 110_650.0, 39_800.0),
     // Two more for the film in the status, which tests make; nine for controllers on the network, apart from those on links, and OSC's counts;
     // 37 for links and their axes in the status and for rooms that tests of pictures and recordings ask.
     // Five more for links in the report of a play, places of seats in the status, and recordings that tests judge again.
@@ -116,7 +118,8 @@ const ROWS: &[Row] = &[
     // 17 more: ticks that went as one datagram, in status and report, and their networks, which tests make.
     // One more for what a hall is about, in the status.
     // One more: how the program ended before, which tests tell a hall.
-    ("public items and fields", counts::public_items, Less, 1_293.0, 400.0),
+    // Six more in the status and the report, which tests make: zone, waits, and seats that were out.
+    ("public items and fields", counts::public_items, Less, 1_299.0, 400.0),
     // A table: a row for each reason why a seat stands as it does.
     // The parts that a service opens, one after the other.
     ("lines of the longest function", counts::longest_function, Less, 65.0, 48.0),
