@@ -6,7 +6,7 @@ use crate::app::supervisor::reload::Carryover;
 
 impl Supervisor {
     /// What goes over to the next hall, with what the tick thread said as it left.
-    fn remember(&mut self) -> Carryover {
+    pub(super) fn remember(&mut self) -> Carryover {
         self.take_news();
         let latched = self.hall.mirror.state.is_latched();
         if latched {
@@ -29,7 +29,7 @@ impl Supervisor {
     }
 
     /// Answers whoever waits for what this hall does not do any more.
-    fn refuse_asked(&mut self) {
+    pub(super) fn refuse_asked(&mut self) {
         for asked in std::mem::take(&mut self.procedures).into_asked() {
             let problem = state_mirror::closed(self.why_it_closes());
             self.answer(asked, Err(problem));
