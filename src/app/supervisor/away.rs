@@ -52,7 +52,9 @@ pub(super) fn words(hall: &HallContext, table: &[Row]) -> Option<String> {
 
 /// What a person does first, where the hall is parked and a seat is not.
 pub(super) fn next_action(hall: &HallContext, table: &[Row]) -> Option<(String, Coded)> {
-    if hall.mirror.state != State::Parked || hall.mirror.next == Next::Clear {
+    // What deals with a seat already goes first.
+    let of_a_seat = matches!(hall.mirror.next, Next::Clear | Next::ParkOrStart | Next::ParkOrHome);
+    if hall.mirror.state != State::Parked || of_a_seat {
         return None;
     }
     let seats = away(hall, table);
