@@ -72,7 +72,12 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
 /// Of a seat that was led through a rise of so many seconds: its frames from a height on to the top, and by how much the instants of
 /// the cue that they were made for go on other than the frames do, seconds.
 fn followed(seen: &Seen, seconds: u32, from: f64) -> (usize, f64) {
-    let rows: Vec<_> = seen.rows.iter().map(|row| (f64::from(row.frame), row.commanded[0])).collect();
+    // Where an ack is late one frame may take the time of several.
+    let ends_s = seen.rows.iter().scan(0.0, |end, row| {
+        *end += f64::from(row.time_ms) * 1e-3;
+        Some(*end)
+    });
+    let rows: Vec<_> = ends_s.zip(seen.rows.iter().map(|row| row.commanded[0])).collect();
     let media_s = |at: i32| {
         let wanted = f64::from(at) / STROKE * 3.0;
         let (mut low, mut high) = (0.0_f64, 1.0_f64);
@@ -86,7 +91,7 @@ fn followed(seen: &Seen, seconds: u32, from: f64) -> (usize, f64) {
     // What comes down to park after the cue is no part of it.
     let top = rows.iter().position(|(_, at)| *at >= pulses(0.33)).expect("it comes to the top");
     let rising = rows[..top].iter().filter(|(_, at)| *at > pulses(from));
-    let off: Vec<f64> = rising.map(|(frame, at)| media_s(*at) - frame * 0.01).collect();
+    let off: Vec<f64> = rising.map(|(end_s, at)| media_s(*at) - end_s).collect();
     let (least, most) =
         off.iter().fold((f64::MAX, f64::MIN), |(least, most), off| (least.min(*off), most.max(*off)));
     (off.len(), most - least)
