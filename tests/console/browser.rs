@@ -29,7 +29,7 @@ static ONE: Mutex<()> = Mutex::new(());
 pub(crate) struct Browser {
     driver: Rc<Driver>,
     session: String,
-    shots: PathBuf,
+    shots: Option<PathBuf>,
 }
 
 /// The program that drives browsers.
@@ -69,9 +69,9 @@ impl Browser {
     }
 
     fn driven_by(driver: Rc<Driver>) -> Self {
-        let shots =
-            Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("it is in target").join("console-shots");
-        std::fs::create_dir_all(&shots).expect("a folder for the pictures");
+        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("it is in target");
+        let shots = std::env::var_os("KINOCUE_SHOTS").map(|_| target.join("console-shots"));
+        shots.iter().for_each(|folder| std::fs::create_dir_all(folder).expect("a folder for the pictures"));
         let mut browser = Self { driver, session: String::new(), shots };
         let arguments = [
             "--headless=new",
@@ -219,11 +219,12 @@ impl Browser {
         self.command("/actions", &json!({"actions": [{"type": "key", "id": "keys", "actions": keys}]}));
     }
 
-    /// Keeps a picture of the page in `target/console-shots`.
+    /// Keeps a picture of the page in `target/console-shots`, if `KINOCUE_SHOTS` is set.
     pub(crate) fn shot(&self, name: &str) {
+        let Some(folder) = &self.shots else { return };
         let picture = self.ask("GET", &format!("{}/screenshot", self.session), &Value::Null);
         let bytes = STANDARD.decode(picture.as_str().expect("a picture")).expect("base64");
-        std::fs::write(self.shots.join(format!("{name}.png")), bytes).expect("it can be written");
+        std::fs::write(folder.join(format!("{name}.png")), bytes).expect("it can be written");
     }
 
     /// What the browser complains of, replies of the server that are errors left out.
