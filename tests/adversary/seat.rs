@@ -96,8 +96,9 @@ struct Last {
     sent_ns: u64,
     time_ms: f64,
     number: u32,
-    /// That of the newest: this may be an old one that the network repeats.
+    /// That of the newest, and its Time: this may be an old one that the network repeats.
     newest: u32,
+    newest_ms: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -422,9 +423,10 @@ impl Seat {
         }
         // The first frame that comes ends it.
         self.by_hand = ([0.0; 12], 0, 0);
-        let newest = self.last_of_motion(&command).map_or(0, |last| last.newest).max(command.number);
         let (sent_ns, time_ms, number) = (command.sent_ns, executed.time_ms, command.number);
-        self.executed = Some(Last { sent_ns, time_ms, number, newest });
+        let before = self.last_of_motion(&command).filter(|last| last.newest > number);
+        let (newest, newest_ms) = before.map_or((number, time_ms), |last| (last.newest, last.newest_ms));
+        self.executed = Some(Last { sent_ns, time_ms, number, newest, newest_ms });
     }
 
     /// What was executed last, if the command goes on with that motion.
@@ -449,12 +451,18 @@ impl Seat {
         let (period_ms, admitted_ms) = (self.settings.period_ms, self.admitted_ms(command));
         let repeated_ms = ADMITTED as f64 / MS as f64;
         let frames = |one: u32, other: u32| f64::from(one.abs_diff(other)) * period_ms;
-        if let Some(Last { time_ms, number, newest, .. }) = self.last_of_motion(command)
+        if let Some(Last { time_ms, number, newest, newest_ms, .. }) = self.last_of_motion(command)
             && frames(newest, command.number) <= admitted_ms
             && frames(newest, number) <= repeated_ms
         {
-            // The last one may have taken longer than others.
-            let longer_ms = if command.number < number { time_ms - period_ms } else { 0.0 };
+            // The last one may have taken longer than others, or the newest, which an older one overtook.
+            let longer_ms = if command.number < number {
+                time_ms - period_ms
+            } else if command.number > newest && newest > number {
+                newest_ms - period_ms
+            } else {
+                0.0
+            };
             // Frames that take several ticks are as far apart; those of a blind lane take longer than any of these.
             let takes_ms = command.time_ns as f64 / MS as f64;
             let is_repeated = number != newest || command.number < number;
