@@ -62,6 +62,9 @@ const KEPT: usize = 2_000;
 /// So long after a frame, or after somebody asked for motion, nobody jogs a seat.
 const JUST: u64 = 300 * MS;
 
+/// Weather in which no true answer arrives.
+const DEAF: [Weather; 3] = [Weather::Lost, Weather::Cut, Weather::Mute];
+
 #[derive(Debug, Clone)]
 struct Packet {
     at: u64,
@@ -69,6 +72,8 @@ struct Packet {
     lost_since: u64,
     asked: bool,
     octets: Vec<u8>,
+    /// Of a stretch of old answers: they are of both sources of a place.
+    of_stretch: bool,
 }
 
 #[derive(Debug)]
@@ -275,6 +280,9 @@ impl Ether {
         line.weather.retain(|(until, other)| {
             *until > now && *other != Weather::Shuffled && weather != Weather::Shuffled
         });
+        if DEAF.contains(&weather) {
+            line.back.retain(|packet| !(packet.of_stretch && packet.at < now + ms * MS));
+        }
         line.weather.push((now + ms * MS, weather));
     }
 }
@@ -286,7 +294,7 @@ impl World {
         for (seat, line) in lines.iter_mut().enumerate() {
             while line.there.front().is_some_and(|packet| packet.at <= now) {
                 line.intrude(line.there[0].at, *asked_at);
-                let Some(Packet { at, sent, lost_since, asked, octets }) = line.there.pop_front() else {
+                let Some(Packet { at, sent, lost_since, asked, octets, .. }) = line.there.pop_front() else {
                     break;
                 };
                 if let Some(reply) = line.seat.hear(&octets, Arrival { at, sent, lost_since, asked }) {
@@ -323,8 +331,11 @@ impl Line {
     }
 
     /// The network delivers that at an instant, whatever befalls all else.
-    pub(crate) fn deliver_again(&mut self, octets: Vec<u8>, at: u64) {
-        insert(&mut self.back, Packet { at, sent: at, lost_since: at, asked: false, octets });
+    pub(crate) fn deliver_again(&mut self, octets: Vec<u8>, at: u64, of_stretch: bool) {
+        // README: where old answers of both sources arrive and no true one does, nobody can know that they are old.
+        if !of_stretch || DEAF.iter().all(|weather| self.is(at, *weather).is_none()) {
+            insert(&mut self.back, Packet { at, sent: at, lost_since: at, asked: false, octets, of_stretch });
+        }
     }
 
     /// Whether the pattern of the weather loses the one of that number that goes that way.
@@ -367,18 +378,28 @@ impl Line {
                 let later = arrives + dice.range(0, ms * MS);
                 insert(
                     &mut self.back,
-                    Packet { at: later, sent: at, lost_since: at, asked: false, octets: octets.clone() },
+                    Packet {
+                        at: later,
+                        sent: at,
+                        lost_since: at,
+                        asked: false,
+                        octets: octets.clone(),
+                        of_stretch: false,
+                    },
                 );
             }
             if dice.one_in(3) {
                 let later = arrives + dice.range(0, ms * MS);
                 return insert(
                     &mut self.back,
-                    Packet { at: later, sent: at, lost_since: at, asked: false, octets },
+                    Packet { at: later, sent: at, lost_since: at, asked: false, octets, of_stretch: false },
                 );
             }
         }
-        insert(&mut self.back, Packet { at: arrives, sent: at, lost_since: at, asked: false, octets });
+        insert(
+            &mut self.back,
+            Packet { at: arrives, sent: at, lost_since: at, asked: false, octets, of_stretch: false },
+        );
     }
 
     fn take(&mut self, octets: &[u8], (now, sent): (u64, u64), asked: bool, dice: &mut Dice) -> Delivery {
@@ -413,7 +434,7 @@ impl Line {
         if let Some((_, Weather::Late(ms))) = self.until(now, |what| matches!(what, Weather::Late(_))) {
             at += dice.range(0, ms * MS);
         }
-        let packet = Packet { at, sent, lost_since, asked, octets };
+        let packet = Packet { at, sent, lost_since, asked, octets, of_stretch: false };
         if held == 0 && self.is(now, Weather::Shuffled).is_some() {
             let later = now.max(sent + dice.range(1, 40) * MS);
             if dice.one_in(6) {

@@ -65,7 +65,7 @@ impl Ether {
         let line = &mut self.world().lines[seat];
         for octets in old.farthest(line, now) {
             for at in (now..now + ms * MS).step_by(every_us as usize * 1_000) {
-                line.deliver_again(octets.clone(), at);
+                line.deliver_again(octets.clone(), at, false);
             }
         }
     }
@@ -84,7 +84,7 @@ impl Ether {
         let mut shift = dice;
         for (at, octets) in stretch {
             let later = shift.as_mut().map_or(at - begun, |dice| dice.range(0, ms * MS));
-            line.deliver_again(octets, now + later);
+            line.deliver_again(octets, now + later, true);
         }
     }
 }
