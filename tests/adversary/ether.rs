@@ -240,9 +240,7 @@ impl Ether {
     /// What has come back from a seat.
     pub(crate) fn take_back(&self, seat: usize) -> Option<Vec<u8>> {
         let now = self.ns();
-        let back = &mut self.world().lines[seat].back;
-        let came = back.front().is_some_and(|packet| packet.at <= now);
-        if came { back.pop_front().map(|packet| packet.octets) } else { None }
+        self.world().lines[seat].next_back(now).map(|packet| packet.octets)
     }
 
     /// Another master sends to a seat.
@@ -280,9 +278,6 @@ impl Ether {
         line.weather.retain(|(until, other)| {
             *until > now && *other != Weather::Shuffled && weather != Weather::Shuffled
         });
-        if DEAF.contains(&weather) {
-            line.back.retain(|packet| !(packet.of_stretch && packet.at < now + ms * MS));
-        }
         line.weather.push((now + ms * MS, weather));
     }
 }
@@ -332,9 +327,18 @@ impl Line {
 
     /// The network delivers that at an instant, whatever befalls all else.
     pub(crate) fn deliver_again(&mut self, octets: Vec<u8>, at: u64, of_stretch: bool) {
-        // README: where old answers of both sources arrive and no true one does, nobody can know that they are old.
-        if !of_stretch || DEAF.iter().all(|weather| self.is(at, *weather).is_none()) {
-            insert(&mut self.back, Packet { at, sent: at, lost_since: at, asked: false, octets, of_stretch });
+        insert(&mut self.back, Packet { at, sent: at, lost_since: at, asked: false, octets, of_stretch });
+    }
+
+    /// The next that has come back by then.
+    fn next_back(&mut self, now: u64) -> Option<Packet> {
+        loop {
+            let packet = self.back.pop_front_if(|packet| packet.at <= now)?;
+            // README: where old answers of both sources arrive and no true one does, nobody can know that they are old.
+            let is_deaf = || DEAF.iter().any(|weather| self.is(packet.at, *weather).is_some());
+            if !(packet.of_stretch && (self.seat.is_away(packet.at) || is_deaf())) {
+                return Some(packet);
+            }
         }
     }
 
@@ -495,9 +499,7 @@ impl Network for Ether {
             loop {
                 // What hears it may send.
                 let mut world = self.world();
-                let back = &mut world.lines[lane].back;
-                let Some(packet) = back.front().filter(|packet| packet.at <= now).cloned() else { break };
-                back.pop_front();
+                let Some(packet) = world.lines[lane].next_back(now) else { break };
                 drop(world);
                 on(Origin::Controller(lane), &packet.octets, MonoTime::from_nanos(packet.at));
             }
